@@ -26,18 +26,18 @@ model = arm.with_(mass_scale=1.2)
 
 q_start = np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])  # [rad]
 q_end = np.array([0.8, -0.2, -0.4, -2.0, 0.3, 2.0, 1.2])
-plan = rd.quintic(q_start, q_end, move_s)
+plan = rd.control.quintic(q_start, q_end, move_s)
 
 inertia = np.diag(model.M((q_start + q_end) / 2))
-kp, kd = rd.gains_from(inertia, omega, zeta)  # in [N m/rad], [N m s/rad]
+kp, kd = rd.control.gains_from(inertia, omega, zeta)  # in [N m/rad], [N m s/rad]
 ki = kp * omega / 4  # [N m/(rad s)]; stable for ki < 2 ζ ω kp
-unit_kp, unit_kd = rd.gains_from(1.0, omega, zeta)  # computed torque brings the inertia itself
+unit_kp, unit_kd = rd.control.gains_from(1.0, omega, zeta)  # computed torque brings the inertia itself
 
 controllers = {
-    "PD": rd.PD(plan, kp, kd),
-    "PID": rd.PID(plan, kp, ki, kd),
-    "PD + gravity": rd.PDGravity(model, plan, kp, kd),
-    "computed torque": rd.ComputedTorque(model, plan, unit_kp, unit_kd),
+    "PD": rd.control.PD(plan, kp, kd),
+    "PID": rd.control.PID(plan, kp, ki, kd),
+    "PD + gravity": rd.control.PDGravity(model, plan, kp, kd),
+    "computed torque": rd.control.ComputedTorque(model, plan, unit_kp, unit_kd),
 }
 
 rows = []
@@ -48,7 +48,9 @@ for name, controller in controllers.items():
         v0=np.zeros(arm.n),
         duration_s=duration_s,
         controller=controller,
-        integrator=rd.Adaptive(rtol=1e-8, atol=1e-10),  # the gains make the arm stiff: the method finds its steps
+        integrator=rd.integrate.Adaptive(
+            rtol=1e-8, atol=1e-10
+        ),  # the gains make the arm stiff: the method finds its steps
         record_period_s=0.01,
     )
     print(f"--- {name}\n{trajectory.summary}\n")

@@ -24,13 +24,13 @@ arms = {"empty hand": model, "2 kg in the hand": model.with_(payload=payload)}
 
 q_start = np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])  # [rad]
 q_end = np.array([0.8, -0.2, -0.4, -2.0, 0.3, 2.0, 1.2])
-plan = rd.quintic(q_start, q_end, move_s)
+plan = rd.control.quintic(q_start, q_end, move_s)
 
-kp, kd = rd.gains_from(np.diag(model.M((q_start + q_end) / 2)), omega, zeta)
-unit_kp, unit_kd = rd.gains_from(1.0, omega, zeta)
+kp, kd = rd.control.gains_from(np.diag(model.M((q_start + q_end) / 2)), omega, zeta)
+unit_kp, unit_kd = rd.control.gains_from(1.0, omega, zeta)
 controllers = {
-    "feed-forward": rd.FeedForward(model, plan, kp, kd),
-    "computed torque": rd.ComputedTorque(model, plan, unit_kp, unit_kd),
+    "feed-forward": rd.control.FeedForward(model, plan, kp, kd),
+    "computed torque": rd.control.ComputedTorque(model, plan, unit_kp, unit_kd),
 }
 
 rows = []
@@ -42,7 +42,7 @@ for carried, arm in arms.items():
             v0=np.zeros(arm.n),
             duration_s=duration_s,
             controller=controller,
-            integrator=rd.Adaptive(rtol=1e-8, atol=1e-10),
+            integrator=rd.integrate.Adaptive(rtol=1e-8, atol=1e-10),
             record_period_s=0.01,
         )
         print(f"--- {name}, {carried}\n{trajectory.summary}\n")

@@ -25,11 +25,11 @@ b = 0.5  # viscous friction of the joints, in [N m s/rad]
 def move(arm):
     """From the start to the target in a step of the reference."""
     return rd.simulate(
-        rd.Plant(arm, [rd.ViscousFriction(b)]),
+        rd.Plant(arm, [rd.effects.ViscousFriction(b)]),
         q0=start,
         v0=np.zeros(2),
         duration_s=5.0,
-        controller=rd.PD(rd.hold(target), kp, kd),
+        controller=rd.control.PD(rd.control.hold(target), kp, kd),
         integrator="order_8",
         step_s=0.002,
         record_period_s=0.01,

@@ -3,7 +3,7 @@
     F = Λ (ẍ_d + kd ė + kp e) + μ + p,    τ = Jᵀ F,    Λ = (J M⁻¹ Jᵀ)⁻¹
 
 With the exact model the error obeys ë + kd ė + kp e = 0: it starts at zero and stays there. What is left of the radius
-error is the reference's own: `rd.circle` is made of quintics, within 1e-9 of the radius.
+error is the reference's own: `rd.control.circle` is made of quintics, within 1e-9 of the radius.
 
 Run: python examples/ur5_circle.py
 """
@@ -21,13 +21,13 @@ period_s = 2.0
 q_start = np.array([0.0, -1.2, 1.8, -2.2, -1.57, 0.0])  # [rad]
 
 arm = rd.load("ur5")
-kp, kd = rd.gains_from(1.0, 20.0)  # ω = 20 rad/s, critically damped
+kp, kd = rd.control.gains_from(1.0, 20.0)  # ω = 20 rad/s, critically damped
 
 # The circle passes through the place where the arm stands, and the tool keeps its orientation.
 start = arm.placement(q_start, frame)
 spoke = np.array([radius, 0.0, 0.0])  # from the centre to the start, in [m]
 centre = start[:3, 3] - spoke
-circle = rd.circle(centre, radius, normal, period_s, toward=spoke, rotation=start[:3, :3])
+circle = rd.control.circle(centre, radius, normal, period_s, toward=spoke, rotation=start[:3, :3])
 
 for name, model in (("exact model", arm), ("model 20 % too heavy", arm.with_(mass_scale=1.2))):
     trajectory = rd.simulate(
@@ -35,8 +35,8 @@ for name, model in (("exact model", arm), ("model 20 % too heavy", arm.with_(mas
         q0=q_start,
         v0=np.zeros(arm.n),
         duration_s=circle.position.end,
-        controller=rd.OperationalSpace(model, frame, circle, kp, kd),
-        integrator=rd.Adaptive(rtol=1e-8, atol=1e-10),
+        controller=rd.control.OperationalSpace(model, frame, circle, kp, kd),
+        integrator=rd.integrate.Adaptive(rtol=1e-8, atol=1e-10),
         record_period_s=0.01,
     )
     print(f"--- {name}\n{trajectory.summary}")

@@ -1,4 +1,19 @@
-"""Dynamics of robot arms from a URDF: M(q) a + C(q, v) v + N(t, q, v) = Υ, by Pinocchio and a Lagrangian."""
+"""Dynamics of robot arms from a URDF: M(q) a + C(q, v) v + N(t, q, v) = τ, by Pinocchio and a Lagrangian.
+
+An arm              load, list_robots, Robot, Payload; `arm.M(q)`, `arm.C(q, v)`, `arm.N(q, v)`, …
+Other formulations  Lagrangian, Compiled, euler_lagrange
+What it answers     info (an arm), why (a torque by cause), explain (what is integrated), sweepable (by rollouts)
+Trust               compare, check
+Motors              budget (of a plan or a run: torque, power and headroom of each joint, by cause)
+A simulation        Plant, Setup, Event, read_scene, simulate, rollouts, linearise, advise
+To look at          replay, show, plot, save_replay, save_plot, compare_runs
+To keep             save_run, load_run, save_rollouts, load_rollouts, export
+What comes of it    Trajectory, Rollouts; RobotDynError, ModelWarning, PrecisionWarning; STANDARD_GRAVITY in [m/s²]
+
+Rooms, whose docstrings list what is in them: effects (friction, springs, stops, limits, …), control (controllers,
+references, what a real loop adds), integrate (methods), plan (motions to follow, inverse kinematics), studies
+(work-precision diagrams, certificates, costs, proofs, stress tests), sweeps (many runs under uncertainty).
+"""
 
 from __future__ import annotations
 

@@ -170,7 +170,9 @@ def _of_each(x: Any, of: Callable[[Any], float]) -> Array:
 
     balls = np.asarray(x, dtype=object)
     if not all(isinstance(ball, arb) for ball in balls.flat):
-        raise QueryError(f"give an array of balls, such as rd.Lagrangian(robot, rd.Ball(200)) answers, got {shown(x)}")
+        raise QueryError(
+            f"give an array of balls, such as rd.Lagrangian(robot, rd.studies.Ball(200)) answers, got {shown(x)}"
+        )
     return np.vectorize(of, otypes=[float])(balls)
 
 

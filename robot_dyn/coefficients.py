@@ -184,7 +184,12 @@ def with_values(part: Any, values: Mapping[str, Any]) -> Any:
 def cached_properties(part: Any) -> tuple[str, ...]:
     """Names of the cached properties of a part that have been evaluated."""
     known, kind = getattr(part, "__dict__", ()), type(part)
-    return tuple(name for name in known if isinstance(getattr_static(kind, name, None), cached_property))
+    return tuple(name for name in known if _is_cached(kind, name))
+
+
+@cache
+def _is_cached(kind: type, name: str) -> bool:
+    return isinstance(getattr_static(kind, name, None), cached_property)
 
 
 def rebuilt(part: Any, values: Mapping[str, Any]) -> Any:

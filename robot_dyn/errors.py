@@ -45,6 +45,18 @@ class EditError(RobotDynError):
     """An edit of a robot (lock, payload, armature, gravity) that cannot be applied."""
 
 
+class MissingExtraError(RobotDynError):
+    """A package that an answer needs is not installed."""
+
+
+class PlanError(RobotDynError):
+    """A motion that cannot be planned: limits, way points or samples that are not allowed, or that nothing can meet."""
+
+
+class VideoError(RobotDynError):
+    """A video that cannot be made: of a page without a run, too long, or without a browser that shows the page."""
+
+
 class TraceError(RobotDynError):
     """A function that cannot be traced: it does what symbols cannot."""
 
@@ -81,6 +93,10 @@ class SceneError(RobotDynError):
     """A scene that cannot be read; names file, line, key and value."""
 
 
+class SweepError(RobotDynError):
+    """A sweep that cannot be made, run or read: its specification, its folder or a question to its rows."""
+
+
 class SingularError(RobotDynError):
     """Forward dynamics that has no answer: M is singular.
 
@@ -100,7 +116,7 @@ class UndecidedError(SingularError):
         RobotDynError.__init__(
             self,
             f"forward dynamics not decided: whether joint {joint!r} carries inertia {where} is lost in the rounding of"
-            f" {arithmetic}; ask rd.Lagrangian(robot, rd.Ball(bits)) with enough bits",
+            f" {arithmetic}; ask rd.Lagrangian(robot, rd.studies.Ball(bits)) with enough bits",
         )
         self.joint = joint
 
@@ -114,6 +130,10 @@ class RobotDynWarning(UserWarning):
 
 class ModelWarning(RobotDynWarning):
     """A robot that loads although some of its bodies cannot exist, or cannot be drawn, as described."""
+
+
+class PlanWarning(RobotDynWarning):
+    """A motion of a scene whose samples are doubtful: gaps, jumps, limits passed."""
 
 
 class PrecisionWarning(RobotDynWarning):

@@ -106,7 +106,7 @@ def save(path: Path, write: Callable[[BinaryIO], object], error: type[RobotDynEr
             if not _locks:
                 stream.close()  # Windows cannot rename open files; elsewhere it stays locked until renamed
             os.replace(beside, real)
-        _synchronise(real.parent)
+        sync_folder(real.parent)
     except MemoryError:
         raise error(f"{path}: cannot be written (not enough memory); free some, or save less") from None
     except OSError as cause:
@@ -165,8 +165,8 @@ def _prefix(real: Path) -> str:
     return f".{os.fsencode(real.name)[:180].decode('utf-8', 'ignore')}."
 
 
-def _synchronise(folder: Path) -> None:
-    """Make a rename survive a power loss, where the system can; readers see it already."""
+def sync_folder(folder: Path) -> None:
+    """Wait until the disk has the names in a folder, where the system can; readers see them already."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:

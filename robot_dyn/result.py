@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from math import isfinite
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -45,25 +45,3 @@ def plain(value: Any) -> Any:
 def json_text(value: Any) -> str:
     """Plain data of a value as JSON."""
     return json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-class Result:
-    """A result of a study, a dataclass; `plain` makes its JSON, and its rows are a CSV table.
-
-    Attributes:
-        columns: Of the table; those that a row lacks are empty, and what else it has is left out.
-        interrupted: Whether the study was ended by the user.
-    """
-
-    columns: ClassVar[tuple[str, ...]] = ()
-    interrupted: bool
-
-    @property
-    def sentence(self) -> str:
-        """The result in a sentence."""
-        raise NotImplementedError
-
-    @property
-    def rows(self) -> Iterable[Mapping[str, Any]]:
-        """Rows of the table, values by column."""
-        return ()

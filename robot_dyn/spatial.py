@@ -41,6 +41,17 @@ def rotation_rpy(rpy: Array) -> Array:
     return rotation(z, rpy[2]) @ rotation(y, rpy[1]) @ rotation(x, rpy[0])
 
 
+def rpy_of(R: np.ndarray) -> np.ndarray:
+    """Roll, pitch and yaw of a rotation (3, 3) of float64: `rotation_rpy` of them is R to rounding.
+
+    Roll is that of Rzᵀ(yaw) R, so that it makes up for a yaw which rounding determines where the pitch is ±π/2.
+    """
+    yaw = np.arctan2(R[1, 0], R[0, 0])
+    s, c = np.sin(yaw), np.cos(yaw)
+    pitch = np.arctan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
+    return np.array([np.arctan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1]), pitch, yaw])
+
+
 def adjoint(R: Array, p: Array) -> Array:
     """Ad_g = [[R, p̂ R], [0, R]], shape (..., 6, 6)."""
     return _upper_blocks(R, hat(p) @ R)

@@ -29,9 +29,10 @@ Place = tuple[float, float]
 DARK, UPWARD, FILL = "#1f3b57", "#c0392b", "#eef3f8"
 WIDTH, HEIGHT = 1.5, 0.5  # of a box; rows are 1 apart
 ACROSS = {  # middles of the boxes, such that no arrow passes behind another box
-    "cli": 0.0, "scene": -2.4, "studies": 0.6, "view": 0.6, "simulation": 0.0, "codegen": 0.0,
+    "cli": 0.0, "scene": -2.4, "sweeps": 2.6, "studies": 0.0, "view": 0.0, "simulation": 0.0, "codegen": 0.0,
+    "plan": -3.3,
     "effects": -3.2, "control": -1.2, "integrate": 3.2, "cross_check": 3.0, "model": 1.4, "lagrange": 1.4,
-    "queries": -0.6, "description": -2.6,
+    "shapes": 3.2, "queries": -0.6, "description": 2.4,
 }  # fmt: skip
 
 

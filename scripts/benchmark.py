@@ -5,8 +5,9 @@ rollouts (against MuJoCo), parameters (numbers as inputs of machine code over co
 number of joints), iftomm (problems A01 and A05 of the IFToMM library of multibody benchmarks), stiff (joints with stiff
 dampers and springs), sticking (time stepping of dry friction and stops against the event-driven limit, beside MuJoCo),
 precision (time against error, all methods beside SciPy, MuJoCo, Drake and heyoka), energy (of a long run), estimates
-(of errors, beside true ones), proofs (radius and time of proven runs). What accuracy costs in other scenes:
-work_precision.py.
+(of errors, beside true ones), proofs (radius and time of proven runs), plans (of motions: beside ruckig, paths at their
+limits, poses reached, beside pin-pink), sweeps (coverage of the intervals of each design). What accuracy costs in other
+scenes: work_precision.py.
 """
 
 from __future__ import annotations
@@ -21,12 +22,14 @@ from benchmarks import (
     iftomm,
     kernels,
     parameters,
+    plans,
     precision,
     proofs,
     queries,
     rollouts,
     sticking,
     stiff,
+    sweeps,
 )
 from benchmarks.measure import Effort, command_line
 
@@ -46,6 +49,8 @@ SUBJECTS: dict[str, tuple[Callable[[Effort], None], ...]] = {
     "energy": (energy.energy,),
     "estimates": (estimates.estimates,),
     "proofs": (proofs.proofs,),
+    "plans": (plans.point_to_point, plans.paths, plans.poses, plans.poses_beside_pink),
+    "sweeps": (sweeps.coverage, sweeps.exact_coverage, sweeps.indices, sweeps.costs),
 }
 
 

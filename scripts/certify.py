@@ -1,6 +1,7 @@
 """True digits of M, C, N, inverse and forward dynamics of many robots: the tables of docs/accuracy.md.
 
-Each is `rd.certify`. With --keep FILE the results are stored there, a line of JSON each, and a later call continues.
+Each is `rd.studies.certify`. With --keep FILE the results are stored there, a line of JSON each,
+and a later call continues.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ if __name__ == "__main__":
     settings: dict[str, Any] = {"samples": 100, "repeats": 1} if options.quick else {}
     for name in ["planar_2r"] if options.quick else options.robots or arms():
         if name not in documents:
-            documents[name] = {"name": name} | plain(rd.certify(rd.load(name), **settings))
+            documents[name] = {"name": name} | plain(rd.studies.certify(rd.load(name), **settings))
             if options.keep:
                 with options.keep.open("a") as file:
                     file.write(json.dumps(documents[name]) + "\n")

@@ -1,6 +1,6 @@
 """Error against time: a pendulum, a double pendulum, UR5, Panda-7, a stiff scene, and one with stops.
 
-Each is `rd.work_precision`; the diagrams are those of docs/accuracy_and_time.md.
+Each is `rd.studies.work_precision`; the diagrams are those of docs/accuracy_and_time.md.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from dataclasses import replace
 from benchmarks.measure import PICTURES, READY, command_line, panda, starter_setup
 
 import robot_dyn as rd
-from robot_dyn.cli.studies import lines
 from robot_dyn.cli.terminal import say
 
 SCENES = ("pendulum", "double_pendulum", "ur5_pd", "panda", "flyball_governor", "stops")
@@ -33,9 +32,9 @@ if __name__ == "__main__":
     if unknown := set(options.scenes) - set(SCENES):
         parser.error(f"no scene {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
     if options.quick:
-        say(*lines(rd.work_precision(setup("pendulum"), methods=["DOP853", "rk4"], budget_s=2.0)))
+        say(rd.studies.work_precision(setup("pendulum"), methods=["DOP853", "rk4"], budget_s=2.0))
     for each in () if options.quick else options.scenes:
         print(f"\n## {each}\n", flush=True)
-        result = rd.work_precision(setup(each), budget_s=options.budget)
-        say(*lines(result))
-        rd.save_result(result, PICTURES / f"accuracy_{each}.png")
+        result = rd.studies.work_precision(setup(each), budget_s=options.budget)
+        say(result)
+        rd.studies.save_result(result, PICTURES / f"accuracy_{each}.png")

@@ -128,6 +128,9 @@ BROKEN: dict[str, Broken] = {
     "no limit": Broken(_of("wrist", "<limit[^>]*>", "", "joint"), "limit_missing", "joint 'wrist'"),
     "no effort": Broken(_of("wrist", 'effort="40" ', "", "joint"), "limit_missing", "joint 'wrist'"),
     "effort 0": Broken(_of("elbow", 'effort="40"', 'effort="0"', "joint"), "limit_zero", "joint 'elbow'"),
+    "weak joint": Broken(_of("elbow", 'effort="40"', 'effort="0.5"', "joint"), "effort_gravity", "joint 'elbow'"),
+    "origin in mm": Broken(_of("elbow", 'xyz="0.3 0 0"', 'xyz="300 0 0"', "joint"), "origin_far", "joint 'elbow'"),
+    "no axis": Broken(_of("wrist", "<axis[^>]*>", "", "joint"), "axis_missing", "joint 'wrist'"),
     "negative velocity": Broken(
         _of("elbow", 'velocity="3"', 'velocity="-3"', "joint"), "limit_negative", "joint 'elbow'", True
     ),

@@ -50,7 +50,7 @@ class View:
         return np.array(self.ask(f"matrix(node({path!r}))")).reshape(4, 4).T
 
     def bounds(self, path: str) -> np.ndarray:
-        """Least and largest coordinates (2, 3) of all vertices below a node, in the scene."""
+        """Least and largest coordinates (2, 3) of all vertices that are shown below a node, in the scene."""
         return np.array(self.ask(f"bounds(node({path!r}))"))
 
     def picture(self) -> np.ndarray:
@@ -62,9 +62,9 @@ class View:
 
 
 @contextmanager
-def opened(browser: Any, url: str | Path, *, offline: bool = False) -> Iterator[View]:
-    """A page once its animation is loaded."""
-    context = browser.new_context(viewport={"width": 900, "height": 800}, offline=offline)
+def opened(browser: Any, url: str | Path, *, size: tuple[int, int] = (900, 800), **options: Any) -> Iterator[View]:
+    """A page once its animation is loaded; other arguments as of a context of Playwright, such as `offline`."""
+    context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **options)
     view = View(context.new_page())
     view.page.on("console", lambda m: view.complaints.append(m.text) if m.type == "error" else None)
     view.page.on("pageerror", lambda error: view.complaints.append(str(error)))
@@ -94,7 +94,7 @@ const base = () => { viewer.scene.updateMatrixWorld(true); return viewer.scene.m
 const matrix = (object) => { const from = base(); return from.multiply(object.matrixWorld).toArray(); };
 const bounds = (object) => {
   const from = base(), low = [1e9, 1e9, 1e9], high = [-1e9, -1e9, -1e9];
-  object.traverse((part) => {
+  object.traverseVisible((part) => {
     if (!part.isMesh) return;
     const place = from.clone().multiply(part.matrixWorld), points = part.geometry.attributes.position;
     for (let i = 0; i < points.count; i++) {

@@ -31,7 +31,7 @@ Q0, V0 = np.array([0.31, -0.23]), np.array([0.7, -0.4])
 def plant() -> rd.Plant:
     """Two coupled slides on springs and dampers: a linear plant whose M is constant and not diagonal."""
     robot = rd.Robot.from_text(ARM).with_(gravity=(0.0, 0.0, 0.0))
-    return rd.Plant(robot, [rd.Spring(STIFFNESS), rd.ViscousFriction(DAMPING)])
+    return rd.Plant(robot, [rd.effects.Spring(STIFFNESS), rd.effects.ViscousFriction(DAMPING)])
 
 
 def matrices() -> tuple[np.ndarray, np.ndarray]:

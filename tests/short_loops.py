@@ -122,15 +122,17 @@ class ShortLoop:
 
     def setup(self) -> rd.Setup:
         """A run of `periods` periods."""
-        target, law = rd.hold(self.arm.rest + self.arm.load / self.kp), rd.PD
+        target, law = rd.control.hold(self.arm.rest + self.arm.load / self.kp), rd.control.PD
         gains = {"kp": self.kp, "kd": self.kd, "period_s": self.period}
         if self.ki is not None:
-            law, gains = rd.PID, {**gains, "ki": self.ki}
-        velocity = [rd.Differences()] * self.differences
-        velocity += [rd.LowPass(self.cutoff, self.order)] if self.order else []
+            law, gains = rd.control.PID, {**gains, "ki": self.ki}
+        velocity = [rd.control.Differences()] * self.differences
+        velocity += [rd.control.LowPass(self.cutoff, self.order)] if self.order else []
         made = law(target, **gains)
         if velocity or any(self.late):
-            made = rd.Loop(made, velocity=velocity, measurement_delay=self.late[0], actuation_delay=self.late[1])
+            made = rd.control.Loop(
+                made, velocity=velocity, measurement_delay=self.late[0], actuation_delay=self.late[1]
+            )
         q = self.arm.q0
         return rd.Setup(self.arm.plant, q, 0 * q, self.periods * self.period, made, estimate_error=False)
 
@@ -147,7 +149,7 @@ def slides(rng: np.random.Generator) -> Arm:
     each = zip(mass.tolist(), (" ".join(map(repr, e)) for e in axes.tolist()), strict=True)
     links = "".join(_LINK.format(i=i + 1, p=i, m=m, e=e) for i, (m, e) in enumerate(each))
     robot = rd.Robot.from_text(f'<robot name="slides"><link name="l0"/>{links}</robot>').with_(gravity=(0, 0, 0))
-    effects = [rd.Spring(k)] * bool(k.any()) + [rd.ViscousFriction(d)] * bool(d.any())
+    effects = [rd.effects.Spring(k)] * bool(k.any()) + [rd.effects.ViscousFriction(d)] * bool(d.any())
     inverse, zero = np.linalg.inv(M), np.zeros((n, n))
     A = np.block([[zero, np.eye(n)], [-inverse * k, -inverse * d]])
     name = f"{n} slides" + " with springs" * bool(k.any()) + " with dampers" * bool(d.any())

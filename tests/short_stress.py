@@ -8,7 +8,7 @@ import robot_dyn as rd
 from robot_dyn.studies.stress_test.stress import stressed
 
 
-def short_stress(robot: rd.Robot, looks: int = 1000, runs: int = 0, seed: int = 0) -> rd.Stress:
+def short_stress(robot: rd.Robot, looks: int = 1000, runs: int = 0, seed: int = 0) -> rd.studies.Stress:
     """So much as is done until the clock, which goes a second further at each look, was looked at so often."""
     clock = count()
     return stressed(robot, 100, runs, seed, looks, None, lambda: float(next(clock)))

@@ -67,6 +67,24 @@ def test_what_is_declared_is_used() -> None:
     assert BY_PATH <= DECLARED
 
 
+def test_what_needs_asks_for_is_of_its_extra() -> None:
+    """The line that an error names installs the module that was missing."""
+    homes = packages_distributions()
+    calls = [
+        (module, constants.get(extra, extra).strip('"'))
+        for path in (ROOT / "robot_dyn").rglob("*.py")
+        for text in [path.read_text(encoding="utf-8")]
+        for constants in [{"EXTRA": "data", "_EXTRA": "data"} if re.search(r"import EXTRA|EXTRA = ", text) else {}]
+        for module, extra in re.findall(r'needs\("([\w.]+)", extra=([\w"]+)\)', text)
+    ]
+    assert len(calls) > 3
+    for module, extra in calls:
+        of = PROJECT["project"]["optional-dependencies"][extra]
+        top = module.partition(".")[0]
+        assert names(of) & {normal(home) for home in homes.get(top, [top])}, (module, extra)
+        assert names(of) <= DEVELOPMENT
+
+
 def test_the_lock_holds_what_is_declared() -> None:
     """One version of each, that the declaration allows; on other Pythons than its own it asks for nothing."""
     lines = (ROOT / "requirements-dev.lock").read_text(encoding="utf-8").splitlines()

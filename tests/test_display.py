@@ -57,6 +57,13 @@ def test_text_of_a_file_is_text_of_the_page() -> None:
     assert page.text_content().endswith("<b><i><u>0.001<s>")
 
 
+def test_a_long_table_scrolls_and_is_whole() -> None:
+    for count in (40, 41):
+        page = read(display.page("long", display.table(["k"], [[k] for k in range(count)])))
+        assert len(list(page.iter("tr"))) == count + 1
+        assert bool(page.find_class("l")) is (count > 40)
+
+
 def test_curves_keep_their_peaks_and_leave_out_what_is_not_finite() -> None:
     t = np.linspace(0.0, 1.0, 10_001)
     x = np.zeros_like(t)

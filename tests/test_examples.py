@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text()
+LOOP = (ROOT / "docs" / "how_to" / "a_real_control_loop.md").read_text(encoding="utf-8")
 PAGES = {page.stem: page for page in sorted((ROOT / "examples").glob("*.py"))}
 TEXTBOOK = sorted((ROOT / "examples" / "textbook").glob("*.py"))
 TESTED = {"pendulum", "double_pendulum", "planar_2r_arm", "panda_computed_torque", "ur5_circle", "panda_payload"}
@@ -104,10 +104,10 @@ def test_computed_torque_beats_independent_joints_and_the_integral_leaves_nothin
 
 
 @pytest.mark.long
-def test_the_table_of_the_readme_is_what_the_example_prints() -> None:
+def test_the_table_of_controllers_is_what_the_example_prints() -> None:
     """Two digits, the last one by one at most."""
     text = output("panda_computed_torque", runs=4)
-    table = re.findall(r"^\| ([^|]+) \| ([\d.e-]+) \| ([\d.e-]+) \| ([\d.e-]+) \|$", README, re.MULTILINE)
+    table = re.findall(r"^\| ([^|]+) \| ([\d.e-]+) \| ([\d.e-]+) \| ([\d.e-]+) \|$", LOOP, re.MULTILINE)
     assert len(table) == 4
     for label, *stated in table:
         printed = row(label.removesuffix(" on diag M(q_mid)"), text)
@@ -117,7 +117,7 @@ def test_the_table_of_the_readme_is_what_the_example_prints() -> None:
 
 @pytest.mark.long
 def test_circle_is_round_with_the_exact_model_and_nearly_so_with_a_wrong_one() -> None:
-    """1e-9 of a radius of 0.1 m is what `rd.circle` promises; the integration adds 1e-12 m."""
+    """1e-9 of a radius of 0.1 m is what `rd.control.circle` promises; the integration adds 1e-12 m."""
     text = output("ur5_circle", runs=2)
     assert number("radius error, exact model:", text) < 2e-10
     assert 1e-4 < number("radius error, model 20 % too heavy:", text) < 4e-3

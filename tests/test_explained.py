@@ -54,7 +54,7 @@ def test_every_public_name_has_its_text() -> None:
 @pytest.mark.parametrize("engine", ENGINES, ids=lambda each: each.__name__)
 def test_every_query_says_shapes_and_units(engine: type) -> None:
     """Of each argument and of the answer."""
-    queries = [name for name in members(rd.Dynamics) if name not in ("n", "joint_names")]
+    queries = [name for name in members(rd.effects.Dynamics) if name not in ("n", "joint_names")]
     assert len(queries) == 14
     for name in queries:
         said = text(engine, name)
@@ -165,7 +165,7 @@ def test_a_name_that_a_link_and_a_joint_share_is_the_links() -> None:
 def test_a_wrench_on_the_frame_of_a_joint_is_drawn_on_its_link() -> None:
     robot, force = rd.load("planar_2r"), [1.0, 0.0, 2.0, 0.0, 0.0, 0.0]
     frames, options = ("joint_2", robot.description.joint_frames["joint_2"]), {"engine": "interpreted"}
-    plants = [rd.Plant(robot, [rd.ExternalWrench(frame, force)]) for frame in frames]
+    plants = [rd.Plant(robot, [rd.effects.ExternalWrench(frame, force)]) for frame in frames]
     runs = [rd.simulate(plant, [0.3, 0.4], duration_s=0.01, **options) for plant in plants]
     np.testing.assert_array_equal(runs[0].q, runs[1].q)
     assert runs[0].wrenches.keys() == runs[1].wrenches.keys()

@@ -24,7 +24,7 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Example]:
 
 @pytest.mark.parametrize("name", sorted(public()))
 def test_wrong_arguments_are_refused(known: dict[str, Example], name: str) -> None:
-    assert name in known, f"give a valid call of rd.{name} in tests/wrong_arguments.py"
+    assert name in known, f"give a valid call of {name} in tests/wrong_arguments.py"
     function, arguments = known[name]
     answer = function(**arguments)
     if hasattr(answer, "close"):
@@ -104,9 +104,9 @@ def test_equal_runs_and_setups_do_not_raise() -> None:
         lambda robot, run: rd.Robot(robot.model),
         lambda robot, run: rd.Setup(rd.Plant(robot), [0.1, 0.2], record_period_s=1e-320),
         lambda robot, run: rd.compare(robot, seed=-1),
-        lambda robot, run: rd.Ball(0),
-        lambda robot, run: rd.JointStopSpring([0.0, 0.0], [1.0, 1.0, 1.0], 1.0),
-        lambda robot, run: rd.circle([0, 0, 0], 1.0, [0, 0, 1], 1.0, turns=1e300),
+        lambda robot, run: rd.studies.Ball(0),
+        lambda robot, run: rd.effects.JointStopSpring([0.0, 0.0], [1.0, 1.0, 1.0], 1.0),
+        lambda robot, run: rd.control.circle([0, 0, 0], 1.0, [0, 0, 1], 1.0, turns=1e300),
     ],
 )
 def test_mistakes_of_a_first_hour_are_told(call: Any) -> None:

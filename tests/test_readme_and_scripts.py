@@ -22,14 +22,15 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
 PYTHON = [text for language, text in BLOCKS if language == "python"]
-COMMANDS = [
-    line.removeprefix("$ ")
-    for language, text in BLOCKS
-    if language == "console"
-    for line in text.splitlines()
-    if line.startswith("$ robot-dyn")
-]
 ENVIRONMENT = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+
+
+def commands_of(page: Path) -> list[str]:
+    """The commands of the library in a page."""
+    return re.findall(r"^\$ (robot-dyn .*)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+
+
+COMMANDS = commands_of(ROOT / "README.md")
 
 
 def run(*command: str, folder: Path = ROOT) -> str:
@@ -45,7 +46,8 @@ def test_readme_has_blocks_to_run() -> None:
     assert len(COMMANDS) >= 3
 
 
-def test_python_of_the_readme_prints_what_it_says(capsys) -> None:
+def test_python_of_the_readme_prints_what_it_says(capsys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # where its page is written
     assert check_prints(ROOT / "README.md", capsys) > 8
 
 
@@ -69,29 +71,40 @@ def with_few_samples_here(*command: str) -> str:
     return done.stdout
 
 
-UNTIMED = [each for each in COMMANDS if "--budget" not in each]  # what measures for seconds has tests of its own
+def untimed(commands: list[str]) -> list[str]:
+    """Without those that measure for seconds, which have tests of their own."""
+    return [each for each in commands if "--budget" not in each]
 
 
-@pytest.mark.parametrize(
-    ("commands", "start"), [(UNTIMED, with_few_samples_here), *long([(COMMANDS, in_a_process)])], ids=["few", "all"]
-)
-def test_commands_of_the_readme_run(
-    commands: list[str], start: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def run_commands(commands: list[str], start: Callable[..., str], folder: Path) -> None:
     """One after the other in one folder, as they are read; `> file` keeps what is printed."""
-    monkeypatch.chdir(tmp_path)
     for command in commands:
         line, _, file = command.partition(" > ")
         printed = start(*shlex.split(line))
         assert printed
         if file:
-            (tmp_path / file).write_text(printed, encoding="utf-8")
+            (folder / file).write_text(printed, encoding="utf-8")
+
+
+@pytest.mark.parametrize("start", [with_few_samples_here, *long([in_a_process])], ids=["here", "process"])
+def test_commands_of_the_readme_run(start: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run_commands(COMMANDS, start, tmp_path)
 
 
 SCRIPTS = [[path.name] for path in sorted((ROOT / "scripts").glob("*.py")) if path.name != "benchmark.py"]
 
 
-@pytest.mark.parametrize("command", [["benchmark.py", "energy"], *SCRIPTS, *long([["benchmark.py"]])], ids=" ".join)
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["benchmark.py", "energy"],
+        ["benchmark.py", "sweeps"],
+        *SCRIPTS,
+        *long([["benchmark.py", "plans"], ["benchmark.py"]]),
+    ],
+    ids=" ".join,
+)
 def test_script_runs_quickly(command: list[str]) -> None:
     script = ROOT / "scripts" / command[0]
     if "chromium" in script.read_text(encoding="utf-8"):

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from inspect import isabstract, isclass, signature
 from pathlib import Path
-from socket import socket
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 import robot_dyn as rd
+from robot_dyn.answer import Answer
 from robot_dyn.arithmetic import Arithmetic
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Bound, Conservative, Drive, Effect, Force, Stateful
@@ -30,14 +31,21 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 # Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Proof", "Rollouts", "Stress", "Trajectory",
-    "WorkPrecision",
+    "Advice", "Certificate", "Checkup", "Comparison", "Cost", "InverseKinematics", "MotorBudget", "Motors", "PathPlan",
+    "Plan", "Proof", "Rollouts", "RunDifference", "Stress", "SweepResult", "Trajectory", "WorkPrecision",
+}  # fmt: skip
+# For authors of effects, controllers and methods: called with numbers that were checked before.
+FOR_AUTHORS = {
+    "Dynamics", "Effect", "EquationOfMotion", "Hold", "Interval", "Mode", "CartesianReference", "ControlLaw",
+    "TaskDynamics", "orientation_error", "rotation_vector", "ButcherTableau", "RosenbrockTable", "Surd", "System",
+    "RightSide", "Stepper", "Solution", "Status", "IntegrationError", "ExplicitRungeKutta", "SemiImplicitEuler",
+    "Gauss", "LinearlyImplicitEuler", "SinglyDiagonallyImplicit", "Rosenbrock", "TimeStepping",
 }  # fmt: skip
 # What time loops and traces call, with numbers that were checked before, or symbols.
-INTERFACES = (Effect, Controller, rd.Block, Arithmetic)
+INTERFACES = (Effect, Controller, rd.control.Block, Arithmetic)
 FOR_LOOPS = {
     name
-    for kind in (Force, Conservative, Bound, Stateful, Drive, Controller, rd.Block, Arithmetic)
+    for kind in (Force, Conservative, Bound, Stateful, Drive, Controller, rd.control.Block, Arithmetic)
     for name in dir(kind)
 }
 FOR_LOOPS |= {
@@ -46,6 +54,7 @@ FOR_LOOPS |= {
 }  # fmt: skip
 LAX = {  # arguments that may be infinite or unknown, or of any shape
     "CarriedPayload.acts": {"t"},
+    "choice": {"values"},
     "ExternalWrench.acts": {"t"},
     "Adaptive": {"max_step_s"}, "Adaptive.with_tolerances": {"longest_s"},
     "CarriedPayload": {"end_s"}, "EffortLimit": {"limit"}, "Event": {"direction"},
@@ -55,17 +64,24 @@ LAX = {  # arguments that may be infinite or unknown, or of any shape
     "Rollouts.outcome": {"run"}, "Rollouts.setup_of": {"run"}, "Robot.with_": {"lock", "armature"},
     "midpoint": {"x"}, "radius": {"x"}, "coefficient": {"elsewhere"},
     "joint_stops": {"lower", "upper"}, "RigidStops": {"lower", "upper"}, "plot": {"limits"},
+    "path": {"acceleration", "effort", "velocity"}, "budget": {"continuous", "effort", "velocity"},
+    "point_to_point": {"jerk", "velocity"},
 }  # fmt: skip
 SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
 
 
+ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.plan, rd.studies, rd.sweeps)
+
+SHOWS = {"blocks", "tables", "to_json"}  # methods of answers, which take no argument
+OF_EXTRAS = {"to_pandas", "to_xarray", "samples"}  # take none either, and need packages that may be absent
+
+
 def public() -> Iterator[str]:
     """Names of all public callables: functions, classes and their public methods."""
-    for name in rd.__all__:
-        thing = getattr(rd, name)
+    for name, thing in {name: getattr(room, name) for room in ROOMS for name in room.__all__}.items():
         if (
             not callable(thing)
-            or thing is rd.Dynamics
+            or name in FOR_AUTHORS
             or isabstract(thing)
             or (isclass(thing) and issubclass(thing, BaseException | Warning))
         ):
@@ -75,7 +91,10 @@ def public() -> Iterator[str]:
         for method in dir(thing) if isclass(thing) else ():
             field = method in getattr(thing, "__dataclass_fields__", {})
             for_loops = issubclass(thing, INTERFACES) and method in FOR_LOOPS
-            if not method.startswith("_") and callable(getattr(thing, method)) and not field and not for_loops:
+            shows = issubclass(thing, Answer) and method in SHOWS
+            if method.startswith("_") or not callable(getattr(thing, method)):
+                continue
+            if not (field or for_loops or shows or method in OF_EXTRAS):
                 yield f"{name}.{method}"
 
 
@@ -83,20 +102,27 @@ def examples(folder: Path) -> dict[str, Example]:
     """By name, a callable and arguments that it takes."""
     robot = rd.load("cart_pole")
     q, v, u = np.array([0.3, -0.4]), np.array([0.7, 1.1]), np.array([1.3, 0.9])
-    friction, hold = rd.ViscousFriction(0.1), rd.hold(q)
-    certified = rd.certify(robot, samples=100, repeats=1)
+    friction, hold = rd.effects.ViscousFriction(0.1), rd.control.hold(q)
+    certified = rd.studies.certify(robot, samples=100, repeats=1)
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
     setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
-    proven = rd.prove(setup, bits=53)
-    measured = rd.work_precision(replace(setup, engine="interpreted"), methods=["rk4"], budget_s=2.0, repeats=1)
-    priced = rd.cost(setup, budget_s=1e-9, repeats=1)
+    proven = rd.studies.prove(setup, bits=53)
+    measured = rd.studies.work_precision(replace(setup, engine="interpreted"), methods=["rk4"], budget_s=2.0, repeats=1)
+    priced = rd.studies.cost(setup, budget_s=1e-9, repeats=1)
     saved, scene, urdf = rd.save_run(run, folder / "run"), folder / "scene.toml", folder / "arm.urdf"
     scene.write_text('robot = "cart_pole"\nduration_s = 0.01\n', encoding="utf-8")
     urdf.write_bytes(robot.description.xml)
-    table = folder / "samples.csv"
+    of_sweep = folder / "of_sweep.toml"
+    start = '{q0 = "normal(mean=[0.1, 0.2], sd=0.1)"}'
+    of_sweep.write_text(f'{scene.read_text()}method = "rk4"\n[sweep]\nruns = 48\nvary = {start}\n', encoding="utf-8")
+    sweep = rd.sweeps.from_scene(of_sweep, figures={"end": rd.sweeps.final("q", "slide")})
+    swept = rd.sweeps.run(sweep, folder / "sweep", threads=1, chunk=16)
+    table, motors = folder / "samples.csv", folder / "motors.csv"
+    motors.write_text("joint,peak [N m]\nslide,50\n")
     table.write_text("t [s],q x [m],q y [rad]\n0,0.1,0.2\n1,0.3,0.5\n", encoding="utf-8")
-    adaptive = rd.Adaptive()
+    needs = rd.budget(rd.control.quintic(q, v, 1.0), plant, effort=50.0, velocity=4.0)
+    adaptive = rd.integrate.Adaptive()
     system = System(lambda t, y: -y, 1)
     linked = {"frame": "pole", "expressed_in": "body"}
     given = {"q": q, "v": v, "a": u, "tau": u}
@@ -116,66 +142,70 @@ def examples(folder: Path) -> dict[str, Example]:
     strut = {"frame": "pole", "other_frame": "cart", "point": [0.1, 0.2, 0.3], "other_point": [0.4, 0.2, 0.1]}
     pair = {"model": robot, "reference": hold, "kp": 9.0, "kd": [6.0, 2.0], "period_s": 0.01}
     points, eye = [q, u, v], np.eye(3)
-    sampled = rd.PD(hold, 9.0, 6.0, 0.01)
-    path: Any = rd.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0)
+    sampled = rd.control.PD(hold, 9.0, 6.0, 0.01)
+    path: Any = rd.control.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0)
     return made | {
-        "Adaptive": (rd.Adaptive, {"method": "Rosenbrock", "rtol": 1e-8, "atol": 1e-9, "max_step_s": 0.5}),
+        "Adaptive": (rd.integrate.Adaptive, {"method": "Rosenbrock", "rtol": 1e-8, "atol": 1e-9, "max_step_s": 0.5}),
         "Adaptive.solve": (adaptive.solve, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
         "Adaptive.steps": (adaptive.steps, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
         "Adaptive.with_tolerances": (adaptive.with_tolerances, {"factor": 10.0, "longest_s": 0.5}),
-        "Ball": (rd.Ball, {"bits": 53}),
+        "Ball": (rd.studies.Ball, {"bits": 53}),
         "Compiled": (rd.Compiled, {"robot_or_plant": robot, "dtype": "float64", "threads": 1, "cache": False}),
-        "ComputedTorque": (rd.ComputedTorque, pair),
-        "ActuatorLag": (rd.ActuatorLag, {"time_constant": [0.1, 0.2]}),
-        "Differences": (rd.Differences, {}),
-        "DryFriction": (rd.DryFriction, {"level": [1.0, 2.0], "static": [1.5, 2.0], "stribeck_velocity": 0.1}),
-        "EffortLimit": (rd.EffortLimit, {"limit": [1.0, 2.0]}),
+        "ComputedTorque": (rd.control.ComputedTorque, pair),
+        "ActuatorLag": (rd.effects.ActuatorLag, {"time_constant": [0.1, 0.2]}),
+        "Differences": (rd.control.Differences, {}),
+        "DryFriction": (rd.effects.DryFriction, {"level": [1.0, 2.0], "static": [1.5, 2.0], "stribeck_velocity": 0.1}),
+        "EffortLimit": (rd.effects.EffortLimit, {"limit": [1.0, 2.0]}),
         "Event": (rd.Event, {"function": lambda t, q, v: 1.0, "direction": 1, "terminal": True, "name": "high"}),
         "ExternalWrench": (
-            rd.ExternalWrench,
+            rd.effects.ExternalWrench,
             linked | {"wrench": [1.0, 2.0, 3.0, 0.1, 0.2, 0.3], "start_s": 0.1, "end_s": 0.2},
         ),
-        "CarriedPayload.acts": (rd.CarriedPayload(rd.Payload("pole", 1.0), 0.5).acts, {"t": 0.1}),
-        "ExternalWrench.acts": (rd.ExternalWrench("pole", np.ones(6)).acts, {"t": 0.1}),
-        "ExternalWrench.at": (rd.ExternalWrench("pole", np.ones(6)).at, {"placement": np.eye(4)}),
-        "FeedForward": (rd.FeedForward, pair),
+        "CarriedPayload.acts": (rd.effects.CarriedPayload(rd.Payload("pole", 1.0), 0.5).acts, {"t": 0.1}),
+        "ExternalWrench.acts": (rd.effects.ExternalWrench("pole", np.ones(6)).acts, {"t": 0.1}),
+        "ExternalWrench.at": (rd.effects.ExternalWrench("pole", np.ones(6)).at, {"placement": np.eye(4)}),
+        "FeedForward": (rd.control.FeedForward, pair),
         "Loop": (
-            rd.Loop,
-            {"controller": sampled, "position": [rd.Quantisation(1e-3)], "velocity": [rd.Differences()],
-             "actuation": [rd.RateLimit(9.0)], "measurement_delay": 1.5, "actuation_delay": 0.5, "seed": 3, "run": 1},
+            rd.control.Loop,
+            {"controller": sampled, "position": [rd.control.Quantisation(1e-3)], "velocity": [rd.control.Differences()],
+             "actuation": [rd.control.RateLimit(9.0)], "measurement_delay": 1.5, "actuation_delay": 0.5, "seed": 3,
+             "run": 1},
         ),
-        "LowPass": (rd.LowPass, {"cutoff": [9.0, 8.0], "order": 1}),
+        "LowPass": (rd.control.LowPass, {"cutoff": [9.0, 8.0], "order": 1}),
         "Proof.at": (proven.at, {"t": 0.01}),
         "Proof.contains": (proven.contains, {"t": 0.01, "q": q, "v": v}),
         "Proof.digits_of": (proven.digits_of, {"t": run.t, "q": run.q}),
+        "Trajectory.causes": (run.causes, {}),
         "Trajectory.proven_digits": (run.proven_digits, {"proof": proven}),
         "prove": (
-            rd.prove,
+            rd.studies.prove,
             {"setup": setup, "until_s": 0.001, "bits": 53, "q0": q, "v0": v, "width_q": 1e-9,
              "width_v": 1e-9, "budget_s": 1.0, "on_progress": print},
         ),
-        "Multirate": (rd.Multirate, {"fast": sampled, "slow": rd.PD(hold, 1.0, 1.0, 0.02)}),
-        "Noise": (rd.Noise, {"deviation": [0.1, 0.2]}),
-        "Quantisation": (rd.Quantisation, {"resolution": [0.1, 0.2]}),
-        "RateLimit": (rd.RateLimit, {"rate": [0.1, 0.2]}),
-        "JointStopDamper": (rd.JointStopDamper, stops | {"damping": 0.1}),
-        "JointStopSpring": (rd.JointStopSpring, stops | {"stiffness": 0.1}),
+        "Multirate": (rd.control.Multirate, {"fast": sampled, "slow": rd.control.PD(hold, 1.0, 1.0, 0.02)}),
+        "Noise": (rd.control.Noise, {"deviation": [0.1, 0.2]}),
+        "Quantisation": (rd.control.Quantisation, {"resolution": [0.1, 0.2]}),
+        "RateLimit": (rd.control.RateLimit, {"rate": [0.1, 0.2]}),
+        "JointStopDamper": (rd.effects.JointStopDamper, stops | {"damping": 0.1}),
+        "JointStopSpring": (rd.effects.JointStopSpring, stops | {"stiffness": 0.1}),
         "Lagrangian": (rd.Lagrangian, {"robot": robot, "dtype": np.float32}),
         "Lagrangian.mass_matrix_derivative": (own.mass_matrix_derivative, {"q": q}),
         "OperationalSpace": (
-            rd.OperationalSpace,
+            rd.control.OperationalSpace,
             {"model": robot, "frame": "pole", "reference": path, "kp": 1.0, "kd": [1.0], "posture": q,
              "posture_kp": 1.0, "posture_kd": 2.0, "rows": (0,), "threshold": 0.01, "period_s": 0.01},
         ),
-        "PD": (rd.PD, {"reference": hold, "kp": 9.0, "kd": [6.0, 2.0], "period_s": 0.01}),
-        "PDGravity": (rd.PDGravity, pair),
+        "PD": (rd.control.PD, {"reference": hold, "kp": 9.0, "kd": [6.0, 2.0], "period_s": 0.01}),
+        "PDGravity": (rd.control.PDGravity, pair),
         "PID": (
-            rd.PID,
+            rd.control.PID,
             {"reference": hold, "kp": 9.0, "ki": 1.0, "kd": 2.0, "effort_limit": 3.0, "tracking_time_s": 0.5,
              "period_s": 0.01},
         ),
         "Payload": (rd.Payload, {"frame": "pole", "mass": 0.5, "com": (0.1, 0.2, 0.3), "inertia": eye}),
-        "PiecewisePolynomial": (rd.PiecewisePolynomial, {"breaks": [0.0, 1.0], "coefficients": [[[0.1], [0.2]]]}),
+        "PiecewisePolynomial": (
+            rd.control.PiecewisePolynomial,
+            {"breaks": [0.0, 1.0], "coefficients": [[[0.1], [0.2]]]}),
         "PiecewisePolynomial.at": (hold.at, {"t": 0.1}),
         "Plant": (rd.Plant, {"dynamics": robot, "effects": [friction]}),
         "Plant.C": (plant.C, {"q": q, "v": v}),
@@ -187,11 +217,14 @@ def examples(folder: Path) -> dict[str, Example]:
         "Plant.held": (plant.held, {"t": 0.1, "q": q, "v": v, "u": u}),
         "Plant.inverse_dynamics": (plant.inverse_dynamics, {"t": 0.1, "q": q, "v": v, "a": u}),
         "Plant.torque": (plant.torque, {"t": 0.1, "q": q, "v": v}),
-        "RegularisedCoulombFriction": (rd.RegularisedCoulombFriction, {"friction": 0.1, "velocity_scale": [0.1, 0.2]}),
+        "RegularisedCoulombFriction": (
+            rd.effects.RegularisedCoulombFriction, {"friction": 0.1, "velocity_scale": [0.1, 0.2]}
+        ),
         "Robot": (rd.Robot, {"description": robot.description, "edits": robot.edits}),
         "Robot.announced": (robot.announced, {}),
         "Robot.from_pinocchio": (rd.Robot.from_pinocchio, {"model": robot.model}),
         "Robot.from_text": (rd.Robot.from_text, {"urdf": robot.description.xml.decode(), "source": "arm"}),
+        "Robot.to_urdf": (robot.to_urdf, {"path": folder / "written.urdf"}),
         "Robot.random_configuration": (getattr(robot, "random_configuration", None), {"rng": np.random.default_rng(0)}),
         "Robot.digits": (lambda quantity, q: robot.digits(quantity, q), {"quantity": "N", "q": q}),
         "Robot.warn_below": (robot.warn_below, {"digits": 12.0}),
@@ -201,42 +234,47 @@ def examples(folder: Path) -> dict[str, Example]:
              "mass_scale": 1.1},
         ),
         "Rollouts.outcome": (several.outcome, {"run": 1}),
+        "Rollouts.table": (several.table, {}),
+        "Trajectory.table": (run.table, {}),
         "Rollouts.setup_of": (several.setup_of, {"run": 1}),
-        "Samples": (rd.Samples, {"t": [0.0, 0.5, 1.0], "q": points, "v": points, "a": points}),
-        "Samples.at": (rd.Samples([0.0, 0.5, 1.0], points).at, {"t": 0.1}),
-        "Samples.from_csv": (rd.Samples.from_csv, {"path": table, "joint_names": ["y", "x"]}),
+        "Samples": (rd.control.Samples, {"t": [0.0, 0.5, 1.0], "q": points, "v": points, "a": points}),
+        "Samples.at": (rd.control.Samples([0.0, 0.5, 1.0], points).at, {"t": 0.1}),
         "Setup": (
             rd.Setup,
-            {"plant": plant, "q0": q, "v0": v, "duration_s": 0.1, "controller": rd.PD(hold, 1.0, 1.0),
-             "integrator": rd.method("rk4"), "step_s": 1e-3, "record_period_s": 0.01, "estimate_error": True,
+            {"plant": plant, "q0": q, "v0": v, "duration_s": 0.1, "controller": rd.control.PD(hold, 1.0, 1.0),
+             "integrator": rd.integrate.method("rk4"), "step_s": 1e-3, "record_period_s": 0.01, "estimate_error": True,
              "about": {"note": "text"}, "engine": "interpreted"},
         ),
-        "Spring": (rd.Spring, {"stiffness": 2.0, "rest": [0.1, -0.2]}),
+        "Spring": (rd.effects.Spring, {"stiffness": 2.0, "rest": [0.1, -0.2]}),
         "Threshold": (
-            rd.Threshold,
+            rd.effects.Threshold,
             {"joint": 1, "level": 0.5, "name": "stop", "rising": "touched", "falling": "left", "of_velocity": True},
         ),
-        "ViscousFriction": (rd.ViscousFriction, {"damping": [0.1, 0.2]}),
+        "ViscousFriction": (rd.effects.ViscousFriction, {"damping": [0.1, 0.2]}),
         "certify": (
-            rd.certify,
+            rd.studies.certify,
             {"robot": robot, "q": q, "v": v, "a": u, "tau": u, "samples": 100, "seed": 3, "repeats": 1,
              "on_progress": lambda part, what: None},
         ),
         "Certificate.of": (certified.of, {"quantity": "M", "implementation": "Pinocchio"}),
-        "save_result": (rd.save_result, {"result": certified, "path": folder / "digits.csv", "theme": "dark"}),
+        "save_result": (rd.studies.save_result, {"result": certified, "path": folder / "digits.csv", "theme": "dark"}),
         "stress": (
-            rd.stress,
+            rd.studies.stress,
             {"robot": robot, "samples": 100, "runs": 0, "seed": 3, "budget_s": 1e-3,
              "on_progress": lambda spent, what: None},
         ),
-        "check": (rd.check, {"name_or_path": "planar_2r", "package_dirs": [folder], "density": 1000.0, "units": True}),
+        "check": (
+            rd.check,
+            {"name_or_path": "planar_2r", "package_dirs": [folder], "mass": None, "total_mass": None,
+             "density": 1000.0, "units": True, "xacro": None},
+        ),
         "circle": (
-            rd.circle,
+            rd.control.circle,
             {"centre": [0.1, 0.2, 0.3], "radius": 0.1, "normal": [0.0, 0.1, 1.0], "period_s": 1.0, "turns": 1.0,
              "ramp_s": 0.1, "toward": [1.0, 0.0, 0.0], "rotation": eye, "start_s": 0.1},
         ),
         "coefficient": (
-            rd.coefficient,
+            rd.effects.coefficient,
             {"unit": "N m", "symbol": "f", "shapes": ((), ("n",)), "least": 0.5, "above": 0.5, "infinite": False,
              "elsewhere": 0.5, "stated": "friction", "swept": True},
         ),
@@ -247,101 +285,164 @@ def examples(folder: Path) -> dict[str, Example]:
             rd.euler_lagrange,
             {"kinetic": lambda t, q, v: v[0] ** 2 / 2, "potential": lambda t, q: ca.cos(q[0]), "n": 1},
         ),
-        "gains_from": (rd.gains_from, {"inertia_diagonal": [1.0, 2.0], "frequency": 3.0, "damping_ratio": 0.9}),
-        "hold": (rd.hold, {"q": q}),
+        "from_samples": (
+            rd.plan.from_samples,
+            {"arm": robot, "source": {"slide": [0.1, 0.2, 0.3], "hinge": [0.1, 0.3, 0.4]}, "time": [0.0, 1.0, 2.0],
+             "joints": {"slide": "slide", "hinge": "hinge"}, "unit": "rad", "ends": "measured", "q0": q,
+             "start_s": 0.5, "topic": None},
+        ),
+        "gains_from": (rd.control.gains_from, {"inertia_diagonal": [1.0, 2.0], "frequency": 3.0, "damping_ratio": 0.9}),
+        "hold": (rd.control.hold, {"q": q}),
         "LuGreFriction": (
-            rd.LuGreFriction,
+            rd.effects.LuGreFriction,
             {
                 "bristle_stiffness": 90.0, "bristle_damping": 0.3, "viscous": 0.1, "coulomb": 1.0,
                 "breakaway": [1.5, 1.2], "stribeck_velocity": 0.1,
             },
         ),
-        "DahlFriction": (rd.DahlFriction, {"bristle_stiffness": 90.0, "coulomb": [1.5, 1.2], "exponent": 1.5}),
+        "DahlFriction": (rd.effects.DahlFriction, {"bristle_stiffness": 90.0, "coulomb": [1.5, 1.2], "exponent": 1.5}),
         "CarriedPayload": (
-            rd.CarriedPayload, {"payload": rd.Payload("pole", 0.5), "start_s": 0.1, "end_s": 0.5, "at_rest": True}
+            rd.effects.CarriedPayload,
+            {"payload": rd.Payload("pole", 0.5), "start_s": 0.1, "end_s": 0.5, "at_rest": True}
         ),
         "SeriesElastic": (
-            rd.SeriesElastic,
+            rd.effects.SeriesElastic,
             {"stiffness": [90.0, 1.0], "inertia": 0.1, "ratio": 3.0, "damping": 0.1, "friction": 0.2, "backlash": 0.01},
         ),
         "RigidBacklash": (
-            rd.RigidBacklash, {"gap": [0.1, 0.0], "inertia": 0.1, "ratio": 3.0, "restitution": 0.5, "viscous": 0.2}
+            rd.effects.RigidBacklash,
+            {"gap": [0.1, 0.0], "inertia": 0.1, "ratio": 3.0, "restitution": 0.5, "viscous": 0.2}
         ),
-        "RigidStops": (rd.RigidStops, stops | {"restitution": 0.5}),
-        "LineDamper": (rd.LineDamper, strut | {"damping": 0.1}),
-        "LineSpring": (rd.LineSpring, strut | {"stiffness": 10.0, "length": 0.2}),
-        "LineSpringDamper": (rd.LineSpringDamper, strut | {"stiffness": 10.0, "damping": 0.1, "length": 0.2}),
-        "joint_stops": (rd.joint_stops, stops | {"stiffness": 10.0, "damping": 0.1}),
+        "RigidStops": (rd.effects.RigidStops, stops | {"restitution": 0.5}),
+        "LineDamper": (rd.effects.LineDamper, strut | {"damping": 0.1}),
+        "LineSpring": (rd.effects.LineSpring, strut | {"stiffness": 10.0, "length": 0.2}),
+        "LineSpringDamper": (rd.effects.LineSpringDamper, strut | {"stiffness": 10.0, "damping": 0.1, "length": 0.2}),
+        "joint_stops": (rd.effects.joint_stops, stops | {"stiffness": 10.0, "damping": 0.1}),
+        "inverse_kinematics": (
+            rd.plan.inverse_kinematics,
+            {"arm": robot, "pose": robot.placement(q, "pole"), "frame": "pole", "q0": q, "seed": 1, "starts": 2,
+             "tolerance": 1e-9, "iterations": 5},
+        ),
         "line": (
-            rd.line,
+            rd.control.line,
             {"p0": [0.1, 0.2, 0.3], "p1": [0.4, 0.2, 0.1], "duration_s": 1.0, "rotation": eye, "rotation_end": eye,
              "start_s": 0.1},
         ),
         "linearise": (rd.linearise, {"plant": plant, "q": q, "v": v, "u": u, "t": 0.1}),
         "list_robots": (rd.list_robots, {}),
-        "load": (rd.load, {"name_or_path": urdf, "package_dirs": [folder], "xacro": None}),
+        "load": (
+            rd.load,
+            {"name_or_path": urdf, "package_dirs": [folder], "xacro": None, "inertia": "stated", "mass": None,
+             "total_mass": None, "density": None, "download": False, "without": ()},
+        ),
         "load_run": (rd.load_run, {"path": saved, "max_bytes": 2**30}),
-        "export_csv": (rd.export_csv, {"run": several, "path": folder / "table"}),
+        "compare_runs": (rd.compare_runs, {"a": several[0], "b": several[0]}),
+        "export": (rd.export, {"run": several, "path": folder / "table"}),
         "load_rollouts": (rd.load_rollouts, {"path": rd.save_rollouts(several, folder / "all"), "max_bytes": 2**30}),
-        "method": (rd.method, {"name": "rk4"}),
-        "midpoint": (rd.midpoint, {"x": rd.Lagrangian(robot, rd.Ball(60)).N(q)}),
-        "radius": (rd.radius, {"x": rd.Lagrangian(robot, rd.Ball(60)).N(q)}),
-        "plot": (rd.plot, {"run": run, "only": ["hinge"], "limits": u, "theme": "dark"}),
+        "method": (rd.integrate.method, {"name": "rk4"}),
+        "midpoint": (rd.studies.midpoint, {"x": rd.Lagrangian(robot, rd.studies.Ball(60)).N(q)}),
+        "radius": (rd.studies.radius, {"x": rd.Lagrangian(robot, rd.studies.Ball(60)).N(q)}),
+        "plot": (rd.plot, {"run": run, "only": ["torques"], "joints": ["hinge"], "limits": u, "theme": "light",
+             "style": "paper", "width_mm": 120.0}),
+        "path": (
+            rd.plan.path,
+            {"plant": robot, "points": [q, v], "share": 0.9, "effort": 50.0, "velocity": 4.0, "acceleration": 30.0,
+             "motors": None},
+        ),
+        "budget": (
+            rd.budget,
+            {"motion": rd.control.quintic(q, v, 1.0), "plant": plant, "payload": rd.Payload("pole", 0.5),
+             "motors": None, "effort": 50.0, "velocity": 4.0, "continuous": u},
+        ),
+        "MotorBudget.max_payload": (needs.max_payload, {"link": "pole", "com": [0.1, 0.2, 0.3]}),
+        "MotorBudget.fastest": (needs.fastest, {"share": 0.9}),
+        "read_motors": (rd.plan.read_motors, {"path": motors}),
+        "point_to_point": (
+            rd.plan.point_to_point,
+            {"arm": robot, "q0": q, "q1": v, "acceleration": 1.0, "jerk": 9.0, "velocity": u, "v0": 0.1, "v1": 0.0,
+             "start_s": 0.1},
+        ),
         "quintic": (
-            rd.quintic,
+            rd.control.quintic,
             {"q0": q, "q1": v, "duration_s": 1.0, "start_s": 0.1, "v0": 0.1, "v1": u, "a0": u, "a1": 0.0},
         ),
-        "read_scene": (rd.read_scene, {"path": scene, "effects": {"own": rd.Spring}}),
+        "read_scene": (rd.read_scene, {"path": scene, "effects": {"own": rd.effects.Spring}}),
         "replay": (
-            rd.replay, {"run": run, "package_dirs": [folder], "frame": "pole", "inertia": True, "port": free_port()},
+            rd.replay, {"run": run, "package_dirs": [folder], "frame": "pole", "inertia": True},
         ),
         "rollouts": (
             rd.rollouts,
             {"what": setup, "q0": [q, u], "v0": [v, u], "params": {"viscous_friction.damping": [0.1, 0.2]},
-             "record": ("q",), "cuts": True, "threads": 1, "most_bytes": 10**9},
+             "record": ("q",), "cuts": True, "numbers": [3, 1], "threads": 1, "most_bytes": 10**9},
         ),
-        "save_plot": (rd.save_plot, {"run": run, "path": folder / "plot.png", "dpi": 50.0, "only": ["hinge"]}),
+        "Sweep": (
+            rd.sweeps.Sweep,
+            {"scene": scene, "runs": 8, "vary": {"q0": rd.sweeps.uniform(low=[0.1, 0.2], high=0.3)},
+             "figures": {"peak": rd.sweeps.peak("v")}, "design": "random", "seed": 1, "storage": "npz"},
+        ),
+        "Sweep.values": (swept.sweep.values, {"start": 0, "stop": 3}),
+        "SweepResult.export": (swept.export, {"path": folder / "rows.csv"}),
+        "SweepResult.mean": (swept.mean, {"figure": "end", "level": 0.9, "given": "finished"}),
+        "SweepResult.probability": (swept.probability, {"event": "end > 0.1", "level": 0.9, "given": "finished"}),
+        "SweepResult.quantiles": (swept.quantiles, {"figure": "end", "probabilities": [0.5], "level": 0.9}),
+        "SweepResult.reasons": (swept.reasons, {}),
+        "SweepResult.run": (swept.run, {"i": 3}),
+        "SweepResult.save_report": (swept.save_report, {"path": folder / "report.html"}),
+        "SweepResult.sensitivity": (swept.sensitivity, {"figure": "end", "level": 0.9, "given": "finished"}),
+        "SweepResult.table": (swept.table, {}),
+        "SweepResult.verify": (swept.verify, {}),
+        "SweepResult.worst": (swept.worst, {"figure": "end", "count": 2, "given": "finished"}),
+        "choice": (rd.sweeps.choice, {"values": [1.0, 2.0]}),
+        "final": (rd.sweeps.final, {"of_what": "q", "joint": "slide"}),
+        "from_scene": (rd.sweeps.from_scene, {"path": of_sweep}),
+        "lognormal": (rd.sweeps.lognormal, {"median": 1.0, "sigma_of_log": 0.1}),
+        "normal": (rd.sweeps.normal, {"mean": 1.0, "sd": 0.1}),
+        "peak": (rd.sweeps.peak, {"of_what": "v", "joint": "slide"}),
+        "read": (rd.sweeps.read, {"folder": folder / "sweep"}),
+        "rms_error": (rd.sweeps.rms_error, {"joint": "slide"}),
+        "run": (
+            rd.sweeps.run,
+            {"sweep": swept.sweep, "folder": folder / "sweep", "threads": 1, "chunk": 16, "on_progress": print_nothing},
+        ),
+        "triangular": (rd.sweeps.triangular, {"low": 0.0, "mode": 0.5, "high": 1.0}),
+        "uniform": (rd.sweeps.uniform, {"low": 0.0, "high": 1.0}),
+        "save_plot": (rd.save_plot, {"run": run, "path": folder / "plot.png", "dpi": 50.0, "joints": ["hinge"]}),
         "save_replay": (
             rd.save_replay,
             {"run": run, "path": folder / "page", "package_dirs": [folder], "frame": "pole", "inertia": True},
         ),
         "save_rollouts": (rd.save_rollouts, {"runs": several, "path": folder / "many"}),
         "save_run": (rd.save_run, {"trajectory": run, "path": folder / "again"}),
-        "save_show": (
-            rd.save_show,
-            {"robot": robot, "path": folder / "still", "q": q, "package_dirs": [folder], "inertia": False},
-        ),
-        "show": (rd.show, {"robot": robot, "q": q, "package_dirs": [folder], "inertia": False, "port": free_port()}),
+        "show": (rd.show, {"robot": robot, "q": q, "package_dirs": [folder], "inertia": False}),
+        "samples": (partial(rd.sweeps.samples, "q"), {"every": 3, "failed": True}),
         "simulate": (rd.simulate, {"what": plant, "on_progress": lambda t: None, "q0": q, "duration_s": 0.01}),
         "task_dynamics": (
-            rd.task_dynamics,
+            rd.control.task_dynamics,
             {"dynamics": robot, "q": q, "v": v, "frame": "pole", "rows": (0,), "threshold": 0.01},
         ),
+        "why": (rd.why, {"plant": plant, "q": q, "v": v, "a": u, "joint": "hinge", "t": 0.1}),
+        "explain": (rd.explain, {"what": setup}),
+        "info": (rd.info, {"robot": robot}),
+        "sweepable": (rd.sweepable, {"what": setup}),
         "advise": (rd.advise, {"what": plant, "q0": q, "v0": v, "duration_s": 0.01}),
         "Cost.of": (priced.of, {"what": "gravity"}),
         "cost": (
-            rd.cost,
+            rd.studies.cost,
             {"what": setup, "q0": q, "v0": v, "budget_s": 1e-9, "repeats": 1, "on_progress": print_nothing},
         ),
         "WorkPrecision.digits": (measured.digits, {"error": 1e-6}),
         "WorkPrecision.sentence_of": (measured.sentence_of, {"digits": 6}),
         "work_precision": (
-            rd.work_precision,
+            rd.studies.work_precision,
             {"what": replace(setup, engine="interpreted"), "q0": q, "v0": v, "duration_s": 0.01, "methods": ["rk4"],
              "peers": False, "budget_s": 2.0, "repeats": 1, "on_progress": print_nothing},
         ),
-        "via_points": (rd.via_points, {"times_s": [0.0, 0.5, 1.0], "points": points, "kind": "cubic"}),
+        "via_points": (rd.control.via_points, {"times_s": [0.0, 0.5, 1.0], "points": points, "kind": "cubic"}),
     }  # fmt: skip
 
 
 def print_nothing(*_: object) -> None:
     """A function of anything."""
-
-
-def free_port() -> int:
-    with socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def wrong(name: str, function: Callable[..., Any], argument: str, value: Any) -> Iterator[Any]:

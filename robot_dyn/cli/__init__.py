@@ -3,10 +3,11 @@
 Ctrl-C ends any command with exit code 130; its handler is installed before anything else is imported.
 
 commands/        the commands, by topic
+groups.py        the commands as --help lists them
 app.py           the application, options that commands share, progress bars; completion.py and interrupts.py
 arguments.py     values of arguments; terminal.py: output, escaped
-report.py, state_report.py    documents and tables of robots, comparisons and runs; of one state
-studies.py, outcome.py        what studies print and write
+report.py        documents and tables of comparisons and runs
+outcome.py       what studies print and write
 """
 
 from __future__ import annotations
@@ -18,6 +19,11 @@ from robot_dyn.cli.interrupts import guard, ignore
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
+
+_TOPICS = (
+    "query", "budget", "simulate", "sweep", "show", "check", "cost", "prove", "stress", "diff", "demo", "cache",
+    "export",
+)  # fmt: skip
 
 
 def main() -> None:
@@ -38,19 +44,24 @@ def _run() -> Any:
     import warnings
     from importlib import import_module
 
+    from typer.main import get_command
+
     from robot_dyn.cli.app import app
+    from robot_dyn.cli.groups import group, without_types_of_flags
     from robot_dyn.cli.terminal import failed, finish, open_streams, to_stderr
     from robot_dyn.errors import RobotDynError, RobotDynWarning
 
-    for topic in ("query", "simulate", "show", "check", "cost", "prove", "stress", "demo", "cache"):  # as in --help
+    for topic in _TOPICS:
         import_module(f"robot_dyn.cli.commands.{topic}")
+    group(app)
+    program = without_types_of_flags(get_command(app))
     open_streams()
     with warnings.catch_warnings():
         warnings.simplefilter("always", RobotDynWarning)
         warnings.showwarning = lambda message, *_, **__: to_stderr(f"robot-dyn: warning: {message}")
         try:
             try:
-                app()
+                program(prog_name="robot-dyn")
             except SystemExit as end:
                 finish()
                 return end.code

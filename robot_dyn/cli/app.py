@@ -11,6 +11,7 @@ import typer
 
 from robot_dyn.cli import completion
 from robot_dyn.cli.terminal import put
+from robot_dyn.errors import escaped
 
 app = typer.Typer(
     name="robot-dyn",
@@ -77,25 +78,44 @@ def _options(
 
 
 def progress(items: Iterable[str], description: str) -> Iterator[str]:
-    """Yield the items, with a progress bar on stderr if it is a terminal."""
-    from rich.console import Console
-    from rich.progress import track
-
+    """Yield the items, with a progress bar on stderr if it is a terminal, that names the item being worked on."""
     items = list(items)
-    return iter(
-        track(items, description, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
-    )
+    with bar(len(items)) as advance:
+        for done, item in enumerate(items):
+            advance(done, f"{description} {escaped(item)}")
+            yield item
 
 
 @contextmanager
-def bar(total: float) -> Iterator[Callable[..., object]]:
-    """A progress bar on stderr if it is a terminal.
+def bar(total: float | None = None, what: str = "simulating", at_the_end: str = "") -> Iterator[Callable[..., object]]:
+    """A progress bar with the time left on stderr if it is a terminal; nothing elsewhere.
 
     It gives a function of the part of the total that is done, and of the name of what is being done.
+
+    Args:
+        total: All that is to be done; None if that is not known: the bar then has the time spent.
+        what: What is being done, unless that function is told.
+        at_the_end: What is still being done once the total is reached.
     """
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+    from rich.text import Text
 
-    with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
-        task = progress.add_task("starting", total=total)
-        yield lambda done, what="simulating": progress.update(task, completed=done, description=what)
+    from robot_dyn.queries.units import format_duration
+
+    class Time(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            left = None if task.finished else task.time_remaining
+            return Text(f"{int(task.elapsed or 0)} s" if left is None else f"{format_duration(left)} left")
+
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), Time())
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as shown:
+        task = shown.add_task(what, total=total)
+
+        def advance(done: float, now: str = what) -> None:
+            ended = total is not None and done >= total
+            if done < shown.tasks[0].completed:  # it is done again, as pilot runs are
+                shown.reset(task)
+            shown.update(task, completed=done, description=at_the_end if ended and at_the_end else now)
+
+        yield advance

@@ -13,6 +13,7 @@ from robot_dyn.files import Kind, target
 if TYPE_CHECKING:
     import numpy as np
 
+    from robot_dyn.description.edits import Payload
     from robot_dyn.model.robot import Robot
     from robot_dyn.simulation.setup.setup import Setup
 
@@ -36,7 +37,7 @@ def load(
 
 def expansion(xacro: list[str]) -> dict[str, str]:
     """The arguments of xacro by name."""
-    return dict(_name_and_value("--xacro", text) for text in xacro if text)
+    return dict(pair("--xacro", text) for text in xacro if text)
 
 
 def scene(what: str, given: Mapping[str, object]) -> Setup | None:
@@ -50,26 +51,54 @@ def scene(what: str, given: Mapping[str, object]) -> Setup | None:
     return rd.read_scene(what)
 
 
-def assignments(option: str, texts: list[str]) -> dict[str, float]:
-    """Values by joint of several joint=value; QueryError if a joint comes twice."""
-    pairs = [assignment(option, text) for text in texts]
+def assignments(option: str, texts: list[str], what: str = "joint") -> dict[str, float]:
+    """Values by joint, or link, of several joint=value; QueryError if one comes twice."""
+    pairs = [assignment(option, text, what) for text in texts]
     values = dict(pairs)
     if len(values) < len(pairs):
-        raise QueryError(f"{option} names a joint twice: {', '.join(texts)}")
+        raise QueryError(f"{option} names a {what} twice: {', '.join(texts)}")
     return values
 
 
-def assignment(option: str, text: str) -> tuple[str, float]:
+def assignment(option: str, text: str, what: str = "joint") -> tuple[str, float]:
     """Name and value of joint=value."""
-    name, value = _name_and_value(option, text, "JOINT")
+    name, value = pair(option, text, f"{what.upper()}=VALUE")
     return name, number(option, value)
 
 
-def _name_and_value(option: str, text: str, what: str = "NAME") -> tuple[str, str]:
+def pair(option: str, text: str, form: str = "NAME=VALUE") -> tuple[str, str]:
+    """What stands before and after the first =."""
     name, equals, value = text.partition("=")
     if not equals:
-        raise QueryError(f"{option} must be {what}=VALUE, got {text!r}")
+        raise QueryError(f"{option} must be {form}, got {text!r}")
     return name.strip(), value
+
+
+def payload(text: str) -> Payload:
+    """A body on a link of LINK=MASS@X,Y,Z, in kg and m; its centre of mass is the origin of the link without @."""
+    from robot_dyn.description.edits import Payload
+
+    link, equals, body = text.rpartition("=")
+    mass, place = _placed(body)
+    if not (equals and link.strip()) or place is None:
+        raise QueryError(f"--payload must be LINK=MASS@X,Y,Z in kg and m, as tool0=5kg@0,0,0.1; got {text!r}")
+    com = tuple(number("--payload, place in m", each) for each in place)
+    return Payload(link.strip(), number("--payload, mass in kg", mass.strip().removesuffix("kg")), com)  # pyright: ignore[reportArgumentType]
+
+
+def link_and_place(option: str, text: str) -> tuple[str, tuple[float, ...]]:
+    """A link and a place on it of LINK@X,Y,Z, in m; its origin without @."""
+    link, place = _placed(text)
+    if not link.strip() or place is None:
+        raise QueryError(f"{option} must be LINK@X,Y,Z in m, as tool0@0,0,0.1; got {text!r}")
+    return link.strip(), tuple(number(f"{option}, place in m", each) for each in place)
+
+
+def _placed(text: str) -> tuple[str, list[str] | None]:
+    """What stands before @X,Y,Z, and the three numbers, 0 without; None if they are not three."""
+    what, at, place = text.partition("@")
+    numbers = place.removesuffix("m").split(",") if at else ["0"] * 3
+    return what, numbers if len(numbers) == 3 else None
 
 
 def number(option: str, text: str) -> float:

@@ -23,14 +23,18 @@ def outputs(of: Any, output: str | None, csv: str | None, inputs: Iterable[str],
     return paths + ([arguments.output(csv, table_kind(of), ResultError, [*inputs, *paths], force)] if csv else [])
 
 
-def give(result: Any, paths: Iterable[Path], as_json: bool, dark: bool = False) -> None:
-    """Write a result and say it; exit code 130 if the user ended it."""
-    from robot_dyn.cli import studies
+def give(result: Any, paths: Iterable[Path], as_json: bool, dark: bool = False, drawn: Any = None, **more: Any) -> None:
+    """Write a result, or the one that is `drawn`, and say it, with more answers by key.
+
+    The exit code is 130 if the user ended it.
+    """
+    from robot_dyn.result import plain
 
     try:  # the files first: a terminal or pipe may be gone
-        written = [rd.save_result(result, path, theme="dark" if dark else "light") for path in paths]
+        written = [rd.studies.save_result(drawn or result, path, theme="dark" if dark else "light") for path in paths]
     finally:
-        say_json(result) if as_json else say(*studies.lines(result))
+        said = (part for each in more.values() for part in ("", each))
+        say_json(result, **{key: plain(each) for key, each in more.items()}) if as_json else say(result, *said)
     for path in written:
         to_stderr(f"written: {path}")
     if result.interrupted:

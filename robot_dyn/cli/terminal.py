@@ -6,10 +6,9 @@ import json
 import os
 import re
 import sys
-from collections.abc import Collection, Iterable, Sequence
-from math import isfinite
 from typing import Any
 
+from robot_dyn.answer import Answer, Table
 from robot_dyn.errors import RobotDynError, escaped
 
 _MOST = 4000  # characters of a message
@@ -33,7 +32,7 @@ def open_streams() -> None:
 
 
 def say(*renderables: Any) -> None:
-    """Print tables, and texts of one line each.
+    """Print answers, tables, and texts of one line each.
 
     A pipe that its reader has closed is not an error: the rest is dropped.
 
@@ -51,30 +50,27 @@ def say(*renderables: Any) -> None:
     console = Safe(
         highlight=False, markup=False, emoji=False, width=None if terminal else 1000
     )  # lines in a pipe are not wrapped
-    for each in renderables:
-        put(f"{escaped(each)}\n") if isinstance(each, str) else _guarded(lambda each=each: console.print(each))
+    for each in (part for one in renderables for part in (one.blocks() if isinstance(one, Answer) else (one,))):
+        if isinstance(each, Table) and terminal:
+            for part in each.within(console.width):  # a number that is cut off is another number
+                _guarded(lambda part=part: console.print(_grid(part)))
+        elif isinstance(each, Table | str):
+            put("\n".join([*each.lines, ""] if isinstance(each, Table) else [escaped(each), ""]))
+        else:
+            _guarded(lambda each=each: console.print(each))
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]], words: Collection[str], wrap: bool = False) -> Any:
-    """A table for `say`; columns under the headings `words` begin at the left, the others hold numbers."""
-    from rich.table import Table
+def _grid(table: Table) -> Any:
+    """A table for a terminal: texts begin at the left and may be broken, numbers stand whole at the right."""
+    from rich.table import Table as Grid
 
-    grid = Table(box=None, pad_edge=False, header_style="bold")
-    for heading in headings:
-        grid.add_column(heading, no_wrap=not wrap, justify="left" if heading in words else "right")
-    for row in rows:
+    grid = Grid(box=None, pad_edge=False, header_style="bold")
+    for heading in table.heading:
+        word = heading in table.words
+        grid.add_column(heading, no_wrap=not word, overflow="fold", justify="left" if word else "right")
+    for row in table.cells:
         grid.add_row(*row)
     return grid
-
-
-def or_dash(x: float, digits: int = 6) -> str:
-    """Return a number as text, a dash if it is infinite or not a number."""
-    return f"{x:.{digits}g}" if isfinite(x) else "—"
-
-
-def numbers_row(numbers: Sequence[float]) -> str:
-    """Return numbers in columns of equal width."""
-    return " ".join(f"{x:10.5g}" for x in numbers)
 
 
 def put(text: str) -> None:
@@ -82,11 +78,11 @@ def put(text: str) -> None:
     _guarded(lambda: (sys.stdout.write(text), sys.stdout.flush()))
 
 
-def say_json(value: Any) -> None:
-    """Print a document or a result as JSON; errors as of `say`."""
-    from robot_dyn.result import json_text
+def say_json(value: Any, **more: Any) -> None:
+    """Print a document or a result as JSON, with more keys; errors as of `say`."""
+    from robot_dyn.result import json_text, plain
 
-    put(re.sub(r"[^\n\x20-\x7e]", lambda match: _json_escaped(match[0]), json_text(value)))
+    put(re.sub(r"[^\n\x20-\x7e]", lambda match: _json_escaped(match[0]), json_text(plain(value) | more)))
 
 
 def to_stderr(text: str) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 from numpy import empty
@@ -29,7 +29,6 @@ from robot_dyn.values import OnFirstUse
 _DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
 
 
-@final
 @dataclass(frozen=True)
 class CompiledDynamics(Dynamics, Parametrised):
     """A robot as machine code; each quantity is compiled on first use and checked against Pinocchio.

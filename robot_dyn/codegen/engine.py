@@ -20,6 +20,7 @@ from robot_dyn.codegen.self_check import STATES, SelfCheck
 from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.codegen.trace.trace import Traced
+from robot_dyn.codegen.waiting import announced
 from robot_dyn.errors import QueryError, RobotDynWarning
 from robot_dyn.queries.batch import DoubtError, answered
 from robot_dyn.queries.quantity import Quantity
@@ -104,7 +105,8 @@ class Engine:
         """Whether a quantity is small enough to be compiled; a SizeWarning if not."""
         if self.singular and self.quantities[quantity].solves:
             return False
-        trace = self.traces[quantity]
+        with announced(f"tracing {quantity} of {self.self_check.dynamics.name}"):
+            trace = self.traces[quantity]
         if (count := trace.counts[trace.formulation]) <= LARGEST_KERNEL:
             return True
         warnings.warn(
@@ -239,7 +241,14 @@ class Engine:
         return kernel.many
 
     def _judge(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:
-        """Compare what `run` writes with the independent result; it reports one Status, or one for each state."""
+        """Compare what `run` writes, which compiles it, with the independent result.
+
+        It reports one Status, or one for each state.
+        """
+        with announced(f"compiling {quantity} of {self.self_check.dynamics.name}, once for these equations"):
+            self._compare(quantity, run)
+
+    def _compare(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:
         requested = self.quantities[quantity]
         state = {name: x.astype(self.dtype).astype(float) for name, x in self.self_check.states().items()}
         rows = [

@@ -166,6 +166,16 @@ def link_parameters(dynamics: Any) -> tuple[str, ...]:
     return tuple(f"{link}.{key}" for link in _of_links(robot) for key in _OF_LINK)
 
 
+def sweepable_parameters(
+    dynamics: Any, effects: Iterable[Effect], controller: Controller | None
+) -> tuple[Parameter, ...]:
+    """The parameters that may be swept, those of links and of the controller's models included."""
+    prefixed = [("", dynamics)]
+    prefixed += [(f"{_named(name)}.", model) for name, model in (controller.models if controller else {}).items()]
+    swept = [f"{prefix}{name}" for prefix, of in prefixed for name in (*_WHEN_SWEPT, *link_parameters(of))]
+    return tuple(each for each in parameters(dynamics, effects, controller, swept) if each.declared.swept)
+
+
 def _of_links(robot: Robot) -> dict[str, dict[str, Any]]:
     """Mass and inertia of each link that states some, by link, edited."""
     inertias = {}

@@ -1,4 +1,4 @@
-"""CompiledPlant: a plant as machine code, M(q) a + C(q, v) v + N(t, q, v) = Υ, effects and bounds in the kernel.
+"""CompiledPlant: a plant as machine code, M(q) a + C(q, v) v + N(t, q, v) = τ, effects and bounds in the kernel.
 
 The effects are traced from the code that the interpreted plant runs; other effects are not in the kernel.
 Coefficients, gravity and payloads are inputs of the kernel: plants that differ only in these share compiled code.
@@ -6,10 +6,11 @@ Coefficients, gravity and payloads are inputs of the kernel: plants that differ 
 
 from __future__ import annotations
 
+from abc import ABC
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, final, overload
+from typing import Any, overload
 
 import casadi as ca
 import numpy as np
@@ -32,7 +33,6 @@ from robot_dyn.queries.quantity import PLANT
 _TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.ask` handles others
 
 
-@final
 @dataclass(frozen=True)
 class CompiledPlant:
     """A plant as machine code; each quantity is compiled on first use and checked against the interpreted plant.
@@ -123,7 +123,7 @@ class CompiledPlant:
     def inverse_dynamics(
         self, t: Any, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise"
     ) -> Any:
-        """Actuation Υ = M a + C v + N that gives the acceleration a, (..., n)."""
+        """Actuation τ = M a + C v + N that gives the acceleration a, (..., n)."""
         return self._ask("inverse_dynamics", (t, q, v, a), out, errors)
 
     def forward_dynamics(
@@ -190,17 +190,7 @@ class CompiledPlant:
         return Traced(function, formulation, {formulation: instructions(function)})
 
 
-@overload
-def Compiled(
-    robot_or_plant: Robot, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
-) -> CompiledDynamics: ...
-@overload
-def Compiled(
-    robot_or_plant: Plant, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
-) -> CompiledPlant: ...
-def Compiled(
-    robot_or_plant: Any, *, dtype: Any = "float64", threads: int | None = 1, cache: bool = True
-) -> CompiledDynamics | CompiledPlant:
+class Compiled(ABC):  # noqa: B024  its instances are those of the two classes registered below
     """Compile a robot or a plant to machine code, for one state (n,) and batches (..., n).
 
     Args:
@@ -209,10 +199,29 @@ def Compiled(
         threads: Number of threads for batches; None for all processors.
         cache: Whether compiled code is stored on disk.
 
+    Returns:
+        A `CompiledDynamics` or a `CompiledPlant`; both are instances of `Compiled`.
+
     Raises:
         QueryError: If `robot_or_plant` is neither, or an option is not allowed.
     """
-    if not isinstance(robot_or_plant, Plant):
-        return CompiledDynamics(robot_or_plant, dtype, threads, cache)
-    robot: Any = getattr(robot_or_plant.dynamics, "robot", robot_or_plant.dynamics)
-    return CompiledPlant(robot_or_plant, CompiledDynamics(robot, dtype, threads, cache))
+
+    @overload
+    def __new__(
+        cls, robot_or_plant: Robot, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
+    ) -> CompiledDynamics: ...
+    @overload
+    def __new__(
+        cls, robot_or_plant: Plant, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
+    ) -> CompiledPlant: ...
+    def __new__(
+        cls, robot_or_plant: Any, *, dtype: Any = "float64", threads: int | None = 1, cache: bool = True
+    ) -> Any:
+        if not isinstance(robot_or_plant, Plant):
+            return CompiledDynamics(robot_or_plant, dtype, threads, cache)
+        robot: Any = getattr(robot_or_plant.dynamics, "robot", robot_or_plant.dynamics)
+        return CompiledPlant(robot_or_plant, CompiledDynamics(robot, dtype, threads, cache))
+
+
+Compiled.register(CompiledDynamics)
+Compiled.register(CompiledPlant)

@@ -1,4 +1,4 @@
-"""What a user notices of a compile: a line on stderr after a second, and Ctrl-C, which waits until the compile ends."""
+"""What a user notices of a compile: a line on stderr while it lasts, and Ctrl-C, which waits until the compile ends."""
 
 from __future__ import annotations
 
@@ -9,25 +9,32 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Timer
 
-_AFTER_S = 1.0
+_IN_TERMINAL_S, _IN_NOTEBOOK_S = 1.0, 2.0  # what is kept in a notebook's output should be worth a line
 
 
 @contextmanager
 def announced(what: str) -> Iterator[None]:
-    """Print what a block or function does if it takes longer than a second and stderr is watched by a person."""
-    timer = Timer(_AFTER_S, lambda: print(f"robot_dyn: {what}", file=sys.stderr, flush=True))
+    """Print what a block does if it takes long where a person watches: 1 s in a terminal, 2 s in a notebook."""
+    after = _patience_s()
+    if after is None:
+        yield
+        return
+    timer = Timer(after, lambda: print(f"robot_dyn: {what}", file=sys.stderr, flush=True))
     timer.daemon = True
-    if _is_watched():
-        timer.start()
+    timer.start()
     try:
         yield
     finally:
         timer.cancel()
 
 
-def _is_watched() -> bool:
-    """Whether stderr is a terminal, or the output of a notebook's cell."""
-    return sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
+def _patience_s() -> float | None:
+    """Time after which a line is printed; None where stderr is neither a terminal nor the output of a notebook."""
+    if sys.stderr is None:
+        return None
+    if sys.stderr.isatty():
+        return _IN_TERMINAL_S
+    return _IN_NOTEBOOK_S if "ipykernel" in sys.modules else None
 
 
 @contextmanager

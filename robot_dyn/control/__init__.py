@@ -1,15 +1,16 @@
 """Torque from a reference and a measured state: each controller owns its model of the arm and never sees the plant.
 
-The public names are those of `__init__.pyi`, imported when first used.
+    each joint alone   PD, PID; gains_from: gains of a frequency and a damping ratio
+    with a model       ComputedTorque, PDGravity, FeedForward
+    of a frame         OperationalSpace; task_dynamics (TaskDynamics), orientation_error, rotation_vector
+    a function         ControlLaw: (t, q, v) as a controller
+    joint motions      quintic, via_points, hold (PiecewisePolynomial), Samples
+    motions of a frame line, circle (CartesianReference)
+    a real loop        Loop with delays and blocks: Quantisation, Differences, LowPass, RateLimit, Noise
+                       Multirate: two rates
+    to write one       Controller, Stateless, Block, Reference: base classes
 
-    controller                         base classes: `Controller`, `Stateless`; controllers inside others
-    independent_joint                  `PD`, `PID`
-    computed_torque                    controllers with a model: `ComputedTorque`, `PDGravity`, `FeedForward`
-    operational_space, orientation     control of a frame: `OperationalSpace`, `task_dynamics`
-    control_law                        a function (t, q, v) as a controller
-    reference, samples                 motions of joints: `quintic`, `via_points`, `hold`, `Samples`
-    cartesian                          motions of a frame: `line`, `circle`
-    digital_loop/                      what a real loop adds: delays, rounding, filters, noise, two rates
+docs/extending.md writes a controller step by step; robot_dyn/control/README.md lists its files.
 """
 
 from robot_dyn.public import public_names

@@ -64,6 +64,8 @@ class ComputedTorque(ModelBased):
     Source: Murray, Li, Sastry 1994, sec. 4.5.2; Siciliano et al. 2009, sec. 8.5.2.
     """
 
+    term = "M̂ (a_d + kd ė + kp e) + Ĉ v + N̂"
+
     kp: Any = field(metadata=coefficient("1/s²", symbol="kp", least=0))
     kd: Any = field(metadata=coefficient("1/s", symbol="kd", least=0))
 
@@ -79,6 +81,8 @@ class PDGravity(ModelBased):
     Source: Siciliano et al. 2009, sec. 8.5.1; Takegaki and Arimoto, 1981.
     """
 
+    term = "kp e + kd ė + N̂(q)"
+
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
         q_d, v_d, _ = self.reference.at(t)
         return self.kp * (q_d - q) + self.kd * (v_d - v) + self.model.N(q)
@@ -90,6 +94,8 @@ class FeedForward(ModelBased):
 
     Source: Siciliano et al. 2009, sec. 8.4.
     """
+
+    term = "M̂ a_d + Ĉ v_d + N̂ at the reference + kp e + kd ė"
 
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
         q_d, v_d, a_d = self.reference.at(t)

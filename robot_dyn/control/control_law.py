@@ -20,6 +20,8 @@ from robot_dyn.errors import ControlError
 class ControlLaw(Stateless):
     """A function (t, q, v) → τ as a continuous controller.
 
+    An arm inside a function cannot be traced: make it an attribute of a `Stateless` controller.
+
     Attributes:
         function: Returns the torque of each joint, shape (n,), in [N m] or [N].
         joints: n.
@@ -43,6 +45,10 @@ class ControlLaw(Stateless):
     @property
     def name(self) -> str:
         return getattr(self.function, "__name__", type(self.function).__name__)
+
+    @property
+    def term(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"{self.name}(t, q, v)"
 
     @property
     def n(self) -> int:

@@ -40,7 +40,12 @@ class Nested(NamedTuple):
 class Controller(Value, ABC):
     """A control law τ = τ(t, q, v, z) with controller states, ż = rate(t, q, v, z), z(0) = 0.
 
-    Subclass `Stateless` if it has no states. Its methods are pure functions, called with
+    Subclass `Stateless` if it has no states. Otherwise define
+
+        def torque(self, t, q, v, z): ...              # (n,), in [N m] or [N]
+        def state_rate(self, t, q, v, z): ...          # ż, (state_size,), in the unit of z per second
+
+    and the properties `n` and `state_size`. The methods are pure functions, called with
 
         t: time, a number, in [s]
         q: position, (n,), in [rad] or [m] by joint
@@ -52,9 +57,11 @@ class Controller(Value, ABC):
     coefficients that are declared (`robot_dyn.coefficients`) are checked on construction, and may be swept.
 
     Attributes:
+        term: The law u = … in short form, for `explain`.
         period_s: Time between samples in [s], with the torque constant between them; 0 for continuous control.
     """
 
+    term: ClassVar[str] = ""
     outermost: ClassVar[bool] = False  # whether it may not be part of another controller
     period_s: float = 0.0
 
@@ -196,7 +203,27 @@ class Controller(Value, ABC):
 
 
 class Stateless(Controller):
-    """A controller without states: τ = τ(t, q, v); z is empty. Contract as of `Controller`."""
+    """A controller without states: τ = τ(t, q, v); z is empty.
+
+    To write one, define
+
+        def torque(self, t, q, v, z): ...              # (n,), in [N m] or [N]
+        def thresholds(self): ...                      # () if it is smooth everywhere
+
+    and the property `n`, the number of joints. Contract: see `Controller`. A gain that is declared can be swept:
+
+        @dataclass(frozen=True)
+        class Damped(rd.control.Stateless):
+            arm: rd.Robot
+            damping: float = field(metadata=rd.effects.coefficient("N m s/rad", least=0))
+            n = property(lambda self: self.arm.n)
+
+            def torque(self, t, q, v, z):
+                return self.arm.N(q) - self.damping * v
+
+            def thresholds(self):
+                return ()
+    """
 
     @property
     def state_size(self) -> int:
@@ -223,7 +250,9 @@ def check_joints(part: Any, n: int, where: str = "") -> None:
 def check_sampled(name: str, controller: Any) -> None:
     """Raise a ControlError unless it is a sampled controller that may be nested."""
     if not isinstance(controller, Controller):
-        raise ControlError(f"{name} must be a controller, such as rd.PD(…, period_s=1e-3), got {shown(controller)}")
+        raise ControlError(
+            f"{name} must be a controller, such as rd.control.PD(…, period_s=1e-3), got {shown(controller)}"
+        )
     if controller.outermost:
         raise ControlError(
             f"{name} must not be a {type(controller).__name__}: give the controller in it, and put the loop around all"

@@ -40,6 +40,7 @@ class PD(Stateless):
     kd: Any = field(metadata=DAMPING)
     period_s: float = 0.0
 
+    term = "kp (q_d − q) + kd (v_d − v)"
     thresholds = smooth
 
     @property
@@ -74,6 +75,8 @@ class PID(Controller):
 
     Source: Åström and Hägglund, PID Controllers, 1995, sec. 3.5 (back-calculation).
     """
+
+    term = "sat(kp e + kd ė + z),  ż = ki e + (sat(u) − u)/T_t"
 
     reference: PiecewisePolynomial
     kp: Any = field(metadata=STIFFNESS)

@@ -6,12 +6,15 @@ Automation 3(1), A unified approach for motion and force control of robot manipu
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from math import nan
 from operator import index
 from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.answer import Answer, Block, Table
 from robot_dyn.arithmetic import Array, apply, symmetric, transpose
 from robot_dyn.coefficients import coefficient
 from robot_dyn.control.cartesian import CartesianReference
@@ -28,8 +31,8 @@ POSITION, POSE = (0, 1, 2), (0, 1, 2, 3, 4, 5)  # rows of a twist
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class TaskDynamics(Value):
+@dataclass(frozen=True, eq=False, repr=False)
+class TaskDynamics(Answer, Value):
     """The terms of Λ ẍ + μ + p = F at one state, or at several along batch axes.
 
     Attributes:
@@ -58,6 +61,16 @@ class TaskDynamics(Value):
         """1 − Jᵀ J̄ᵀ, the projector onto torques that do not accelerate the task, shape (..., n, n)."""
         J = self.J
         return np.eye(J.shape[-1], dtype=J.dtype) - transpose(J) @ transpose(self.J_bar)
+
+    def blocks(self) -> Iterator[Block]:
+        *batch, m, n = self.J.shape
+        states = f" at {'×'.join(map(str, batch))} states" if batch else ""
+        yield f"Λ ẍ + μ + p = F of a task of {m} rows, {n} joints{states}"
+        least = float(np.min(self.smallest)) if np.size(self.smallest) else nan
+        yield f"smallest eigenvalue of J M⁻¹ Jᵀ: {least:.4g} [1/kg or 1/(kg m²)]"
+        if not batch:
+            rows = np.column_stack([np.arange(1, m + 1), self.Lambda, self.mu, self.p, self.drift]).astype(float)
+            yield Table(("row", *(f"Λ {k}" for k in range(1, m + 1)), "μ", "p", "J̇ v"), tuple(map(tuple, rows)), 4)
 
 
 def task_dynamics(
@@ -150,6 +163,7 @@ class OperationalSpace(Stateless):
     threshold: Any = field(default=0.01, metadata=coefficient("1/kg", shapes=((),), above=0))
     period_s: float = 0.0
 
+    term = "Jᵀ (Λ (ẍ_d + kd ė + kp e) + μ + p) + null-space posture"
     thresholds = smooth
 
     def __post_init__(self) -> None:

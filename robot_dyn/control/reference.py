@@ -64,6 +64,11 @@ class PiecewisePolynomial(Reference):
         object.__setattr__(self, "coefficients", table)
         object.__setattr__(self, "breaks", increasing("breaks", self.breaks, len(table) + 1))
 
+    def __repr__(self) -> str:
+        pieces, terms, n = self.coefficients.shape
+        kind = f"{pieces} polynomial{'s' * (pieces != 1)} of degree {terms - 1}"
+        return f"<{type(self).__name__}: {n} joint{'s' * (n != 1)}, {kind}, {self.start:g} to {self.end:g} s>"
+
     @property
     def n(self) -> int:
         """Number of joints or coordinates."""
@@ -196,7 +201,7 @@ def via_points(
     if len(points) < 2:
         raise ControlError(f"points must be 2 at least, got {len(points)}; to rest at one, hold(q)")
     if len(points) > _MOST_POINTS:
-        raise ControlError(f"points must be {_MOST_POINTS} at most, got {len(points)}; rd.Samples takes more")
+        raise ControlError(f"points must be {_MOST_POINTS} at most, got {len(points)}; rd.control.Samples takes more")
     t = increasing("times_s", times_s, len(points))
     unit = (t[-1] - t[0]) / (len(t) - 1)  # time unit: derivatives of similar size keep the solve well conditioned
     shape = points.shape[1:]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.answer import Answer, Block, Table
+from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.lagrange.scale import floored, scaled
+from robot_dyn.queries.units import numbers_row
 from robot_dyn.result import UNREPORTED, reported
 
 
@@ -32,7 +35,7 @@ class Agreement:
     entry: str
     pinocchio: float
     own: float
-    state: dict[str, list[float]] = field(hash=False)
+    state: dict[str, list[float]] = field(hash=False, repr=False)
 
     @reported
     def ok(self) -> bool:
@@ -46,8 +49,8 @@ class Agreement:
 
 
 @final
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Answer):
     """The outcome of `compare`.
 
     Attributes:
@@ -78,6 +81,34 @@ class Comparison:
     def worst(self) -> Agreement:
         """The quantity with the largest share of its tolerance."""
         return max(self.agreements, key=lambda agreement: agreement.share)
+
+    def blocks(self) -> Iterator[Block]:
+        agreed = f"{sum(each.ok for each in self.agreements)} of {len(self.agreements)} quantities agree"
+        yield f"{self.robot}: Pinocchio and the own Lagrangian at {self.samples} random states: {agreed}"
+        headings = ("quantity", "worst error", "allowed", "where", "Pinocchio", "own")
+        yield Table(headings, tuple(map(_row, self.agreements)), right=(*headings[1:3], *headings[4:]))
+        yield from self.notes
+        worst = self.worst
+        yield f"worst: {worst.quantity}, {worst.error:.2e} of {worst.tolerance:.1e} allowed, at {worst.entry}"
+        if not self.ok:
+            yield from (f"  {name} = {numbers_row(values)}" for name, values in worst.state.items())
+
+    @property
+    def drawing(self) -> str:
+        from robot_dyn.display import levels
+
+        shares = {each.quantity: each.share for each in self.agreements}
+        return levels("worst error / allowed; exact agreement is left out", shares, 1.0)
+
+
+def _row(x: Agreement) -> tuple[str, ...]:
+    numbers = (f"{each:.16g}" if abs(each) < float(UNBOUNDED) else "none" for each in (x.pinocchio, x.own))
+    return x.quantity, marked(x.ok, x.error), f"{x.tolerance:.1e}", x.entry, *numbers
+
+
+def marked(ok: bool, error: float) -> str:
+    """An error, and whether it is too large."""
+    return f"{error:.1e}" if ok else f"{error:.1e}  DISAGREE"
 
 
 @final

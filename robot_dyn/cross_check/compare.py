@@ -50,7 +50,7 @@ def compare(
     Raises:
         QueryError: If samples is not positive.
     """
-    instance("robot", robot, Robot, "give one of rd.load")
+    instance("robot", robot, Robot, "give one, such as rd.load('ur5')")
     samples, seed = integer("samples", samples, least=1, most=10**6), integer("seed", seed, most=2**128 - 1)
     function("on_sample", on_sample, "no argument")
     tolerance = number("tolerance", tolerance, above=0)

@@ -55,13 +55,15 @@ def second_reading(description: Description, tolerance: float) -> tuple[list[Pai
 def _by_yourdfpy(text: bytes) -> Any:
     from yourdfpy import URDF  # heavy: imports trimesh
 
-    etree.fromstring(text)  # raises where yourdfpy would continue with what the parser can recover
+    root = etree.fromstring(text)  # raises where yourdfpy would continue with what the parser can recover
+    if None in root.nsmap:
+        raise ValueError("it takes no element of a default namespace")
     return URDF.load(BytesIO(text), build_scene_graph=False, load_meshes=False).robot
 
 
 def _elements_stated(robot: Any) -> Iterator[str]:
     """Links, including a root named only by joints, and joints with their kind and links, as read by yourdfpy."""
-    names = {link.name for link in robot.links} | {joint.parent for joint in robot.joints}
+    names = {link.name for link in _connected(robot)} | {joint.parent for joint in robot.joints}
     yield from (f"link {name.strip()!r}" for name in names)
     for joint in robot.joints:
         source = joint.mimic.joint.strip() if joint.mimic and joint.type != "fixed" else None
@@ -82,7 +84,7 @@ def _joint(name: str, kind: str, parent: str, child: str, source: str | None) ->
 
 def _stated(robot: Any) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
     """The numbers of the file as read by yourdfpy, or the format's defaults where the file states none."""
-    for link in robot.links:
+    for link in _connected(robot):
         where, inertial = f"link {link.name.strip()!r}", link.inertial
         if inertial is not None:
             yield ("file: origin", where), _or_identity(inertial.origin)
@@ -100,6 +102,12 @@ def _stated(robot: Any) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
             yield ("file: friction", where), np.array([float(term or 0) for term in terms])
         if joint.mimic is not None:
             yield ("file: mimic", where), np.array([joint.mimic.multiplier, joint.mimic.offset])
+
+
+def _connected(robot: Any) -> list[Any]:
+    """The links that joints connect, all of them without joints: a link beside the arm is left out, with a finding."""
+    named = {name for joint in robot.joints for name in (joint.parent, joint.child)}
+    return [link for link in robot.links if not named or link.name in named]
 
 
 def _or_identity(origin: np.ndarray | None) -> np.ndarray:

@@ -62,6 +62,22 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
     raise CatalogError(f"no robot {shorten(text)!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
 
 
+def abbreviated(path: str | Path) -> str:
+    """A path as answers print it.
+
+    Files of example-robot-data stand without the folder of their installation, those below the working directory
+    relative to it.
+    """
+    text = Path(path).as_posix()
+    _, package, inside = text.partition("/example-robot-data/robots/")
+    if package:
+        return package[1:] + inside
+    try:
+        return Path(path).absolute().relative_to(Path.cwd()).as_posix()
+    except (OSError, ValueError):
+        return text
+
+
 def resolve(address: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:
     """The file of a package://package/path address that stands in `urdf`.
 

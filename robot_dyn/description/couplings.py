@@ -90,7 +90,7 @@ class Couplings(Value):
         if self._rounded.size and full.dtype.kind == "f" and self._hidden(full):
             raise OverflowedError(
                 "q is so large that rounding hides where the joints that follow others are, to"
-                f" {LEAST_EXACT:g} rad or m; take a smaller q, or rd.Lagrangian(robot, rd.Ball(bits))"
+                f" {LEAST_EXACT:g} rad or m; take a smaller q, or rd.Lagrangian(robot, rd.studies.Ball(bits))"
             )
         return full
 

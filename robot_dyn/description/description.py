@@ -51,6 +51,12 @@ class Description:
         return parse(self.xml, self.source)[0]
 
     @cached_property
+    def estimated(self) -> dict[str, str]:
+        """What the inertials that nobody measured were made from, by link: the mark that `load` and `check` write."""
+        marked = ((link.get("name"), link.find("inertial[@estimated]")) for link in self.element.iterfind("link"))
+        return {name: inertial.get("estimated") for name, inertial in marked if inertial is not None}
+
+    @cached_property
     def joint_kinds(self) -> dict[str, str]:
         """Type by joint: "revolute", "continuous", "prismatic" or "fixed"."""
         return {joint.get("name"): joint.get("type") for joint in self.element.iterfind("joint")}

@@ -12,6 +12,7 @@ import numpy as np
 from robot_dyn.description.inertia import implausibility
 from robot_dyn.description.urdf import LARGEST
 from robot_dyn.errors import EditError, nearest, shown
+from robot_dyn.signatures import takes, unchanged
 from robot_dyn.validate import instance, numbers
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s²], CGPM 1901
@@ -57,6 +58,10 @@ class Changes(TypedDict, total=False):
     mass_scale: float
     masses: Mapping[str, float]
     inertias: Mapping[str, Any]
+
+
+takes_changes = takes(unchanged(Changes.__annotations__))
+"""A decorator: the signature names what can be changed, in place of `**changes`."""
 
 
 @final

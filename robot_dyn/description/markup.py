@@ -1,7 +1,7 @@
 """The XML of a robot description, read without entities, DTD, network, mended structure or unbounded nesting.
 
-Three departures from XML that the world's files show are taken, each with a finding that says how: a declaration that
-does not stand first, one of a version that does not exist, and prefixes that are not declared.
+Four departures that the world's files show are taken, each with a finding that says how: a declaration that does not
+stand first, one of a version that does not exist, prefixes that are not declared, and a default namespace.
 """
 
 from __future__ import annotations
@@ -31,10 +31,11 @@ def parse(text: bytes, source: str, comments: bool = False) -> tuple[etree._Elem
     text, findings = _declared_first(text)
     root, errors = _fed(text, source, False, comments)
     if root is not None:
-        return root, findings
+        return root, (*findings, *_without_namespace(root))
     root, _ = _fed(text, source, True, comments)  # which passes over these errors alone: there are no others
     prefixes = dict.fromkeys(match[1] for error in errors if (match := _PREFIX.search(error.message)))
     prefixes.pop("xacro", None)  # reported where the robot is read
+    findings = (*findings, *_without_namespace(root))
     if not prefixes:
         return root, findings
     listed = ", ".join(shorten(prefix, 40) for prefix in [*prefixes][:5])
@@ -42,6 +43,20 @@ def parse(text: bytes, source: str, comments: bool = False) -> tuple[etree._Elem
         *findings,
         f"line {errors[0].line}: uses prefixes that are not declared ({listed}); what has one of them is left"
         ' out; declare each: <robot xmlns:PREFIX="…">',
+    )
+
+
+def _without_namespace(root: etree._Element) -> tuple[str, ...]:
+    """Take the elements of a robot out of its default namespace."""
+    namespace = root.nsmap.get(None)
+    prefix = f"{{{namespace}}}"
+    if not namespace or root.tag != f"{prefix}robot":
+        return ()
+    for element in root.iter(f"{prefix}*"):
+        element.tag = element.tag.removeprefix(prefix)
+    return (
+        f'line {root.sourceline}: <robot> declares the default namespace "{shorten(namespace)}"; its elements are read'
+        " without it; remove xmlns=…",
     )
 
 

@@ -16,6 +16,8 @@ from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_FAR = 10.0  # times the longest distance between joints
+_GIMBAL = 0.01  # [m], below which that distance does not tell the size of a robot
 Triple = tuple[float, ...]
 
 
@@ -104,6 +106,21 @@ class Structure:
         for name in self.joints.keys() - set(self.moving):
             below[self.joints[name].parent].append(self.joints[name].child)
         return below
+
+    @cached_property
+    def longest_link(self) -> float:
+        """The longest distance between the origins of neighbouring joints, in [m]."""
+        return max((float(np.linalg.norm(joint.xyz)) for joint in self.joints.values()), default=0.0)
+
+    def radius_beyond_reach(self, mass: float, inertia: np.ndarray) -> float | None:
+        """√(½ tr I / m), the least distance at which some of a mass is, if it is beyond 10 times `longest_link`.
+
+        None below 1 cm of that length: of a gimbal, whose axes all but meet, it does not tell the size.
+        """
+        reach = _FAR * self.longest_link
+        half = float(np.trace(inertia)) / 2
+        far = self.longest_link >= _GIMBAL and mass > 0 and half > mass * reach**2
+        return (half / mass) ** 0.5 if far else None
 
     def _body(self, first: str) -> tuple[str, ...]:
         links = [first]

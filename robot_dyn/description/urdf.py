@@ -24,7 +24,13 @@ _MAX_NAME, _MAX_LITERAL = 256, 64
 _XACRO = re.compile(r"(\{[^}]*xacro[^}]*\}|xacro:)")
 _EXPRESSION = re.compile(r"\$[{(]")
 EXPAND = "expand the file: xacro={} of load, --xacro on the command line, or xacro robot.xacro > robot.urdf"
+_OTHER_FORMATS = {
+    "sdf": "it is SDF, not URDF; no converter to URDF is known that keeps the inertias: export a URDF from the program"
+    " that wrote it",
+    "mujoco": "it is MJCF, not URDF; load reads MJCF from a file that ends with .xml",
+}
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_PRODUCTS = ("ixy", "ixz", "iyz")
 
 
 def checked_robot(robot: etree._Element, source: str) -> tuple[etree._Element, tuple[str, ...]]:
@@ -35,9 +41,7 @@ def checked_robot(robot: etree._Element, source: str) -> tuple[etree._Element, t
     """
     check = _Check(source)
     if robot.tag != "robot":
-        check.refuse(
-            f"line {robot.sourceline}", f"it begins with <{shorten(robot.tag)}>, not <robot>; give a URDF file"
-        )
+        check.refuse(f"line {robot.sourceline}", other_format(robot.tag))
     check.no_macros(robot)
     out = etree.Element("robot", name=check.name(robot, "robot"))
     for tag, most in (("joint", MAX_JOINTS), ("link", MAX_JOINTS + 1)):
@@ -52,9 +56,15 @@ def checked_robot(robot: etree._Element, source: str) -> tuple[etree._Element, t
     joints = [check.joint(joint, out, names) for joint in robot.iterfind("joint")]
     check.distinct("joint", joints)
     links += check.implicit_root(links, out)
+    links = check.connected(links, out)
     connections.one_tree(links, out, check.refuse)
     connections.mimics(out, check.refuse)
     return out, tuple(check.findings)
+
+
+def other_format(tag: str) -> str:
+    """Why a file that begins with this element is refused, and what to do."""
+    return _OTHER_FORMATS.get(tag, f"it begins with <{shorten(tag)}>, not <robot>; give a URDF file")
 
 
 def _texts(element: etree._Element) -> tuple[str, ...]:
@@ -87,6 +97,19 @@ class _Check:
         self.findings.append(
             f"line {left[0].sourceline}: {elements} left out with all that they would add to the robot; {EXPAND}"
         )
+
+    def connected(self, links: list[str], robot: etree._Element) -> list[str]:
+        """The links that a joint connects to others; the rest is left out of the robot, unless there is no joint."""
+        ends = {end.get("link") for role in ("parent", "child") for end in robot.iterfind(f"joint/{role}")}
+        free = [link for link in links if ends and link not in ends]
+        for link in robot.findall("link") if free else ():
+            if link.get("name") not in ends:
+                robot.remove(link)
+        self.findings += [
+            f"link {name!r}: no joint connects it to the robot; it is left out; connect it by a joint, or remove it"
+            for name in free
+        ]
+        return [link for link in links if link not in free]
 
     def implicit_root(self, links: list[str], robot: etree._Element) -> list[str]:
         """The link that joints name as their parent and the file does not define, where it can only be the root."""
@@ -121,6 +144,13 @@ class _Check:
         found = parent.findall(tag)
         if len(found) > 1:
             self.refuse(where, f"has {len(found)} <{tag}> elements; keep one")
+        return found[0] if found else None
+
+    def first(self, parent: etree._Element, tag: str, where: str) -> etree._Element | None:
+        """The first child of that tag, as urdfdom takes it, or None."""
+        found = parent.findall(tag)
+        if len(found) > 1:
+            self.findings.append(f"{where}: has {len(found)} <{tag}> elements; the first is taken; keep one")
         return found[0] if found else None
 
     def number(
@@ -172,16 +202,30 @@ class _Check:
         name = self.name(link, "link")
         where = f"link {name!r}"
         out = etree.SubElement(robot, "link", name=name)
-        inertial = self.one(link, "inertial", where)
+        inertial = self.first(link, "inertial", where)
         if inertial is not None:
-            mass, inertia = self.one(inertial, "mass", where), self.one(inertial, "inertia", where)
-            if mass is None or inertia is None:
-                self.refuse(where, "<inertial> needs both <mass> and <inertia>; add the one that is missing")
+            mass = self.one(inertial, "mass", where)
+            if mass is None:
+                self.refuse(where, "<inertial> has no <mass>; add it")
             copy = etree.SubElement(out, "inertial")
+            if (basis := inertial.get("estimated")) is not None:  # the mark of robot_dyn.shapes.estimate
+                copy.set("estimated", shorten(basis, 200))
             self.origin(inertial, copy, where)
             etree.SubElement(copy, "mass", value=self.number(mass, "value", where, minimum=0.0))
-            etree.SubElement(copy, "inertia", {key: self.number(inertia, key, where) for key in _MOMENTS})
+            etree.SubElement(copy, "inertia", self.moments(inertial, where))
         return name
+
+    def moments(self, inertial: etree._Element, where: str) -> dict[str, str]:
+        """The six moments; 0 for products of inertia that are not stated, or for all without an <inertia>."""
+        inertia = self.one(inertial, "inertia", where)
+        if inertia is None:
+            self.findings.append(f"{where}: <inertial> has a mass and no <inertia>; its moments are taken as 0; add it")
+            return dict.fromkeys(_MOMENTS, "0")
+        if left_out := [key for key in _PRODUCTS if inertia.get(key) is None]:
+            self.findings.append(
+                f"{where}: <inertia> has no {', '.join(left_out)}; taken as 0; write each, since urdfdom refuses that"
+            )
+        return {key: self.number(inertia, key, where, "0" if key in _PRODUCTS else None) for key in _MOMENTS}
 
     def joint(self, joint: etree._Element, robot: etree._Element, links: frozenset[str]) -> str:
         name = self.name(joint, "joint")
@@ -226,7 +270,7 @@ class _Check:
 
     def limit(self, joint: etree._Element, out: etree._Element, where: str) -> None:
         """Limits as stated; where none is stated, `UNBOUNDED`, since urdfdom insists on all four."""
-        limit = self.one(joint, "limit", where)
+        limit = self.first(joint, "limit", where)
         unbounded = {"lower": "-" + UNBOUNDED, "upper": UNBOUNDED}
         bounds = unbounded | {"effort": UNBOUNDED, "velocity": UNBOUNDED}
         if limit is not None:

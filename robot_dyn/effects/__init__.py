@@ -1,15 +1,15 @@
-"""What acts on the joints besides actuation: one effect a file, each a torque or a bound, summed by a `Plant`.
+"""What acts on the joints besides actuation: effects, each a torque or a bound, summed by a `Plant`.
 
-The public names are those of `__init__.pyi`, imported when first used.
+    friction           ViscousFriction, RegularisedCoulombFriction, DryFriction, LuGreFriction, DahlFriction
+    stops and springs  joint_stops (JointStopSpring, JointStopDamper), RigidStops, Spring
+                       LineSpringDamper (LineSpring, LineDamper): between two points
+    drives             EffortLimit, ActuatorLag, SeriesElastic, RigidBacklash
+    loads              ExternalWrench, CarriedPayload
+    to write one       Conservative, Dissipative, Active, Bound, Stateful, Drive, SetValued: base classes of Effect
+                       coefficient, Threshold: what an effect declares; Dynamics: what it is called with
+    about them         Plant, EquationOfMotion, Force, Hold, Interval, Mode
 
-    effect               base classes: `Conservative`, `Dissipative`, `Active`, `Bound`, `Stateful`, `Drive`
-    set_valued, settling base class of effects that hold joints at rest, and the problem that decides which ones
-    plant                `Plant`: a robot and its effects; its queries check their arguments
-    equation_of_motion   M a + C v + N = Υ with effects, of arguments that are not checked
-    hold                 how firmly a joint at rest is held
-    geared_motor         what joints driven by motors behind gears share
-
-Every other file is one effect, or a pair of them.
+docs/extending.md writes an effect step by step; robot_dyn/effects/README.md lists its files.
 """
 
 from robot_dyn.public import public_names

@@ -10,6 +10,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import count
 from math import inf
 from typing import Any, ClassVar
 
@@ -110,7 +111,15 @@ class Force(Effect, ABC):
 
 
 class Conservative(Force):
-    """An effect with a potential E(t, q), counted in the energy ledger: torque = −∂E/∂q. Contract: see `Effect`."""
+    """An effect with a potential E(t, q), counted in the energy ledger: torque = −∂E/∂q.
+
+    To write one, define
+
+        def torque(self, dynamics, t, q, v): ...       # −∂E/∂q, (..., n), in [N m] or [N]
+        def potential(self, dynamics, t, q): ...       # E(t, q), (...), in [J]
+
+    and `thresholds`, which returns () if it is smooth everywhere. Contract: see `Effect`.
+    """
 
     @abstractmethod
     def potential(self, dynamics: Dynamics, t: float, q: Array) -> Array:
@@ -118,15 +127,36 @@ class Conservative(Force):
 
 
 class Dissipative(Force):
-    """An effect that never adds energy: torqueᵀ v ≤ 0 at all t, q, v. For the contract, see `Effect`."""
+    """An effect that never adds energy: torqueᵀ v ≤ 0 at all t, q, v.
+
+    To write one, define
+
+        def torque(self, dynamics, t, q, v): ...       # (..., n), in [N m] or [N]
+        def thresholds(self, n): ...                   # () if it is smooth everywhere
+
+    Contract: see `Effect`.
+    """
 
 
 class Active(Force):
-    """An effect whose power torqueᵀ v may have either sign. For the contract, see `Effect`."""
+    """An effect whose power torqueᵀ v may have either sign.
+
+    To write one, define
+
+        def torque(self, dynamics, t, q, v): ...       # (..., n), in [N m] or [N]
+        def thresholds(self, n): ...                   # () if it is smooth everywhere
+
+    Contract: see `Effect`.
+    """
 
 
 class Stateful(Effect, ABC):
     """An effect with states z, ż = rate(t, q, v, u, z), which are integrated with the plant.
+
+    To write one, define
+
+        def state_size(self, n): ...                           # number of states on an arm with n joints
+        def state_rate(self, dynamics, t, q, v, u, z): ...     # ż, (state_size,), in the unit of z per second
 
     A subclass also derives from another kind. A stateful force defines torque(dynamics, t, q, v, z), a stateful bound
     actuation(u, z). A dissipative effect satisfies torqueᵀ v + dE/dt ≤ 0, where E is the energy stored in its states.
@@ -190,7 +220,15 @@ class Drive(Stateful, Force, ABC):
 
 
 class Bound(Effect, ABC):
-    """An effect that bounds the actuation, applied in the order of the plant's effects. Contract: see `Effect`."""
+    """An effect that bounds the actuation, applied in the order of the plant's effects.
+
+    To write one, define
+
+        def actuation(self, u): ...                    # the bounded actuation for u, (..., n), in [N m] or [N]
+        def thresholds(self, n): ...                   # () if it is smooth everywhere
+
+    Contract: see `Effect`.
+    """
 
     @abstractmethod
     def actuation(self, u: Array) -> Array:
@@ -240,3 +278,12 @@ def check_frame(effect: Effect, dynamics: Any, frame: str) -> None:
         dynamics.placement(np.zeros(dynamics.n), frame)
     except QueryError as error:
         raise EffectError(f"{effect.name}: {error}") from None
+
+
+def numbered(*names: str) -> tuple[str, ...]:
+    """Names, each of them once: a second part of a name gets a number, "spring" and "spring 2"."""
+    made: list[str] = []
+    for name in names:
+        others = (f"{name} {k}" for k in count(2))
+        made.append(name if name not in made else next(each for each in others if each not in {*made, *names}))
+    return tuple(made)

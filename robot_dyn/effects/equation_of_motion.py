@@ -1,6 +1,6 @@
-"""The equation of motion, M(q) a + C(q, v) v + N(t, q, v) = Υ, with N = ∂V/∂q − Σ τ_effect.
+"""The equation of motion, M(q) a + C(q, v) v + N(t, q, v) = τ, with N = ∂V/∂q − Σ τ_effect.
 
-    a = M⁻¹ (Υ + Σ τ_effect − C v − ∂V/∂q),    ṗ = Υ + Σ τ_effect + Cᵀ v − ∂V/∂q  with p = M v
+    a = M⁻¹ (τ + Σ τ_effect − C v − ∂V/∂q),    ṗ = τ + Σ τ_effect + Cᵀ v − ∂V/∂q  with p = M v
 
 Arguments are not checked, and may be floats, balls or symbols. [Murray, Li, Sastry 1994, eq. 4.24]
 """
@@ -193,7 +193,7 @@ class EquationOfMotion:
         return self.dynamics.inverse_dynamics(q, v, a) - torque
 
     def acceleration(self, q: Array, v: Array, total: Array) -> Array:
-        """The acceleration under the total torque Υ + Σ τ_effect."""
+        """The acceleration under the total torque τ + Σ τ_effect."""
         if not self.set_valued:
             return self.dynamics.forward_dynamics(q, v, total)
         return self.with_reaction(q, v, total)[0]

@@ -1,6 +1,6 @@
 """How firmly dry friction and rigid stops hold a joint at rest: its load, and the loads at which it breaks away.
 
-    M a + C v + ∂V/∂q = u + Σ τ_effect + λ,    load = −λ
+    M a + C v + ∂V/∂q = τ + Σ τ_effect + λ,    load = −λ
 
 λ solves one convex problem for all joints, so the load of each joint depends on the state of all.
 """
@@ -47,7 +47,7 @@ def held(equation: EquationOfMotion, q: np.ndarray, v: np.ndarray, total: np.nda
         equation: Equation of motion whose effects have no mode.
         q: Position, (n,).
         v: Velocity, (n,).
-        total: Υ + Σ τ_effect, (n,).
+        total: τ + Σ τ_effect, (n,).
     """
     if not equation.set_valued:
         return ()

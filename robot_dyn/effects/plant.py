@@ -15,6 +15,7 @@ from robot_dyn.coefficients import with_values
 from robot_dyn.effects.carried_payload import CarriedPayload, robot_with
 from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
+from robot_dyn.effects.explanation import explanation
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.hold import Hold, held
 from robot_dyn.effects.set_valued import Mode, SetValued
@@ -47,7 +48,9 @@ class Plant:
                 raise EffectError(f"effects={shown(effects)}; give effects, or 'urdf' for those the file states")
             effects = stated_friction(dynamics)
         if not isinstance(effects, Iterable):
-            raise EffectError(f"effects must be several, such as [rd.ViscousFriction(0.1)], got {shown(effects)}")
+            raise EffectError(
+                f"effects must be several, such as [rd.effects.ViscousFriction(0.1)], got {shown(effects)}"
+            )
         parts = [part for effect in effects for part in (effect.parts if isinstance(effect, Effect) else (effect,))]
         for part in parts:
             if not isinstance(part, Force | Bound | CarriedPayload):
@@ -58,6 +61,12 @@ class Plant:
             if isinstance(part, Conservative) and isinstance(part, Stateful):
                 raise EffectError(f"{part.name} is Conservative and has states; its energy is their stored_energy")
         object.__setattr__(self, "effects", tuple(part.on(dynamics) for part in parts))
+
+    def __repr__(self) -> str:
+        return f"<Plant: {explanation(self)}>"
+
+    def _repr_html_(self) -> str:
+        return explanation(self)._repr_html_()
 
     @cached_property
     def equation_of_motion(self) -> EquationOfMotion:
@@ -134,7 +143,7 @@ class Plant:
             return self._finite(sum(self.equation_of_motion.torques(t, q, v, zeros.shape), start=zeros))
 
     def inverse_dynamics(self, t: float, q: Array, v: Array, a: Array) -> Array:
-        """Actuation Υ = M a + C v + N that gives the acceleration a, (..., n)."""
+        """Actuation τ = M a + C v + N that gives the acceleration a, (..., n)."""
         return self._finite(self.at(t).equation_of_motion.inverse_dynamics(q, v, a, self.torque(t, q, v)))
 
     def forward_dynamics(self, t: float, q: Array, v: Array, u: Array) -> Array:

@@ -1,14 +1,15 @@
 """Methods for y' = f(t, y), one family a file; they know no robot. `method("rk4")` finds one by name.
 
-The public names are those of `__init__.pyi`, imported when first used.
+    by name            method; `integrator="rk4"` of `rd.simulate` takes the same names
+    chosen steps       Adaptive: DOP853, Radau and others, within a tolerance
+    fixed steps        ExplicitRungeKutta, SemiImplicitEuler, Gauss
+    stiff, fixed steps LinearlyImplicitEuler, SinglyDiagonallyImplicit, Rosenbrock
+    with impacts       TimeStepping
+    to write one       ButcherTableau, RosenbrockTable, Surd: coefficients as data
+                       Integrator, PlainMethod: base classes; Stepper, System, RightSide
+    what they return   Solution, Status; IntegrationError
 
-    integrator                     base classes: `Integrator`, `PlainMethod`; the equation, `System`
-    methods                        the list of methods by name
-    explicit, gauss, implicit, rosenbrock, time_stepping    the families with fixed steps
-    adaptive, dop853, step_control, controlled_steps        methods that choose their steps
-    tableau, rosenbrock_table      coefficients as data
-    primitives, fixed_point, differences                    what steps are made of
-    hermite, bernstein             dense output, and where it passes a level
+docs/extending.md adds a method step by step; robot_dyn/integrate/README.md lists its files.
 """
 
 from robot_dyn.public import public_names

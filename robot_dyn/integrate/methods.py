@@ -65,6 +65,6 @@ def as_method(given: Any) -> Integrator | Adaptive:
         return method(given)
     if not isinstance(given, Integrator | Adaptive):
         raise QueryError(
-            f"integrator: give a name, such as 'rk4' or 'DOP853', or an rd.Adaptive(…), got {shown(given)}"
+            f"integrator: give a name, such as 'rk4' or 'DOP853', or an rd.integrate.Adaptive(…), got {shown(given)}"
         )
     return given

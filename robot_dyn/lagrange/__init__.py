@@ -1,4 +1,4 @@
-"""The library's own implementation: M(q) a + C(q, v) v + N = Υ out of K − V, in any arithmetic.
+"""The library's own implementation: M(q) a + C(q, v) v + N = τ out of K − V, in any arithmetic.
 
 tree, linkage: joints and links in literals, then in numbers · lagrangian: `Lagrangian`, the closed form
 summand, christoffel, breakdown: what one body or link adds · recursions: the O(n) algorithms

@@ -86,7 +86,7 @@ def doubt(robot: Robot, quantity: str, state: Sequence[Any], answer: Any, least:
     has = "has" if counts else "is only certain to have"
     return (
         f"{quantity} of {robot.name} {has} {held:.1f} digits{where}, fewer than {least:g}; use"
-        " rd.Lagrangian(robot, np.longdouble), or rd.Ball(bits) for digits that are proven"
+        " rd.Lagrangian(robot, np.longdouble), or rd.studies.Ball(bits) for digits that are proven"
     )
 
 

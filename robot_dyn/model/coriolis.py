@@ -13,7 +13,7 @@ of the world; it is taken where a bound of its rounding is small (`regrouped`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
@@ -42,8 +42,8 @@ class Coriolis:
         rounding: The bound ε of |δC_ij| ≤ ε Ω √(M_ii M_jj), see `regrouped`.
     """
 
-    bodies: Bodies
-    regrouped: Any
+    bodies: Bodies = field(repr=False)
+    regrouped: Any = field(repr=False)
     slides: tuple[tuple[int, float], ...]
     rounding: float
 

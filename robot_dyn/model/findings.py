@@ -30,14 +30,23 @@ _LISTED = 6  # names in a finding
 def findings_of(description: Description, edits: Edits, regularity: Regularity) -> tuple[str, ...]:
     """Findings about a description, then about the robot with its edits: location, problem and remedy."""
     kinds = (
-        massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, long_lengths, large_ratios,
-        welded_base, zero_limits, equal_limits, impossible_inertias_of_the_base,
+        massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, inertias_beyond_reach, long_lengths,
+        large_ratios, welded_base, zero_limits, equal_limits, impossible_inertias_of_the_base,
     )  # fmt: skip
     robot = structure(description, edits)
     of_kinds = (finding for kind in kinds for finding in kind(robot))
     joint = None if regularity.near else regularity.joint
     singular, near = no_inertia_about_axis(robot, joint), hardly_any_inertia(regularity.near)
-    return (*description.findings, *singular, *of_kinds, *near)
+    return (*description.findings, *estimated_links(description), *singular, *of_kinds, *near)
+
+
+def estimated_links(description: Description) -> Iterator[str]:
+    """Links with an inertia that was estimated from their shapes."""
+    if names := [*description.estimated]:
+        yield (
+            f"{_named('link', names)}: mass or inertia is estimated from shapes, not measured; take torques as rough,"
+            " and give measured values where you have them"
+        )
 
 
 def impossible_inertias(robot: Structure) -> Iterator[str]:
@@ -75,6 +84,18 @@ def moments_without_mass(robot: Structure) -> Iterator[str]:
             yield (
                 f"link {name!r}: has moments of inertia up to {most:.3g} kg m² and no mass: they count here, and MuJoCo"
                 " drops them; give it a mass, or remove its <inertial>"
+            )
+
+
+def inertias_beyond_reach(robot: Structure) -> Iterator[str]:
+    """Moving links with ½ tr I > m (10 L)², L the longest distance between neighbouring joints: another unit."""
+    for name, link in robot.links.items():
+        tiny = link.mass < LIGHTEST  # a finding of its own
+        if name not in robot.base and not tiny and (radius := robot.radius_beyond_reach(link.mass, link.inertia)):
+            yield (
+                f"link {name!r}: its inertia is that of {link.mass:g} kg at {radius:.3g} m and more from the centre of"
+                f" mass, and no joint of the robot is more than {robot.longest_link:.3g} m from the one before; correct"
+                " the inertia, or its unit"
             )
 
 
@@ -164,7 +185,11 @@ def _has_mass(robot: Structure, joint: str) -> bool:
 
 
 def _joints(names: Iterable[Any]) -> str:
+    return _named("joint", names)
+
+
+def _named(kind: str, names: Iterable[Any]) -> str:
     names = list(names)
     shown = ", ".join(repr(shorten(name)) for name in names[:_LISTED])
     more = f", … ({len(names)} in all)" if len(names) > _LISTED else ""
-    return f"joint{'s' if len(names) > 1 else ''} {shown}{more}"
+    return f"{kind}{'s' if len(names) > 1 else ''} {shown}{more}"

@@ -93,6 +93,11 @@ class Mechanism:
         return MappingProxyType({"n": self.n, "p": len(NAMES) * self.model.nv})
 
     @cached_property
+    def estimated(self) -> Mapping[str, str]:
+        """Links whose inertia was estimated from shapes, not measured, and what from: see `load`."""
+        return MappingProxyType(self.description.estimated)
+
+    @cached_property
     def scratch(self) -> Scratch:
         """Memory that the algorithms of `model` write to."""
         return Scratch(self.model)

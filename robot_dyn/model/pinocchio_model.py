@@ -28,7 +28,7 @@ def build(description: Description, edits: Edits) -> tuple[Any, Couplings, tuple
         EditError: If a payload's frame is unknown, or no joint is left to move.
     """
     robot = description.element
-    _state(robot, edits)
+    state_edits(robot, edits)
     mimics = stated_mimics(robot)
     for joint in robot.iterfind("joint"):
         joint.set("name", _MARK + joint.get("name"))
@@ -54,7 +54,7 @@ def build(description: Description, edits: Edits) -> tuple[Any, Couplings, tuple
     return model, *_couplings(tuple(model.names[1:]), mimics)
 
 
-def _state(robot: Any, edits: Edits) -> None:
+def state_edits(robot: Any, edits: Edits) -> None:
     """Replace masses and inertias of links in the file by those of the edits."""
     links = {link.get("name"): link.find("inertial") for link in robot.iterfind("link")}
     known = [name for name, inertial in links.items() if inertial is not None]
@@ -89,7 +89,9 @@ def _apply(edits: Edits, model: Any) -> None:
         model.armature[model.idx_vs[ids[name]]] = value
     if edits.mass_scale != 1.0:
         for i, body in enumerate(model.inertias):
-            model.inertias[i] = pin.Inertia(edits.mass_scale * body.mass, body.lever, edits.mass_scale * body.inertia)
+            scaled = pin.Inertia(body)  # the constructor of numbers refuses moments that no body has
+            scaled.mass, scaled.inertia = edits.mass_scale * body.mass, edits.mass_scale * body.inertia
+            model.inertias[i] = scaled
     links = link_frames(model)
     for payload in edits.payloads:
         if payload.frame not in links:

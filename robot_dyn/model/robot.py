@@ -17,7 +17,7 @@ from numpy import ndarray
 
 from robot_dyn.description.couplings import Couplings
 from robot_dyn.description.description import Description, check
-from robot_dyn.description.edits import Changes, Edits
+from robot_dyn.description.edits import Changes, Edits, takes_changes
 from robot_dyn.description.inertial_parameters import Parametrised, ordered
 from robot_dyn.errors import announce
 from robot_dyn.model import kernels
@@ -26,8 +26,9 @@ from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.evaluation import Evaluation, warn_of_digits, warning_answer
 from robot_dyn.model.findings import findings_of
 from robot_dyn.model.gravity import warn_without_torque
-from robot_dyn.model.html import robot_html
+from robot_dyn.model.info import info_html, robot_line
 from robot_dyn.model.mechanism import Mechanism, forwarded
+from robot_dyn.model.to_urdf import to_urdf
 from robot_dyn.queries.dynamics import Array, Axes, Dynamics
 from robot_dyn.queries.quantity import DOUBTFUL
 from robot_dyn.validate import is_moderate, is_plain, is_state
@@ -47,7 +48,8 @@ class Robot(Dynamics, Parametrised):
     description: Description
     edits: Edits = field(default_factory=Edits)
     least_digits: float | None = None
-    _repr_html_ = robot_html
+    __repr__, _repr_html_ = robot_line, info_html
+    to_urdf = to_urdf
 
     def M(self, q: Array, *, errors: str = "raise") -> ndarray:
         if is_plain(q, self._shape):
@@ -124,11 +126,11 @@ class Robot(Dynamics, Parametrised):
         return self._ask("jacobian_rate", errors, kernel, Couplings.columns, self.model, q, v)
 
     name = forwarded(Mechanism.name)
+    estimated = forwarded(Mechanism.estimated)
     frame_names = forwarded(Mechanism.frame_names)
     joint_types = forwarded(Mechanism.joint_types)
     gravity = forwarded(Mechanism.gravity)
-    lower = forwarded(Mechanism.lower)
-    upper = forwarded(Mechanism.upper)
+    lower, upper = forwarded(Mechanism.lower), forwarded(Mechanism.upper)
     effort_limit = forwarded(Mechanism.effort_limit)
     velocity_limit = forwarded(Mechanism.velocity_limit)
     armature = forwarded(Mechanism.armature)
@@ -165,8 +167,7 @@ class Robot(Dynamics, Parametrised):
     def random_configuration(self, rng: np.random.Generator) -> ndarray:
         """A position within the joint limits, uniformly distributed.
 
-        A revolute joint that has no limits, or more than one turn between them, is drawn from one turn, as near to 0 as
-        its limits allow; a prismatic one without limits from −1 m to 1 m.
+        Of revolute joints without limits, or more than a turn between them, a turn near 0; of prismatic ones ±1 m.
 
         Args:
             rng: Source of random numbers, such as numpy.random.default_rng(0).
@@ -196,9 +197,7 @@ class Robot(Dynamics, Parametrised):
     def from_pinocchio(model: Any) -> Robot:
         """A robot of a `pinocchio.Model` that was built elsewhere, with its gravity and armature; warns as `load` does.
 
-        It is written as a URDF and read as any other (`model/from_pinocchio.py`), so that `Lagrangian` and `Compiled`
-        take it too; the model is neither stored nor changed. An unbounded joint becomes one angle. Where branches come
-        in another order than in the model, a warning says so.
+        It is written as a URDF and read as any other; an unbounded joint is one angle; a warning says if order changes.
 
         Raises:
             DescriptionError: If it is not a `pinocchio.Model`, or has joints that are not revolute or prismatic.
@@ -213,6 +212,7 @@ class Robot(Dynamics, Parametrised):
         regularity = self._evaluation.regularity
         return self.warn_below(LEAST_DIGITS) if regularity.near and not regularity.singular else self
 
+    @takes_changes
     def with_(self, **changes: Unpack[Changes]) -> Robot:
         """A new robot with more edits. Locks and payloads add up; the others replace what was given before.
 

@@ -12,7 +12,7 @@ from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import Block, Differences, Noise, Quantisation, RateLimit, name_of
-from robot_dyn.control.digital_loop.loop import LINES, Loop
+from robot_dyn.control.digital_loop.loop import LINES, SIGNALS, Loop
 from robot_dyn.control.digital_loop.low_pass import LowPass
 from robot_dyn.control.digital_loop.multirate import Multirate
 from robot_dyn.control.independent_joint import PD, PID, gains_from
@@ -26,15 +26,17 @@ from robot_dyn.scene.effects import AnyEdit
 from robot_dyn.scene.references import Reference, frame_of
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Stated, per_joint
 
-_BLOCKS: dict[str, tuple[str, tuple[type[Block], ...]]] = {  # of each line: the unit of its signal, and its blocks
-    "position": ("rad", (Noise, Quantisation, LowPass)),
-    "velocity": ("rad/s", (Differences, Noise, Quantisation, LowPass)),
-    "actuation": ("N m", (LowPass, Quantisation, RateLimit, Noise)),
+_BLOCKS: dict[str, tuple[type[Block], ...]] = {  # of each line
+    "position": (Noise, Quantisation, LowPass),
+    "velocity": (Differences, Noise, Quantisation, LowPass),
+    "actuation": (LowPass, Quantisation, RateLimit, Noise),
 }
 _ORDER: dict[type[Block], dict[str, Any]] = {LowPass: {"order": (Literal[1, 2], Field(2, description="Order."))}}
 BLOCKS: dict[str, tuple[type[Declared], ...]] = {
-    line: tuple(declared_part(Declared, name_of(each), each, signal=unit, **_ORDER.get(each, {})) for each in classes)
-    for line, (unit, classes) in _BLOCKS.items()
+    line: tuple(
+        declared_part(Declared, name_of(each), each, signal=SIGNALS[line], **_ORDER.get(each, {})) for each in classes
+    )
+    for line, classes in _BLOCKS.items()
 }
 PositionBlock, VelocityBlock, ActuationBlock = (
     Annotated[Union[BLOCKS[line]], Field(discriminator="kind")]  # pyright: ignore  # noqa: UP007
@@ -59,13 +61,13 @@ class Model(Part):
         return robot.with_(mass_scale=self.mass_scale)
 
 
-LAWS = {
-    "pd": "u = kp (q_d − q) + kd (v_d − v)",
-    "pid": "u = sat(kp e + kd ė + z),  ż = ki e + (sat(u) − u)/T_t",
-    "pd_gravity": "u = kp e + kd ė + N(q)",
-    "feed_forward": "u = M a_d + C v_d + N at the reference + kp e + kd ė",
-    "computed_torque": "u = M (a_d + kd ė + kp e) + C v + N",
-    "operational_space": "u = Jᵀ (Λ (ẍ_d + kd ė + kp e) + μ + p) + null-space posture",
+KINDS: dict[str, type[Controller]] = {
+    "pd": PD,
+    "pid": PID,
+    "pd_gravity": PDGravity,
+    "feed_forward": FeedForward,
+    "computed_torque": ComputedTorque,
+    "operational_space": OperationalSpace,
 }
 
 

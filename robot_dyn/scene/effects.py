@@ -13,6 +13,7 @@ from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.dahl import DahlFriction
 from robot_dyn.effects.dry_friction import DryFriction
 from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.explanation import EDITED, term_of
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring, joint_stops
 from robot_dyn.effects.line_spring_damper import LineSpringDamper
@@ -84,7 +85,7 @@ class Body(Part):
 class Gravity(Edit):
     """Gravity: ∂V/∂q in N, with V = −Σ m gᵀ p."""
 
-    term = "∂V/∂q in N, with V = −Σ m gᵀ p"
+    term = EDITED["gravity"]
 
     kind: Literal["gravity"]
     acceleration_m_s2: Vector3 = STANDARD_GRAVITY
@@ -97,7 +98,7 @@ class Gravity(Edit):
 class Lock(Edit):
     """Joints held at a value: their links become part of the links before them."""
 
-    term = "a joint held at a value, its link part of the link before"
+    term = EDITED["lock"]
 
     kind: Literal["lock"]
     joints: dict[str, Number]
@@ -110,7 +111,7 @@ class Lock(Edit):
 class Load(Edit, Body):
     """A rigid body fixed to a link, in M, C and N."""
 
-    term = "a rigid body on a link, in M, C and N"
+    term = EDITED["payload"]
 
     kind: Literal["payload"]
 
@@ -121,7 +122,7 @@ class Load(Edit, Body):
 class Armature(Edit):
     """Inertia of the drives felt at the joints, added to the diagonal of M."""
 
-    term = "added to the diagonal of M"
+    term = EDITED["armature"]
 
     kind: Literal["armature"]
     inertia_kg_m2: PerJoint
@@ -209,7 +210,7 @@ class Line(Acting):
 
 def _declared(kind: str, *classes: type[Effect], **choices: Any) -> type[DeclaredEffect]:
     part = declared_part(DeclaredEffect, kind, *classes, **choices)
-    part.term = " ".join(each.term for each in classes).replace(" −", " − ").replace("−  ", "− ")
+    part.term = term_of(classes)
     return part
 
 

@@ -1,121 +1,148 @@
-"""Explanation of a scene: its equation term by term, what is not simulated, and the source of each number."""
+"""Explanations: the equation term by term, what is not simulated, and, of a scene, the source of each number."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from robot_dyn.coefficients import URDF
-from robot_dyn.control.digital_loop.loop import LINES
-from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
-from robot_dyn.effects.effect import Effect
+from robot_dyn.control.digital_loop.loop import LINES, Loop
+from robot_dyn.control.digital_loop.multirate import Multirate
+from robot_dyn.effects.explanation import Explanation, Number, Term, as_they_act, explanation
+from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import ADAPTIVE
-from robot_dyn.queries.units import coefficient_texts
-from robot_dyn.scene.control import BLOCKS, LAWS, Control
-from robot_dyn.scene.declared import Declared
-from robot_dyn.scene.effects import BY_KIND, Acting, Body, Edit
-from robot_dyn.scene.scene import Scene
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.scene.control import BLOCKS, Control
+from robot_dyn.scene.effects import BY_KIND, Acting
+from robot_dyn.scene.scene import Scene, read_both
 from robot_dyn.scene.schema import Part, kinds_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
+from robot_dyn.simulation.setup.explanation import explanation_of, model_lines, pace, span
 from robot_dyn.simulation.setup.setup import Setup
 
-_BOUNDS = [
-    kind for kind, part in BY_KIND.items() if issubclass(part, Declared) and part.factory in (EffortLimit, ActuatorLag)
-]
-_NO_FORCES = [*_BOUNDS, *(kind for kind, part in BY_KIND.items() if issubclass(part, Edit | Body))]
 _DELAYS = "measurement_delay_periods", "actuation_delay_periods"
 
 
-def explain(scene: Scene, setup: Setup) -> Iterator[str]:
-    """Yield the explanation, line by line."""
-    named = {effect.kind for effect in scene.effect}
-    forces = [kind for kind in BY_KIND if kind in named and kind not in _NO_FORCES]
-    gravity = ["∂V/∂q"] if "gravity" in named else []
-    N = " ".join([*gravity, *(f"− τ_{kind}" for kind in forces)]).removeprefix("− ") or "0"
-    N = f"−{N}" if not gravity and forces else N
-    n, names = setup.plant.dynamics.n, setup.plant.dynamics.joint_names
-    yield f"{scene.robot}: {n} joint{'s' if n > 1 else ''}, {', '.join(names)}"
-    yield ""
-    yield "    M(q) a + C(q, v) v + N = u"
-    yield f"    N = {N}"
-    slow = "" if scene.control is None or scene.control.slow is None else " + u_slow"
-    yield f"    u = {'0' if scene.control is None else LAWS[scene.control.kind].removeprefix('u = ')}{slow}"
-    yield ""
-    yield "effects:" if scene.effect else "effects: none"
+def explain(what: Setup | Plant | Dynamics | str | Path) -> Explanation:
+    """The equation of motion that is integrated: each term, what acts with its coefficients, and what is not simulated.
+
+    Its `repr` are the lines that `robot-dyn explain` prints, `to_json()` the document of `robot-dyn explain --json`.
+    Of a scene file it says where each number came from, too.
+
+    Args:
+        what: A setup, a plant, a robot, or the path of a scene file.
+
+    Raises:
+        SceneError: If the scene cannot be read.
+        EffectError: If it is none of these.
+    """
+    if isinstance(what, str | Path):
+        return of_scene(*read_both(what))
+    if isinstance(what, Setup):
+        return _complete(explanation_of(what), what.plant, what)
+    plant = what if isinstance(what, Plant) else Plant(what)
+    return _complete(explanation(plant), plant, None)
+
+
+def of_scene(scene: Scene, setup: Setup) -> Explanation:
+    """The explanation of a scene, with the source of each number."""
+    plain, control = explanation_of(setup), scene.control
+    return replace(
+        _complete(plain, setup.plant, setup, None if control is None else control.kind),
+        robot=scene.robot,
+        effects=tuple(_terms(scene, setup)),
+        absent=_absent({effect.kind for effect in scene.effect}),
+        absent_of_control=() if control is None else tuple(_ideal(control)),
+        control=() if control is None else tuple(_control(scene, control, setup)),
+        method=tuple(_method(scene)),
+    )
+
+
+def _complete(known: Explanation, plant: Plant, setup: Setup | None, kind: str | None = None) -> Explanation:
+    """An explanation with what is absent, and the instructions of machine code."""
+    absent = _absent({each.kind for each in known.effects})
+    code = (*_machine_code(plant, setup), *(() if setup is None else _of_tick(setup, kind)))
+    return replace(known, absent=absent, machine_code=code)
+
+
+def _absent(named: set[str]) -> tuple[str, ...]:
+    return tuple(kind for kind in BY_KIND if kind not in named)
+
+
+def _terms(scene: Scene, setup: Setup) -> Iterator[Term]:
+    """What a scene names, in its order."""
     effects = iter(setup.plant.effects)
     for effect in scene.effect:
-        yield f"  {effect.kind}: {BY_KIND[effect.kind].term}"
-        yield from _numbers(effect, "    ")
-        if isinstance(effect, Acting):
-            yield from _as_it_acts(islice(effects, len(effect.build(setup.plant.dynamics))), setup)  # pyright: ignore
-    yield ""
-    yield "not simulated, since the scene does not name it:"
-    yield f"  {', '.join(kind for kind in BY_KIND if kind not in named)}"
-    if scene.control is not None and (ideal := _ideal(scene.control)):
-        yield f"  of the control: {', '.join(ideal)}"
-    if scene.control is not None:
-        every = f"every {scene.control.period_s:g} s, constant between" if scene.control.period_s else "continuously"
-        yield ""
-        yield f"control: {scene.control.kind}, {every}"
-        yield from _numbers(scene.control, "  ")
-        yield from _blocks(scene.control)
-        yield f"reference: {scene.reference.kind}"
-        yield from _numbers(scene.reference, "  ")
+        parts = list(islice(effects, len(effect.build(setup.plant.dynamics)))) if isinstance(effect, Acting) else []  # pyright: ignore
+        yield Term(effect.kind, BY_KIND[effect.kind].term, _numbers(effect), as_they_act(parts, setup.plant.dynamics))
+
+
+def _control(scene: Scene, control: Control, setup: Setup) -> Iterator[str]:
+    yield f"control: {control.kind}, {pace(control.period_s)}"
+    yield from _lines(control, "  ")
+    for line, block in control.blocks:
+        yield f"  {line}: {block.kind}, {block.factory.term}"
+        yield from _lines(block, "    ")
+    spans: list[str] = []
+    if setup.controller is not None:
+        yield from model_lines(setup.controller, setup.plant.dynamics)
+        spans = [span(each) for each in setup.controller.references.values()]
+    yield ", ".join([f"reference: {scene.reference.kind}", *dict.fromkeys(spans)])
+    yield from _lines(scene.reference, "  ")
+
+
+def _method(scene: Scene) -> Iterator[str]:
     method, used = scene.method, ("rtol", "atol") if scene.method in ADAPTIVE else ("step_s",)
     if scene.accuracy is not None:
         method, used = f"chosen for an error of q of at most {scene.accuracy:g}", ("accuracy",)
-    yield ""
     yield f"method: {method}, {scene.duration_s:g} s"
     for key in (*used, "record_period_s", "estimate_error", "engine"):
         yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)})"
     yield "start:"
-    yield from _numbers(scene.start, "  ")
-    yield from _machine_code(setup)
-    if scene.control is not None and scene.control.period_s:
-        yield from _of_tick(scene.control, setup)
-    yield ""
-    yield f"the file of the robot: {setup.plant.dynamics.description.source}"  # pyright: ignore[reportAttributeAccessIssue]
+    yield from _lines(scene.start, "  ")
 
 
-def _machine_code(setup: Setup) -> Iterator[str]:
+def _machine_code(plant: Plant, setup: Setup | None) -> Iterator[str]:
     """Instructions of the compiled right-hand side, by effect."""
     from robot_dyn.codegen.plant import Compiled
 
     try:
-        compiled: Any = Compiled(StateEquation(setup.plant, None).in_a_mode.plant)
+        compiled: Any = Compiled(StateEquation(plant, None).in_a_mode.plant)
         by_effect, which = compiled.instructions_by_effect, compiled.engine.traces["forward_dynamics"]
     except RobotDynError as error:
-        yield ""
         yield f"machine code: none, {error}"
         return
     whole = which.counts[which.formulation]
     parts = ", ".join(f"{name} {count}" for name, count in by_effect.items()) or "none"
-    yield ""
     yield f"machine code of the acceleration, by the {which.formulation}: {whole} instructions; of effects: {parts}"
-    if edits := edits_of_machine_code(setup):
+    if setup is not None and (edits := edits_of_machine_code(setup)):
         yield f"  edited there: {edits['right_angles']}"
 
 
-def _of_tick(control: Control, setup: Setup) -> Iterator[str]:
+def _of_tick(setup: Setup, kind: str | None) -> Iterator[str]:
     """Instructions of a tick, and those of the first controller alone."""
     from robot_dyn.simulation.compiled.build import compiled_equation
 
-    controller: Any = setup.controller
-    inside: Any = controller.controller if control.loops else controller
-    inside = inside if control.slow is None else inside.fast
+    inside: Any = setup.controller
+    if inside is None or not inside.period_s:
+        return
+    inside = inside.controller if isinstance(inside, Loop) else inside
+    inside = inside.fast if isinstance(inside, Multirate) else inside
     try:
         counts = [
             len(compiled_equation(StateEquation(setup.plant, each).in_a_mode, None).functions.programs["tick"])
-            for each in dict.fromkeys((controller, inside))
+            for each in dict.fromkeys((setup.controller, inside))
         ]
     except RobotDynError:  # the reason is given with the acceleration, or the run is interpreted
         return
-    more = f"; {control.kind} alone takes {counts[1]}" if len(counts) > 1 else ""
+    more = f"; {kind or inside.name} alone takes {counts[1]}" if len(counts) > 1 else ""
     yield f"machine code of a tick of the control: {counts[0]} instructions{more}"
 
 
@@ -127,28 +154,17 @@ def _ideal(control: Control) -> list[str]:
     return [*delays, *(kind for kind in kinds if kind not in named)]
 
 
-def _blocks(control: Control) -> Iterator[str]:
-    """The blocks of the loop of a controller, line by line."""
-    for line, block in control.blocks:
-        yield f"  {line}: {block.kind}, {block.factory.term}"
-        yield from _numbers(block, "    ")
+def _lines(part: Part, indent: str) -> Iterator[str]:
+    return (f"{indent}{each.key} = {each.value}  ({each.source})" for each in _numbers(part))
 
 
-def _as_it_acts(effects: Iterable[Effect], setup: Setup) -> Iterator[str]:
-    """Coefficients of the parts of an effect as they act, with units."""
-    dynamics: Any = setup.plant.dynamics
-    values = {
-        name: text for effect in effects for name, text in coefficient_texts(effect, dynamics.joint_types).items()
-    }
-    if values:
-        yield f"    as it acts: {'; '.join(values.values())}"
-
-
-def _numbers(part: Part, indent: str) -> Iterator[str]:
+def _numbers(part: Part) -> tuple[Number, ...]:
     unused = {*part.unused, *LINES} if isinstance(part, Control) else ()
-    for key in type(part).model_fields:
-        if key != "kind" and getattr(part, key) not in (None, ()) and key not in unused:
-            yield f"{indent}{key} = {_shown(getattr(part, key))}  ({_source(part, key)})"
+    return tuple(
+        Number(key, _shown(getattr(part, key)), _source(part, key))
+        for key in type(part).model_fields
+        if key != "kind" and getattr(part, key) not in (None, ()) and key not in unused
+    )
 
 
 def _source(part: Part, key: str) -> str:

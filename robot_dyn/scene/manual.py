@@ -10,11 +10,12 @@ from pydantic.fields import FieldInfo
 
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.methods import FIXED_STEP
-from robot_dyn.scene.control import BLOCKS, LAWS, Control, Model, Slow
+from robot_dyn.scene.control import BLOCKS, KINDS, Control, Model, Slow
 from robot_dyn.scene.effects import ACTING, EDITS
 from robot_dyn.scene.references import AnyReference
 from robot_dyn.scene.scene import Scene, Start
 from robot_dyn.scene.schema import Part, kinds_of
+from robot_dyn.scene.sweep import SweepTable
 
 _OPENING = """# Scenes
 
@@ -60,7 +61,11 @@ def manual() -> str:
     ]
     parts += _kinds(*EDITS, *ACTING)
     parts += _section("`[control]`", _text(Control), Control)
-    parts += ["| kind | law |\n|---|---|", *(f"| `{kind}` | {_cell(law)} |" for kind, law in LAWS.items()), ""]
+    parts += [
+        "| kind | law |\n|---|---|",
+        *(f"| `{kind}` | {_cell(f'u = {law.term}')} |" for kind, law in KINDS.items()),
+        "",
+    ]
     parts += _section("`[control.model]`", _text(Model), Model)
     parts += _section("`[control.slow]`", _text(Slow), Slow)
     for line, blocks in BLOCKS.items():
@@ -68,6 +73,7 @@ def manual() -> str:
         parts += _kinds(*blocks)
     parts += ["## `[reference]`\n\nWhat the controller follows; one table, with its `kind`.\n"]
     parts += _kinds(*get_args(get_args(AnyReference)[0]))
+    parts += _section("`[sweep]`", _text(SweepTable), SweepTable)
     return "\n".join(parts).rstrip() + "\n"
 
 
@@ -87,8 +93,10 @@ def _section(title: str, text: str, part: type[Part], level: int = 2) -> Iterato
 
 
 def _row(key: str, field: FieldInfo) -> str:
+    form = _form(field)
     unit = _UNITS_OF_KEYS.get(key) or next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
-    return f"| `{key}` | {_cell(_form(field))} | {unit} | {_default(field)} | {_cell(field.description or '')} |"
+    unit = "" if "text" in form else unit
+    return f"| `{key}` | {_cell(form)} | {unit} | {_default(field)} | {_cell(field.description or '')} |"
 
 
 def _form(field: FieldInfo) -> str:
@@ -112,7 +120,7 @@ def _of(annotation: Any) -> str:
     if origin is Annotated:
         return first
     if origin is dict:
-        return f"table of {_of(args[1])}s by joint"
+        return f"table of {_of(args[1])}s by {'name' if args[1] is str else 'joint'}"
     if origin is tuple and Ellipsis not in args:
         return f"list of {len(args)} {'lists' if first.startswith('list') else first + 's'}"
     if origin in (list, tuple):
@@ -127,7 +135,7 @@ def _default(field: FieldInfo) -> str:
     if field.is_required():
         return "required"
     default = field.default
-    if default is None or isinstance(default, Part) or default == ():
+    if default is None or isinstance(default, Part) or default in ((), {}):
         return ""
     return f"`{_toml(default)}`"
 

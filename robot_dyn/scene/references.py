@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -9,9 +10,11 @@ from pydantic import Field
 
 from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
-from robot_dyn.control.samples import Samples, read_table
-from robot_dyn.errors import SceneError
+from robot_dyn.errors import PlanWarning, SceneError
 from robot_dyn.model.robot import Robot
+from robot_dyn.plan.samples.columns import columns
+from robot_dyn.plan.samples.findings import refuse_other_units
+from robot_dyn.plan.samples.measured import from_samples
 from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Truth, Vector3, per_joint
 
 
@@ -63,7 +66,11 @@ class ViaPoints(Reference):
     points: tuple[list[Number], ...] = ()
     """Position at each time, a list of n numbers, in rad, or m for a prismatic joint."""
     file: str | None = None
-    """Path of a CSV file with columns t and q of each joint, from the folder of the scene."""
+    """Path of a CSV file with columns of t and of each joint, from the folder of the scene."""
+    joints: dict[str, str] | None = None
+    """Heading of the column of each joint, where they are not the names of the joints."""
+    unit: Literal["rad", "deg"] | None = None
+    """Of angles whose heading states none."""
     v_end: PerJoint = 0.0
     """Velocity at the last point."""
 
@@ -82,24 +89,40 @@ class ViaPoints(Reference):
             raise SceneError("reference: give times_s and points, or a file of both")
         if self.file is None:
             return list(self.times_s), list(self.points)
-        table = read_table(self.file, robot.joint_names)
-        if more := table.keys() - {"t", "q"}:
-            raise SceneError(f"{self.file}: columns of {min(more)} are for kind = 'samples'; leave them out")
-        t = table["t"]
-        if len(t) and t[0] < 0:
-            raise SceneError(f"{self.file}: the first time is {t[0]:g} s; start at 0 s or later")
-        return t.tolist(), table["q"].tolist()
+        table = columns(robot, self.file, joints=self.joints, unit=self.unit, least=1)
+        refuse_other_units(robot, table)
+        if table.more:
+            raise SceneError(f"{self.file}: columns of v are for kind = 'samples'; leave them out")
+        if table.t[0] < 0:
+            raise SceneError(f"{self.file}: the first time is {table.t[0]:g} s; start at 0 s or later")
+        return table.t.tolist(), table.q.tolist()
 
 
 class Sampled(Reference):
-    """Samples of a CSV file with columns t, q and if given v and a of each joint, as rd.Samples takes them."""
+    """The motion through samples of a file, as rd.plan.from_samples makes it: what is doubtful in them is a warning."""
 
     kind: Literal["samples"]
     file: str
-    """Path of the file, from the folder of the scene."""
+    """Path of a CSV file, or of an MCAP log of ROS 2 (.mcap), from the folder of the scene."""
+    time: str | None = None
+    """Heading of the times; of a log "header" or "log". By default the column t, time or timestamp."""
+    joints: dict[str, str] | None = None
+    """Heading of the column of each joint, or its name in the log, where they are not the names of the joints."""
+    unit: Literal["rad", "deg"] | None = None
+    """Of angles whose heading states none."""
+    ends: Literal["rest", "measured"] = "rest"
+    """Whether the motion is at rest at both ends, or moves there as the samples do."""
+    start_s: Number | None = None
+    """Time of the first sample; as in the file by default."""
+    topic: str | None = None
+    """Topic of a log; by default its only one of joint states, or /joint_states."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
-        return Samples.from_csv(self.file, robot.joint_names)
+        stated = {key: getattr(self, key) for key in ("time", "joints", "unit", "ends", "start_s", "topic")}
+        plan = from_samples(robot, self.file, **stated)
+        if plan.findings:
+            warnings.warn(f"{self.file}: {'; '.join(plan.findings)}", PlanWarning, stacklevel=2)
+        return plan.reference
 
 
 class Line(Reference):

@@ -24,6 +24,7 @@ from robot_dyn.scene.effects import BY_KIND, Acting, AnyEffect, Edit
 from robot_dyn.scene.messages import located, validation_message, where
 from robot_dyn.scene.references import AnyReference, Hold, Sampled, ViaPoints
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
+from robot_dyn.scene.sweep import SweepTable
 from robot_dyn.scene.user_effects import Factories, UserEffect, check_factories, user_defined_or
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
@@ -71,6 +72,8 @@ class Scene(Part):
     """What drives the joints; nothing by default."""
     reference: AnyReference = Hold(kind="hold")
     """What the controller follows; rest at the start by default."""
+    sweep: SweepTable | None = None
+    """What varies in many runs; none by default."""
 
     def described(self, folder: Path) -> Robot:
         """Return the robot of its file, without gravity."""

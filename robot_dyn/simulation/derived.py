@@ -8,6 +8,7 @@ from typing import final
 
 import numpy as np
 
+from robot_dyn.effects.plant import Plant
 from robot_dyn.simulation.diagnostics.damped_task import damped
 from robot_dyn.simulation.diagnostics.imbalance import cause
 from robot_dyn.simulation.diagnostics.step_remarks import remarks
@@ -17,10 +18,11 @@ from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.acting import acting, at_stop, frame_of, wrenches
+from robot_dyn.simulation.results.causes import broken_away, effect_torques, plant_of
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger
-from robot_dyn.simulation.results.provenance import edits_of_machine_code, origin
-from robot_dyn.simulation.results.samples import Columns, columns, deviation_of, ledger
+from robot_dyn.simulation.results.provenance import edits_of_machine_code, origin, settings_text
+from robot_dyn.simulation.results.samples import Columns, Tracking, columns, ledger, tracking_of
 from robot_dyn.simulation.results.trajectory import leak
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.run.recording import Recording
@@ -64,10 +66,22 @@ class Results:
         """Velocities there, (m, n)."""
         return self._columns.v
 
-    @property
+    @cached_property
     def a(self) -> np.ndarray:
         """Accelerations there, (m, n)."""
-        return self._columns.a
+        if not self.setup.equation.impulses or not self._asks_plant:
+            return self._columns.a
+        return broken_away(self._plant, self.record.t, self._columns, self.effect_states)
+
+    @property
+    def _asks_plant(self) -> bool:
+        """Whether effects may be called again: of undeclared parts not after an interrupt, nor by the search."""
+        again = self.setup.estimate_error and self.record.outcome.ending is not Ending.STOPPED
+        return again or not self.setup.undeclared
+
+    @cached_property
+    def _plant(self) -> Plant:
+        return plant_of(self.setup.plant, self.compiled)
 
     @property
     def u(self) -> np.ndarray:
@@ -89,18 +103,23 @@ class Results:
         return energy
 
     @cached_property
-    def _tracking(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        return deviation_of(self.setup, self.record.t, self.q)
+    def _tracking(self) -> Tracking:
+        return tracking_of(self.setup, self.record.t, self.q)
 
     @property
     def desired(self) -> np.ndarray | None:
         """Positions of a joint reference, (m, n)."""
-        return self._tracking[0]
+        return self._tracking.desired
+
+    @property
+    def desired_velocity(self) -> np.ndarray | None:
+        """Velocities of a joint reference, (m, n)."""
+        return self._tracking.desired_velocity
 
     @property
     def deviation(self) -> np.ndarray | None:
         """From the reference."""
-        return self._tracking[1]
+        return self._tracking.deviation
 
     @property
     def outcome(self) -> Outcome:
@@ -110,9 +129,10 @@ class Results:
 
     @property
     def about(self) -> dict[str, str]:
-        """Texts: where it comes from, what machine code changed, and those of the setup."""
+        """Texts: where it comes from, its settings, what machine code changed, and those of the setup."""
         edits = edits_of_machine_code(self.setup) if self.compiled else {}
-        return frame_of(self.setup) | origin(self.setup.plant.dynamics) | edits | self.texts
+        known = frame_of(self.setup) | origin(self.setup.plant.dynamics) | settings_text(self.setup)
+        return known | edits | self.texts
 
     @property
     def wrenches(self) -> dict[str, np.ndarray]:
@@ -163,3 +183,10 @@ class Results:
     def effect_states(self) -> dict[str, np.ndarray]:
         """Of each effect with states at the samples."""
         return self.setup.equation.effect_states(self.record.y)
+
+    @property
+    def effect_torques(self) -> dict[str, np.ndarray] | None:
+        """What each effect exerted at the samples; None where effects are not to be called again."""
+        if not self._asks_plant:
+            return None
+        return effect_torques(self._plant, self.record.t, self._columns._replace(a=self.a), self.effect_states)

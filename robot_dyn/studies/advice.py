@@ -15,12 +15,14 @@ from typing import Any, Unpack, final
 
 import numpy as np
 
+from robot_dyn.answer import Answer, Block, Table
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, RobotDynError, escaped
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.queries.units import units
 from robot_dyn.result import UNREPORTED, reported
 from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest, jacobian
 from robot_dyn.simulation.dynamics.sampled_loop import linearised, remedy
@@ -37,6 +39,7 @@ from robot_dyn.simulation.dynamics.stability import (
 )
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.error_estimate import Verdict
+from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options
@@ -52,8 +55,8 @@ State = tuple[float, Array]  # t and y
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Advice:
+@dataclass(frozen=True, eq=False, repr=False)
+class Advice(Answer):
     """What may be expected of a setup.
 
     Attributes:
@@ -96,6 +99,17 @@ class Advice:
         """A line for each thing: the step, the period, growth over the run, the error, the fastest motion."""
         parts = [self._of_step(), *self._of_period(), *self._of_growth(), self._of_error()]
         return "\n".join(map(escaped, [*parts, f"{self.fastest}, at {self.at:.3g} s"]))
+
+    def blocks(self) -> Iterator[Block]:
+        yield from self.text.split("\n")
+        rows = tuple((name, f"{h:.3g}" if isfinite(h) else "every step") for name, h in self.limits.items())
+        yield Table(("method", "stable up to a step of [s]"), rows, right=("stable up to a step of [s]",))
+
+    @property
+    def drawing(self) -> str:
+        from robot_dyn.display import levels
+
+        return levels("longest stable step [s]; dashed: the step of the setup", self.limits, self.step_s)
 
     @reported
     def error(self) -> float | None:
@@ -148,7 +162,8 @@ class Advice:
         end = self.run.outcome
         if end.ending is not Ending.FINISHED:
             return f"the run {end.ending} at {end.t:.3g} s: {end.advice}"
-        return f"error of q to expect: {self.run.error}"
+        unit = units("q", joint_types(self.run))
+        return f"error of q [{unit}] to expect: {self.run.error}"
 
 
 @takes_options

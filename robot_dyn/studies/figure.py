@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import io
+import re
 from collections.abc import Mapping, Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.errors import RobotDynError
-from robot_dyn.result import Result
+from robot_dyn.studies.result import Result
 from robot_dyn.view.plots.figure import THEMES, drawable, framed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LETTERS = 9.5  # of a heading, in an inch
+_PART = 0.75  # of the width, on a page, which is narrower than paper
 _TOP, _LEFT, _LINE, _CAPTION = 0.15, 0.16, 0.22, 0.43  # [inch]: above and beside the heading, of its lines, below
 
 Colours = Mapping[str, Any]
+
+_INK = "#010203"  # stands for the colour of the text of a page
+PAGE: Colours = {"paper": "none", "ink": _INK, "grid": "#80808055", "veil": "#80808022"} | {
+    "lines": tuple(_INK if each == "#000000" else each for each in THEMES["light"]["lines"])
+}
+"""Colours for light and dark pages, without paper."""
 
 
 class ResultError(RobotDynError):
@@ -24,9 +33,14 @@ class ResultError(RobotDynError):
 
 
 def sheet(width: float, height: float, result: Result, caption: str, theme: str) -> tuple[Figure, Colours]:
-    """Return a figure of a size in [inch], headed by the sentence of a result and a caption, and its colours."""
-    from matplotlib.figure import Figure
+    """Return a figure of a size in [inch], headed by the sentence of a result and a caption, and its colours.
 
+    For the page of a notebook, which has the sentence beside it, there is no heading.
+    """
+    from robot_dyn.view.plots.shown import Figure
+
+    if theme == "page":
+        return Figure(figsize=(_PART * width, height), facecolor=PAGE["paper"]), PAGE
     colours = THEMES[theme]
     figure = Figure(figsize=(width, height), facecolor=colours["paper"])
     heading, left = fill(result.sentence, int(_LETTERS * width)), _LEFT / width
@@ -34,6 +48,16 @@ def sheet(width: float, height: float, result: Result, caption: str, theme: str)
     figure.text(left, 1 - _TOP / height, lines(heading), fontsize=12, weight="bold", va="top", **ink(colours))
     figure.text(left, 1 - below / height, lines(caption), fontsize=8.5, va="top", linespacing=1.4, **ink(colours))
     return figure, colours
+
+
+def inline(figure: Figure) -> str:
+    """Return a figure in the colours of `PAGE` as SVG within a page of HTML, without the room around it."""
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg", bbox_inches="tight", pad_inches=0.05, metadata={"Date": None})
+    svg = stream.getvalue()
+    svg = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
+    svg = re.sub(r'translate\([^)]*\)| (?:d|x|y)="[^"]*"', lambda at: re.sub(r"(\.\d\d)\d+", r"\1", at[0]), svg)
+    return re.sub(r"\s*\n\s*", "\n", svg.replace(_INK, "currentColor").replace("*{", ".robot-dyn svg *{"))
 
 
 def programs(environment: Mapping[str, str], *names: str) -> str:

@@ -9,12 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn import files
-from robot_dyn.result import Result, json_text
+from robot_dyn.result import json_text
+from robot_dyn.studies import run_difference_figure
 from robot_dyn.studies.certificate import diagram as certificate_diagram
 from robot_dyn.studies.certificate.certificate import Certificate
 from robot_dyn.studies.costs import diagram as cost_diagram
 from robot_dyn.studies.costs.cost import Cost
 from robot_dyn.studies.figure import ResultError
+from robot_dyn.studies.motor_budget import diagram as budget_diagram
+from robot_dyn.studies.motor_budget.result import MotorBudget
+from robot_dyn.studies.result import Result
+from robot_dyn.studies.run_difference import RunDifference
 from robot_dyn.studies.work_precision_diagram import diagram
 from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
 from robot_dyn.validate import choice, instance
@@ -28,6 +33,8 @@ JSON = files.Kind("a result", ".json", b'{\n "robot":')
 DRAWINGS: Mapping[type, Callable[[Any, str], Figure]] = {
     Certificate: certificate_diagram.draw,
     Cost: cost_diagram.draw,
+    MotorBudget: budget_diagram.draw,
+    RunDifference: run_difference_figure.draw,
     WorkPrecision: diagram.draw,
 }
 
@@ -35,11 +42,11 @@ DRAWINGS: Mapping[type, Callable[[Any, str], Figure]] = {
 def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Path:
     """Write a result by the suffix of `path`, and by the first of these that it can be if there is none.
 
-    PNG, SVG or PDF hold the figure and CSV the table of a certificate, of costs or of work and precision; JSON holds
-    any result. Another file of that kind under that name is replaced; any other is not.
+    PNG, SVG or PDF hold the figure and CSV the table of a certificate, of costs, of work and precision, of two runs
+    or of a budget; JSON holds any result. Another file of that kind under that name is replaced; any other is not.
 
     Args:
-        result: Of `certify`, `cost`, `stress` or `work_precision`.
+        result: Of `certify`, `cost`, `stress`, `work_precision`, `compare_runs` or `budget`.
         path: Where to.
         theme: For "light" or "dark" paper.
 
@@ -47,7 +54,12 @@ def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Pa
         QueryError: If an argument is wrong.
         ResultError: If it cannot be written, or there is nothing to draw.
     """
-    instance("result", result, Result, "give that of rd.certify, rd.cost, rd.stress or rd.work_precision")
+    instance(
+        "result",
+        result,
+        Result,
+        "give that of rd.studies.certify, cost, stress or work_precision, of rd.compare_runs or rd.budget",
+    )
     choice("theme", theme, THEMES)
     path = files.target(path, kinds(type(result)), ResultError)
     stream = io.BytesIO()

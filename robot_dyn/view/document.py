@@ -5,7 +5,7 @@ The first run is drawn opaque, the others as ghosts. Problems list what is drawn
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, final
@@ -13,31 +13,31 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.description.packages import searched
-from robot_dyn.errors import QueryError, RobotDynError, shorten
+from robot_dyn.errors import QueryError, shorten
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Array
-from robot_dyn.queries.units import unit
+from robot_dyn.simulation.comparison.differing_settings import run_names
 from robot_dyn.simulation.observation.remarks import lines
 from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.spatial import homogeneous
 from robot_dyn.validate import instance, one_state, truth
 from robot_dyn.view import commands
-from robot_dyn.view.cost_table import cost_table
-from robot_dyn.view.geometry.visuals import Drawing, drawing
+from robot_dyn.view.causes import causes, resolution
+from robot_dyn.view.geometry.coarse import look_of
+from robot_dyn.view.geometry.visuals import Drawing, Piece
 from robot_dyn.view.keyframes import Keyframes, keyframes
 from robot_dyn.view.overlays import GHOST, Overlays, arrows, overlays
-from robot_dyn.view.rests import rests
+from robot_dyn.view.page import ReplayError
+from robot_dyn.view.rests import lanes
 from robot_dyn.view.scenery import Scenery, gravity_arrow, gravity_label, ground, scenery, turned, upright
-from robot_dyn.view.series import ghost_mark, plots
+from robot_dyn.view.series import plots
+from robot_dyn.view.sliders import sliders
 from robot_dyn.view.stage import Stage
+from robot_dyn.view.tables import cost_table, settings_table
 
 _MOST_EVENTS = 200  # of a run
 _FAR = 1e4  # [rad] or [m]; diverged runs are drawn up to here
-
-
-class ReplayError(RobotDynError):
-    """A replay that cannot be built or written."""
 
 
 @final
@@ -92,10 +92,10 @@ class _Picture:
         seen = scenery(points @ turn.T)
         return cls(gravity, seen, turn, [ground(seen), *gravity_arrow(seen, gravity)])
 
-    def add(self, stage: Stage, look: Drawing, keys: Keyframes, opacity: float = 1.0) -> None:
-        """Draw a robot that moves by keyframes."""
+    def add(self, stage: Stage, look: Drawing, keys: Keyframes, inertia: bool, opacity: float = 1.0) -> None:
+        """Draw a robot that moves by keyframes; its boxes of inertia are seen or not."""
         self.commands.append(commands.set_transform(stage.root, homogeneous(self.turn, np.zeros(3))))
-        self.commands += stage.draw(look.pieces, opacity)
+        self.commands += stage.draw(look.pieces, opacity) + stage.fasten(look.boxes, opacity, "inertia ", inertia)
         self.tracks |= stage.tracks(keys)
 
     def document(self, notes: list[str], **entries: Any) -> dict[str, Any]:
@@ -110,8 +110,9 @@ class _Picture:
 
 @np.errstate(all="ignore")  # what is far out is drawn as far as it can be
 def document(
-    runs: tuple[Trajectory, ...], package_dirs: Iterable[str | Path], frame: str | None, inertia: bool
-) -> dict[str, Any]:
+    runs: tuple[Trajectory, ...], package_dirs: Iterable[str | Path], frame: str | None, inertia: bool,
+    meshes: str = "full",
+) -> dict[str, Any]:  # fmt: skip
     """Return the document of runs; arguments as of `replay`.
 
     Raises:
@@ -122,38 +123,46 @@ def document(
         instance("run", run, Trajectory, "give the trajectory of rd.simulate, or a run of rollouts, as runs[0]")
     package_dirs, inertia = searched(package_dirs), truth("inertia", inertia)
     instance("frame", frame, str | None, "give the name of a link, or None")
-    shown = [_shown(number, run, len(runs), package_dirs, inertia) for number, run in enumerate(runs)]
+    names = run_names(*runs)
+    look = look_of(meshes)
+    shown = [_shown(number, run, names, look, package_dirs, inertia) for number, run in enumerate(runs)]
     if frame is not None and all(frame not in each.stage.linkage.links for each in shown):
         shown[0].stage.link_path(frame)  # raises, with the nearest names
-    corners = np.concatenate([_corners(each) for each in shown])
+    corners = np.concatenate([_corners(each, inertia) for each in shown])
     picture = _Picture.about(corners, shown[0].stage.robot.edits.gravity)
     radius = picture.scenery.radius
     layers = [_overlays(each, radius, frame, number > 0) for number, each in enumerate(shown)]
     scale = arrows([(each.stage, each.run, layer) for each, layer in zip(shown, layers, strict=True)], radius)
     notes, problems, remarks = [], [], []
     for number, (each, layer) in enumerate(zip(shown, layers, strict=True)):
-        picture.add(each.stage, each.drawing, each.keys, GHOST if number else 1.0)
+        picture.add(each.stage, each.drawing, each.keys, inertia, GHOST if number else 1.0)
         picture.commands += layer.commands
         picture.tracks |= layer.tracks
         notes += [each.prefix + note for note in (*each.notes, *each.drawing.remarks, *layer.notes)]
         problems += [each.prefix + note for note in (*each.problems, *each.drawing.notes)]
         remarks += [each.prefix + line for line in lines(each.run.remarks)]
+    split = _causes(shown)
     return picture.document(
-        [*notes, *scale],
-        title=" and ".join(each.name for each in shown),
+        [*notes, *scale, *([resolution(split)] if split else [])],
+        title=_title(shown),
         outcome="; ".join(_outcome(each) for each in shown),
+        layers={"inertia": inertia, "paths": _paths(shown, layers)},
         duration=max(float(each.run.t[-1]) for each in shown),
         remarks=remarks,
         problems=problems,
         gravity=_labels(shown),
         events=_events(shown),
-        rests=_rests(shown),
-        plots=plots([each.run for each in shown], [each.stage for each in shown]),
+        rests=[lane for each in shown for lane in lanes(each.run, each.prefix, _MOST_EVENTS)],
+        plots=plots([each.run for each in shown], [each.stage for each in shown], [each.name for each in shown]),
+        differs=settings_table([(each.name, each.run) for each in shown]),
+        causes=split,
         price=cost_table([(each.name, each.run) for each in shown]),
     )
 
 
-def still(robot: Robot, q: Array | None, package_dirs: Iterable[str | Path], inertia: bool) -> dict[str, Any]:
+def still(
+    robot: Robot, q: Array | None, package_dirs: Iterable[str | Path], inertia: bool, meshes: str
+) -> dict[str, Any]:
     """Return the document of a robot at one configuration; arguments as of `show`.
 
     Raises:
@@ -164,15 +173,14 @@ def still(robot: Robot, q: Array | None, package_dirs: Iterable[str | Path], ine
     at: Array = np.zeros(robot.n) if q is None else one_state("q", q, robot.joint_names)
     if np.abs(at).max() > _FAR:
         raise QueryError(f"q must be within ±{_FAR:g}, got {shorten(at)}")
-    stage, look = Stage("run", robot), drawing(robot, package_dirs, inertia=inertia)
-    picture = _Picture.about(stage.corners(look.pieces, at[None]), robot.edits.gravity)
-    picture.add(stage, look, keyframes(np.zeros(1), stage.linkage.couplings.position(at[None])))
-    values = zip(robot.joint_names, at, robot.joint_types, strict=True)
-    state = "q: " + ", ".join(f"{name} = {value:.4g} {unit('q', kind)}" for name, value, kind in values)
+    stage, look = Stage("run", robot), look_of(meshes)(robot, package_dirs, inertia=inertia)
+    picture = _Picture.about(stage.corners(_seen(look, inertia), at[None]), robot.edits.gravity)
+    picture.add(stage, look, keyframes(np.zeros(1), stage.linkage.couplings.position(at[None])), inertia)
     return picture.document(
-        [state, *look.remarks],
+        [*look.remarks],
         title=robot.name,
         outcome=f"{robot.n} joint{'s' if robot.n > 1 else ''}, {robot.total_mass:.4g} kg",
+        layers={"inertia": inertia, "paths": {}},
         duration=0.0,
         remarks=[],
         problems=list(look.notes),
@@ -180,13 +188,23 @@ def still(robot: Robot, q: Array | None, package_dirs: Iterable[str | Path], ine
         events=[],
         rests=[],
         plots=[],
+        differs={"runs": [], "rows": []},
         price={"runs": [], "rows": []},
+        sliders=sliders(stage, at),
     )
 
 
 def _overlays(shown: Shown, radius: float, frame: str | None, ghost: bool) -> Overlays:
     traced = frame if frame in shown.stage.linkage.links else None  # a ghost may be another robot
     return overlays(shown.stage, shown.run, radius, traced, ghost)
+
+
+def _paths(shown: list[Shown], layers: list[Overlays]) -> dict[str, Any]:
+    """The frames whose paths are drawn, and the one that is shown at first, of each run."""
+    return {
+        each.stage.root: {"frames": layer.frames, "shown": layer.frames[0]}
+        for each, layer in zip(shown, layers, strict=True)
+    }
 
 
 def _events(shown: list[Shown]) -> list[dict[str, Any]]:
@@ -196,21 +214,10 @@ def _events(shown: list[Shown]) -> list[dict[str, Any]]:
     ]
 
 
-def _rests(shown: list[Shown]) -> list[dict[str, Any]]:
-    """The rests and the events of each joint that is held for a time."""
-    lanes = []
-    for each in shown:
-        for name, spans in zip(each.run.joint_names, rests(each.run), strict=True):
-            if spans:
-                events = [(event.t, event.name) for event in each.run.events if event.joint == name]
-                lanes.append(
-                    {
-                        "joint": each.prefix + name,
-                        "spans": [list(span) for span in spans],
-                        "events": events[:_MOST_EVENTS],
-                    }
-                )
-    return lanes
+def _causes(shown: list[Shown]) -> dict[str, Any] | None:
+    """The torque by cause of the first run."""
+    split = causes(shown[0].run, shown[0].stage.robot)
+    return split and split | {"whose": shown[0].name if len(shown) > 1 else ""}
 
 
 def _outcome(shown: Shown) -> str:
@@ -218,7 +225,18 @@ def _outcome(shown: Shown) -> str:
     return f"{shown.prefix}{end.ending} at t = {end.t:g} s" + (f": {end.advice}" if end.advice else "")
 
 
-def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[Path, ...], inertia: bool) -> Shown:
+def _title(shown: list[Shown]) -> str:
+    """The robot of one run; names of several, with how they are drawn."""
+    first, *others = (each.name for each in shown)
+    robots = list(dict.fromkeys(each.stage.robot.name for each in shown))
+    prefix = f"{robots[0]}: " if len(robots) == 1 else ""
+    return f"{prefix}{first} / {', '.join(others)} (transparent, dashed)" if others else first
+
+
+def _shown(
+    number: int, run: Trajectory, names: tuple[str, ...], look: Callable[..., Drawing], dirs: tuple[Path, ...],
+    inertia: bool,
+) -> Shown:  # fmt: skip
     robot = robot_of(run)
     whole, run = len(run.t), _drawable(run)
     stage = Stage("run" if number == 0 else f"ghost {number}", robot)
@@ -234,12 +252,11 @@ def _shown(number: int, run: Trajectory, count: int, package_dirs: tuple[Path, .
         f"drawn at {len(keys.t)} of the {keys.samples} samples; between these, joint positions are interpolated, with"
         f" an error of at most {keys.error[worst]:.1e} {'rad' if joint.revolute else 'm'} ({joint.joint})"
     )
-    mark = ghost_mark(number, count)
-    look = drawing(robot, package_dirs, inertia=inertia)
     some = f"the first {_MOST_EVENTS} of {len(run.events)} events are marked on the plots"
     notes = (thinning, some) if len(run.events) > _MOST_EVENTS else (thinning,)
-    name = robot.name + mark
-    return Shown(name, "" if count == 1 else f"{name}: ", run, stage, keys, look, tuple(problems), notes)
+    name = names[number] if len(names) > 1 else robot.name
+    drawn = look(robot, dirs, inertia=inertia)
+    return Shown(name, "" if len(names) == 1 else f"{name}: ", run, stage, keys, drawn, tuple(problems), notes)
 
 
 def _drawable(run: Trajectory) -> Trajectory:
@@ -250,15 +267,24 @@ def _drawable(run: Trajectory) -> Trajectory:
     if not end:
         raise ReplayError("the run has no samples that can be shown; simulate it again, with a smaller step")
     cut = {name: getattr(run, name)[:end] for name in ("t", "q", "v", "a", "u")}
+    if run.effect_torques is not None:
+        cut["effect_torques"] = {name: torque[:end] for name, torque in run.effect_torques.items()}
+    of_reference = {name: getattr(run, name) for name in ("desired", "desired_velocity", "deviation")}
+    cut |= {name: None if x is None else x[:end] for name, x in of_reference.items()}
     wrenches = {link: F[F[:, 0] <= run.t[end - 1]] for link, F in run.wrenches.items()}
     return replace(run, **cut, wrenches=wrenches, at_stop=None if run.at_stop is None else run.at_stop[:end])
 
 
-def _corners(shown: Shown) -> np.ndarray:
+def _seen(look: Drawing, inertia: bool) -> tuple[Piece, ...]:
+    """The pieces that are shown at first."""
+    return look.pieces + look.boxes if inertia else look.pieces
+
+
+def _corners(shown: Shown, inertia: bool) -> np.ndarray:
     """Corners (k, 3) in the base of what is drawn, at a few keyframes."""
     few = np.unique(np.linspace(0, len(shown.keys.t) - 1, 12).round().astype(int))
     at = np.searchsorted(shown.run.t, shown.keys.t[few]).clip(0, len(shown.run.t) - 1)
-    return shown.stage.corners(shown.drawing.pieces, shown.run.q[at])
+    return shown.stage.corners(_seen(shown.drawing, inertia), shown.run.q[at])
 
 
 def _labels(shown: list[Shown]) -> str:

@@ -1,4 +1,4 @@
-"""Overlays of a replay: p_com = Σ mᵢ pᵢ / Σ mᵢ, the trace of a frame, stops, and arrows of external wrenches (f, τ).
+"""Overlays of a replay: p_com = Σ mᵢ pᵢ / Σ mᵢ, the paths of frames, stops, and arrows of external wrenches (f, τ).
 
 Paths are thinned like joints: a straight line replaces the samples between keyframes, to a part of what is seen.
 """
@@ -11,12 +11,13 @@ from typing import final
 
 import numpy as np
 
+from robot_dyn.lagrange.linkage import BASE, Pose
+from robot_dyn.shapes.triangles import Mesh
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.spatial import first_moment
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
 from robot_dyn.view.geometry.shapes import arrow, cylinder, sphere
-from robot_dyn.view.geometry.triangles import Mesh
 from robot_dyn.view.keyframes import Keyframes, corners, keyframes
 from robot_dyn.view.stage import Stage, placement, plain
 
@@ -33,6 +34,7 @@ _WRENCH: tuple[tuple[str, str, slice, str, Rgba], ...] = (
     ("force", "orange", slice(1, 4), "N", (0.84, 0.37, 0.0, 1.0)),
     ("torque", "pink", slice(4, 7), "N m", (0.8, 0.47, 0.65, 1.0)),
 )
+_MOST_PATHS = 60  # of frames, of a run
 _CHUNK = 20_000  # samples whose placements are held at a time
 
 
@@ -43,12 +45,14 @@ class Overlays:
 
     Attributes:
         ghost: Whether the overlays are transparent.
+        frames: Links whose paths are drawn, the one to be shown first.
     """
 
     ghost: bool = False
     commands: list[Command] = field(default_factory=list)
     tracks: dict[str, list[Command]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    frames: tuple[str, ...] = ()
 
     def colour(self, rgba: Rgba) -> Rgba:
         """A colour, transparent if it is a ghost's."""
@@ -63,13 +67,13 @@ class Overlays:
 
 
 def overlays(stage: Stage, run: Trajectory, reach: float, frame: str | None = None, ghost: bool = False) -> Overlays:
-    """What a run recorded: centre of mass, trace of a frame, joints at their stops.
+    """What a run recorded: centre of mass, paths of frames, joints at their stops.
 
     Args:
         stage: Where the robot stands.
         run: Its samples.
         reach: Radius of what is seen, in [m].
-        frame: Link whose path is traced; the one under control, or the tip, if not given.
+        frame: Link whose path is shown at first; the one under control, or the tip, if not given.
         ghost: Whether it is drawn transparent.
     """
     found = Overlays(ghost)
@@ -78,14 +82,35 @@ def overlays(stage: Stage, run: Trajectory, reach: float, frame: str | None = No
     found.add(f"{stage.root}/centre of mass", sphere(0.02 * reach), _COM, place)
 
     frame = frame or run.about.get("frame") or stage.tip
-    path = keyframes(run.t, _of_link(stage, run.q, frame), _PART * reach)
-    line = commands.polyline(path.q), commands.material(found.colour(_TRACE), line=True)
-    found.commands.append(commands.set_object(f"{stage.root}/trace", *line, kind="Line"))
-    what = f"the line is the path of {frame}, the yellow ball the centre of mass of what moves"
-    found.notes.append(f"{what}; they are off by at most {1e3 * _off(com, path):.1g} mm")
+    stage.link_path(frame)  # raises if there is none
+    paths = _paths(found, stage, run, reach, frame)
+    what = "the line is the path of a frame, the yellow ball the centre of mass of what moves"
+    found.notes.append(f"{what}; they are off by at most {1e3 * _off(com, *paths):.1g} mm")
     if run.at_stop is not None:
         _stops(found, stage, run, reach)
     return found
+
+
+def _paths(found: Overlays, stage: Stage, run: Trajectory, reach: float, first: str) -> list[Keyframes]:
+    """Add the paths of a frame and of the other links that move, those next to the tip first."""
+    links, moving = stage.linkage.links, [name for name, (body, _, _) in stage.linkage.links.items() if body != BASE]
+    found.frames = tuple(dict.fromkeys([first, *reversed(moving)]))[:_MOST_PATHS]
+    poses = [links[name][:2] for name in found.frames]
+    points = _over(stage, run.q, lambda at: np.stack([_origin(at, body, pose) for body, pose in poses], axis=1))
+    paths = [keyframes(run.t, points[:, i], _PART * reach) for i in range(len(poses))]
+    look = commands.material(found.colour(_TRACE), line=True)
+    for name, path in zip(found.frames, paths, strict=True):
+        place = f"{stage.root}/paths/{plain(name)}"
+        found.commands.append(commands.set_object(place, commands.polyline(path.q), look, kind="Line"))
+        if name != first:
+            found.commands.append(commands.set_property(place, "visible", False))
+    return paths
+
+
+def _origin(at: Placements, body: int, pose: Pose) -> np.ndarray:
+    """Positions of the origin of a frame of a body, (m, 3)."""
+    p = placement(at, body, pose)[1]
+    return np.broadcast_to(p, (len(at[0][1]), 3))
 
 
 def _off(*paths: Keyframes) -> float:
@@ -103,8 +128,7 @@ def _of_link(stage: Stage, q: np.ndarray, link: str) -> np.ndarray:
     """Positions of a link's frame, (m, 3); QueryError if there is no such link."""
     stage.link_path(link)
     body, pose, _ = stage.linkage.links[link]
-    shape = (-1, 3)
-    return _over(stage, q, lambda at: np.broadcast_to(placement(at, body, pose)[1], (len(at[0][1]), 3)).reshape(shape))
+    return _over(stage, q, lambda at: _origin(at, body, pose))
 
 
 def centre_of_mass(stage: Stage, at: Placements) -> np.ndarray:

@@ -1,70 +1,149 @@
-"""The page of a replay: one HTML file that contains the viewer, the plots, the slider and all data."""
+"""A page as a value: in a cell of a notebook it shows itself, at a prompt its `repr` is an address for a browser."""
 
 from __future__ import annotations
 
-import html
-import json
-import re
+import sys
 from base64 import b64encode
-from collections.abc import Iterable, Iterator
-from hashlib import sha256
-from importlib.util import find_spec
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
 from pathlib import Path
-from string import Template
-from typing import Any
+from tempfile import mkdtemp
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, final
 
-from robot_dyn.view.commands import as_text
+from robot_dyn.errors import RobotDynError
+from robot_dyn.files import Kind, save, target, why
+from robot_dyn.validate import integer
+from robot_dyn.view.picture import HEIGHT, WIDTH, picture
+from robot_dyn.view.web.text import page_text
 
-# Nothing is loaded, and only the scripts in the page run; pictures are data; only the live page has a socket.
-_POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'; script-src {}; style-src {}; img-src data: blob:"
-_LIVE = "; connect-src 'self' ws://127.0.0.1:* ws://localhost:*"
-_PANEL = re.compile(r'\}\("(\.dg ul\{(?:[^"\\]|\\.)*)"\)')  # the style that meshcat's panel, dat.gui, gives itself
+if TYPE_CHECKING:
+    from robot_dyn.view.live.server import Server
 
-
-def page(document: dict[str, Any]) -> str:
-    """The HTML text of a document: title, outcome, notes, duration, scene, plots, and commands unless it is `live`."""
-    web = Path(__file__).parent / "web"
-    meshcat = _inline(_read(_meshcat() / "viewer" / "dist" / "main.min.js"))
-    scripts = {
-        "meshcat": meshcat,
-        "uplot": _inline(_read(web / "uplot" / "uPlot.iife.min.js")),
-        "script": _inline(_read(web / "replay.js")),
-    }
-    styles = {"uplot_style": _read(web / "uplot" / "uPlot.min.css"), "style": _read(web / "replay.css")}
-    policy = _POLICY.format(_hashes(scripts.values()), _hashes([*styles.values(), *_own_styles(meshcat)]))
-    return Template(_read(web / "replay.html")).substitute(
-        policy=policy + (_LIVE if document["live"] else ""),
-        title=html.escape(document["title"]),
-        data=json.dumps(as_text(document)),  # base64 has no character that HTML would read
-        **scripts,
-        **styles,
-    )
+_HEIGHT = 720  # of a frame in a notebook, in pixels
+PAGE = Kind("a page", ".html", b"<!DOCTYPE html>")
 
 
-def _hashes(texts: Iterable[str]) -> str:
-    """The sources of a content policy that are these texts and no others [CSP 3, §2.3.1]."""
-    digests = (sha256(text.encode()).digest() for text in texts)
-    return " ".join(f"'sha256-{b64encode(digest).decode()}'" for digest in digests)
+class ReplayError(RobotDynError):
+    """A replay that cannot be built or written."""
 
 
-def _own_styles(meshcat: str) -> Iterator[str]:
-    """The styles that meshcat puts into its page: an empty one, filled later, and that of its panel."""
-    yield ""
-    for text in _PANEL.findall(meshcat):
-        yield json.loads(f'"{text}"')
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Page:
+    """A page of `replay` or `show`, which needs neither server nor network.
 
+    As the last value of a notebook's cell it is shown there: in a frame that has no access to the notebook, or as a
+    picture of its first instant where frames are removed. At a prompt, `repr` gives its address.
 
-def _meshcat() -> Path:
-    """The folder of the package meshcat; importing it would import IPython."""
-    found = find_spec("meshcat")
-    assert found is not None and found.submodule_search_locations, "meshcat is a dependency"
-    return Path(found.submodule_search_locations[0])
+    Attributes:
+        document: What it consists of.
+    """
 
+    document: Mapping[str, Any]
 
-def _read(file: Path) -> str:
-    return file.read_text(encoding="utf-8")
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "document", MappingProxyType(dict(self.document)))
 
+    @cached_property
+    def text(self) -> str:
+        """Its HTML."""
+        return page_text({**self.document, "live": False})
 
-def _inline(script: str) -> str:
-    """Return a script that HTML parsers do not end early."""
-    return script.replace("</script", "<\\/script").replace("<!--", "<\\!--")
+    @cached_property
+    def address(self) -> str:
+        """Address (file:) of a copy among the temporary files, which is written when this is first asked for.
+
+        Raises:
+            ReplayError: If it cannot be written.
+        """
+        try:
+            folder = Path(mkdtemp(prefix="robot_dyn-"))  # readable for you alone
+        except OSError as cause:
+            raise ReplayError(f"no temporary folder ({why(cause)}); write the page with .save(path)") from None
+        return self.save(folder / "page.html").as_uri()
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as one HTML file; an existing page of that name is replaced, a file of another kind is not.
+
+        Raises:
+            ReplayError: If the file cannot be written.
+        """
+        file, content = target(path, PAGE, ReplayError), self.text.encode()
+        return save(file, lambda stream: stream.write(content), ReplayError)
+
+    def save_video(
+        self,
+        path: str | Path,
+        *,
+        fps: int | None = None,
+        size: tuple[int, int] = (1280, 720),
+        dark: bool = False,
+        browser: str | Path | None = None,
+        on_progress: Callable[[float, str], object] | None = None,
+    ) -> Path:
+        """Write the run as a video, .mp4 or .gif: frame k shows t = k / fps, by the clock of the page.
+
+        An installed Chrome, Chromium or Edge draws it, without a window, a network or an open port; WebGL runs on the
+        processor. Number, times and states of the frames are those of the page; pixels depend on the browser. An
+        existing video of that name is replaced. An .mp4 needs `pip install 'robot-dyn[video]'`.
+
+        Args:
+            path: The file.
+            fps: Frames a second, 1 to 240, of a .gif to 50; 60 of an .mp4 and 25 of a .gif if not given.
+            size: Width and height in pixels, even numbers from 160 to 3840.
+            dark: Whether it is drawn for dark screens.
+            browser: Path of the browser; the first of this machine if not given.
+            on_progress: Called with the part that is done, from 0 to 1, and with what is being done.
+
+        Raises:
+            VideoError: If the page has no run, the video is too long, no browser is installed or shows the page, or
+                the file cannot be written.
+            MissingExtraError: If imageio-ffmpeg is not installed.
+        """
+        from robot_dyn.view.video.video import save_video  # starts no browser
+
+        text, duration = self.text, self.document["duration"]
+        return save_video(text, duration, path, fps, size, dark, browser, on_progress)
+
+    def serve(self, port: int | None = None) -> Server:
+        """Serve it live, on this machine only, at the `url` of what is returned, until that is closed.
+
+        Other meshcat programs may draw into the scene, at its `zmq_url`.
+
+        Args:
+            port: Port to listen on; any free one if not given.
+
+        Raises:
+            QueryError: If the port is not one.
+            ServerError: If the port is taken.
+        """
+        port = None if port is None else integer("port", port, least=1, most=65535)
+        from robot_dyn.view.live.server import Server  # imports zmq and tornado
+
+        rest = {name: entry for name, entry in self.document.items() if name != "commands"}
+        return Server(page_text(rest | {"live": True}), self.document["commands"], port)
+
+    def __repr__(self) -> str:
+        return f"<{self._title}: {self.address}>"
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        """The page in a frame, its picture, and a line of text; the line has an address only in a terminal."""
+        still = b64encode(picture(self.document)).decode()
+        text = repr(self) if sys.stdout.isatty() else f"<{self._title}: .address is a page, .save(path) writes it>"
+        return {"text/html": self._frame(still), "image/png": still, "text/plain": text}
+
+    def _frame(self, still: str) -> str:
+        """A frame with the page; what removes frames and keeps their content shows the picture."""
+        title = escape(self._title)
+        return (
+            f'<iframe title="{title}" sandbox="allow-scripts allow-downloads" width="100%" height="{_HEIGHT}"'
+            f' style="border:0" srcdoc="{escape(self.text)}">'
+            f'<img alt="{title}" width="{WIDTH}" height="{HEIGHT}" src="data:image/png;base64,{still}"></iframe>'
+        )
+
+    @property
+    def _title(self) -> str:
+        return f"{self.document['title']}: {self.document['outcome']}"

@@ -5,7 +5,8 @@ A joint that is held has v = 0 and the same q at two successive times, to the la
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,14 @@ def rests(run: Trajectory) -> tuple[tuple[Rest, ...], ...]:
         for name, x in (("q", run.q), ("v", run.v))
     )
     return tuple(_of_joint(run, i, t[order], q[:, i], v[:, i]) for i in range(len(names)))
+
+
+def lanes(run: Trajectory, prefix: str, most_events: int) -> Iterator[dict[str, Any]]:
+    """The entries `rests` of a page's document: of each joint that is held for a time, its rests and its events."""
+    for name, spans in zip(run.joint_names, rests(run), strict=True):
+        if spans:
+            events = [(event.t, event.name) for event in run.events if event.joint == name]
+            yield {"joint": prefix + name, "spans": [list(each) for each in spans], "events": events[:most_events]}
 
 
 def _of_joint(run: Trajectory, i: int, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[Rest, ...]:

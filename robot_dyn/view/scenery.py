@@ -6,7 +6,8 @@ R g/‖g‖ = −z    the scene is the base turned by the least rotation R that 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from itertools import product
+from typing import Any, final
 
 import numpy as np
 
@@ -22,6 +23,9 @@ _GRAVITY = (0.42, 0.24, 0.6, 1.0)  # violet
 _CORNER = np.array([0.67, -0.67, 0.32])  # default direction of the camera, from the middle of what is seen
 _POINT = 1e-9  # [m], below which nothing has a size
 _FRONTAL = 1.2  # how far it moves to the front of what is flat
+_OUTWARD = np.array([d for d in product(range(-2, 3), repeat=3) if any(d)], dtype=float)  # directions of an outline
+_ARROW = 0.3  # length of the arrow of gravity, in radii of what is seen
+_FLOOR = 1.5  # its half width, in radii of what is seen
 
 
 @final
@@ -34,21 +38,34 @@ class Scenery:
         radius: Of the sphere, in [m].
         floor: The lowest z, in [m].
         camera: Unit vector from the center to the camera, (3,).
+        outline: The outermost points in some directions, (k, 3), which the camera has in view.
     """
 
     center: np.ndarray
     radius: float
     floor: float
     camera: np.ndarray
+    outline: np.ndarray
 
     @property
     def square(self) -> float:
         """Edge of the squares on the floor, in [m]."""
         return 10.0 ** np.round(np.log10(self.radius)) / 5
 
-    def as_json(self) -> dict[str, object]:
-        """What the page needs for its camera."""
-        return {"center": self.center.tolist(), "radius": self.radius, "camera": self.camera.tolist()}
+    @property
+    def aside(self) -> np.ndarray:
+        """A place at the left of what is seen, where the arrow of gravity starts, (3,)."""
+        left = np.cross(self.camera, [0.0, 0.0, 1.0])
+        length = np.linalg.norm(left)
+        left = left / length if length > 1e-6 else np.array([-1.0, 0.0, 0.0])  # seen from above
+        away = ((self.outline - self.center) @ left).max() + 0.1 * self.radius
+        return self.center + away * left + [0.0, 0.0, _ARROW * self.radius]
+
+    def as_json(self) -> dict[str, Any]:
+        """What the page needs for its camera; the arrow of gravity is in view."""
+        seen = np.vstack([self.outline, self.aside, self.aside - [0.0, 0.0, _ARROW * self.radius]])
+        places = {"center": self.center, "camera": self.camera, "outline": seen}
+        return {"radius": self.radius} | {name: each.tolist() for name, each in places.items()}
 
 
 def scenery(points: np.ndarray) -> Scenery:
@@ -62,7 +79,8 @@ def scenery(points: np.ndarray) -> Scenery:
     normal = axes[:, 0] * (1.0 if axes[:, 0] @ _CORNER >= 0 else -1.0)
     flat = (spread[1] - spread[0]) / spread[2] if spread[2] > 0 else 0.0
     camera = _CORNER / np.linalg.norm(_CORNER) + _FRONTAL * flat * normal
-    return Scenery(center, radius, float(low[2]), camera / np.linalg.norm(camera))
+    outline = points[np.unique((points @ _OUTWARD.T).argmax(axis=0))]
+    return Scenery(center, radius, float(low[2]), camera / np.linalg.norm(camera), outline)
 
 
 def upright(gravity: tuple[float, float, float]) -> np.ndarray:
@@ -80,7 +98,7 @@ def upright(gravity: tuple[float, float, float]) -> np.ndarray:
 
 def ground(seen: Scenery) -> Command:
     """Squares on the floor, each edge a separate line: viewers drop lines that pass behind the camera."""
-    middle, count = np.round(seen.center[:2] / seen.square), int(np.ceil(4 * seen.radius / seen.square))
+    middle, count = np.round(seen.center[:2] / seen.square), int(np.ceil(_FLOOR * seen.radius / seen.square))
     ticks = np.arange(-count, count + 1)
     x, y = np.meshgrid(ticks, ticks[:-1], indexing="ij")
     along = np.stack([np.stack([x, y], axis=-1), np.stack([x, y + 1], axis=-1)], axis=-2).reshape(-1, 2)
@@ -94,14 +112,10 @@ def gravity_arrow(seen: Scenery, gravity: tuple[float, float, float]) -> list[Co
     """An arrow down, at the left of what is seen; none without gravity."""
     if not any(gravity):
         return []
-    left = np.cross(seen.camera, [0.0, 0.0, 1.0])
-    if (length := np.linalg.norm(left)) < 1e-6:  # seen from above
-        left, length = np.array([-1.0, 0.0, 0.0]), 1.0
-    place = seen.center + seen.radius * (0.9 * left / length + [0.0, 0.0, 0.3])
     down = np.diag([1.0, -1.0, -1.0])
     look = commands.material(_GRAVITY)
-    drawn = commands.set_object("gravity", commands.triangles(arrow(0.35 * seen.radius)), look)
-    return [drawn, commands.set_transform("gravity", homogeneous(down, place))]
+    drawn = commands.set_object("gravity", commands.triangles(arrow(_ARROW * seen.radius)), look)
+    return [drawn, commands.set_transform("gravity", homogeneous(down, seen.aside))]
 
 
 def gravity_label(robot: Robot) -> str:

@@ -65,15 +65,23 @@ class Stage:
             commands.set_transform(self.link_path(link), homogeneous(pose.R, pose.p))
             for link, (_, pose, _) in self.linkage.links.items()
         ]
-        meshes = {id(piece.mesh): commands.triangles(piece.mesh) for piece in pieces}
+        return found + self.fasten(pieces, opacity)
+
+    def fasten(
+        self, pieces: tuple[Piece, ...], opacity: float = 1.0, kind: str = "", seen: bool = True
+    ) -> list[Command]:
+        """The commands that fasten pieces to links; their names begin with their kind."""
+        found, meshes = [], {id(piece.mesh): commands.triangles(piece.mesh) for piece in pieces}
         for number, piece in enumerate(pieces):
-            path = f"{self.link_path(piece.link)}/{number}"
+            path = f"{self.link_path(piece.link)}/{kind}{number}"
             rgba = (*piece.rgba[:3], piece.rgba[3] * opacity)
             look = commands.material(rgba, vertex_colors=piece.mesh.colors is not None)
             if piece.image is not None:
                 look["image"] = piece.image
             found.append(commands.set_object(path, meshes[id(piece.mesh)], look))
             found.append(commands.set_transform(path, piece.pose))
+            if not seen:
+                found.append(commands.set_property(path, "visible", False))
         return found
 
     def tracks(self, keys: Keyframes) -> dict[str, list[Command]]:

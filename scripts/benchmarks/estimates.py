@@ -12,15 +12,15 @@ import numpy as np
 import robot_dyn as rd
 from benchmarks.measure import READY, Effort, arms, row, table
 
-TIGHT = rd.Adaptive(rtol=1e-13, atol=1e-14)
+TIGHT = rd.integrate.Adaptive(rtol=1e-13, atol=1e-14)
 
 
 def scenes() -> dict[str, rd.Setup]:
     """Five smooth scenes, for RK4."""
-    panda, double, rk4 = arms()["Panda-7"], rd.load("planar_2r"), rd.method("rk4")
-    reach = rd.quintic(READY, READY + np.array([0.4, -0.3, 0.5, 0.2, -0.6, 0.3, 0.4]), 0.5)
-    control = rd.ComputedTorque(panda, reach, *rd.gains_from(1.0, 8.0, 0.9))
-    friction, spring = rd.ViscousFriction([0.4, 0.2]), rd.Spring([30.0, 0.0], [0.2, 0.0])
+    panda, double, rk4 = arms()["Panda-7"], rd.load("planar_2r"), rd.integrate.method("rk4")
+    reach = rd.control.quintic(READY, READY + np.array([0.4, -0.3, 0.5, 0.2, -0.6, 0.3, 0.4]), 0.5)
+    control = rd.control.ComputedTorque(panda, reach, *rd.control.gains_from(1.0, 8.0, 0.9))
+    friction, spring = rd.effects.ViscousFriction([0.4, 0.2]), rd.effects.Spring([30.0, 0.0], [0.2, 0.0])
     return {
         "pendulum": rd.Setup(rd.Plant(rd.load("pendulum")), [2.5], [0.7], 2.0, None, rk4, 4e-3),
         "planar_2r, friction": rd.Setup(rd.Plant(double, [friction]), [0.4, -0.7], [0.3, 0.5], 1.0, None, rk4, 5e-3),

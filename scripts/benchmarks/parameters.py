@@ -30,12 +30,12 @@ def parameters(effort: Effort) -> None:
     """Scenes of Panda-7 whose numbers are gravity, a payload, gains and coefficients; and what another value costs."""
     arm = completed(arms()["Panda-7"])[0]
     held = arm.with_(payload=rd.Payload("panda_link8", 1.5, (0.01, 0.02, 0.1)))
-    friction, goal = [rd.ViscousFriction(0.5)], rd.quintic(READY, READY + 0.2, 1.0)
+    friction, goal = [rd.effects.ViscousFriction(0.5)], rd.control.quintic(READY, READY + 0.2, 1.0)
     scenes = {
         "free swing": (rd.Plant(arm), None),
         "free swing, payload": (rd.Plant(held), None),
-        "PD, friction": (rd.Plant(arm, friction), rd.PD(goal, 100.0, 10.0)),
-        "computed torque, friction": (rd.Plant(arm, friction), rd.ComputedTorque(arm, goal, 100.0, 20.0)),
+        "PD, friction": (rd.Plant(arm, friction), rd.control.PD(goal, 100.0, 10.0)),
+        "computed torque, friction": (rd.Plant(arm, friction), rd.control.ComputedTorque(arm, goal, 100.0, 20.0)),
     }
     table("what", "constants", "inputs", "ratio", "one run", "64 runs", "other values, ms")
     for name, (plant, controller) in list(scenes.items())[: 1 if effort.quick else None]:

@@ -1,6 +1,7 @@
 """What accuracy costs in time: free swing of Panda-7 over 1 s, all methods beside SciPy, MuJoCo, Drake and heyoka.
 
-It is `rd.work_precision`; a whole call of `rd.simulate`, with all that it checks, watches and tells, stands beside it.
+It is `rd.studies.work_precision`; a whole call of `rd.simulate`, with all that it checks, watches and tells,
+stands beside it.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ def precision(effort: Effort) -> None:
     """A table of the time that each takes to an error, and the diagram of all."""
     setup = rd.Setup(rd.Plant(arms()["Panda-7"]), READY, engine="compiled", estimate_error=False)
     quick: Any = {"methods": ["DOP853", "rk4"], "budget_s": 2.0, "repeats": 1} if effort.quick else {"budget_s": 120.0}
-    result = rd.work_precision(setup, **quick)
+    result = rd.studies.work_precision(setup, **quick)
     table("what", *(f"to {x:g}, ms" for x in TARGETS), *(f"over DOP853, {x:g}" for x in TARGETS))
     base = [result.ladders[0].price(x) for x in TARGETS]
     for ladder in result.ladders:
@@ -34,14 +35,16 @@ def precision(effort: Effort) -> None:
     row("whole call of simulate, DOP853", *(f"{1e3 * x:.3f}" for x in whole(setup, effort)), *["—"] * len(TARGETS))
     print("\n( ) extrapolated by the order.", result.sentence)
     if (picture := effort.picture("precision")) is not None:
-        rd.save_result(result, picture)
+        rd.studies.save_result(result, picture)
 
 
 def whole(setup: rd.Setup, effort: Effort) -> list[float]:
     """Median times of warm calls of simulate, in [s], with a tolerance of a tenth of each target."""
     found = []
     for target in TARGETS:
-        with_method = replace(setup, integrator=rd.Adaptive(rtol=target / 10, atol=target / 10), record_period_s=1.0)
+        with_method = replace(
+            setup, integrator=rd.integrate.Adaptive(rtol=target / 10, atol=target / 10), record_period_s=1.0
+        )
         times = [seconds(lambda: rd.simulate(with_method)) for _ in range(effort.repeats + 1)]
         found.append(median(times[1:]))
     return found

@@ -40,19 +40,19 @@ class Case:
         what: What acts, in words.
         effects: Besides gravity.
         control: (robot, q) → controller, or None.
-        options: Of `rd.prove`.
+        options: Of `rd.studies.prove`.
         start: q and v, drawn from seed 0 if not given.
     """
 
     name: str
     until_s: float
     what: str = ""
-    effects: tuple[rd.ViscousFriction | Any, ...] = ()
+    effects: tuple[rd.effects.ViscousFriction | Any, ...] = ()
     control: Any = None
     options: dict[str, Any] = field(default_factory=dict)
     start: tuple[np.ndarray, np.ndarray] | None = None
 
-    def prove(self, bits: int) -> tuple[rd.Proof, float, float]:
+    def prove(self, bits: int) -> tuple[rd.studies.Proof, float, float]:
         """The theorem, the time of tracing and that of the rest, in [s]."""
         robot, rng = arm(self.name), np.random.default_rng(0)
         q, v = (rng.uniform(-1, 1, robot.n) for _ in range(2)) if self.start is None else self.start
@@ -61,7 +61,7 @@ class Case:
         began = process_time()
         Tape(motion(setup, self.until_s))
         traced = process_time()
-        made = rd.prove(setup, self.until_s, bits, budget_s=600.0, **self.options)
+        made = rd.studies.prove(setup, self.until_s, bits, budget_s=600.0, **self.options)
         return made, traced - began, max(process_time() - traced - (traced - began), 0.0)
 
 
@@ -111,14 +111,26 @@ def boxes(effort: Effort) -> None:
 
 def acting(effort: Effort) -> None:
     """With effects and control."""
-    viscous, tanh = rd.ViscousFriction(0.5), rd.RegularisedCoulombFriction
+    viscous, tanh = rd.effects.ViscousFriction(0.5), rd.effects.RegularisedCoulombFriction
     cases = (
         Case("ur5", 0.1, "viscous, b = 0.5", (viscous,)),
         Case("panda", 0.05, "viscous, b = 0.5", (viscous,)),
-        Case("ur5", 0.1, "spring, k = 10", (rd.Spring(10.0, 0.2),)),
-        Case("planar_2r", 1.0, "PD, kp = 100, kd = 10", control=lambda _, q: rd.PD(rd.hold(q + 0.1), 100.0, 10.0)),
-        Case("ur5", 0.1, "PD, kp = 100, kd = 1", control=lambda _, q: rd.PD(rd.hold(q + 0.1), 100.0, 1.0)),
-        Case("ur5", 0.1, "PD, kp = 100, kd = 10", control=lambda _, q: rd.PD(rd.hold(q + 0.1), 100.0, 10.0)),
+        Case("ur5", 0.1, "spring, k = 10", (rd.effects.Spring(10.0, 0.2),)),
+        Case(
+            "planar_2r",
+            1.0,
+            "PD, kp = 100, kd = 10",
+            control=lambda _, q: rd.control.PD(rd.control.hold(q + 0.1), 100.0, 10.0),
+        ),
+        Case(
+            "ur5", 0.1, "PD, kp = 100, kd = 1", control=lambda _, q: rd.control.PD(rd.control.hold(q + 0.1), 100.0, 1.0)
+        ),
+        Case(
+            "ur5",
+            0.1,
+            "PD, kp = 100, kd = 10",
+            control=lambda _, q: rd.control.PD(rd.control.hold(q + 0.1), 100.0, 10.0),
+        ),
         Case("ur5", 0.1, "computed torque, masses 10 % off", control=_computed_torque),
         Case("pendulum", 1.0, "tanh, f = 1, v_s = 0.01", (tanh(1.0),)),
         Case("planar_2r", 1.0, "tanh, f = 1, v_s = 0.1", (tanh(1.0, 0.1),)),
@@ -132,8 +144,8 @@ def acting(effort: Effort) -> None:
         row(NAMES[case.name], case.what, case.until_s, radius, len(made.nodes) - 1, f"{time:.2f}")
 
 
-def _computed_torque(robot: rd.Robot, q: np.ndarray) -> rd.ComputedTorque:
-    return rd.ComputedTorque(robot.with_(mass_scale=0.9), rd.quintic(q, q + 0.5, 0.5), 100.0, 20.0)
+def _computed_torque(robot: rd.Robot, q: np.ndarray) -> rd.control.ComputedTorque:
+    return rd.control.ComputedTorque(robot.with_(mass_scale=0.9), rd.control.quintic(q, q + 0.5, 0.5), 100.0, 20.0)
 
 
 def _row(case: Case, bits: int) -> None:

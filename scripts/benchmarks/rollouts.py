@@ -66,15 +66,15 @@ def sticking(effort: Effort) -> None:
     """The same with dry friction and rigid stops, e = 0, by time stepping; MuJoCo with its stiffest settings."""
     model: Any = mujoco_model(mujoco, arms()["Panda-7"], GAINS, DAMPING)
     stick_and_stop(mujoco, model, LEVEL, LOWER, UPPER, STEP_S)
-    held = [rd.DryFriction(LEVEL), rd.RigidStops(LOWER, UPPER)]
+    held = [rd.effects.DryFriction(LEVEL), rd.effects.RigidStops(LOWER, UPPER)]
     _side_by_side(effort, model, held, "time_stepping", "steps, PD, dry friction and rigid stops")
 
 
 def _side_by_side(effort: Effort, model: Any, held: list[Any], method: str, what: str) -> None:
     panda, runs, steps = arms()["Panda-7"], (128 if effort.quick else BATCH), (40 if effort.quick else 1000)
     goal, starts = READY + 0.2, READY + 0.1 * np.random.default_rng(0).uniform(-1, 1, size=(runs, 7))
-    control = rd.PD(rd.hold(goal), *GAINS)
-    plant = rd.Plant(panda, [rd.ViscousFriction(DAMPING), *held])
+    control = rd.control.PD(rd.control.hold(goal), *GAINS)
+    plant = rd.Plant(panda, [rd.effects.ViscousFriction(DAMPING), *held])
     setup = rd.Setup(plant, READY, duration_s=steps * STEP_S, controller=control, integrator=method)
     first = np.zeros((runs, 1 + 14))
     first[:, 1:8] = starts

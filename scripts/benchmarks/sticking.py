@@ -34,13 +34,15 @@ def sticking(effort: Effort) -> None:
     def drive(t: float, q: Any, v: Any) -> np.ndarray:
         return weight + AMPLITUDE * np.sin(OMEGA * t + 0.3)
 
-    for what, stops in (("dry friction", []), ("dry friction and stops, e = 0", [rd.RigidStops(LOWER, UPPER)])):
-        plant = rd.Plant(panda, [rd.ViscousFriction(DAMPING), rd.DryFriction(LEVELS), *stops])
+    for what, stops in (("dry friction", []), ("dry friction and stops, e = 0", [rd.effects.RigidStops(LOWER, UPPER)])):
+        plant = rd.Plant(panda, [rd.effects.ViscousFriction(DAMPING), rd.effects.DryFriction(LEVELS), *stops])
         options: dict[str, Any] = {
             "q0": START, "duration_s": DURATION_S, "controller": drive, "record_period_s": SAMPLE_S,
             "estimate_error": False,
         }  # fmt: skip
-        limit = rd.simulate(plant, **options, engine="compiled", integrator=rd.Adaptive(rtol=1e-12, atol=1e-12))
+        limit = rd.simulate(
+            plant, **options, engine="compiled", integrator=rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)
+        )
         print(f"\n{what}: {len(limit.events)} events")
         table("h, s", *(f"{h:g}" for h in steps), "mean order")
 

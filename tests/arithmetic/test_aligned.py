@@ -41,11 +41,11 @@ def test_arrays_of_zeros_begin_at_cache_lines() -> None:
 def test_what_each_step_touches_begins_at_cache_lines(method: str) -> None:
     """States, stages and extremes, of many allocations: by chance one in four does."""
     robot = rd.load("planar_2r")
-    equation = StateEquation(rd.Plant(robot, [rd.ViscousFriction([0.5] * 2)]), None)
+    equation = StateEquation(rd.Plant(robot, [rd.effects.ViscousFriction([0.5] * 2)]), None)
     m, n, kept = equation.size, robot.n, []
     for _ in range(8):
         runs = runs_of(equation, np.ones((m, W)), np.zeros((1, W)), 0, np.arange(W))
-        K = rd.method(method).stepper(FLOAT64, m, n, m | 1, W).work.K
+        K = rd.integrate.method(method).stepper(FLOAT64, m, n, m | 1, W).work.K
         kept += [runs.y, runs.after, K]
     start = np.random.default_rng(3).normal(size=(3 * n, 3 * W))
     for of in observations_of(start, guard_levels(robot, (), None, 3 * W), 3):

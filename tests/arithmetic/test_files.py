@@ -19,7 +19,7 @@ import robot_dyn as rd
 from robot_dyn import files
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.files import Kind, save, target
-from robot_dyn.simulation.table import export_csv
+from robot_dyn.simulation.export.export import export
 from tests.arithmetic.faults import failing_at, raising
 from tests.simulation.test_run_file import run  # noqa: F401  the fixture
 
@@ -73,11 +73,13 @@ def test_whichever_call_fails_the_old_file_or_the_new_one_is_whole(tmp_path: Pat
     assert 8 < k < 99, k  # open, fdopen, writes, flush, chmod, fsync, replace, … were among them
 
 
-@pytest.mark.parametrize("what", ["run", "table"])
+@pytest.mark.parametrize("what", ["run", "table", "parquet", "nc", "mcap"])
 def test_whatever_is_saved_survives_a_fault_at_each_call(run, tmp_path: Path, what: str) -> None:  # noqa: F811
     """The same through the public functions, whose formats write in many pieces, and close in their own ways."""
-    keep = {"run": (rd.save_run, "x.npz"), "table": (export_csv, "x.csv")}
-    function, name = keep[what]
+    keep = {"run": (rd.save_run, "x.npz"), "table": (export, "x.csv")}
+    for package in {"parquet": ["pyarrow"], "nc": ["xarray"], "mcap": ["mcap_ros2"]}.get(what, ()):
+        pytest.importorskip(package)
+    function, name = keep.get(what, (export, f"x.{what}"))
     path = function(run, tmp_path / name)
     before = path.read_bytes()
     for k in (*range(1, 12), *range(12, 400, 37)):
@@ -250,7 +252,7 @@ def test_closed_folders_and_protected_files_are_refused(old: Path, tmp_path: Pat
 
 def test_the_public_functions_replace_their_own_kind_and_no_other(run, tmp_path: Path) -> None:  # noqa: F811
     """As numpy.save replaces; but a scene under a link named run.npz stays."""
-    every = ((rd.save_run, "x.npz"), (export_csv, "x.csv"), (partial(rd.save_plot, dpi=20), "x.png"))
+    every = ((rd.save_run, "x.npz"), (export, "x.csv"), (partial(rd.save_plot, dpi=20), "x.png"))
     every += ((rd.save_replay, "x.html"),)
     for function, name in every:
         path = function(run, tmp_path / name)

@@ -15,9 +15,9 @@ from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 ARM = rd.load("planar_2r")
 START = [0.3, -0.2]
 LIMIT = [18.0, 5.0]
-REFERENCE = rd.quintic([0.1, 0.2], [1.3, -0.7], 0.8)
+REFERENCE = rd.control.quintic([0.1, 0.2], [1.3, -0.7], 0.8)
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
-TIGHT = rd.Adaptive(rtol=1e-12, atol=1e-12)
+TIGHT = rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)
 
 
 def slide(effects, control, duration_s: float, **options) -> rd.Trajectory:
@@ -30,7 +30,7 @@ def slide(effects, control, duration_s: float, **options) -> rd.Trajectory:
 def test_a_growing_command_is_followed_up_to_the_limit(engine: str, method: str) -> None:
     """The command c + d t up to U: a cubic, and a parabola behind t = (U − c)/d; these methods are exact on both."""
     c, d, U, T = 0.3, 2.0, 1.1, 0.7
-    run = slide([rd.EffortLimit(U)], Ramp(c, d), T, integrator=method, engine=engine)
+    run = slide([rd.effects.EffortLimit(U)], Ramp(c, d), T, integrator=method, engine=engine)
     (reached,) = run.events
     at = (U - c) / d
     assert (reached.name, reached.direction, reached.joint) == ("upper effort limit of slide reached", 1, "slide")
@@ -48,7 +48,7 @@ def test_a_growing_command_is_followed_up_to_the_limit(engine: str, method: str)
 def test_a_lag_that_reaches_the_limit_behind_it(engine: str, period_s: float) -> None:
     """u₀ (1 − exp(−t/T)) = U at t = −T ln(1 − U/u₀), also where the command is that of a sampled controller."""
     u0, U, T = 3.0, 1.2, 0.08
-    effects = [rd.ActuatorLag(T), rd.EffortLimit(U)]
+    effects = [rd.effects.ActuatorLag(T), rd.effects.EffortLimit(U)]
     run = slide(effects, Ramp(u0, 0.0, period_s), 0.4, integrator=TIGHT, engine=engine)
     (reached,) = run.events
     at = -T * np.log(1 - U / u0)
@@ -60,22 +60,22 @@ def test_a_lag_that_reaches_the_limit_behind_it(engine: str, period_s: float) ->
 @BOTH
 def test_a_reference_that_jumps_passes_the_limit_at_its_break(engine: str) -> None:
     """From rest at 0 to 2 at t = 0.2: kp (2 − q) − kd v > U at once, and q = U t²/(2 m) until it is left."""
-    there = rd.PiecewisePolynomial([0.0, 0.2, 1.0], [[[0.0]], [[2.0]]])
-    run = slide([rd.EffortLimit(1.5)], rd.PD(there, 10.0, 4.0), 0.6, integrator=TIGHT, engine=engine)
+    there = rd.control.PiecewisePolynomial([0.0, 0.2, 1.0], [[[0.0]], [[2.0]]])
+    run = slide([rd.effects.EffortLimit(1.5)], rd.control.PD(there, 10.0, 4.0), 0.6, integrator=TIGHT, engine=engine)
     assert [each.name for each in run.events] == ["upper effort limit of slide reached"]
     assert run.events[0].t == pytest.approx(0.2, abs=np.spacing(0.2))
     assert run.q[-1, 0] == pytest.approx(1.5 / MASS * 0.4**2 / 2, rel=1e-12)
-    whole = slide([rd.EffortLimit(1.5)], rd.PD(there, 10.0, 4.0), 3.0, integrator=TIGHT, engine=engine)
+    whole = slide([rd.effects.EffortLimit(1.5)], rd.control.PD(there, 10.0, 4.0), 3.0, integrator=TIGHT, engine=engine)
     left = whole.events[1]
     assert left.name == "upper effort limit of slide left"
     assert 10.0 * (2.0 - left.q[0]) - 4.0 * left.v[0] == pytest.approx(1.5, abs=1e-13)
 
 
-def control(kind: str) -> tuple[rd.Controller, list[rd.Effect]]:
+def control(kind: str) -> tuple[rd.control.Controller, list[rd.Effect]]:
     if kind == "pid":  # with back-calculation: ż has the torque that is cut away
         gains = [120.0, 60.0], [300.0, 150.0], [20.0, 8.0]
-        return rd.PID(REFERENCE, *gains, effort_limit=LIMIT), []
-    return rd.ComputedTorque(ARM, REFERENCE, *rd.gains_from(1.0, 12.0)), [rd.EffortLimit(LIMIT)]
+        return rd.control.PID(REFERENCE, *gains, effort_limit=LIMIT), []
+    return rd.control.ComputedTorque(ARM, REFERENCE, *rd.control.gains_from(1.0, 12.0)), [rd.effects.EffortLimit(LIMIT)]
 
 
 def saturated(kind: str, **options) -> rd.Trajectory:
@@ -90,7 +90,7 @@ def test_methods_keep_their_order_over_limits_that_are_reached_and_left(kind: st
 
     Without cuts the slopes are between −2 and 8, the errors up to 1e8 times as large.
     """
-    exact = saturated(kind, integrator=rd.Adaptive(rtol=1e-13, atol=1e-13))
+    exact = saturated(kind, integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-13))
     names = [each.name for each in exact.events]
     assert len(names) == events
     errors = []
@@ -103,7 +103,7 @@ def test_methods_keep_their_order_over_limits_that_are_reached_and_left(kind: st
     coarse, fine = (np.abs(saturated(kind, integrator="order_8", step_s=h).q - exact.q).max() for h in (0.02, 0.01))
     assert np.log2(coarse / fine) > 7.5
     for tolerance in (1e-6, 1e-9):
-        run = saturated(kind, integrator=rd.Adaptive(rtol=tolerance, atol=tolerance))
+        run = saturated(kind, integrator=rd.integrate.Adaptive(rtol=tolerance, atol=tolerance))
         assert np.abs(run.q[-1] - exact.q[-1]).max() < tolerance
 
 
@@ -116,7 +116,7 @@ def test_both_engines_meet_the_same_limits(kind: str) -> None:
 
 def test_the_estimate_sees_the_order_over_a_limit() -> None:
     """A kink that steps end at bounds nothing: the verdict is the order, and the estimate right within 0.3 … 30."""
-    exact = saturated("computed_torque", integrator=rd.Adaptive(rtol=1e-13, atol=1e-13))
+    exact = saturated("computed_torque", integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-13))
     run = saturated("computed_torque", integrator="rk4", step_s=1e-3, estimate_error=True)
     assert run.error is not None
     assert run.error.verdict is Verdict.ORDER
@@ -127,7 +127,7 @@ def test_limits_that_are_not_reached_change_no_step() -> None:
     controller, _ = control("computed_torque")
     options = {"duration_s": 1.0, "controller": controller, "estimate_error": False, "engine": "compiled"}
     bare = rd.simulate(rd.Plant(ARM), START, **options)
-    far = rd.simulate(rd.Plant(ARM, [rd.EffortLimit(1e4)]), START, **options)
+    far = rd.simulate(rd.Plant(ARM, [rd.effects.EffortLimit(1e4)]), START, **options)
     assert far.events == ()
     assert far.statistics.steps == bare.statistics.steps
     assert np.array_equal(far.q, bare.q)
@@ -136,9 +136,9 @@ def test_limits_that_are_not_reached_change_no_step() -> None:
 @pytest.mark.parametrize("method", ["rk4", "DOP853"])
 def test_what_is_held_between_ticks_is_not_cut(method: str) -> None:
     """The command is constant between ticks, and nothing switches there."""
-    gains = rd.gains_from(1.0, 12.0)
-    sampled = rd.ComputedTorque(ARM, REFERENCE, *gains, period_s=0.01)
-    setup = rd.Setup(rd.Plant(ARM, [rd.EffortLimit(LIMIT)]), START, controller=sampled, integrator=method)
+    gains = rd.control.gains_from(1.0, 12.0)
+    sampled = rd.control.ComputedTorque(ARM, REFERENCE, *gains, period_s=0.01)
+    setup = rd.Setup(rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), START, controller=sampled, integrator=method)
     run = rd.simulate(setup, estimate_error=False)
     assert setup.finds_events is (method == "DOP853")
     assert run.events == ()
@@ -146,7 +146,7 @@ def test_what_is_held_between_ticks_is_not_cut(method: str) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Bang(rd.Stateless):
+class Bang(rd.control.Stateless):
     """u = 3 on one side of the line q + 2 v = 0.5, and −3 on the other: a controller that switches by itself."""
 
     n: int = 1
@@ -158,7 +158,7 @@ class Bang(rd.Stateless):
 @pytest.mark.parametrize(("method", "engine"), [("rk4", "interpreted"), ("DOP853", "compiled")])
 def test_a_limit_that_chatters_is_named_and_does_not_hang(method: str, engine: str) -> None:
     """On either side of the line q + 2 v = 0.5 u drives back across it: the motion slides along it."""
-    run = slide([rd.EffortLimit(1.0)], Bang(), 0.4, integrator=method, engine=engine)
+    run = slide([rd.effects.EffortLimit(1.0)], Bang(), 0.4, integrator=method, engine=engine)
     assert run.outcome.ending == ("finished" if method == "rk4" else "diverged")  # no error control gets over it
     assert any("effort limit of slide" in each.name and "chatters" in each.name for each in run.events)
 
@@ -170,7 +170,7 @@ def test_what_is_held_stays_held_when_a_limit_is_no_longer_looked_for() -> None:
     def drive(t, q, v):
         return np.array([np.where(q[0] + 2.0 * v[0] < 0.5, 3.0, -3.0), 0.0])
 
-    plant = rd.Plant(arm, [rd.EffortLimit([1.0, np.inf]), rd.DryFriction([0.0, 60.0])])
+    plant = rd.Plant(arm, [rd.effects.EffortLimit([1.0, np.inf]), rd.effects.DryFriction([0.0, 60.0])])
     run = rd.simulate(
         plant, [0.3, 0.7], duration_s=0.6, controller=drive, integrator="rk4", step_s=0.002,
         estimate_error=False,
@@ -183,26 +183,27 @@ def test_sweeps_of_the_limit_are_cut_as_single_runs_are() -> None:
     """A limit of none for the first, and two that are reached."""
     controller, _ = control("computed_torque")
     setup = rd.Setup(
-        rd.Plant(ARM, [rd.EffortLimit(LIMIT)]), START, controller=controller, duration_s=1.0, record_period_s=0.25,
+        rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), START, controller=controller, duration_s=1.0,
+        record_period_s=0.25,
         estimate_error=False,
     )  # fmt: skip
     limits = np.array([[np.inf, np.inf], [18.0, 5.0], [25.0, 8.0]])
     runs = rd.rollouts(setup, params={"effort_limit.limit": limits})
     for i, limit in enumerate(limits):
-        alone = rd.simulate(setup, plant=rd.Plant(ARM, [rd.EffortLimit(limit)]), engine="compiled")
+        alone = rd.simulate(setup, plant=rd.Plant(ARM, [rd.effects.EffortLimit(limit)]), engine="compiled")
         np.testing.assert_allclose(runs.q[i], alone.q, atol=1e-13)
 
 
 def test_thresholds_of_the_actuation_are_for_bounds() -> None:
     @dataclass(frozen=True, eq=False)
-    class Odd(rd.Dissipative):
+    class Odd(rd.effects.Dissipative):
         def torque(self, dynamics, t, q, v):
             return -v
 
         def thresholds(self, n):
-            return (rd.Threshold(0, 1.0, "odd", "up", "down", of_actuation=True),)
+            return (rd.effects.Threshold(0, 1.0, "odd", "up", "down", of_actuation=True),)
 
     with pytest.raises(EffectError, match="for bounds"):
         rd.simulate(rd.Plant(ARM, [Odd()]), START)
     with pytest.raises(EffectError, match="not of both"):
-        rd.Threshold(0, 1.0, "odd", "up", "down", of_actuation=True, of_velocity=True)
+        rd.effects.Threshold(0, 1.0, "odd", "up", "down", of_actuation=True, of_velocity=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -15,6 +16,7 @@ from robot_dyn.spatial import (
     homogeneous,
     rotation,
     rotation_rpy,
+    rpy_of,
     spatial_inertia,
 )
 
@@ -92,3 +94,11 @@ def test_spatial_inertia_is_the_energy_of_its_points(com, V) -> None:
     velocity = v + np.cross(omega, com)
     energy = m * velocity @ velocity + omega @ inertia @ omega
     np.testing.assert_allclose(V @ spatial_inertia(m, com, inertia) @ V, energy, atol=1e-11)
+
+
+@pytest.mark.parametrize("pitch", [0.4, -1.2, np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-9, -np.pi / 2 + 1e-12, 3.0])
+def test_roll_pitch_and_yaw_give_the_rotation_back_also_at_right_angles_of_the_pitch(pitch: float) -> None:
+    """Where roll and yaw are not determined one by one, their sum or difference is; three products of rounding."""
+    for roll, yaw in ((0.3, -0.7), (2.9, 3.1), (0.0, 0.0), (-1.4, 2.2)):
+        R = rotation_rpy(np.array([roll, pitch, yaw]))
+        assert np.abs(rotation_rpy(rpy_of(R)) - R).max() < 1e-15 * 3

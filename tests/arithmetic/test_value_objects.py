@@ -7,6 +7,8 @@ from copy import copy, deepcopy
 from dataclasses import FrozenInstanceError, fields, is_dataclass
 from functools import cache
 from inspect import isabstract, isclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -15,13 +17,21 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.studies.work_precision_diagram.reference_run import Reference
 from tests.short_stress import short_stress
+from tests.wrong_arguments import FOR_AUTHORS, ROOMS
 
 ARM = rd.load("planar_2r")
 Q = np.array([0.3, -0.4])
-PLAN = rd.quintic(Q, Q + 1, 1.0)
-LINE = rd.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0, rotation=np.eye(3))
-CLASSES = {name for name in rd.__all__ if isclass(thing := getattr(rd, name)) and not isabstract(thing)}
-NO_VALUES = {"Dynamics", "ModelWarning", "PrecisionWarning", "RobotDynError"}  # for types, warned of or raised
+PLAN = rd.control.quintic(Q, Q + 1, 1.0)
+LINE = rd.control.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0, rotation=np.eye(3))
+CLASSES = {
+    name for room in ROOMS for name in room.__all__ if isclass(thing := getattr(room, name)) and not isabstract(thing)
+}
+NO_VALUES = FOR_AUTHORS | {
+    "ModelWarning",
+    "PrecisionWarning",
+    "RobotDynError",
+    "SweepError",
+}  # for types, warned of or raised
 HELD = {  # of values that are made by functions, or held by others
     "CartesianReference", "Compiled", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate", "ExplicitRungeKutta",
     "Gauss", "Ledger", "Outcome", "SinglyDiagonallyImplicit", "Statistics", "TaskDynamics", "WorstCase",
@@ -33,41 +43,64 @@ def height(t: float, q: np.ndarray, v: np.ndarray) -> float:
     return q[0]
 
 
+def sweep_of_pendulum() -> rd.sweeps.SweepResult:
+    with TemporaryDirectory() as folder:
+        scene = Path(folder, "scene.toml")
+        scene.write_text('robot = "pendulum"\nduration_s = 0.01\nmethod = "rk4"\n', encoding="utf-8")
+        sweep = rd.sweeps.Sweep(str(scene), 4, {"q0": rd.sweeps.uniform(low=[0.1], high=[0.2])})
+        return rd.sweeps.run(sweep, Path(folder, "out"), threads=1, chunk=4)
+
+
 @cache
 def values() -> dict[str, Any]:
     """One of each public class, by its name, and of the values that they hold; made when the first is asked for."""
-    plant = rd.Plant(ARM, [rd.ViscousFriction([0.1, 0.2])])
-    options: Any = {"duration_s": 0.05, "controller": rd.PD(PLAN, 10.0, 1.0), "integrator": "rk4", "step_s": 0.01}
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction([0.1, 0.2])])
+    options: Any = {
+        "duration_s": 0.05,
+        "controller": rd.control.PD(PLAN, 10.0, 1.0),
+        "integrator": "rk4",
+        "step_s": 0.01,
+    }
     setup = rd.Setup(plant, Q, **options)
     run, runs = rd.simulate(setup), rd.rollouts(setup, q0=[Q, Q + 0.1], params={"kp": [1.0, 2.0]})
-    spring, damper = rd.joint_stops([-1.0, -1.0], [1.0, 1.0])
-    strut = rd.LineSpringDamper("tip", None, stiffness=9.0, damping=1.0, length=0.3)
-    loop = rd.Loop(
-        rd.Multirate(rd.PD(PLAN, [1.0, 2.0], 1.0, 0.01), rd.PD(PLAN, 1.0, 1.0, 0.02)),
-        [rd.Noise([0.1, 0.2]), rd.Quantisation(0.1)], [rd.Differences(), rd.LowPass(9.0)],
-        rd.RateLimit([1.0, 2.0]), 1.5,
+    spring, damper = rd.effects.joint_stops([-1.0, -1.0], [1.0, 1.0])
+    strut = rd.effects.LineSpringDamper("tip", None, stiffness=9.0, damping=1.0, length=0.3)
+    loop = rd.control.Loop(
+        rd.control.Multirate(rd.control.PD(PLAN, [1.0, 2.0], 1.0, 0.01), rd.control.PD(PLAN, 1.0, 1.0, 0.02)),
+        [rd.control.Noise([0.1, 0.2]), rd.control.Quantisation(0.1)],
+        [rd.control.Differences(), rd.control.LowPass(9.0)],
+        rd.control.RateLimit([1.0, 2.0]), 1.5,
     )  # fmt: skip
     made = [
-        rd.Event(height), rd.Threshold(0, 0.5, "upper stop", "touched", "left"),
-        rd.Adaptive(), rd.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM, rd.Lagrangian(ARM), plant,
-        rd.PD(PLAN, [1.0, 2.0], 1.0), rd.PID(PLAN, 1.0, 1.0, 1.0), rd.PDGravity(ARM, PLAN, 1.0, 1.0),
-        rd.FeedForward(ARM, PLAN, 1.0, 1.0), rd.ComputedTorque(ARM, PLAN, 1.0, 1.0),
-        rd.OperationalSpace(ARM, "tip", LINE, 1.0, 1.0, posture=Q, rows=(0, 2)), rd.EffortLimit([1.0, 2.0]),
-        rd.ExternalWrench("tip", np.ones(6)), spring, damper, rd.RegularisedCoulombFriction([0.1, 0.2]), strut,
-        *strut.parts, rd.Spring([1.0, 2.0]), rd.ViscousFriction([1.0, 2.0]), PLAN,
-        rd.DryFriction([1.0, 2.0], 2.0, 0.1), rd.RigidStops(-1.0, [1.0, 2.0], 0.5),
-        rd.ActuatorLag([0.1, 0.2]), rd.LuGreFriction(9.0, 1.0, 1.0, [1.0, 2.0], 2.0, 0.1),
-        rd.DahlFriction(9.0, [1.0, 2.0], 1.5), rd.CarriedPayload(rd.Payload("tip", 1.0)),
-        rd.RigidBacklash([0.1, 0.0], 0.1, 3.0, 0.5, 0.2),
-        rd.SeriesElastic([9.0, 0.0], 0.1, 3.0, 0.1, 0.2, 0.01),
-        rd.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
+        rd.Event(height), rd.effects.Threshold(0, 0.5, "upper stop", "touched", "left"),
+        rd.integrate.Adaptive(), rd.studies.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM,
+        rd.Lagrangian(ARM), plant,
+        rd.control.PD(PLAN, [1.0, 2.0], 1.0), rd.control.PID(PLAN, 1.0, 1.0, 1.0),
+        rd.control.PDGravity(ARM, PLAN, 1.0, 1.0),
+        rd.control.FeedForward(ARM, PLAN, 1.0, 1.0), rd.control.ComputedTorque(ARM, PLAN, 1.0, 1.0),
+        rd.control.OperationalSpace(ARM, "tip", LINE, 1.0, 1.0, posture=Q, rows=(0, 2)),
+        rd.effects.EffortLimit([1.0, 2.0]),
+        rd.effects.ExternalWrench("tip", np.ones(6)), spring, damper,
+        rd.effects.RegularisedCoulombFriction([0.1, 0.2]), strut,
+        *strut.parts, rd.effects.Spring([1.0, 2.0]), rd.effects.ViscousFriction([1.0, 2.0]), PLAN,
+        rd.effects.DryFriction([1.0, 2.0], 2.0, 0.1), rd.effects.RigidStops(-1.0, [1.0, 2.0], 0.5),
+        rd.effects.ActuatorLag([0.1, 0.2]), rd.effects.LuGreFriction(9.0, 1.0, 1.0, [1.0, 2.0], 2.0, 0.1),
+        rd.effects.DahlFriction(9.0, [1.0, 2.0], 1.5), rd.effects.CarriedPayload(rd.Payload("tip", 1.0)),
+        rd.effects.RigidBacklash([0.1, 0.0], 0.1, 3.0, 0.5, 0.2),
+        rd.effects.SeriesElastic([9.0, 0.0], 0.1, 3.0, 0.1, 0.2, 0.01),
+        rd.control.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
         loop, loop.controller, *loop.position, *loop.velocity, *loop.actuation,
         setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
-        rd.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.method("rk4"), rd.method("gauss_4"), rd.method("sdirk_3"),
-        rd.WorkPrecision("arm", (), "rad", 1.0, Reference(Q, Q, 1e-12, ("a", "b"), 1.0), (), (), {}, 1.0, 1.0),
-        rd.prove(rd.Setup(plant, Q), 0.01), rd.advise(setup), rd.Cost("arm", (), (), (), {}, 1.0, 1.0),
-        rd.certify(rd.load("pendulum"), samples=100, repeats=1), rd.check("pendulum"),
-        (stressed := short_stress(rd.load("pendulum"))), stressed.worst[0],
+        rd.control.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.integrate.method("rk4"),
+        rd.integrate.method("gauss_4"), rd.integrate.method("sdirk_3"),
+        rd.studies.WorkPrecision("arm", (), "rad", 1.0, Reference(Q, Q, 1e-12, ("a", "b"), 1.0), (), (), {}, 1.0, 1.0),
+        rd.studies.prove(rd.Setup(plant, Q), 0.01), rd.advise(setup), rd.studies.Cost("arm", (), (), (), {}, 1.0, 1.0),
+        rd.studies.certify(rd.load("pendulum"), samples=100, repeats=1), rd.check("pendulum"),
+        (swept := sweep_of_pendulum()), swept.sweep, rd.budget(PLAN, plant, effort=9.0, velocity=9.0),
+        (stressed := short_stress(rd.load("pendulum"))), stressed.worst[0], rd.compare_runs(run, run),
+        rd.plan.inverse_kinematics(ARM, ARM.placement(Q, "tip"), frame="tip", starts=2),
+        rd.plan.Motors(peak={"shoulder": 9.0}, continuous={}, speed={}, armature={}),
+        (motion := rd.plan.path(ARM, [Q, Q + 0.5], effort=50.0, velocity=1.0)), motion.plan,
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}
     return named | {"Compiled": rd.Compiled(ARM), "CompiledPlant": rd.Compiled(plant)}
@@ -119,22 +152,22 @@ def test_values_keep_copies_of_what_they_are_given() -> None:
     x, six, points, three = np.array([0.3, 0.4]), np.ones(6), np.ones((3, 2)), np.ones(3)
     times, about = np.array([0.0, 1.0, 2.0]), {"author": "me"}
     made: list[tuple[Any, tuple[str, ...]]] = [
-        (rd.PD(PLAN, x, x), ("kp", "kd")),
-        (rd.ComputedTorque(ARM, PLAN, x, x), ("kp", "kd")),
-        (rd.PID(PLAN, x, x, x, x), ("kp", "ki", "kd", "effort_limit")),
-        (rd.ViscousFriction(x), ("damping",)),
-        (rd.RegularisedCoulombFriction(x), ("friction",)),
-        (rd.Spring(x, x), ("stiffness", "rest")),
-        (rd.joint_stops(-x, x, x)[0], ("upper", "stiffness")),
-        (rd.EffortLimit(x), ("limit",)),
-        (rd.DryFriction(x, x, x), ("level", "static", "stribeck_velocity")),
-        (rd.RigidStops(-x, x, x), ("upper", "restitution")),
-        (rd.ExternalWrench("tip", six), ("wrench",)),
+        (rd.control.PD(PLAN, x, x), ("kp", "kd")),
+        (rd.control.ComputedTorque(ARM, PLAN, x, x), ("kp", "kd")),
+        (rd.control.PID(PLAN, x, x, x, x), ("kp", "ki", "kd", "effort_limit")),
+        (rd.effects.ViscousFriction(x), ("damping",)),
+        (rd.effects.RegularisedCoulombFriction(x), ("friction",)),
+        (rd.effects.Spring(x, x), ("stiffness", "rest")),
+        (rd.effects.joint_stops(-x, x, x)[0], ("upper", "stiffness")),
+        (rd.effects.EffortLimit(x), ("limit",)),
+        (rd.effects.DryFriction(x, x, x), ("level", "static", "stribeck_velocity")),
+        (rd.effects.RigidStops(-x, x, x), ("upper", "restitution")),
+        (rd.effects.ExternalWrench("tip", six), ("wrench",)),
         (
-            rd.LineSpringDamper("tip", None, three, three, stiffness=1.0, damping=1.0, length=1.0),
+            rd.effects.LineSpringDamper("tip", None, three, three, stiffness=1.0, damping=1.0, length=1.0),
             ("point", "other_point"),
         ),
-        (rd.Samples(times, points), ("breaks", "coefficients")),
+        (rd.control.Samples(times, points), ("breaks", "coefficients")),
         (rd.Setup(rd.Plant(ARM), x, x, about=about), ("q0", "v0", "about")),
     ]
     before = [[deepcopy(getattr(value, name)) for name in names] for value, names in made]
@@ -149,7 +182,7 @@ def test_values_keep_copies_of_what_they_are_given() -> None:
 def test_a_users_own_arrays_stay_as_they_are() -> None:
     """Copies of a controller or an effect of one's own have read-only arrays only where it has."""
 
-    class Own(rd.Stateless):
+    class Own(rd.control.Stateless):
         n = 2
 
         def __init__(self) -> None:

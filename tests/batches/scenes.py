@@ -37,7 +37,8 @@ def batch(seed: int, index: int) -> Batch:
     method = str(rng.choice(EVENTS if family in ("rigid stops", "dry friction") else METHODS))
     options = {} if method == "DOP853" else {"step_s": step}
     setup = rd.Setup(
-        rd.Plant(arm, [rd.ViscousFriction(scale * rng.uniform(0.1, 1.0, arm.n)), *effects]), q0[0], v0[0], duration,
+        rd.Plant(arm, [rd.effects.ViscousFriction(scale * rng.uniform(0.1, 1.0, arm.n)), *effects]), q0[0], v0[0],
+        duration,
         _controller(rng, family, arm, q0[0], scale, duration), method,
         record_period_s=float(rng.choice([0.0, 0.02])), estimate_error=False, engine="compiled", **options,
     )  # fmt: skip
@@ -54,43 +55,47 @@ def _effects(
     lower, upper = q0.min(0) - rng.uniform(0.05, 0.6, n), q0.max(0) + rng.uniform(0.05, 0.6, n)
     if family == "soft stops":
         stiffness = scale * 10 ** rng.uniform(2, 5)
-        stops = rd.joint_stops(lower, upper, stiffness, stiffness * rng.choice([0.0, 0.1]))
+        stops = rd.effects.joint_stops(lower, upper, stiffness, stiffness * rng.choice([0.0, 0.1]))
         return [*stops], {"joint_stops.upper": upper + rng.uniform(-0.02, 0.3, (B, n))}
     if family == "rigid stops":
-        return [rd.RigidStops(lower, upper, rng.uniform(0, 0.8))], {}
+        return [rd.effects.RigidStops(lower, upper, rng.uniform(0, 0.8))], {}
     if family == "dry friction":
-        return [rd.DryFriction(scale * rng.uniform(0.5, 5, n))], {
+        return [rd.effects.DryFriction(scale * rng.uniform(0.5, 5, n))], {
             "dry_friction.level": scale * rng.uniform(0.5, 5, (B, n))
         }
     if family == "window":
         start = rng.uniform(0, duration / 2)
         force = scale.max() * rng.uniform(-5, 5, 6)
-        stops = rd.joint_stops(lower, upper, scale * 1e3, 0.0)
-        return [rd.ExternalWrench(arm.frame_names[-1], force, start_s=start, end_s=start + duration / 5), *stops], {}
+        stops = rd.effects.joint_stops(lower, upper, scale * 1e3, 0.0)
+        return [
+            rd.effects.ExternalWrench(arm.frame_names[-1], force, start_s=start, end_s=start + duration / 5),
+            *stops,
+        ], {}
     if family == "effort limit":
         limit = scale * rng.uniform(2, 20, n)
-        return [rd.EffortLimit(limit)], {"effort_limit.limit": limit * rng.uniform(0.5, 2, (B, n))}
+        return [rd.effects.EffortLimit(limit)], {"effort_limit.limit": limit * rng.uniform(0.5, 2, (B, n))}
     if family == "bristles":
         level = scale * rng.uniform(0.5, 3, n)
-        bristles = rd.LuGreFriction(100 * scale, 2 * scale, 0.1 * scale, level, 1.5 * level, 0.1)
+        bristles = rd.effects.LuGreFriction(100 * scale, 2 * scale, 0.1 * scale, level, 1.5 * level, 0.1)
         return [bristles], {"lugre_friction.bristle_stiffness": scale * rng.uniform(50, 200, (B, n))}
-    stops = rd.joint_stops(lower, upper, scale * 1e3, 0.0)
-    return [*stops, rd.EffortLimit(scale * rng.uniform(5, 50, n))], {}
+    stops = rd.effects.joint_stops(lower, upper, scale * 1e3, 0.0)
+    return [*stops, rd.effects.EffortLimit(scale * rng.uniform(5, 50, n))], {}
 
 
 def _controller(
     rng: np.random.Generator, family: str, arm: rd.Robot, q: np.ndarray, scale: np.ndarray, duration: float
-) -> rd.Controller | None:
+) -> rd.control.Controller | None:
     """None, PD, PID within its limit, or a loop with delay and noise."""
-    plan = rd.quintic(q, q + rng.uniform(-1, 1, arm.n), duration * rng.uniform(0.4, 1.2))
-    kp, kd = rd.gains_from(scale, rng.uniform(3, 12), 0.7)
+    plan = rd.control.quintic(q, q + rng.uniform(-1, 1, arm.n), duration * rng.uniform(0.4, 1.2))
+    kp, kd = rd.control.gains_from(scale, rng.uniform(3, 12), 0.7)
     if family == "sampled":
-        law = rd.PD(plan, kp, kd, float(rng.choice([0.005, 0.01, 0.02])))
+        law = rd.control.PD(plan, kp, kd, float(rng.choice([0.005, 0.01, 0.02])))
         measured, acts = float(rng.choice([0.0, 0.4, 1.2])), float(rng.choice([0.0, 0.5, 1.0]))
-        return rd.Loop(
-            law, position=rd.Noise(1e-4), velocity=rd.LowPass(30.0), measurement_delay=measured, actuation_delay=acts,
+        return rd.control.Loop(
+            law, position=rd.control.Noise(1e-4), velocity=rd.control.LowPass(30.0), measurement_delay=measured,
+            actuation_delay=acts,
             seed=int(rng.integers(99)),
         )  # fmt: skip
     if family == "effort limit" and rng.random() < 0.5:
-        return rd.PID(plan, kp, 2 * kp, kd, effort_limit=scale * rng.uniform(2, 20, arm.n))
-    return rd.PD(plan, kp, kd) if family == "effort limit" or rng.random() < 0.5 else None
+        return rd.control.PID(plan, kp, 2 * kp, kd, effort_limit=scale * rng.uniform(2, 20, arm.n))
+    return rd.control.PD(plan, kp, kd) if family == "effort limit" or rng.random() < 0.5 else None

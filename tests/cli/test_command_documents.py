@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import robot_dyn as rd
+from robot_dyn.scene.starters import starter
 from tests.command import ROOT, document
 
 PROMISE = (ROOT / "docs" / "json.md").read_text(encoding="utf-8")
@@ -47,6 +49,22 @@ def test_query():
     assert why["why"].keys() == names(own.partition(":")[2])
     (inside,) = re.findall(r"`shares` \(([^)]*)\)", own)
     assert {key for share in why["why"]["shares"] for key in share} == set(re.findall(r"`(\w+)`", inside))
+
+
+def test_explain(tmp_path: Path):
+    keys = promised("explain")
+    (tmp_path / "scene.toml").write_text(starter("cart_pole"), encoding="utf-8")
+    explained = document("explain", tmp_path / "scene.toml")
+    assert explained.keys() == keys.keys()
+    assert {key for each in explained["effects"] for key in each} == names(keys["effects"])
+
+
+def test_sweepable(tmp_path: Path):
+    keys = promised("sweepable")
+    (tmp_path / "scene.toml").write_text(starter("cart_pole"), encoding="utf-8")
+    listed = document("sweepable", tmp_path / "scene.toml")
+    assert listed.keys() == keys.keys()
+    assert {key for each in listed["parameters"] for key in each} == names(keys["parameters"])
 
 
 def test_compare():

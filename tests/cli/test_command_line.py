@@ -26,6 +26,12 @@ def test_the_command_in_the_process_of_a_test_is_that_of_its_own(args: list[str]
     assert (own.returncode, own.stdout.decode(), own.stderr.decode()) == (here.returncode, here.stdout, here.stderr)
 
 
+def test_the_package_runs_as_a_module():
+    """`python -m robot_dyn` is the command."""
+    done = subprocess.run([sys.executable, "-m", "robot_dyn", "info", "pendulum"], capture_output=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, said("info", "pendulum").encode(), b"")
+
+
 # --- help and list
 
 

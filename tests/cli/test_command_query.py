@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.queries.units import without_rounding
 from tests.command import ROOT, document, refusal, run, said
 
 Q, V, A = "-0.1,0.7,-0.4,0.3,0.9,-0.6", "0.2,-0.3,0.4,0.5,-0.6,0.7", "1.1,-1.2,1.3,0.4,0.5,-0.6"
@@ -28,7 +29,8 @@ def test_info_shows_joints_couplings_and_locks():
         assert re.search(rf"^{name} +(revolute|prismatic) ", text, re.M)
     assert re.search(r"^coupled: panda_finger_joint2 = 1 · panda_finger_joint1 \+ 0$", text, re.M)
     assert re.search(r"^locked: panda_joint2 = 0\.25$", text, re.M)
-    assert robot.description.source in text.splitlines()
+    (short,) = (line for line in text.splitlines() if line.endswith(".urdf"))
+    assert short.startswith("example-robot-data/robots/") and robot.description.source.endswith(short)
 
 
 def test_info_has_the_numbers_of_the_library():
@@ -135,6 +137,33 @@ def test_why_adds_up(given: str):
         }  # fmt: skip
 
 
+def test_a_payload_is_that_of_the_library():
+    """With units or without; several of them; the centre of mass is the origin of the link unless given."""
+    arm = rd.load("ur5").with_(payload=rd.Payload("tool0", 5.0, (0.1, 0.0, -0.2)))
+    arm = arm.with_(payload=rd.Payload("forearm_link", 1.0))
+    q = np.array(numbers(Q))
+    for body in ("tool0=5kg@0.1,0,-0.2", "tool0=5@0.1,0,-0.2", "tool0 = 5 kg @ 0.1, 0, -0.2 m"):
+        answer = document("query", "ur5", "--q", Q, "--payload", body, "--payload", "forearm_link=1")
+        assert answer["M"] == arm.M(q).tolist() and answer["N"] == arm.N(q).tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("tool0", r"--payload must be LINK=MASS@X,Y,Z in kg and m, as tool0=5kg@0,0,0\.1; got 'tool0'"),
+        ("tool0=5@1,2", r"--payload must be LINK=MASS@X,Y,Z in kg and m, .*; got 'tool0=5@1,2'"),
+        ("=5", r"--payload must be LINK=MASS@X,Y,Z in kg and m, .*"),
+        ("tool0=5lb", r"--payload, mass in kg: '5lb' is not a number"),
+        ("tool0=5@0,0,1mm", r"--payload, place in m: '1m' is not a number"),
+        ("tool0=-1", r"payload mass must not be negative, got -1\.0"),
+        ("tool0=1@nan,0,0", r"payload com must be finite, got nan"),
+        ("tool=1", r"payload: no frame 'tool'; nearest: tool0"),
+    ],
+)
+def test_a_payload_without_meaning_is_refused(text: str, message: str):
+    assert re.fullmatch(message, refusal(["query", "ur5", "--payload", text]))
+
+
 HELD = """robot = "planar_2r"
 duration_s = 1.0
 [start]
@@ -201,7 +230,9 @@ def test_of_a_joint_that_breaks_away_the_friction_of_sliding_is_a_share(tmp_path
         assert abs(why["at_rest"]) == pytest.approx(3.0, rel=1e-10)
 
 
-@pytest.mark.parametrize("option", [["--effects", "urdf"], ["--lock", "joint_1=0"], ["--package-dir", "."]])
+@pytest.mark.parametrize(
+    "option", [["--effects", "urdf"], ["--lock", "joint_1=0"], ["--package-dir", "."], ["--payload", "link=1"]]
+)
 def test_a_scene_states_its_own_edits(option: list[str], tmp_path: Path):
     (tmp_path / "held.toml").write_text(HELD)
     assert "is for a robot; a scene states its own" in refusal(["query", str(tmp_path / "held.toml"), *option])
@@ -250,9 +281,21 @@ def test_query_without_forward_dynamics_names_the_joint():
         (["--a", "elbow_joint=1e999"], r"a must be finite, got inf for joint 'elbow_joint'"),
         (["--tau", "elbow_joint=nan"], r"tau must be finite, got nan for joint 'elbow_joint'"),
         (["--v", "elbow_joint=1e200"], r"q, v.* are so large that the result overflows"),
-        (["--why", "elbow"], r"--why: no joint 'elbow'; nearest: elbow_joint"),
+        (["--why", "elbow"], r"why: no joint 'elbow'; nearest: elbow_joint"),
         (["--effects", "friction"], r"effects='friction'; give effects, or 'urdf'.*"),
     ],
 )
 def test_query_without_meaning_is_refused_in_one_line(args: list[str], message: str):
     assert re.fullmatch(message, refusal(["query", "ur5", *args]))
+
+
+def test_what_rounding_leaves_of_a_vector_is_shown_as_0_and_kept_in_json() -> None:
+    """UR5 stretched out: 1e-16 N m beside 60; a rest of 2e-12 of the largest is shown."""
+    args = ("query", "ur5", "--q", "shoulder_lift_joint=0.1")
+    kept = np.abs(document(*args)["tau"])
+    assert any(0 < x < 1e-12 * kept.max() for x in kept)
+    text = said(*args)
+    assert not re.search(r"e-1[3-9]|(?<![\d.])-0(?![\d.])", text)
+    shown = without_rounding([-0.0, 1e-16, -2e-11, 10.0, np.inf, np.nan])
+    assert [f"{x:g}" for x in shown] == ["0", "0", "-2e-11", "10", "inf", "nan"]
+    assert without_rounding([]).tolist() == []

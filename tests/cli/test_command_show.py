@@ -60,14 +60,14 @@ def test_the_price_needs_no_other_program(monkeypatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise RobotDynError("no reference")
 
-    monkeypatch.setattr(rd, "work_precision", refuse)
+    monkeypatch.setattr(rd.studies, "work_precision", refuse)
     assert list(demo._price(swing))[2:] == ["left out: no reference"]
 
 
 def test_a_plot_is_written_beside_the_run_unless_told(file, tmp_path) -> None:
     assert "run.png" in said("plot", file)
     assert file.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
-    said("plot", file, "-o", tmp_path / "two.svg", "--show", "joints", "--show", "phase", "--dark")
+    said("plot", file, "-o", tmp_path / "two.svg", "--only", "joints", "--only", "phase", "--dark")
     assert "<svg" in (tmp_path / "two.svg").read_text(encoding="utf-8")
 
 
@@ -79,11 +79,11 @@ def test_help_names_every_plot() -> None:
 @pytest.mark.parametrize(
     ("args", "text"),
     [
-        (["--show", "jonts"], "no plot 'jonts'; nearest: joints"),
+        (["--only", "jonts"], "no plot 'jonts'; nearest: joints"),
         (["--joint", "elbo"], "no joint 'elbo'"),
         (["-o", "out.bmp"], "'.bmp' is not the suffix of a plot; end the name with .png, .svg, .pdf"),
         (["-o", "none/out.png"], "there is no folder"),
-        (["--show", "tracking"], "it followed no reference"),
+        (["--only", "tracking"], "it followed no reference"),
     ],
 )
 def test_plots_without_meaning_are_refused_in_one_line(file, args: list[str], text: str) -> None:

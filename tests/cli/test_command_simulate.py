@@ -121,7 +121,9 @@ def test_explain_shows_the_equation(scene) -> None:
 
 
 def test_scene_prints_starters() -> None:
-    assert run("scene").stdout.split() == list(starters())
+    listed = [line.split(maxsplit=1) for line in run("scene").stdout.splitlines()[1:]]
+    assert [name for name, _ in listed] == list(starters())
+    assert all(starter(name).startswith(f"# {what}\n") for name, what in listed)
     assert run("scene", "pendulum").stdout == starter("pendulum")
     wrong = run("scene", "pendulun")
     assert wrong.returncode == 2

@@ -41,7 +41,7 @@ def assert_harmless(text: str) -> None:
         ("simulate", "{urdf}.toml.gone"),
         ("explain", "{toml}"),
         ("replay", "{npz}", "--html", "{npz}.html"),
-        ("plot", "{npz}", "--show", "phase"),
+        ("plot", "{npz}", "--only", "phase"),
         ("plot", "{urdf}"),
     ],
     ids=" ".join,

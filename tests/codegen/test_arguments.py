@@ -15,7 +15,11 @@ from robot_dyn.errors import QueryError
 ARM = rd.load("planar_2r")
 FAST = rd.Compiled(ARM)
 PUSHED = rd.Plant(
-    ARM, [rd.ViscousFriction(0.3), rd.ExternalWrench("tip", [1.0, 0, 2, 0, -0.5, 0], start_s=0.2, end_s=0.6)]
+    ARM,
+    [
+        rd.effects.ViscousFriction(0.3),
+        rd.effects.ExternalWrench("tip", [1.0, 0, 2, 0, -0.5, 0], start_s=0.2, end_s=0.6),
+    ],
 )
 PLANT = rd.Compiled(PUSHED)
 FAR = 2 * np.pi * 40_000
@@ -119,6 +123,6 @@ def test_an_effect_that_cannot_be_traced_is_named(does) -> None:
 
 def test_one_sided_stops_are_compiled_exactly() -> None:
     """No digit of the stop that is not there, 1e9 away, is in the torque of the one that is."""
-    plant = rd.Plant(ARM, [*rd.joint_stops(-3.0, np.inf)])
+    plant = rd.Plant(ARM, [*rd.effects.joint_stops(-3.0, np.inf)])
     q, v = np.array([-3.05, -2.9]), np.array([0.2, -0.1])
     np.testing.assert_allclose(rd.Compiled(plant).torque(0.0, q, v), plant.torque(0.0, q, v), rtol=1e-13)

@@ -19,14 +19,14 @@ from robot_dyn.effects.effect import Active
 from tests.codegen.arms import states
 
 ROBOT = rd.load("planar_2r")
-WINDOW = rd.ExternalWrench(ROBOT.frame_names[-1], [1, 2, 3, 0.1, 0.2, 0.3], start_s=0.2, end_s=0.7)
+WINDOW = rd.effects.ExternalWrench(ROBOT.frame_names[-1], [1, 2, 3, 0.1, 0.2, 0.3], start_s=0.2, end_s=0.7)
 EFFECTS: dict[str, list[Any]] = {
-    "viscous": [rd.ViscousFriction([0.3, 0.1])],
-    "coulomb": [rd.RegularisedCoulombFriction(0.5, 0.1)],
-    "spring": [rd.Spring(2.0, 0.1)],
-    "stops": [*rd.joint_stops(-1.0, 1.0)],
+    "viscous": [rd.effects.ViscousFriction([0.3, 0.1])],
+    "coulomb": [rd.effects.RegularisedCoulombFriction(0.5, 0.1)],
+    "spring": [rd.effects.Spring(2.0, 0.1)],
+    "stops": [*rd.effects.joint_stops(-1.0, 1.0)],
     "wrench": [WINDOW],
-    "bound": [rd.EffortLimit(5.0)],
+    "bound": [rd.effects.EffortLimit(5.0)],
     "none": [],
 }
 EFFECTS["all"] = [effect for effects in EFFECTS.values() for effect in effects]
@@ -70,7 +70,11 @@ def test_plants_that_differ_in_numbers_share_their_machine_code(monkeypatch: pyt
 
     def answers(damping: Any, limit: Any, gravity: float, mass: float) -> None:
         robot = ROBOT.with_(gravity=(0, 0, gravity), payload=rd.Payload(ROBOT.frame_names[-1], mass, (0.1, 0, 0)))
-        effects = [rd.ViscousFriction(damping), rd.EffortLimit(limit), rd.RegularisedCoulombFriction(mass, 0.1)]
+        effects = [
+            rd.effects.ViscousFriction(damping),
+            rd.effects.EffortLimit(limit),
+            rd.effects.RegularisedCoulombFriction(mass, 0.1),
+        ]
         compiled = Compiled(rd.Plant(robot, effects), cache=False)
         expected = np.array([compiled.interpreted.forward_dynamics(*row) for row in zip(t, q, v, u, strict=True)])
         batch = compiled.forward_dynamics(t, q, v, u)
@@ -129,7 +133,7 @@ def test_an_effect_that_cannot_be_traced_is_named() -> None:
 
 def test_machine_code_does_not_keep_the_plant_that_it_was_made_for() -> None:
     """What stays loaded is known by its instructions alone."""
-    made = plant([rd.ViscousFriction([0.31, 0.12])])
+    made = plant([rd.effects.ViscousFriction([0.31, 0.12])])
     q, v, u = states(2, 12)
     made.forward_dynamics(0.0, q[0], v[0], u[0])
     made.forward_dynamics(0.0, q, v, u)

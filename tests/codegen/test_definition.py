@@ -76,8 +76,8 @@ class Shape:
 
 
 @dataclass(frozen=True, eq=False)
-class Drag(Shape, rd.Dissipative):
-    c: Any = field(default=1.0, metadata=rd.coefficient("N m", least=0))
+class Drag(Shape, rd.effects.Dissipative):
+    c: Any = field(default=1.0, metadata=rd.effects.coefficient("N m", least=0))
     offset: float = 0.25
     then: Any = twice
 
@@ -118,7 +118,7 @@ EDITS = {
     "an attribute of a base class": ("= 0.1\n", "= 0.2\n"),
     "a method of a base class": ("v / self.width", "v * self.width"),
     "a static method": ("x * 0.75", "x * 0.5"),
-    "the base classes": ("Drag(Shape, rd.Dissipative)", "Drag(Shape, rd.Active)"),
+    "the base classes": ("Drag(Shape, rd.effects.Dissipative)", "Drag(Shape, rd.effects.Active)"),
     "a cached property": ("self.c**2", "self.c**3"),
     "a property": ("+ 0.125", "+ 0.375"),
     "a default of a field": ("= 0.25\n", "= 0.5\n"),
@@ -272,9 +272,16 @@ def test_what_is_changed_at_run_time_is_in_the_structure() -> None:
 def test_values_inside_of_parts_that_are_no_parameters_are_in_the_structure() -> None:
     """A coefficient of an effect is an input of machine code; that of a part of it is not, nor is −0 or 1 for 1.0."""
     module = cell(CELL)
-    inner = [module.Drag(then=each) for each in (rd.Spring(3.0), rd.Spring(5.0), rd.Payload("tip", 1.0))]
-    inner += [module.Drag(then=rd.Payload("tip", 2.0)), module.Drag(then=rd.hold([0.1, 0.2]))]
-    inner += [module.Drag(then=rd.hold([0.1, 0.3])), module.Drag(then=0.0), module.Drag(then=-0.0), module.Drag(then=0)]
+    inner = [
+        module.Drag(then=each) for each in (rd.effects.Spring(3.0), rd.effects.Spring(5.0), rd.Payload("tip", 1.0))
+    ]
+    inner += [module.Drag(then=rd.Payload("tip", 2.0)), module.Drag(then=rd.control.hold([0.1, 0.2]))]
+    inner += [
+        module.Drag(then=rd.control.hold([0.1, 0.3])),
+        module.Drag(then=0.0),
+        module.Drag(then=-0.0),
+        module.Drag(then=0),
+    ]
     inner += [module.Drag(then=ARM), module.Drag(then=ARM.with_(gravity=(0.0, 0.0, -1.62)))]
     assert len({structure_of(each).described for each in inner}) == len(inner)
     assert structure_of(module.Drag(1.0)) == structure_of(module.Drag(2.0))
@@ -284,7 +291,7 @@ def test_a_part_that_is_an_effect_and_stands_in_another_one_is_a_number_there() 
     """Its coefficient is an input as that of the effect, and a constant of the other one."""
     module = cell(CELL)
     made = []
-    for spring in (rd.Spring(3.0), rd.Spring(5.0)):
+    for spring in (rd.effects.Spring(3.0), rd.effects.Spring(5.0)):
         plants = rd.Plant(ARM, [spring]), rd.Plant(ARM, [spring, module.Drag(then=spring)])
         made.append([structure(StateEquation(each, None)).described for each in plants])
     assert made[0][0] == made[1][0]
@@ -296,8 +303,8 @@ def test_numbers_that_a_controller_follows_and_knows_are_no_structure() -> None:
     known = []
     for x, scale in ((1.0, 1.0), (2.0, 1.0), (1.0, 1.1)):
         model = ARM.with_(payload=rd.Payload("tip", x), gravity=(0.0, 0.0, -9.0 - x), mass_scale=scale)
-        inner = rd.ComputedTorque(model, rd.hold([x, 0.2]), 10.0 * x, x, period_s=0.01)
-        loop = rd.Loop(inner, velocity=[rd.LowPass(3.0 * x)])
+        inner = rd.control.ComputedTorque(model, rd.control.hold([x, 0.2]), 10.0 * x, x, period_s=0.01)
+        loop = rd.control.Loop(inner, velocity=[rd.control.LowPass(3.0 * x)])
         known.append([structure(StateEquation(rd.Plant(ARM), each)).described for each in (inner, loop)])
     assert known[0] == known[1]
     assert known[0][0] != known[2][0]
@@ -309,7 +316,7 @@ def in_another_process(module: Any, store: Memory, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(build, "_functions", LRUByIdentity())
     monkeypatch.setattr(programs, "_symbols", LRUByIdentity())
     monkeypatch.setattr(programs, "default_store", lambda: store)
-    made = compiled_equation(StateEquation(rd.Plant(ARM, [module.Drag()]), None), rd.method("rk4"))
+    made = compiled_equation(StateEquation(rd.Plant(ARM, [module.Drag()]), None), rd.integrate.method("rk4"))
     return str(made.functions.programs["rate"])
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.codegen.trace.right_angles import completed
-from robot_dyn.scene.explain import explain
+from robot_dyn.scene.explain import of_scene
 from robot_dyn.scene.scene import parse_scene
 
 ARM = """<robot name="arm"><link name="base"/>
@@ -90,7 +90,7 @@ def test_right_angles_are_named_wherever_machine_code_runs(tmp_path) -> None:
     exact = rd.simulate(completed(given)[0], **options, engine="compiled")
     for other in (interpreted, exact):
         assert "right_angles" not in other.about and "right angles" not in other.summary
-    law = rd.PDGravity(given, rd.hold([0.3]), 5.0, 1.0)
+    law = rd.control.PDGravity(given, rd.control.hold([0.3]), 5.0, 1.0)
     run = rd.simulate(completed(given)[0], **options, engine="compiled", controller=law)
     assert run.about["right_angles"] == words
 
@@ -99,6 +99,6 @@ def test_explain_names_right_angles(tmp_path) -> None:
     path = tmp_path / "scene.toml"
     (tmp_path / "arm.urdf").write_text(ARM.format(rpy="0 1.57079632679 0.3"))
     path.write_text('robot = "arm.urdf"\nduration_s = 0.1\n')
-    assert "  edited there: rpy of elbow taken as exact multiples of π/2" in "\n".join(
-        explain(parse_scene(path.read_text(), "scene.toml"), rd.read_scene(path))
+    assert "  edited there: rpy of elbow taken as exact multiples of π/2" in repr(
+        of_scene(parse_scene(path.read_text(), "scene.toml"), rd.read_scene(path))
     )

@@ -37,7 +37,7 @@ class Screen(io.StringIO):
 def test_a_wait_is_told_where_a_person_watches(watched: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     screen = Screen(watched)
     monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(waiting, "_AFTER_S", 0.0)
+    monkeypatch.setattr(waiting, "_IN_TERMINAL_S", 0.0)
     with announced("thinking"):
         assert screen.said.wait(30.0 if watched else 0.05) is watched
     assert screen.getvalue() == "robot_dyn: thinking\n" * watched
@@ -62,7 +62,7 @@ class Clock:
 def clocks(monkeypatch: pytest.MonkeyPatch) -> list[Clock]:
     Clock.started = []
     monkeypatch.setattr(waiting, "Timer", Clock)
-    monkeypatch.setattr(waiting, "_is_watched", lambda: True)
+    monkeypatch.setattr(waiting, "_patience_s", lambda: 1.0)
     return Clock.started
 
 
@@ -95,3 +95,33 @@ def test_machine_code_of_a_run_and_of_a_loop_is_told_and_what_is_there_is_not(
         "robot_dyn: compiling the equations of this run, once for its structure",
         "robot_dyn: compiling a function, once for this version",
     ]
+
+
+def test_machine_code_of_a_robot_and_of_a_batch_is_told(
+    clocks: list[Clock], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
+    robot = rd.load("planar_2r").with_(mass_scale=1.017)
+    rd.Compiled(robot).M([0.4, -0.7])
+    for clock in clocks:
+        clock.say()
+    assert capsys.readouterr().err.splitlines() == [
+        "robot_dyn: tracing M of planar_2r",
+        "robot_dyn: compiling M of planar_2r, once for these equations",
+    ]
+    clocks.clear()
+    rd.rollouts(robot, [[0.4, -0.7], [0.1, 0.2]], duration_s=0.01, integrator="rk4", step_s=1e-3)
+    for clock in clocks:
+        clock.say()
+    assert "robot_dyn: compiling the equations of this run, once for its structure" in capsys.readouterr().err
+
+
+def test_a_notebook_waits_longer_for_a_line_than_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is printed in a notebook is kept with it; a pipe and a missing stderr get nothing."""
+    for screen, ipython, after in ((True, False, 1.0), (False, True, 2.0), (False, False, None), (None, True, None)):
+        monkeypatch.setattr(sys, "stderr", None if screen is None else Screen(screen))
+        with monkeypatch.context() as modules:
+            modules.delitem(sys.modules, "ipykernel", raising=False)
+            if ipython:
+                modules.setitem(sys.modules, "ipykernel", sys)
+            assert waiting._patience_s() == after

@@ -21,7 +21,7 @@ from tests.loops import Q0, V0, Exact, exact, matrices, plant
 
 T, PERIODS = 0.03, 40
 KP, KD, TARGET = np.array([60.0, 45.0]), np.array([5.0, 4.0]), np.array([0.5, 0.2])
-PD = rd.PD(rd.hold(TARGET), KP, KD, T)
+PD = rd.control.PD(rd.control.hold(TARGET), KP, KD, T)
 PLANT = plant()
 NEAR = 1e-11  # rtol 1e-12 over 1.2 s, and rounding of the exponentials
 
@@ -32,11 +32,11 @@ def law(k: int, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def run(
-    controller: rd.Controller, engine: str = "interpreted", periods: int = PERIODS, **options: object
+    controller: rd.control.Controller, engine: str = "interpreted", periods: int = PERIODS, **options: object
 ) -> rd.Trajectory:
     """A run with a sample at each quarter of a period, which is no tick."""
     setup = rd.Setup(
-        PLANT, Q0, V0, periods * T, controller, rd.Adaptive("DOP853", 1e-12, 1e-14), record_period_s=T / 4,
+        PLANT, Q0, V0, periods * T, controller, rd.integrate.Adaptive("DOP853", 1e-12, 1e-14), record_period_s=T / 4,
         engine=engine, estimate_error=False,
     )  # fmt: skip
     return rd.simulate(setup, **options)  # type: ignore[arg-type]
@@ -56,7 +56,7 @@ def differences(made: rd.Trajectory, truth: Exact) -> float:
     [(0.25, 0.75), (1.6, 2.45), *long([(0, 0), (0, 0.37), (0.37, 0), (1, 0.5), (0, 2), (2, 1)])],
 )
 def test_delays_are_those_of_the_definition(engine: str, measured: float, acts: float) -> None:
-    loop = rd.Loop(PD, measurement_delay=measured, actuation_delay=acts)
+    loop = rd.control.Loop(PD, measurement_delay=measured, actuation_delay=acts)
     assert differences(run(loop, engine), exact(law, T, PERIODS, measured, acts)) < NEAR
 
 
@@ -72,7 +72,9 @@ def test_quantisation_of_position_and_torque() -> None:
         return rounded(law(k, rounded(q, encoder), v), converter)
 
     truth = exact(by_hand, T, PERIODS)
-    loop = rd.Loop(PD, position=rd.Quantisation(encoder), actuation=[rd.Quantisation(converter)])
+    loop = rd.control.Loop(
+        PD, position=rd.control.Quantisation(encoder), actuation=[rd.control.Quantisation(converter)]
+    )
     made = run(loop)
     assert min(edges) > 100 * NEAR
     assert differences(made, truth) < NEAR
@@ -94,14 +96,18 @@ def test_velocity_by_differences_of_a_quantised_position_through_a_filter(order:
         start = lfilter_zi(b, a)[:, None] * rates[0]
         return law(k, found[-1], lfilter(b, a, rates, axis=0, zi=start)[0][-1])
 
-    loop = rd.Loop(PD, position=rd.Quantisation(encoder), velocity=[rd.Differences(), rd.LowPass(cutoff, order)])
+    loop = rd.control.Loop(
+        PD,
+        position=rd.control.Quantisation(encoder),
+        velocity=[rd.control.Differences(), rd.control.LowPass(cutoff, order)],
+    )
     assert differences(run(loop), exact(by_hand, T, PERIODS)) < NEAR
 
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_filter_is_butterworths(order: int) -> None:
     """|H|² = 1/(1 + (tan(ω T/2) / tan(ω_c T/2))^(2 order)), and a constant signal passes from the first tick on."""
-    block, period = rd.LowPass([70.0, 9.0], order), 0.01
+    block, period = rd.control.LowPass([70.0, 9.0], order), 0.01
     b, a = block._coefficients(period)
     for omega in (3.0, 70.0, 200.0):
         z = np.exp(-1j * omega * period * np.arange(3))
@@ -124,7 +130,7 @@ def test_the_rate_limit_of_the_torque() -> None:
         before.append(before[-1] + np.clip(step, -rate * T, rate * T))
         return before[-1]
 
-    loop = rd.Loop(PD, actuation=rd.RateLimit(rate), actuation_delay=0.5)
+    loop = rd.control.Loop(PD, actuation=rd.control.RateLimit(rate), actuation_delay=0.5)
     assert differences(run(loop), exact(by_hand, T, PERIODS, 0, 0.5)) < NEAR
     assert limited[0] and not limited[-1]
 
@@ -133,15 +139,15 @@ def test_the_rate_limit_of_the_torque() -> None:
 @pytest.mark.parametrize("late", [0.0, 1.25])
 def test_two_rates(engine: str, late: float) -> None:
     """PD at each tick, a spring's torque at each fourth, held between; with delays around both."""
-    slow = rd.PD(rd.hold([0.1, -0.3]), [9.0, 8.0], [0.5, 0.4], 4 * T)
-    both, kept = rd.Multirate(PD, slow), []
+    slow = rd.control.PD(rd.control.hold([0.1, -0.3]), [9.0, 8.0], [0.5, 0.4], 4 * T)
+    both, kept = rd.control.Multirate(PD, slow), []
 
     def by_hand(k: int, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         if k % 4 == 0:
             kept.append(np.array([9.0, 8.0]) * ([0.1, -0.3] - q) - np.array([0.5, 0.4]) * v)
         return law(k, q, v) + kept[-1]
 
-    made = run(rd.Loop(both, measurement_delay=late) if late else both, engine)
+    made = run(rd.control.Loop(both, measurement_delay=late) if late else both, engine)
     assert differences(made, exact(by_hand, T, PERIODS, late)) < NEAR
 
 
@@ -153,17 +159,22 @@ def test_the_integral_of_a_pid_is_that_of_what_is_measured() -> None:
         z.append(z[-1] + T * ki * (TARGET - q))
         return law(k, q, v) + z[-2]
 
-    pid = rd.PID(rd.hold(TARGET), KP, ki, KD, period_s=T)
-    nothing = rd.PD(rd.hold(TARGET), 0.0, 0.0, 2 * T)
-    for controller in (pid, rd.Multirate(pid, nothing)):
+    pid = rd.control.PID(rd.control.hold(TARGET), KP, ki, KD, period_s=T)
+    nothing = rd.control.PD(rd.control.hold(TARGET), 0.0, 0.0, 2 * T)
+    for controller in (pid, rd.control.Multirate(pid, nothing)):
         z[:] = [np.zeros(2)]
-        assert differences(run(rd.Loop(controller, measurement_delay=0.75)), exact(by_hand, T, PERIODS, 0.75)) < NEAR
+        assert (
+            differences(run(rd.control.Loop(controller, measurement_delay=0.75)), exact(by_hand, T, PERIODS, 0.75))
+            < NEAR
+        )
 
 
-EVERYTHING = rd.Loop(
-    rd.Multirate(PD, rd.PD(rd.hold(TARGET), 3.0, 0.1, 2 * T)),
-    position=[rd.Noise(1e-4), rd.Quantisation(1e-3)], velocity=[rd.Differences(), rd.LowPass(40.0)],
-    actuation=[rd.Noise(0.1), rd.RateLimit(300.0), rd.Quantisation(0.02)], measurement_delay=1.25, actuation_delay=0.5,
+EVERYTHING = rd.control.Loop(
+    rd.control.Multirate(PD, rd.control.PD(rd.control.hold(TARGET), 3.0, 0.1, 2 * T)),
+    position=[rd.control.Noise(1e-4), rd.control.Quantisation(1e-3)],
+    velocity=[rd.control.Differences(), rd.control.LowPass(40.0)],
+    actuation=[rd.control.Noise(0.1), rd.control.RateLimit(300.0), rd.control.Quantisation(0.02)],
+    measurement_delay=1.25, actuation_delay=0.5,
     seed=7,
 )  # fmt: skip
 
@@ -192,12 +203,17 @@ def test_coefficients_of_blocks_are_swept_by_name() -> None:
     }  # fmt: skip
     many = rd.rollouts(setup, Q0, V0, params=params)
     for run in range(2):
-        fast = rd.PD(rd.hold(TARGET), params["fast.kp"][run], KD, T)
+        fast = rd.control.PD(rd.control.hold(TARGET), params["fast.kp"][run], KD, T)
         own = replace(
             EVERYTHING, controller=replace(EVERYTHING.controller, fast=fast), run=run,
-            position=(rd.Noise(params["position.noise.deviation"][run]), rd.Quantisation([1e-3, 4e-3][run])),
-            velocity=(rd.Differences(), rd.LowPass([40.0, 20.0][run])),
-            actuation=(rd.Noise([0.0, 0.1][run]), rd.RateLimit([300.0, 50.0][run]), rd.Quantisation(0.02)),
+            position=(
+                rd.control.Noise(params["position.noise.deviation"][run]), rd.control.Quantisation([1e-3, 4e-3][run])
+            ),
+            velocity=(rd.control.Differences(), rd.control.LowPass([40.0, 20.0][run])),
+            actuation=(
+                rd.control.Noise([0.0, 0.1][run]), rd.control.RateLimit([300.0, 50.0][run]),
+                rd.control.Quantisation(0.02),
+            ),
         )  # fmt: skip
         alone = rd.simulate(setup, controller=own)
         np.testing.assert_allclose(many.q[run], alone.q, atol=1e-13)
@@ -206,9 +222,9 @@ def test_coefficients_of_blocks_are_swept_by_name() -> None:
 
 
 def test_two_periods_that_differ_in_their_ratio_share_no_machine_code() -> None:
-    slow = [rd.PD(rd.hold(TARGET), 9.0, 0.5, r * T) for r in (2, 3)]
+    slow = [rd.control.PD(rd.control.hold(TARGET), 9.0, 0.5, r * T) for r in (2, 3)]
     for each in slow:
-        made = [run(rd.Multirate(PD, each), engine, 8) for engine in ("interpreted", "compiled")]
+        made = [run(rd.control.Multirate(PD, each), engine, 8) for engine in ("interpreted", "compiled")]
         np.testing.assert_allclose(made[0].q, made[1].q, atol=1e-12)
 
 
@@ -216,7 +232,7 @@ def test_a_loop_of_nothing_adds_no_instruction() -> None:
     """And a run without a controller, or with a bare one, has the instructions that it had."""
     counts = [
         {name: len(each) for name, each in compiled_equation(StateEquation(PLANT, x), None).functions.programs.items()}
-        for x in (PD, rd.Loop(PD), rd.Loop(PD, actuation_delay=0.5))
+        for x in (PD, rd.control.Loop(PD), rd.control.Loop(PD, actuation_delay=0.5))
     ]
     assert counts[0] == counts[1]
     assert counts[0]["rate"] == counts[2]["rate"]  # what a loop does, it does at ticks
@@ -224,17 +240,17 @@ def test_a_loop_of_nothing_adds_no_instruction() -> None:
 
 
 def test_what_a_loop_costs_is_told_apart_from_its_controller() -> None:
-    setup = rd.Setup(PLANT, Q0, V0, 1.0, rd.Loop(PD, actuation_delay=0.5))
+    setup = rd.Setup(PLANT, Q0, V0, 1.0, rd.control.Loop(PD, actuation_delay=0.5))
     assert dict(parts(setup))["loop"].controller is PD
     assert "loop" not in dict(parts(replace(setup, controller=PD)))
 
 
 def test_states_that_wait_do_not_loosen_the_tolerance() -> None:
     """They do not change between ticks: the mean of squares of the local error is that of the others."""
-    arm, free = rd.load("planar_2r"), rd.PD(rd.hold(Q0), 0.0, 0.0, 1.0)
+    arm, free = rd.load("planar_2r"), rd.control.PD(rd.control.hold(Q0), 0.0, 0.0, 1.0)
     made = [
         rd.simulate(arm, [0.9, -0.4], duration_s=3.0, controller=x, integrator="DOP853", estimate_error=False)
-        for x in (free, rd.Loop(free, actuation_delay=50))
+        for x in (free, rd.control.Loop(free, actuation_delay=50))
     ]
     assert made[0].statistics.steps == made[1].statistics.steps
     np.testing.assert_allclose(made[0].q, made[1].q, atol=1e-12)  # an rtol that differs in its last bit
@@ -242,7 +258,7 @@ def test_states_that_wait_do_not_loosen_the_tolerance() -> None:
 
 def test_the_last_torque_is_that_of_the_last_tick() -> None:
     """Where a run ends between two ticks."""
-    for controller in (PD, rd.Loop(PD), rd.Loop(PD, actuation_delay=0.75)):
+    for controller in (PD, rd.control.Loop(PD), rd.control.Loop(PD, actuation_delay=0.75)):
         made = run(controller, periods=PERIODS - 0.5)  # type: ignore[arg-type]
         longer = run(controller)
         np.testing.assert_allclose(made.u[-1], longer.u[len(made.t) - 1], atol=1e-12)
@@ -253,7 +269,7 @@ def test_chatter_is_seen_where_a_torque_acts_late(late: float) -> None:
     """Damping of 2.24/T reverses at each tick, whether there are one or two instants in a period."""
     M = np.linalg.inv(matrices()[1][2:])
     kd = 2.24 / T / np.abs(np.linalg.eigvals(np.linalg.inv(M))).max()
-    loop = rd.Loop(rd.PD(rd.hold(TARGET), 0.0, kd, T), actuation_delay=late)
+    loop = rd.control.Loop(rd.control.PD(rd.control.hold(TARGET), 0.0, kd, T), actuation_delay=late)
     for integrator in ("rk4", "DOP853"):
         for engine in ("interpreted", "compiled"):
             options = {"integrator": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
@@ -271,33 +287,36 @@ def test_what_is_rounded_shows_no_order() -> None:
     """A sample may be rounded the other way in the exact motion: its error is bounded by companions, not divided."""
     setup = rd.Setup(PLANT, Q0, V0, 10 * T, PD, "rk4", T / 8)
     assert rd.simulate(setup).error.verdict is Verdict.ORDER
-    made = rd.simulate(setup, controller=rd.Loop(PD, position=rd.Quantisation(1e-4))).error
+    made = rd.simulate(setup, controller=rd.control.Loop(PD, position=rd.control.Quantisation(1e-4))).error
     assert made.verdict is Verdict.BOUND
     assert "rounded" in str(made)
-    assert rd.simulate(setup, controller=rd.Loop(PD, position=rd.Noise(1e-4))).error.verdict is Verdict.ORDER
+    assert (
+        rd.simulate(setup, controller=rd.control.Loop(PD, position=rd.control.Noise(1e-4))).error.verdict
+        is Verdict.ORDER
+    )
 
 
 def test_loops_that_have_no_meaning_are_refused() -> None:
-    block, hold = rd.Quantisation(1e-3), rd.hold(TARGET)
+    block, hold = rd.control.Quantisation(1e-3), rd.control.hold(TARGET)
     wrong: list[tuple[object, str]] = [
-        (lambda: rd.Loop(rd.PD(hold, 1.0, 1.0)), "acts continuously"),
-        (lambda: rd.Loop(rd.Loop(PD)), "must not be a Loop"),
-        (lambda: rd.Multirate(PD, rd.Loop(PD)), "must not be a Loop"),
-        (lambda: rd.Multirate(PD, rd.PD(hold, 1.0, 1.0, 2.5 * T)), "whole number"),
-        (lambda: rd.Multirate(rd.PD(hold, 1.0, 1.0, 2 * T), PD), "whole number"),
-        (lambda: rd.Multirate(PD, rd.PD(rd.hold([0.0]), 1.0, 1.0, T)), "drives 2 joints"),
-        (lambda: rd.Loop(PD, position=rd.Differences()), "first block of velocity"),
-        (lambda: rd.Loop(PD, velocity=[block, rd.Differences()]), "first block of velocity"),
-        (lambda: rd.Loop(PD, velocity=[rd.LowPass(np.pi / T)]), "cutoff must be less than"),
-        (lambda: rd.Loop(PD, velocity=[rd.LowPass(1.0, 3)]), "order"),
-        (lambda: rd.Loop(PD, position=[rd.Quantisation([1.0, 2.0, 3.0])]), r"shape \(2,\)"),
-        (lambda: rd.Loop(PD, measurement_delay=-0.5), "from 0 to 1000"),
-        (lambda: rd.Loop(PD, measurement_delay=0.5, actuation_delay=0.5 + 1e-8), "closer together"),
-        (lambda: rd.Loop(PD, seed=-1), "whole number"),
-        (lambda: rd.Loop(PD, position=["noise"]), "must be blocks"),  # type: ignore[list-item]
+        (lambda: rd.control.Loop(rd.control.PD(hold, 1.0, 1.0)), "acts continuously"),
+        (lambda: rd.control.Loop(rd.control.Loop(PD)), "must not be a Loop"),
+        (lambda: rd.control.Multirate(PD, rd.control.Loop(PD)), "must not be a Loop"),
+        (lambda: rd.control.Multirate(PD, rd.control.PD(hold, 1.0, 1.0, 2.5 * T)), "whole number"),
+        (lambda: rd.control.Multirate(rd.control.PD(hold, 1.0, 1.0, 2 * T), PD), "whole number"),
+        (lambda: rd.control.Multirate(PD, rd.control.PD(rd.control.hold([0.0]), 1.0, 1.0, T)), "drives 2 joints"),
+        (lambda: rd.control.Loop(PD, position=rd.control.Differences()), "first block of velocity"),
+        (lambda: rd.control.Loop(PD, velocity=[block, rd.control.Differences()]), "first block of velocity"),
+        (lambda: rd.control.Loop(PD, velocity=[rd.control.LowPass(np.pi / T)]), "cutoff must be less than"),
+        (lambda: rd.control.Loop(PD, velocity=[rd.control.LowPass(1.0, 3)]), "order"),
+        (lambda: rd.control.Loop(PD, position=[rd.control.Quantisation([1.0, 2.0, 3.0])]), r"shape \(2,\)"),
+        (lambda: rd.control.Loop(PD, measurement_delay=-0.5), "from 0 to 1000"),
+        (lambda: rd.control.Loop(PD, measurement_delay=0.5, actuation_delay=0.5 + 1e-8), "closer together"),
+        (lambda: rd.control.Loop(PD, seed=-1), "whole number"),
+        (lambda: rd.control.Loop(PD, position=["noise"]), "must be blocks"),  # type: ignore[list-item]
     ]
     for make, words in wrong:
         with pytest.raises(ControlError, match=words):
             make()  # type: ignore[operator]
     with pytest.raises(QueryError, match="drives 2 joints, the plant has 1"):
-        rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], controller=rd.Loop(PD))
+        rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], controller=rd.control.Loop(PD))

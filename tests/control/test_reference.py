@@ -278,30 +278,6 @@ def test_a_spline_has_the_velocities_asked_for_at_its_ends(kind: str) -> None:
     np.testing.assert_allclose(reference.at(TIMES[-1])[1], -0.8, atol=1e-12)
 
 
-def test_samples_are_read_from_the_table_of_a_run(tmp_path) -> None:
-    """Columns by name, in the order of the joints asked for; what is not a table of samples is refused."""
-    path, t = tmp_path / "run.csv", np.linspace(0, 1, 9)
-    q, v, _ = motion(t)
-    head = "t [s],q b [rad],q a [rad],v a [rad/s],v b [rad/s],u a [N m],energy [J]"
-    rows = np.column_stack([t, q[:, ::-1], v, v[:, 0], t]).tolist()
-    path.write_text("\n".join([head, *(",".join(map(repr, row)) for row in rows)]))
-    reference = Samples.from_csv(path, ["a", "b"])
-    np.testing.assert_array_equal(reference.coefficients, Samples(t, q, v).coefficients)
-    for text, message in {
-        "t,q a,accel a\n0,1,2\n1,2,3": "column 'accel a' is unknown",
-        "q a\n0\n1": "no column t",
-        "t,q c\n0,1\n1,2": "no column 'q a'",
-        "t,q a,q b\n0,1,2\n1,x,3": "line 3: column 'q a' holds 'x', not a number; correct it",
-        "t,q a,q b\n0,1,2\n1,nan,3": "must be finite",
-        "t,q a,q b\n0,1,2\n0,1,3": "must increase",
-    }.items():
-        path.write_text(text)
-        with pytest.raises(ControlError, match=message):
-            Samples.from_csv(path, ["a", "b"])
-    with pytest.raises(ControlError, match="a folder"):
-        Samples.from_csv(tmp_path)
-
-
 def test_the_estimate_along_dense_samples_is_honest(tmp_path) -> None:
     """Samples nearer than a step: each ends a step, no order is lost, and the error estimate covers the error.
 
@@ -309,7 +285,7 @@ def test_the_estimate_along_dense_samples_is_honest(tmp_path) -> None:
     """
     arm, t = rd.load("planar_2r"), np.linspace(0, 0.3, 101)
     reference = Samples(t, *motion(t)[:2])
-    controller = rd.ComputedTorque(arm, reference, 100.0, 20.0)
+    controller = rd.control.ComputedTorque(arm, reference, 100.0, 20.0)
     setup = rd.Setup(
         rd.Plant(arm), motion(t)[0][0] + 0.1, duration_s=0.3, controller=controller, integrator="rk4", step_s=5e-3
     )
@@ -319,6 +295,6 @@ def test_the_estimate_along_dense_samples_is_honest(tmp_path) -> None:
     assert 0 < error < 2 * run.error.final < 1e-4
     (tmp_path / "wave.csv").write_text("\n".join(["t,q joint_1,q joint_2", *(f"{x},{x},{2 * x}" for x in t)]))
     scene = 'robot = "planar_2r"\nduration_s = 0.1\n[control]\nkind = "pd"\nfrequency_rad_per_s = 5.0\n'
-    (tmp_path / "s.toml").write_text(scene + '[reference]\nkind = "samples"\nfile = "wave.csv"\n')
+    (tmp_path / "s.toml").write_text(scene + '[reference]\nkind = "samples"\nfile = "wave.csv"\nends = "measured"\n')
     followed = rd.read_scene(tmp_path / "s.toml").controller.reference
     np.testing.assert_allclose(followed.at(np.array([0.05]))[0], [[0.05, 0.1]], atol=1e-12)

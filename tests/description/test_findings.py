@@ -71,6 +71,31 @@ def test_a_sound_arm_has_no_findings(catalog, name: str) -> None:
     assert catalog[name] == ()
 
 
+@pytest.mark.parametrize(("factor", "found"), [(0.999, False), (1.001, True)])
+def test_an_inertia_is_beyond_reach_from_ten_times_the_longest_distance_between_joints(
+    tmp_path: Path, factor: float, found: bool
+) -> None:
+    """½ tr I = factor · m (10 L)², with m = 1.5 kg and L = 0.7 m of the file; the moments are those of a ball."""
+    moment = 2 / 3 * factor * 1.5 * (10 * 0.7) ** 2
+    text = altered((MOMENTS, f'ixx="{moment}" ixy="0" ixz="0" iyy="{moment}" iyz="0" izz="{moment}"'))
+    told = findings(text, tmp_path)
+    assert len(told) == found
+    assert not found or "no joint of the robot is more than 0.7 m from the one before" in told[0]
+    assert findings(text, tmp_path, inertias={"upper": np.eye(3) * 0.01}) == ()
+
+
+@pytest.mark.parametrize(("offset", "warns"), [(0.009, False), (0.011, True)])
+def test_the_joints_of_a_gimbal_do_not_tell_its_size(tmp_path: Path, offset: float, warns: bool) -> None:
+    """Of 1 kg with ½ tr I = 0.015 kg m² some is 0.12 m away: more than 10 times 11 mm, but nothing of a gimbal."""
+    body = '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>'
+    pan, tilt = (f"<link name='{name}'>{body}</link>" for name in ("pan", "tilt"))
+    text = f"""<robot name="gimbal"><link name="base"/>{pan}{tilt}
+      <joint name="yaw" type="continuous"><parent link="base"/><child link="pan"/><axis xyz="0 0 1"/></joint>
+      <joint name="pitch" type="continuous"><parent link="pan"/><child link="tilt"/><axis xyz="0 1 0"/>
+        <origin xyz="0 0 {offset}"/></joint></robot>"""
+    assert bool(findings(text, tmp_path)) == warns
+
+
 WELDED = '<link name="hand"><inertial><mass value="{}"/><inertia {}/></inertial></link>' + joint(
     "wrist", "fore", "hand", kind="fixed"
 )
@@ -215,13 +240,13 @@ def no_effort(tmp_path: Path) -> rd.Robot:
 def test_an_effort_limit_of_zero_in_the_file_never_drops_the_arm_in_silence(tmp_path: Path) -> None:
     robot = no_effort(tmp_path)
     with pytest.raises(EffectError, match=r"an effort limit of 0 for 'shoulder', .* give limits by joint"):
-        rd.Plant(robot, [rd.EffortLimit("urdf")])
-    stated = rd.Plant(robot, [rd.EffortLimit({"shoulder": 5.0, "elbow": 8.0})])
+        rd.Plant(robot, [rd.effects.EffortLimit("urdf")])
+    stated = rd.Plant(robot, [rd.effects.EffortLimit({"shoulder": 5.0, "elbow": 8.0})])
     assert stated.actuation(np.array([7.0, 9.0])).tolist() == [5.0, 8.0]
-    meant = rd.Plant(robot, [rd.EffortLimit([0.0, 8.0])])  # a drive that is off, said so by the user
+    meant = rd.Plant(robot, [rd.effects.EffortLimit([0.0, 8.0])])  # a drive that is off, said so by the user
     assert meant.actuation(np.array([7.0, 9.0])).tolist() == [0.0, 8.0]
     held = robot.with_(lock={"shoulder": 0.3})
-    assert rd.Plant(held, [rd.EffortLimit("urdf")]).actuation(np.array([9.0])).tolist() == [8.0]
+    assert rd.Plant(held, [rd.effects.EffortLimit("urdf")]).actuation(np.array([9.0])).tolist() == [8.0]
 
 
 @pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")

@@ -47,10 +47,10 @@ def test_a_link_with_another_mass_and_inertia_is_that_of_an_edited_file() -> Non
 
 
 def setup(robot: rd.Robot, model: rd.Robot | None = None) -> rd.Setup:
-    plan = rd.quintic(STATES[0], STATES[0] + 0.4, 0.2)
-    control = None if model is None else rd.ComputedTorque(model, plan, 50.0, 9.0)
+    plan = rd.control.quintic(STATES[0], STATES[0] + 0.4, 0.2)
+    control = None if model is None else rd.control.ComputedTorque(model, plan, 50.0, 9.0)
     return rd.Setup(
-        rd.Plant(robot, [rd.ViscousFriction(0.3)]), STATES[0], STATES[1], duration_s=0.2, controller=control,
+        rd.Plant(robot, [rd.effects.ViscousFriction(0.3)]), STATES[0], STATES[1], duration_s=0.2, controller=control,
         integrator="rk4", step_s=1e-3, record_period_s=0.02, estimate_error=False,
     )  # fmt: skip
 

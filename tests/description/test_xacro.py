@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.description import xacro
+from robot_dyn.description.sources import xacro
 from robot_dyn.errors import DescriptionError, ModelWarning
 from tests.command import document, refusal
 from tests.hostile.kinds import ARM

@@ -14,7 +14,7 @@ from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, 0.7]), np.array([1.0, -2.0])
 BODY = rd.Payload("tip", 0.8, (0.1, 0.02, 0.05), ((0.02, 0, 0), (0, 0.03, 0), (0, 0, 0.01)))
-TIGHT = rd.Adaptive("DOP853", 1e-13, 1e-15)
+TIGHT = rd.integrate.Adaptive("DOP853", 1e-13, 1e-15)
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 G = 9.80665
 
@@ -28,8 +28,8 @@ def test_a_slider_keeps_its_momentum_and_the_ledger_has_what_was_lost(method, en
     """
     F, M, mu, z = 2.0, 0.9, 0.4, 0.3
     bodies = [
-        rd.CarriedPayload(rd.Payload("cart", M, (0.0, 0.0, z)), 0.3, 0.7),
-        rd.CarriedPayload(rd.Payload("cart", mu), 0.5, 0.9, at_rest=False),
+        rd.effects.CarriedPayload(rd.Payload("cart", M, (0.0, 0.0, z)), 0.3, 0.7),
+        rd.effects.CarriedPayload(rd.Payload("cart", mu), 0.5, 0.9, at_rest=False),
     ]
     run = rd.simulate(
         rd.Plant(SLIDER, bodies), [0.1], [0.8], duration_s=1.2, controller=Ramp(F), integrator=method, engine=engine,
@@ -67,7 +67,7 @@ def test_a_pendulum_swings_on_with_the_momentum_it_had() -> None:
     carrying = robot.with_(payload=body)
     inertia = link + 0.6 * (0.4**2 + 0.05**2)
     assert carrying.M([0.3])[0, 0] == pytest.approx(inertia, rel=1e-14)
-    plant = rd.Plant(robot, [rd.CarriedPayload(body, 0.5, 1.1)])
+    plant = rd.Plant(robot, [rd.effects.CarriedPayload(body, 0.5, 1.1)])
     run = rd.simulate(plant, [0.9], [1.3], duration_s=2.0, integrator=TIGHT, record_period_s=0.01)
     energies = [
         np.array([dynamics.total_energy(q, v) for q, v in zip(run.q[part], run.v[part], strict=True)])
@@ -95,7 +95,7 @@ def test_a_run_is_those_of_the_robots_before_and_behind_joined_by_the_momentum(a
     after = np.linalg.solve(carrying.M(q), ARM.M(q) @ v) if at_rest else v
     second = rd.simulate(carrying, q, after, duration_s=0.4, **options)
     third = rd.simulate(ARM, second.q[-1], second.v[-1], duration_s=0.3, **options)
-    plant = rd.Plant(ARM, [rd.CarriedPayload(BODY, 0.3, 0.7, at_rest)])
+    plant = rd.Plant(ARM, [rd.effects.CarriedPayload(BODY, 0.3, 0.7, at_rest)])
     whole = rd.simulate(plant, Q, V, duration_s=1.0, **options)
     np.testing.assert_allclose(whole.q[3:7], second.q[:4], atol=1e-11)
     np.testing.assert_allclose(whole.v[3:7], second.v[:4], atol=1e-10)
@@ -111,12 +111,14 @@ def test_a_run_is_those_of_the_robots_before_and_behind_joined_by_the_momentum(a
 def test_what_is_stuck_is_kicked_loose_and_what_rests_at_a_stop_stays_above_it(engine: str) -> None:
     """With dry friction, rigid stops and a sampled controller whose ticks meet the switches the ledger closes."""
     effects = [
-        rd.DryFriction([0.8, 0.5]), rd.RigidStops([-3.0, 0.6], [3.0, 2.0], 0.4),
-        rd.CarriedPayload(BODY, 0.2, 0.6), rd.CarriedPayload(rd.Payload("tip", 0.3), 0.2, 0.45, at_rest=False),
+        rd.effects.DryFriction([0.8, 0.5]), rd.effects.RigidStops([-3.0, 0.6], [3.0, 2.0], 0.4),
+        rd.effects.CarriedPayload(BODY, 0.2, 0.6),
+        rd.effects.CarriedPayload(rd.Payload("tip", 0.3), 0.2, 0.45, at_rest=False),
     ]  # fmt: skip
-    control = rd.PD(rd.quintic(Q, [0.9, 1.1], 0.8), 40.0, 8.0, period_s=0.02)
+    control = rd.control.PD(rd.control.quintic(Q, [0.9, 1.1], 0.8), 40.0, 8.0, period_s=0.02)
     run = rd.simulate(
-        rd.Plant(ARM, effects), Q, duration_s=1.0, controller=control, integrator=rd.Adaptive("DOP853", 1e-11, 1e-13),
+        rd.Plant(ARM, effects), Q, duration_s=1.0, controller=control,
+        integrator=rd.integrate.Adaptive("DOP853", 1e-11, 1e-13),
         engine=engine, record_period_s=0.01, estimate_error=False,
     )  # fmt: skip
     names = [each.name for each in run.events]
@@ -129,7 +131,7 @@ def test_what_is_stuck_is_kicked_loose_and_what_rests_at_a_stop_stays_above_it(e
 def test_a_joint_that_sticks_slides_when_the_impact_reaches_it() -> None:
     """One joint moves, the other sticks: v⁺ of both is that of the law without friction, which is finite."""
     light, q, v = ARM.with_(gravity=(0, 0, 0)), np.array([0.3, 0.9]), np.array([1.5, 0.0])
-    plant = rd.Plant(light, [rd.DryFriction([0.0, 50.0]), rd.CarriedPayload(BODY, 0.1)])
+    plant = rd.Plant(light, [rd.effects.DryFriction([0.0, 50.0]), rd.effects.CarriedPayload(BODY, 0.1)])
     run = rd.simulate(plant, q, v, duration_s=0.2, integrator=TIGHT, record_period_s=0.05)
     at = next(each for each in run.events if "picked up" in each.name)
     place = q + 0.1 * v
@@ -141,7 +143,8 @@ def test_a_joint_that_sticks_slides_when_the_impact_reaches_it() -> None:
 
 def test_rollouts_of_chosen_steps_and_run_files_keep_them(tmp_path) -> None:
     setup = rd.Setup(
-        rd.Plant(ARM, [rd.CarriedPayload(BODY, 0.1, 0.2)]), Q, V, 0.3, record_period_s=0.05, estimate_error=False,
+        rd.Plant(ARM, [rd.effects.CarriedPayload(BODY, 0.1, 0.2)]), Q, V, 0.3, record_period_s=0.05,
+        estimate_error=False,
         integrator="DOP853",
     )  # fmt: skip
     runs = rd.rollouts(setup, params={"gravity": [[0, 0, -G], [0, 0, -1.6]]}, record=("q", "work"))
@@ -159,12 +162,12 @@ def test_rollouts_of_chosen_steps_and_run_files_keep_them(tmp_path) -> None:
 
 def test_a_plant_is_asked_at_a_time() -> None:
     """N and accelerations know the time; M and C are those of `at` a time, and refuse without."""
-    body = rd.CarriedPayload(BODY, 0.1, 0.2)
+    body = rd.effects.CarriedPayload(BODY, 0.1, 0.2)
     plant, carrying = (
-        rd.Plant(ARM, [rd.ViscousFriction(0.1), body]),
-        rd.Plant(ARM.with_(payload=BODY), [rd.ViscousFriction(0.1)]),
+        rd.Plant(ARM, [rd.effects.ViscousFriction(0.1), body]),
+        rd.Plant(ARM.with_(payload=BODY), [rd.effects.ViscousFriction(0.1)]),
     )
-    for t, other in ((0.05, rd.Plant(ARM, [rd.ViscousFriction(0.1)])), (0.15, carrying)):
+    for t, other in ((0.05, rd.Plant(ARM, [rd.effects.ViscousFriction(0.1)])), (0.15, carrying)):
         np.testing.assert_array_equal(plant.N(t, Q, V), other.N(t, Q, V))
         np.testing.assert_array_equal(plant.forward_dynamics(t, Q, V, V), other.forward_dynamics(t, Q, V, V))
         np.testing.assert_array_equal(plant.inverse_dynamics(t, Q, V, V), other.inverse_dynamics(t, Q, V, V))
@@ -180,7 +183,7 @@ def test_a_plant_is_asked_at_a_time() -> None:
 
 
 def test_what_is_not_supported_is_refused_by_name() -> None:
-    body = rd.CarriedPayload(BODY, 0.1, 0.2)
+    body = rd.effects.CarriedPayload(BODY, 0.1, 0.2)
     with pytest.raises(QueryError, match=r"carried_payload: .* changes momenta, which gauss_4 integrates"):
         rd.Setup(rd.Plant(ARM, [body]), Q, duration_s=0.3, integrator="gauss_4")
     with pytest.raises(QueryError, match="cuts=False: carried_payload comes and goes, where steps must end"):
@@ -188,8 +191,8 @@ def test_what_is_not_supported_is_refused_by_name() -> None:
     with pytest.raises(QueryError, match="advise: carried_payload changes the bodies"):
         rd.advise(rd.Plant(ARM, [body]), Q)
     with pytest.raises(EffectError, match=r"carried_payload: .*'tipp'"):
-        rd.Plant(ARM, [rd.CarriedPayload(rd.Payload("tipp", 1.0))])
+        rd.Plant(ARM, [rd.effects.CarriedPayload(rd.Payload("tipp", 1.0))])
     with pytest.raises(EffectError, match="carried_payload: needs a Robot, got Lagrangian"):
         rd.Plant(rd.Lagrangian(ARM), [body])
     with pytest.raises(EffectError, match=r"end_s must lie after start_s, got 0.2 and 0.1"):
-        rd.CarriedPayload(BODY, 0.2, 0.1)
+        rd.effects.CarriedPayload(BODY, 0.2, 0.1)

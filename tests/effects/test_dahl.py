@@ -16,7 +16,7 @@ BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 
 
 @dataclass(frozen=True, eq=False)
-class Beats(rd.Stateless):
+class Beats(rd.control.Stateless):
     """A force of two frequencies, so that reversals fall on many parts of the curve."""
 
     period_s: float = 0.0
@@ -27,7 +27,7 @@ class Beats(rd.Stateless):
 
 
 def run(exponent: float | None, engine: str, **options) -> rd.Trajectory:
-    plant = rd.Plant(SLIDER, [rd.DahlFriction(STIFFNESS, LEVEL, exponent)])
+    plant = rd.Plant(SLIDER, [rd.effects.DahlFriction(STIFFNESS, LEVEL, exponent)])
     options = {"duration_s": 6.0, "record_period_s": 0.01, "estimate_error": False} | options
     return rd.simulate(plant, q0=[0.0], controller=Beats(), engine=engine, **options)
 
@@ -43,7 +43,7 @@ def curve(start: float, path: np.ndarray, side: float, exponent: float) -> np.nd
 @BOTH
 def test_the_hysteresis_is_that_of_the_closed_form(exponent: float | None, engine: str) -> None:
     """From reversal to reversal F is a function of the path alone; a tolerance of 1e-12 leaves 1e-9."""
-    swing = run(exponent, engine, integrator=rd.Adaptive("DOP853", 1e-12, 1e-14))
+    swing = run(exponent, engine, integrator=rd.integrate.Adaptive("DOP853", 1e-12, 1e-14))
     turns = [(each.t, each.q[0]) for each in swing.events]
     assert len(turns) > 4
     at, place = np.array([0.0, *(t for t, _ in turns), np.inf]), np.array([0.0, *(q for _, q in turns)])
@@ -76,14 +76,14 @@ def test_an_exponent_of_one_that_is_stated_is_the_default() -> None:
 
 def test_exponents_differ_from_run_to_run_in_rollouts() -> None:
     """Each run is that of the setup with its value, 1e-12."""
-    plant = rd.Plant(SLIDER, [rd.DahlFriction(STIFFNESS, LEVEL, 1.5)])
+    plant = rd.Plant(SLIDER, [rd.effects.DahlFriction(STIFFNESS, LEVEL, 1.5)])
     base = rd.Setup(
         plant, [0.0], duration_s=0.5, controller=Beats(), integrator="rk4", record_period_s=0.1, estimate_error=False
     )
     values = np.array([1.2, 2.0])
     runs = rd.rollouts(base, params={"dahl_friction.exponent": values})
     for k, value in enumerate(values):
-        other = rd.Plant(SLIDER, [rd.DahlFriction(STIFFNESS, LEVEL, value)])
+        other = rd.Plant(SLIDER, [rd.effects.DahlFriction(STIFFNESS, LEVEL, value)])
         alone = rd.simulate(replace(base, plant=other), engine="interpreted")
         np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-12)
     assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-6

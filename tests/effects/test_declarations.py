@@ -46,10 +46,10 @@ def engine_of(part: Any) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Drag(rd.Dissipative):
+class Drag(rd.effects.Dissipative):
     """τ = −c tanh(v): what is written outside of the library, and declared."""
 
-    c: Any = field(metadata=rd.coefficient("N m", symbol="c", least=0))
+    c: Any = field(metadata=rd.effects.coefficient("N m", symbol="c", least=0))
 
     def thresholds(self, n=0):
         return ()
@@ -62,7 +62,7 @@ class Drag(rd.Dissipative):
 
 
 @dataclass(frozen=True, eq=False)
-class Silent(rd.Dissipative):
+class Silent(rd.effects.Dissipative):
     """The same, and nothing is declared."""
 
     c: Any
@@ -100,7 +100,7 @@ def test_an_undeclared_part_runs_interpreted_and_the_summary_says_what_to_declar
     assert f"interpreted (Silent {remedy})" in made.summary
 
 
-class Bare(rd.Active):
+class Bare(rd.effects.Active):
     def thresholds(self, n=0):
         return ()
 
@@ -112,7 +112,7 @@ class Bare(rd.Active):
 
 
 @dataclass(frozen=True, eq=False)
-class Remembers(rd.Active):
+class Remembers(rd.effects.Active):
     memory: Any = field(default_factory=dict)
 
     def thresholds(self, n=0):
@@ -123,8 +123,8 @@ class Remembers(rd.Active):
 
 
 @dataclass(frozen=True, eq=False)
-class Cached(rd.Active):
-    c: Any = field(default=2.0, metadata=rd.coefficient("N m s/rad", least=0))
+class Cached(rd.effects.Active):
+    c: Any = field(default=2.0, metadata=rd.effects.coefficient("N m s/rad", least=0))
 
     def thresholds(self, n=0):
         return ()
@@ -152,8 +152,8 @@ class Halved(Block):
     ],
 )
 def test_what_may_change_unseen_is_not_declared(effects: Any, block: Any, said: str) -> None:
-    pd = rd.PD(rd.hold(Q), 4.0, 1.0, period_s=0.01)
-    controller = None if block is None else rd.Loop(pd, velocity=[block])
+    pd = rd.control.PD(rd.control.hold(Q), 4.0, 1.0, period_s=0.01)
+    controller = None if block is None else rd.control.Loop(pd, velocity=[block])
     found = undeclared(rd.Plant(ARM, effects), controller)
     assert [why for _, why in found] == [] if not said else said in found[0][1]
     if not block and not said:
@@ -185,18 +185,27 @@ def test_each_part_of_the_library_declares_as_a_users_does(base: type, name: str
 
 
 def test_no_part_of_the_library_is_undeclared() -> None:
-    sampled = rd.PD(rd.hold(Q), 4.0, 1.0, period_s=0.01)
-    blocks = [rd.Noise(0.1), rd.LowPass(3.0), rd.Quantisation(0.1)]
-    loop = rd.Loop(rd.Multirate(sampled, sampled), velocity=[rd.Differences(), *blocks], actuation=rd.RateLimit(1.0))
+    sampled = rd.control.PD(rd.control.hold(Q), 4.0, 1.0, period_s=0.01)
+    blocks = [rd.control.Noise(0.1), rd.control.LowPass(3.0), rd.control.Quantisation(0.1)]
+    loop = rd.control.Loop(
+        rd.control.Multirate(sampled, sampled),
+        velocity=[rd.control.Differences(), *blocks],
+        actuation=rd.control.RateLimit(1.0),
+    )
     one = np.ones(2)
     effects = [
-        rd.ViscousFriction(1.0), rd.Spring(1.0), rd.EffortLimit(1.0), rd.ActuatorLag(1.0), rd.DryFriction(1.0, 1.0),
-        rd.RigidStops(-2.0, 2.0), rd.DahlFriction(1.0, 1.0), rd.LuGreFriction(*np.ones((6, 2))),
-        rd.ExternalWrench(ARM.frame_names[-1], np.ones(6)), *rd.joint_stops(-one, one),
+        rd.effects.ViscousFriction(1.0), rd.effects.Spring(1.0), rd.effects.EffortLimit(1.0),
+        rd.effects.ActuatorLag(1.0), rd.effects.DryFriction(1.0, 1.0),
+        rd.effects.RigidStops(-2.0, 2.0), rd.effects.DahlFriction(1.0, 1.0), rd.effects.LuGreFriction(*np.ones((6, 2))),
+        rd.effects.ExternalWrench(ARM.frame_names[-1], np.ones(6)), *rd.effects.joint_stops(-one, one),
     ]  # fmt: skip
-    for controller in (loop, rd.PID(rd.hold(Q), 4.0, 1.0, 1.0), rd.FeedForward(ARM, rd.hold(Q), 4.0, 1.0)):
+    for controller in (
+        loop,
+        rd.control.PID(rd.control.hold(Q), 4.0, 1.0, 1.0),
+        rd.control.FeedForward(ARM, rd.control.hold(Q), 4.0, 1.0),
+    ):
         assert undeclared(rd.Plant(ARM, effects), controller) == ()
-    assert undeclared(rd.Plant(ARM, [rd.SeriesElastic(one, one), rd.Spring(1.0)]), None) == ()
+    assert undeclared(rd.Plant(ARM, [rd.effects.SeriesElastic(one, one), rd.effects.Spring(1.0)]), None) == ()
 
 
 STATE = {"count": 0, "gain": 2.0}
@@ -204,7 +213,7 @@ DRAWN = np.random.default_rng(1)
 
 
 @dataclass(frozen=True, eq=False)
-class Law(rd.Stateless):
+class Law(rd.control.Stateless):
     """A controller whose formula is that of the test; thresholds are declared, which says nothing of its code."""
 
     formula: Any
@@ -299,7 +308,7 @@ def test_a_branch_is_traced_both_ways(law: Any) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Gravity(rd.Stateless):
+class Gravity(rd.control.Stateless):
     """A controller whose model is an attribute of any name."""
 
     robot: Any
@@ -352,10 +361,10 @@ def test_a_compiled_plant_is_not_what_is_simulated() -> None:
 
 SCENES = {
     "free": ((), None, "auto"),
-    "friction": ([rd.ViscousFriction(0.3), rd.RegularisedCoulombFriction(0.4, 0.1)], None, "auto"),
-    "stops": (rd.joint_stops(-0.9, 0.9, 1e4, 10.0), None, "auto"),
-    "sticks": ([rd.DryFriction(1.0, 1.2)], None, "auto"),
-    "sampled": ((), rd.PD(rd.hold(Q - 0.3), 40.0, 4.0, period_s=0.01), "auto"),
+    "friction": ([rd.effects.ViscousFriction(0.3), rd.effects.RegularisedCoulombFriction(0.4, 0.1)], None, "auto"),
+    "stops": (rd.effects.joint_stops(-0.9, 0.9, 1e4, 10.0), None, "auto"),
+    "sticks": ([rd.effects.DryFriction(1.0, 1.2)], None, "auto"),
+    "sampled": ((), rd.control.PD(rd.control.hold(Q - 0.3), 40.0, 4.0, period_s=0.01), "auto"),
     "declared by a user": ([Drag(1.5)], None, "rk4"),
 }
 
@@ -377,9 +386,9 @@ def test_auto_takes_the_machine_code_that_is_there_and_both_engines_agree_within
 
 def test_auto_has_machine_code_for_other_coefficients_and_none_for_another_structure(monkeypatch) -> None:
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
-    base = rd.Setup(rd.Plant(ARM, [rd.Spring(3.0)]), Q, V, 0.2, integrator="rk4", estimate_error=False)
+    base = rd.Setup(rd.Plant(ARM, [rd.effects.Spring(3.0)]), Q, V, 0.2, integrator="rk4", estimate_error=False)
     rd.simulate(base, engine="compiled")
-    assert rd.simulate(replace(base, plant=rd.Plant(ARM, [rd.Spring(5.0)]))).statistics.engine == "compiled"
-    other = rd.Plant(ARM.with_(mass_scale=1.07), [rd.Spring(5.0)])
+    assert rd.simulate(replace(base, plant=rd.Plant(ARM, [rd.effects.Spring(5.0)]))).statistics.engine == "compiled"
+    other = rd.Plant(ARM.with_(mass_scale=1.07), [rd.effects.Spring(5.0)])
     engine = rd.simulate(replace(base, plant=other)).statistics.engine
     assert engine == "interpreted (short: compiling is not worthwhile)"

@@ -19,7 +19,7 @@ from tests.long import long
 ENGINES = ["interpreted", "compiled"]
 RAIL = arms()["rail"]  # 1 kg on a vertical rail
 ARM = rd.load("planar_2r")
-TIGHT = rd.Adaptive(rtol=1e-12, atol=1e-12)
+TIGHT = rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)
 OPTIONS = {"estimate_error": False, "integrator": TIGHT}
 
 
@@ -37,7 +37,9 @@ def level(robot: rd.Robot, g: float = 0.0) -> rd.Robot:
 def test_a_load_within_friction_moves_nothing(part: float) -> None:
     """A block on an incline for an hour: 0.0 to the last bit, also with the load exactly at the limit."""
     g = 9.80665 * np.sin(np.radians(20))
-    run = rd.simulate(rd.Plant(level(RAIL, g), [rd.DryFriction(g / part)]), [0.25], duration_s=3600.0, **OPTIONS)
+    run = rd.simulate(
+        rd.Plant(level(RAIL, g), [rd.effects.DryFriction(g / part)]), [0.25], duration_s=3600.0, **OPTIONS
+    )
     assert (run.q == 0.25).all()
     assert (run.v == 0).all()
     assert run.outcome.ending == "finished"
@@ -45,12 +47,14 @@ def test_a_load_within_friction_moves_nothing(part: float) -> None:
 
 def test_a_load_above_friction_moves_by_what_is_left() -> None:
     """1e-9 above: q = −(g − f) t²/2, to the rounding of the load itself."""
-    run = rd.simulate(rd.Plant(level(RAIL, 5.0), [rd.DryFriction(5.0 * (1 - 1e-9))]), [0.0], duration_s=4.0, **OPTIONS)
+    run = rd.simulate(
+        rd.Plant(level(RAIL, 5.0), [rd.effects.DryFriction(5.0 * (1 - 1e-9))]), [0.0], duration_s=4.0, **OPTIONS
+    )
     assert run.q[-1, 0] == pytest.approx(-5e-9 * 8, rel=1e-6)
 
 
 @dataclass(frozen=True, eq=False)
-class Drag(rd.Dissipative):
+class Drag(rd.effects.Dissipative):
     """τ = −c v, with c under the names that set-valued effects give their mode."""
 
     held: Any = field(metadata=coefficient("N m s/rad", least=0))
@@ -66,8 +70,10 @@ class Drag(rd.Dissipative):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_mode_is_written_into_effects_that_have_one_alone(engine: str) -> None:
     """Beside dry friction, drag of the user's is what viscous friction with the same coefficients is."""
-    start, friction = ([0.31, -0.73], [0.9, -1.7]), rd.DryFriction([0.4, 0.2])
-    plants = [rd.Plant(ARM, [each, friction]) for each in (Drag(1.5, [0.5, 1.5]), rd.ViscousFriction([2.0, 3.0]))]
+    start, friction = ([0.31, -0.73], [0.9, -1.7]), rd.effects.DryFriction([0.4, 0.2])
+    plants = [
+        rd.Plant(ARM, [each, friction]) for each in (Drag(1.5, [0.5, 1.5]), rd.effects.ViscousFriction([2.0, 3.0]))
+    ]
     ours, theirs = (rd.simulate(each, *start, duration_s=0.3, engine=engine, **OPTIONS) for each in plants)
     np.testing.assert_allclose(ours.q, theirs.q, rtol=0, atol=1e-13)
 
@@ -78,7 +84,7 @@ def test_a_sliding_block_stops_when_and_where_it_must(engine: str, v0: float, g:
     """At t = |v₀| / (f ± g) and v₀² / 2 (f ± g), to 1e-12, and stays there: f > g."""
     f = 3.0
     run = rd.simulate(
-        rd.Plant(level(RAIL, g), [rd.DryFriction(f)]), [0.1], [v0], duration_s=3.0, engine=engine, **OPTIONS
+        rd.Plant(level(RAIL, g), [rd.effects.DryFriction(f)]), [0.1], [v0], duration_s=3.0, engine=engine, **OPTIONS
     )
     slows = f + g * np.sign(v0)
     (stop,) = run.events
@@ -99,7 +105,7 @@ def test_stick_slip_has_the_period_of_its_closed_form(engine: str) -> None:
     omega, r = np.sqrt(k), (fs - fk) / k
     slip = 2 / omega * (np.pi - np.arctan(omega * r / V))
     drawn = lambda t, q, v: k * (V * t - q)  # noqa: E731
-    plant = rd.Plant(level(RAIL), [rd.DryFriction(fk, fs)])
+    plant = rd.Plant(level(RAIL), [rd.effects.DryFriction(fk, fs)])
     run = rd.simulate(plant, [0.0], duration_s=30.0, controller=drawn, engine=engine, **OPTIONS)
     starts = np.array([each.t for each in run.events if each.name.endswith("slides")])
     stops = np.array([each.t for each in run.events if each.name.endswith("sticks")])
@@ -113,7 +119,9 @@ def test_stick_slip_has_the_period_of_its_closed_form(engine: str) -> None:
 
 def test_friction_of_rest_alone_catches_what_turns_round() -> None:
     """f_k = 0: 1 kg thrown up on a rail slides freely to its highest point, and stays there."""
-    run = rd.simulate(rd.Plant(level(RAIL, 2.0), [rd.DryFriction(0.0, 3.0)]), [0.0], [1.0], duration_s=2.0, **OPTIONS)
+    run = rd.simulate(
+        rd.Plant(level(RAIL, 2.0), [rd.effects.DryFriction(0.0, 3.0)]), [0.0], [1.0], duration_s=2.0, **OPTIONS
+    )
     (stop,) = run.events
     assert stop.t == pytest.approx(0.5, rel=1e-12)
     assert run.q[-1, 0] == pytest.approx(0.25, rel=1e-12)
@@ -124,9 +132,9 @@ def test_what_cannot_be_decided_is_refused() -> None:
     with pytest.warns(rd.ModelWarning):
         tip = rd.load("massless_tip")
     with pytest.raises(SingularError, match="'pointer_joint' carries no inertia"):
-        rd.Plant(tip, [rd.DryFriction(1.0)]).forward_dynamics(0.0, [0.3, 0.4], [0.0, 0.0], [0.0, 0.0])
-    for arithmetic in (rd.Ball(80), np.longdouble):
-        plant = rd.Plant(rd.Lagrangian(ARM, arithmetic), [rd.DryFriction(1.0)])
+        rd.Plant(tip, [rd.effects.DryFriction(1.0)]).forward_dynamics(0.0, [0.3, 0.4], [0.0, 0.0], [0.0, 0.0])
+    for arithmetic in (rd.studies.Ball(80), np.longdouble):
+        plant = rd.Plant(rd.Lagrangian(ARM, arithmetic), [rd.effects.DryFriction(1.0)])
         with pytest.raises(EffectError, match="dry_friction: which joints it holds is decided in float64"):
             plant.forward_dynamics(0.0, [0.3, 0.4], [0.0, 0.0], [0.0, 0.0])
 
@@ -136,7 +144,7 @@ def test_stribecks_curve_is_followed_while_sliding() -> None:
     from scipy.integrate import solve_ivp
 
     fk, fs, vs = 1.0, 1.6, 0.5
-    plant = rd.Plant(level(RAIL), [rd.DryFriction(fk, fs, vs)])
+    plant = rd.Plant(level(RAIL), [rd.effects.DryFriction(fk, fs, vs)])
     run = rd.simulate(plant, [0.0], [2.0], duration_s=3.0, record_period_s=0.1, **OPTIONS)
     stops = lambda t, y: y[1]  # noqa: E731
     stops.terminal = True
@@ -157,7 +165,7 @@ def test_a_step_up_to_an_event_has_an_error_within_the_tolerance_too(engine: str
     from scipy.integrate import quad
 
     F, fk, fs, vs = 600.0, 1.0, 1.4, 0.02
-    plant = rd.Plant(level(RAIL, F), [rd.DryFriction(fk, fs, vs)])
+    plant = rd.Plant(level(RAIL, F), [rd.effects.DryFriction(fk, fs, vs)])
     run = rd.simulate(plant, [0.0], [30.0], duration_s=0.1, engine=engine, **OPTIONS)
     parts = [quad(lambda v: 1 / (F + fk + (fs - fk) * np.exp(-((v / vs) ** 2))), a, b, epsabs=1e-15, epsrel=1e-13)[0]
              for a, b in ((0.0, 0.05), (0.05, 0.2), (0.2, 30.0))]  # fmt: skip
@@ -168,7 +176,9 @@ def test_a_step_up_to_an_event_has_an_error_within_the_tolerance_too(engine: str
 def test_an_arm_obeys_the_law_of_friction_at_every_sample() -> None:
     """Where a joint slides M a + C v + N = u − f sign(v); where it rests the torque that is missing is at most f."""
     f = np.array([3.0, 1.0])
-    run = rd.simulate(rd.Plant(ARM, [rd.DryFriction(f)]), [-1.4, 0.2], duration_s=4.0, controller=DRIVE, **OPTIONS)
+    run = rd.simulate(
+        rd.Plant(ARM, [rd.effects.DryFriction(f)]), [-1.4, 0.2], duration_s=4.0, controller=DRIVE, **OPTIONS
+    )
     missing = ARM.inverse_dynamics(run.q, run.v, run.a) - run.u
     events = np.array([each.t for each in run.events])
     apart = np.abs(run.t[:, None] - events).min(axis=1) > 1e-9
@@ -184,7 +194,7 @@ def test_an_arm_obeys_the_law_of_friction_at_every_sample() -> None:
 
 def test_both_engines_switch_alike() -> None:
     """The same events in the same order; times to 1e-10, since roundings differ."""
-    plant = rd.Plant(ARM, [rd.DryFriction([3.0, 1.0], [3.5, 1.0])])
+    plant = rd.Plant(ARM, [rd.effects.DryFriction([3.0, 1.0], [3.5, 1.0])])
     runs = [
         rd.simulate(plant, [-1.4, 0.2], duration_s=3.0, controller=DRIVE, engine=engine, **OPTIONS)
         for engine in ENGINES
@@ -208,7 +218,7 @@ def test_joints_that_break_away_together_move_the_way_they_were_let_go() -> None
         load = fs * rng.choice([-1, 1], n) * rng.choice([0.5, 1, 1, 1.001, 1.3], n)
         i = int(rng.integers(n))
         forced = {i: int(np.sign(load[i]))} if k % 3 == 0 and abs(load[i]) >= fs[i] else {}
-        _, mode = settled([rd.DryFriction(fk, fs)], M, load, q, np.zeros(n), forced)
+        _, mode = settled([rd.effects.DryFriction(fk, fs)], M, load, q, np.zeros(n), forced)
         free = 1 - mode.held
         a = np.linalg.solve(M * np.outer(free, free) + np.diag(mode.held), free * (load - fk * mode.direction))
         assert (np.abs(load - M @ a)[mode.held > 0] <= (1 + 1e-9) * fs[mode.held > 0]).all(), k
@@ -224,12 +234,12 @@ def test_a_joint_at_its_limit_is_let_go_whatever_the_rounding_of_its_load(n: int
         fs, i = rng.uniform(0.1, 5, n), int(rng.integers(n))
         load = np.zeros(n)
         load[i] = fs[i] * (1 + float(rng.integers(-8, 9)) * np.finfo(float).eps)
-        _, mode = settled([rd.DryFriction(fs)], U @ U.T + np.eye(n), load, np.zeros(n), np.zeros(n), {i: 1})
+        _, mode = settled([rd.effects.DryFriction(fs)], U @ U.T + np.eye(n), load, np.zeros(n), np.zeros(n), {i: 1})
         assert mode.held.tolist() == [k != i for k in range(n)]
         assert mode.direction[i] == 1
 
 
-def driven_panda(integrator: rd.Integrator | rd.Adaptive | str, **options) -> rd.Trajectory:
+def driven_panda(integrator: rd.Integrator | rd.integrate.Adaptive | str, **options) -> rd.Trajectory:
     """Panda, driven about its weight against dry and viscous friction, some 55 switches in 2 s."""
     panda = rd.load("panda")
     panda = panda.with_(lock=dict.fromkeys(panda.joint_names[7:], 0.0))
@@ -237,7 +247,7 @@ def driven_panda(integrator: rd.Integrator | rd.Adaptive | str, **options) -> rd
     A, omega = np.array([6, 10, 5, 8, 2, 1.5, 0.6]), np.array([4, 5, 6, 4.5, 7, 5.5, 8])
     weight, levels = panda.N(q0), [3, 6, 2, 4, 1, 0.8, 0.3]
     return rd.simulate(
-        rd.Plant(panda, [rd.ViscousFriction(0.1), rd.DryFriction(levels)]), q0, duration_s=2.0,
+        rd.Plant(panda, [rd.effects.ViscousFriction(0.1), rd.effects.DryFriction(levels)]), q0, duration_s=2.0,
         controller=lambda t, q, v: 0.8 * weight + A * np.sin(omega * t + 0.3), engine="compiled",
         estimate_error=False, integrator=integrator, **options,
     )  # fmt: skip
@@ -245,7 +255,7 @@ def driven_panda(integrator: rd.Integrator | rd.Adaptive | str, **options) -> rd
 
 def test_a_joint_breaks_away_in_machine_code_as_in_python() -> None:
     """Machine code has the right angles of a file in full, Pinocchio 1e-11 of the loads beside it: one decides."""
-    plant = rd.Plant(rd.load("ur5"), [rd.DryFriction(2.0)])
+    plant = rd.Plant(rd.load("ur5"), [rd.effects.DryFriction(2.0)])
     compiled, interpreted = (
         rd.simulate(plant, [0.3, -0.9, 0.8, -0.2, 0.4, 0.1], duration_s=0.25, engine=engine, estimate_error=False)
         for engine in ("compiled", "interpreted")
@@ -264,7 +274,7 @@ def names(run: rd.Trajectory) -> list[str]:
 def test_an_arm_of_seven_joints_sticks_and_slides_to_eleven_digits() -> None:
     """Errors of at most ten times the tolerance."""
     exact, *others = (
-        driven_panda(rd.Adaptive(rtol=tolerance, atol=tolerance), record_period_s=0.02)
+        driven_panda(rd.integrate.Adaptive(rtol=tolerance, atol=tolerance), record_period_s=0.02)
         for tolerance in (1e-13, 1e-8, 1e-12)
     )
     assert len(exact.events) > 50
@@ -275,7 +285,7 @@ def test_an_arm_of_seven_joints_sticks_and_slides_to_eleven_digits() -> None:
 
 @cache
 def exactly_driven_panda() -> rd.Trajectory:
-    return driven_panda(rd.Adaptive(rtol=1e-13, atol=1e-13), record_period_s=2.0)
+    return driven_panda(rd.integrate.Adaptive(rtol=1e-13, atol=1e-13), record_period_s=2.0)
 
 
 @pytest.mark.parametrize(("method", "coarsest", "order"), long([("rk4", 64, 3.5), ("order_8", 32, 5.0)]))
@@ -293,7 +303,7 @@ def test_fixed_steps_keep_their_order_on_an_arm_of_seven_joints(method: str, coa
 @pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("midpoint", 2), ("order_8", 8)])
 def test_fixed_steps_keep_their_order_across_sticking(method: str, order: int) -> None:
     """Mean slope over three halvings, against DOP853 at 1e-12; within 1 of the order of the method."""
-    plant = rd.Plant(ARM, [rd.DryFriction([3.0, 1.0])])
+    plant = rd.Plant(ARM, [rd.effects.DryFriction([3.0, 1.0])])
     options = {"duration_s": 2.0, "controller": DRIVE, "estimate_error": False, "record_period_s": 2.0}
     exact = rd.simulate(plant, [-1.4, 0.2], integrator=TIGHT, **options).q[-1]
     steps = [0.05 / 2**k for k in range(4)] if method != "order_8" else [0.1 / 2**k for k in range(3)]

@@ -21,13 +21,13 @@ SLIDER = rd.Robot.from_text(
 )
 ARM = rd.load("planar_2r")
 Q = np.array([0.1, 0.2])
-FRICTION = rd.LuGreFriction(120.0, [1.0, 0.8], 0.8, [1.0, 0.5], 1.5, 0.1)
+FRICTION = rd.effects.LuGreFriction(120.0, [1.0, 0.8], 0.8, [1.0, 0.5], 1.5, 0.1)
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 SLOW_INTERPRETED = pytest.mark.parametrize("engine", [pytest.param("interpreted", marks=pytest.mark.long), "compiled"])
 
 
 @dataclass(frozen=True, eq=False)
-class Ramp(rd.Stateless):
+class Ramp(rd.control.Stateless):
     """u = c + d t."""
 
     constant: float
@@ -48,7 +48,7 @@ def slide(effects, control, engine: str, **options) -> rd.Trajectory:
 def test_a_lag_of_first_order_follows_a_constant_command(engine: str) -> None:
     """The torque is u₀ (1 − exp(−t/T)), v = u₀/m (t − u T/u₀), and the work of the control is the kinetic energy."""
     u0, T = 3.0, 0.08
-    run = slide([rd.ActuatorLag(T)], Ramp(u0), engine, duration_s=0.4)
+    run = slide([rd.effects.ActuatorLag(T)], Ramp(u0), engine, duration_s=0.4)
     u = u0 * (1 - np.exp(-run.t / T))
     np.testing.assert_allclose(run.u[:, 0], u, atol=1e-12)
     np.testing.assert_allclose(run.v[:, 0], (u0 * run.t - u * T) / MASS, atol=1e-12)
@@ -61,7 +61,7 @@ def test_a_lag_of_first_order_follows_a_constant_command(engine: str) -> None:
 def test_a_lag_follows_what_a_sampled_controller_holds(engine: str) -> None:
     """Between ticks c is constant: u(t + Δ) = c + (u(t) − c) exp(−Δ/T), while c changes from tick to tick."""
     T, period = 0.08, 0.05
-    run = slide([rd.ActuatorLag(T)], Ramp(1.0, 4.0, period), engine, duration_s=0.4)
+    run = slide([rd.effects.ActuatorLag(T)], Ramp(1.0, 4.0, period), engine, duration_s=0.4)
     u, expected = 0.0, []
     for tick in np.arange(0, 0.4 - 1e-9, period):
         c = 1.0 + 4.0 * tick
@@ -75,8 +75,8 @@ def test_a_lag_follows_what_a_sampled_controller_holds(engine: str) -> None:
 @pytest.mark.parametrize(
     ("effects", "peak"),
     [
-        ([rd.EffortLimit(1.0), rd.ActuatorLag(0.05)], 1.0 - np.exp(-6.0)),
-        ([rd.ActuatorLag(0.05), rd.EffortLimit(1.0)], 1.0),
+        ([rd.effects.EffortLimit(1.0), rd.effects.ActuatorLag(0.05)], 1.0 - np.exp(-6.0)),
+        ([rd.effects.ActuatorLag(0.05), rd.effects.EffortLimit(1.0)], 1.0),
     ],
 )
 @BOTH
@@ -91,7 +91,7 @@ def test_a_limit_before_a_lag_cuts_the_command_and_one_after_it_the_torque(effec
 def test_lugre_friction_slides_steadily_at_its_level(engine: str) -> None:
     """Pushed by F beyond breakaway the speed goes to the root of F = g(v) + σ₂ v, and z to g / σ₀."""
     s0, s1, s2, fc, fs, vs, F = 400.0, 3.0, 2.0, 1.0, 1.4, 0.2, 2.5
-    friction = rd.LuGreFriction(s0, s1, s2, fc, fs, vs)
+    friction = rd.effects.LuGreFriction(s0, s1, s2, fc, fs, vs)
     run = slide([friction], Ramp(F), engine, duration_s=12.0, step_s=2e-3, record_period_s=0.1)
     v = run.v[-1, 0]
     level = fc + (fs - fc) * np.exp(-((v / vs) ** 2))
@@ -105,7 +105,7 @@ def test_lugre_friction_slides_steadily_at_its_level(engine: str) -> None:
 def test_lugre_friction_at_rest_is_a_spring(engine: str) -> None:
     """Pushed slowly by F < f, with g = f: dz/dx = 1 − σ₀ z / f, so it rests at x = −(f/σ₀) ln(1 − F/f), σ₀ z = F."""
     s0, f, F = 50.0, 1.2, 0.7
-    friction = rd.LuGreFriction(s0, 0.0, 40.0, f, f, 0.1)  # heavily damped: it does not overshoot
+    friction = rd.effects.LuGreFriction(s0, 0.0, 40.0, f, f, 0.1)  # heavily damped: it does not overshoot
     run = slide([friction], Ramp(F), engine, duration_s=50.0, step_s=0.02, record_period_s=0.5)
     assert run.q[-1, 0] == pytest.approx(-f / s0 * np.log(1 - F / f), rel=1e-9)
     assert s0 * run.effect_states["lugre_friction"][-1, 0] == pytest.approx(F, rel=1e-9)
@@ -114,8 +114,8 @@ def test_lugre_friction_at_rest_is_a_spring(engine: str) -> None:
 
 
 def setup(engine: str, period: float = 0.0, **options) -> rd.Setup:
-    effects = [rd.ActuatorLag([0.05, 0.02]), FRICTION, rd.EffortLimit(15.0)]
-    control = rd.PID(rd.quintic(Q, [0.6, -0.3], 0.3), 90.0, 60.0, 20.0, period_s=period)
+    effects = [rd.effects.ActuatorLag([0.05, 0.02]), FRICTION, rd.effects.EffortLimit(15.0)]
+    control = rd.control.PID(rd.control.quintic(Q, [0.6, -0.3], 0.3), 90.0, 60.0, 20.0, period_s=period)
     return rd.Setup(
         rd.Plant(ARM, effects), Q, controller=control, record_period_s=0.01, estimate_error=False, engine=engine,
         **({"duration_s": 0.3, "integrator": "rk4", "step_s": 1e-3} | options),
@@ -178,7 +178,7 @@ def test_effects_with_states_run_in_rollouts(name: str, values: np.ndarray) -> N
 
 def test_passive_bristles_only_take_energy() -> None:
     """With σ₂ ≥ σ₁ (f_s/f_c − 1), work done on it minus what it stores never falls; without storage it would."""
-    friction = rd.LuGreFriction(200.0, 0.5, 0.4, 1.0, 1.6, 0.1)
+    friction = rd.effects.LuGreFriction(200.0, 0.5, 0.4, 1.0, 1.6, 0.1)
     swing = rd.simulate(
         rd.Plant(rd.load("pendulum"), [friction]), q0=[0.9], duration_s=3.0, integrator="rk4", step_s=5e-4,
         record_period_s=0.01, estimate_error=False,
@@ -195,15 +195,15 @@ def test_effect_states_are_kept_in_run_files_and_tables(tmp_path) -> None:
     for name in ("actuator_lag", "lugre_friction"):
         np.testing.assert_array_equal(again.effect_states[name], run.effect_states[name])
     np.testing.assert_array_equal(again.ledger.stored["lugre_friction"], run.ledger.stored["lugre_friction"])
-    from robot_dyn.simulation.table import export_csv
+    from robot_dyn.simulation.export.export import export
 
-    heading = export_csv(run, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()[0]
+    heading = export(run, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()[0]
     assert heading.endswith("actuator_lag state 1,actuator_lag state 2,lugre_friction state 1,lugre_friction state 2")
 
 
 def test_a_plant_that_is_asked_takes_relaxed_states() -> None:
     """At z = 0 LuGre friction is −(σ₁ + σ₂) v, one state or a batch; a lag passes the actuation; also compiled."""
-    plant, v = rd.Plant(ARM, [rd.ActuatorLag(0.1), FRICTION]), np.array([[0.3, -0.7], [1.0, 2.0]])
+    plant, v = rd.Plant(ARM, [rd.effects.ActuatorLag(0.1), FRICTION]), np.array([[0.3, -0.7], [1.0, 2.0]])
     expected = -(np.array([1.0, 0.8]) + 0.8) * v
     np.testing.assert_allclose(plant.torque(0.0, v, v), expected, rtol=1e-14)
     np.testing.assert_array_equal(plant.actuation(v), v)
@@ -213,10 +213,10 @@ def test_a_plant_that_is_asked_takes_relaxed_states() -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Wrong(rd.Stateful, rd.Active):
+class Wrong(rd.effects.Stateful, rd.effects.Active):
     """An effect whose rate has another number of entries than it has states."""
 
-    stiffness: float = field(default=1.0, metadata=rd.coefficient("N m/rad", shapes=((),)))
+    stiffness: float = field(default=1.0, metadata=rd.effects.coefficient("N m/rad", shapes=((),)))
 
     def state_size(self, n):
         return 3
@@ -232,11 +232,11 @@ def test_states_that_do_not_fit_are_refused() -> None:
     with pytest.raises(EffectError, match=r"Wrong.state_rate returned shape \(2,\) for 3 states"):
         rd.Setup(rd.Plant(ARM, [Wrong()]), Q, duration_s=0.1)
 
-    class Both(Wrong, rd.Conservative):
+    class Both(Wrong, rd.effects.Conservative):
         def potential(self, dynamics, t, q):
             return q[..., 0]
 
     with pytest.raises(EffectError, match="both is Conservative and has states"):
         rd.Plant(ARM, [Both()])
     with pytest.raises(EffectError, match="breakaway must not be less than coulomb"):
-        rd.LuGreFriction(1.0, 1.0, 1.0, 2.0, 1.5, 0.1)
+        rd.effects.LuGreFriction(1.0, 1.0, 1.0, 2.0, 1.5, 0.1)

@@ -1,4 +1,4 @@
-"""The contract of effects, and the plant that sums them: M a + C v + N(t, q, v) = Υ."""
+"""The contract of effects, and the plant that sums them: M a + C v + N(t, q, v) = τ."""
 
 from __future__ import annotations
 
@@ -54,20 +54,20 @@ def depth(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 # every force of the library, with its formula written out once more
 FORMULAS = {
-    rd.ViscousFriction(B): lambda t, q, v: -B * v,
-    rd.RegularisedCoulombFriction(F, V_S): lambda t, q, v: (
+    rd.effects.ViscousFriction(B): lambda t, q, v: -B * v,
+    rd.effects.RegularisedCoulombFriction(F, V_S): lambda t, q, v: (
         -F * (np.exp(v / V_S) - np.exp(-v / V_S)) / (np.exp(v / V_S) + np.exp(-v / V_S))
     ),
-    rd.DryFriction(F): lambda t, q, v: -F * np.sign(v),
-    rd.DryFriction(F, 2 * F, V_S): lambda t, q, v: -F * (1 + np.exp(-((v / V_S) ** 2))) * np.sign(v),
-    rd.Spring(K, Q0): lambda t, q, v: K * (Q0 - q),
-    rd.JointStopSpring(LOWER, UPPER, K): lambda t, q, v: K * (depth(q)[0] - depth(q)[1]),
-    rd.JointStopDamper(LOWER, UPPER, B): lambda t, q, v: -B * (depth(q)[0] + depth(q)[1]) * v,
-    rd.LineSpring("pole", None, **STRUT, stiffness=3.0, length=0.7): lambda t, q, v: (
+    rd.effects.DryFriction(F): lambda t, q, v: -F * np.sign(v),
+    rd.effects.DryFriction(F, 2 * F, V_S): lambda t, q, v: -F * (1 + np.exp(-((v / V_S) ** 2))) * np.sign(v),
+    rd.effects.Spring(K, Q0): lambda t, q, v: K * (Q0 - q),
+    rd.effects.JointStopSpring(LOWER, UPPER, K): lambda t, q, v: K * (depth(q)[0] - depth(q)[1]),
+    rd.effects.JointStopDamper(LOWER, UPPER, B): lambda t, q, v: -B * (depth(q)[0] + depth(q)[1]) * v,
+    rd.effects.LineSpring("pole", None, **STRUT, stiffness=3.0, length=0.7): lambda t, q, v: (
         -3.0 * (strut(q)[0] - 0.7) * strut(q)[1]
     ),
-    rd.LineDamper("pole", None, **STRUT, damping=0.9): lambda t, q, v: -0.9 * along(q, v) * strut(q)[1],
-    rd.ExternalWrench("pole", WRENCH): lambda t, q, v: np.vecmat(WRENCH, pole(q)),
+    rd.effects.LineDamper("pole", None, **STRUT, damping=0.9): lambda t, q, v: -0.9 * along(q, v) * strut(q)[1],
+    rd.effects.ExternalWrench("pole", WRENCH): lambda t, q, v: np.vecmat(WRENCH, pole(q)),
 }
 EFFECTS = list(FORMULAS)
 
@@ -87,7 +87,7 @@ def every_effect(base: type) -> set[type]:
 def test_no_effect_escapes_the_contract() -> None:
     """Those with states are held to theirs in test_effect_states; rigid stops in test_rigid_stops."""
     assert {type(effect) for effect in EFFECTS} == {
-        each for each in every_effect(Force) if not issubclass(each, rd.Stateful | rd.RigidStops)
+        each for each in every_effect(Force) if not issubclass(each, rd.effects.Stateful | rd.effects.RigidStops)
     }
 
 
@@ -133,11 +133,11 @@ def test_effect_runs_in_every_arithmetic(effect: Effect) -> None:
     wide = effect.torque(ROBOT, 0.0, *[v.astype(np.longdouble)] * 2)
     assert wide.dtype == np.longdouble
     np.testing.assert_allclose(wide.astype(float), expected, rtol=1e-14, atol=1e-15)
-    ball = rd.Ball(100)
+    ball = rd.studies.Ball(100)
     with ball.scope():
         got = effect.torque(ROBOT, 0.0, ball.array(v), ball.array(v))
         assert isinstance(got.flat[0], arb)
-    np.testing.assert_allclose(rd.midpoint(got), expected, rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(rd.studies.midpoint(got), expected, rtol=1e-14, atol=1e-15)
 
 
 def test_a_wrench_is_the_same_in_every_axes() -> None:
@@ -148,23 +148,23 @@ def test_a_wrench_is_the_same_in_every_axes() -> None:
     R, p, force, torque = g[:3, :3], g[:3, 3], WRENCH[:3], WRENCH[3:]
     body = np.concatenate([R.T @ force, R.T @ torque])
     world = np.concatenate([force, torque + np.cross(p, force)])
-    expected = rd.ExternalWrench("left_tool", WRENCH).torque(robot, 0.0, q, q)
+    expected = rd.effects.ExternalWrench("left_tool", WRENCH).torque(robot, 0.0, q, q)
     for wrench, axes in ((body, "body"), (world, "world")):
-        got = rd.ExternalWrench("left_tool", wrench, axes).torque(robot, 0.0, q, q)
+        got = rd.effects.ExternalWrench("left_tool", wrench, axes).torque(robot, 0.0, q, q)
         np.testing.assert_allclose(got, expected, rtol=1e-13)
-    own = rd.ExternalWrench("left_tool", WRENCH).torque(rd.Lagrangian(robot), 0.0, q, q)
+    own = rd.effects.ExternalWrench("left_tool", WRENCH).torque(rd.Lagrangian(robot), 0.0, q, q)
     np.testing.assert_allclose(own, expected, rtol=1e-13)
 
 
 def test_a_wrench_acts_in_its_window_only() -> None:
-    push = rd.ExternalWrench("pole", WRENCH, start_s=1.0, end_s=2.0)
+    push = rd.effects.ExternalWrench("pole", WRENCH, start_s=1.0, end_s=2.0)
     q = np.array([0.1, 0.2])
     assert push.switches == (1.0, 2.0)
     assert [bool(push.torque(ROBOT, t, q, q).any()) for t in (0.5, 1.0, 1.5, 2.0)] == [False, True, True, False]
 
 
 def test_effort_limit_cuts_the_actuation() -> None:
-    bound = rd.EffortLimit([1.0, np.inf])
+    bound = rd.effects.EffortLimit([1.0, np.inf])
     assert isinstance(bound, Bound)
     np.testing.assert_array_equal(bound.actuation(np.array([[3.0, 99.0], [-2.0, -99.0]])), [[1.0, 99.0], [-1.0, -99.0]])
     plant, still = Plant(ROBOT, [bound]), np.zeros(2)
@@ -202,7 +202,7 @@ def test_what_is_off_is_evaluated_zero_times_and_what_is_on_once() -> None:
 @pytest.mark.parametrize("engine", [ROBOT, rd.Lagrangian(ROBOT)], ids=["Robot", "Lagrangian"])
 @pytest.mark.parametrize("batch", [(), (4,), (2, 3)])
 def test_plant_keeps_the_equation_of_motion(engine, batch) -> None:
-    """M a + C v + N = Υ with the deck's full N, and forward dynamics inverts it; κ < 100, so 1e-13."""
+    """M a + C v + N = τ with the deck's full N, and forward dynamics inverts it; κ < 100, so 1e-13."""
     rng = np.random.default_rng(2)
     q, v, a = rng.normal(size=(3, *batch, ROBOT.n))
     plant = Plant(engine, EFFECTS)
@@ -238,14 +238,14 @@ def test_friction_of_coupled_joints_counts_by_virtual_work() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: rd.ViscousFriction(-0.1), "damping must not be negative"),
-        (lambda: rd.ViscousFriction([0.1, np.nan]), "damping must be finite"),
-        (lambda: rd.ViscousFriction("much"), "damping must be real numbers"),
-        (lambda: rd.RegularisedCoulombFriction(1.0, 0.0), "velocity_scale must be positive"),
-        (lambda: rd.JointStopSpring(1.0, 0.5, 3.0), "lower stops must lie below"),
-        (lambda: rd.ExternalWrench("pole", [1, 2, 3]), r"shape \(6,\)"),
-        (lambda: rd.ExternalWrench("pole", WRENCH, start_s=2.0, end_s=1.0), "end_s must lie after"),
-        (lambda: rd.EffortLimit(-1.0), "limit must not be negative"),
+        (lambda: rd.effects.ViscousFriction(-0.1), "damping must not be negative"),
+        (lambda: rd.effects.ViscousFriction([0.1, np.nan]), "damping must be finite"),
+        (lambda: rd.effects.ViscousFriction("much"), "damping must be real numbers"),
+        (lambda: rd.effects.RegularisedCoulombFriction(1.0, 0.0), "velocity_scale must be positive"),
+        (lambda: rd.effects.JointStopSpring(1.0, 0.5, 3.0), "lower stops must lie below"),
+        (lambda: rd.effects.ExternalWrench("pole", [1, 2, 3]), r"shape \(6,\)"),
+        (lambda: rd.effects.ExternalWrench("pole", WRENCH, start_s=2.0, end_s=1.0), "end_s must lie after"),
+        (lambda: rd.effects.EffortLimit(-1.0), "limit must not be negative"),
         (lambda: Plant(ROBOT, "friction"), "give effects, or 'urdf'"),
         (lambda: Plant(ROBOT, [3]), "3 is neither a Force nor a Bound"),
         (lambda: Plant(object(), "urdf"), "give a robot, such as rd.load"),
@@ -266,7 +266,7 @@ def test_a_velocity_of_the_wrong_shape_is_refused(method: str) -> None:
 
 def test_coefficients_are_copied_and_frozen() -> None:
     given = np.array([1.0, 2.0])
-    effect = rd.ViscousFriction(given)
+    effect = rd.effects.ViscousFriction(given)
     given[0] = 9.0
     assert effect.damping[0] == 1.0
     with pytest.raises(ValueError, match="read-only"):
@@ -276,13 +276,13 @@ def test_coefficients_are_copied_and_frozen() -> None:
 @pytest.mark.parametrize(
     ("effect", "coefficient"),
     [
-        (rd.ViscousFriction([1.0, 2.0, 3.0]), "damping"),
-        (rd.RegularisedCoulombFriction(1.0, [1.0, 2.0, 3.0]), "velocity_scale"),
-        (rd.Spring(1.0, [1.0, 2.0, 3.0]), "rest"),
-        (rd.JointStopSpring([-1.0, -1.0, -1.0], 1.0, 1.0), "lower"),
-        (rd.JointStopDamper(-1.0, [1.0, 1.0, 1.0], 1.0), "upper"),
-        (rd.EffortLimit([1.0, 2.0, 3.0]), "limit"),
-        (rd.ViscousFriction([1.0]), "damping"),
+        (rd.effects.ViscousFriction([1.0, 2.0, 3.0]), "damping"),
+        (rd.effects.RegularisedCoulombFriction(1.0, [1.0, 2.0, 3.0]), "velocity_scale"),
+        (rd.effects.Spring(1.0, [1.0, 2.0, 3.0]), "rest"),
+        (rd.effects.JointStopSpring([-1.0, -1.0, -1.0], 1.0, 1.0), "lower"),
+        (rd.effects.JointStopDamper(-1.0, [1.0, 1.0, 1.0], 1.0), "upper"),
+        (rd.effects.EffortLimit([1.0, 2.0, 3.0]), "limit"),
+        (rd.effects.ViscousFriction([1.0]), "damping"),
     ],
     ids=lambda each: getattr(each, "name", each),
 )

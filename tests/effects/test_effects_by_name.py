@@ -18,24 +18,24 @@ def only(effect):
 
 def test_what_is_not_named_is_free() -> None:
     """No friction, no spring, no stop and no limit at a joint that is not named."""
-    np.testing.assert_array_equal(only(rd.ViscousFriction({"hinge": 0.3})).damping, [0.0, 0.3])
-    spring = only(rd.Spring({"slide": 2.0}, rest={"slide": 0.1}))
+    np.testing.assert_array_equal(only(rd.effects.ViscousFriction({"hinge": 0.3})).damping, [0.0, 0.3])
+    spring = only(rd.effects.Spring({"slide": 2.0}, rest={"slide": 0.1}))
     np.testing.assert_array_equal([spring.stiffness, spring.rest], [[2.0, 0.0], [0.1, 0.0]])
-    np.testing.assert_array_equal(only(rd.EffortLimit({"slide": 3.0})).limit, [3.0, np.inf])
-    stop = only(rd.JointStopSpring({"slide": -1.0}, {"slide": 1.0}, 10.0))
+    np.testing.assert_array_equal(only(rd.effects.EffortLimit({"slide": 3.0})).limit, [3.0, np.inf])
+    stop = only(rd.effects.JointStopSpring({"slide": -1.0}, {"slide": 1.0}, 10.0))
     assert stop.torque(ROBOT, 0.0, np.array([0.5, 99.0]), np.zeros(2)).tolist() == [0.0, 0.0]
     assert stop.torque(ROBOT, 0.0, np.array([1.5, 99.0]), np.zeros(2)).tolist() == [-5.0, 0.0]
 
 
 def test_urdf_is_what_the_file_states() -> None:
-    np.testing.assert_array_equal(only(rd.ViscousFriction("urdf")).damping, [0.8, 0.02])
-    np.testing.assert_array_equal(only(rd.RegularisedCoulombFriction("urdf")).friction, [1.5, 0.01])
-    np.testing.assert_array_equal(only(rd.EffortLimit("urdf")).limit, [100.0, np.inf])
-    np.testing.assert_array_equal(only(rd.JointStopSpring("urdf", "urdf", 1.0)).upper[0], 2.0)
+    np.testing.assert_array_equal(only(rd.effects.ViscousFriction("urdf")).damping, [0.8, 0.02])
+    np.testing.assert_array_equal(only(rd.effects.RegularisedCoulombFriction("urdf")).friction, [1.5, 0.01])
+    np.testing.assert_array_equal(only(rd.effects.EffortLimit("urdf")).limit, [100.0, np.inf])
+    np.testing.assert_array_equal(only(rd.effects.JointStopSpring("urdf", "urdf", 1.0)).upper[0], 2.0)
 
 
 def test_an_effect_given_by_name_is_left_as_it_was() -> None:
-    effect = rd.ViscousFriction({"hinge": 0.3})
+    effect = rd.effects.ViscousFriction({"hinge": 0.3})
     only(effect)
     assert effect.damping == {"hinge": 0.3}
 
@@ -43,13 +43,13 @@ def test_an_effect_given_by_name_is_left_as_it_was() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: only(rd.Spring({"slid": 1.0})), "stiffness: no joint 'slid'; nearest: slide"),
-        (lambda: only(rd.ViscousFriction({"slide": -1.0})), "damping must not be negative"),
-        (lambda: only(rd.EffortLimit({"slide": -1.0})), "limit must not be negative"),
-        (lambda: only(rd.RegularisedCoulombFriction(1.0, {"slide": 0.0})), "velocity_scale must be positive"),
-        (lambda: only(rd.JointStopSpring({"slide": 1.0}, {"slide": -1.0}, 1.0)), "lower stops must lie below"),
-        (lambda: rd.Plant(rd.Lagrangian(ROBOT), [rd.ViscousFriction("urdf")]), "damping='urdf' needs a Robot"),
-        (lambda: only(rd.ViscousFriction("file")), "damping must be real numbers"),
+        (lambda: only(rd.effects.Spring({"slid": 1.0})), "stiffness: no joint 'slid'; nearest: slide"),
+        (lambda: only(rd.effects.ViscousFriction({"slide": -1.0})), "damping must not be negative"),
+        (lambda: only(rd.effects.EffortLimit({"slide": -1.0})), "limit must not be negative"),
+        (lambda: only(rd.effects.RegularisedCoulombFriction(1.0, {"slide": 0.0})), "velocity_scale must be positive"),
+        (lambda: only(rd.effects.JointStopSpring({"slide": 1.0}, {"slide": -1.0}, 1.0)), "lower stops must lie below"),
+        (lambda: rd.Plant(rd.Lagrangian(ROBOT), [rd.effects.ViscousFriction("urdf")]), "damping='urdf' needs a Robot"),
+        (lambda: only(rd.effects.ViscousFriction("file")), "damping must be real numbers"),
     ],
 )
 def test_names_and_values_are_checked_when_the_joints_are_known(make, message: str) -> None:
@@ -61,21 +61,21 @@ def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
     """The kinds of a scene are the names of the effects they build; those that work have them in the ledger."""
     robot = rd.load("planar_2r")
     built = {
-        "viscous_friction": [rd.ViscousFriction(0.3)],
-        "regularised_coulomb_friction": [rd.RegularisedCoulombFriction(0.2)],
-        "dry_friction": [rd.DryFriction(0.2)],
-        "lugre_friction": [rd.LuGreFriction(100.0, 0.1, 0.2, 1.0, 1.2, 0.1)],
-        "dahl_friction": [rd.DahlFriction(100.0, 1.0, 1.5)],
-        "spring": [rd.Spring(2.0)],
-        "joint_stops": rd.joint_stops(-1.0, 1.0),
-        "rigid_stops": [rd.RigidStops(-1.0, 1.0)],
-        "line_spring_damper": rd.LineSpringDamper("tip", None, stiffness=1.0, damping=0.3, length=0.2).parts,
-        "external_wrench": [rd.ExternalWrench("tip", [1.0, 0, 0, 0, 0, 0])],
-        "carried_payload": [rd.CarriedPayload(rd.Payload("tip", 0.5), 0.004)],
-        "series_elastic": [rd.SeriesElastic({"joint_2": 90.0}, 0.1, 3.0, backlash=1e-3)],
-        "rigid_backlash": [rd.RigidBacklash({"joint_1": 0.01}, 0.1, 3.0)],
-        "effort_limit": [rd.EffortLimit(5.0)],
-        "actuator_lag": [rd.ActuatorLag(0.05)],
+        "viscous_friction": [rd.effects.ViscousFriction(0.3)],
+        "regularised_coulomb_friction": [rd.effects.RegularisedCoulombFriction(0.2)],
+        "dry_friction": [rd.effects.DryFriction(0.2)],
+        "lugre_friction": [rd.effects.LuGreFriction(100.0, 0.1, 0.2, 1.0, 1.2, 0.1)],
+        "dahl_friction": [rd.effects.DahlFriction(100.0, 1.0, 1.5)],
+        "spring": [rd.effects.Spring(2.0)],
+        "joint_stops": rd.effects.joint_stops(-1.0, 1.0),
+        "rigid_stops": [rd.effects.RigidStops(-1.0, 1.0)],
+        "line_spring_damper": rd.effects.LineSpringDamper("tip", None, stiffness=1.0, damping=0.3, length=0.2).parts,
+        "external_wrench": [rd.effects.ExternalWrench("tip", [1.0, 0, 0, 0, 0, 0])],
+        "carried_payload": [rd.effects.CarriedPayload(rd.Payload("tip", 0.5), 0.004)],
+        "series_elastic": [rd.effects.SeriesElastic({"joint_2": 90.0}, 0.1, 3.0, backlash=1e-3)],
+        "rigid_backlash": [rd.effects.RigidBacklash({"joint_1": 0.01}, 0.1, 3.0)],
+        "effort_limit": [rd.effects.EffortLimit(5.0)],
+        "actuator_lag": [rd.effects.ActuatorLag(0.05)],
     }
     assert [kind for kind in BY_KIND if kind in built] == list(built)
     assert set(BY_KIND) - set(built) == {"gravity", "lock", "payload", "armature"}
@@ -96,7 +96,7 @@ def test_a_stop_that_differs_from_run_to_run_moves_both_of_its_parts() -> None:
     upper = np.array([0.3, 0.4])
 
     def stops(at: float) -> rd.Setup:
-        plant = rd.Plant(robot, rd.joint_stops([-1.0], [at], 1e3, 1e2))
+        plant = rd.Plant(robot, rd.effects.joint_stops([-1.0], [at], 1e3, 1e2))
         return rd.Setup(
             plant, [0.2], [2.0], duration_s=0.2, record_period_s=0.1, estimate_error=False, integrator="rk4"
         )

@@ -14,7 +14,7 @@ from tests.long import long
 
 TREE = rd.load("skew_tree")
 K, C, LENGTH = 320.0, 7.0, 0.45
-BETWEEN = rd.LineSpringDamper(
+BETWEEN = rd.effects.LineSpringDamper(
     "left_tool", "right_lower", [0.11, -0.2, 0.3], [0.4, 0.05, -0.15], stiffness=K, damping=C, length=LENGTH
 )
 TO_WORLD = replace(BETWEEN, other_frame=None, other_point=[0.9, -0.3, 0.7])
@@ -33,7 +33,7 @@ def state(seed: int = 4) -> tuple[np.ndarray, np.ndarray]:
     return q, v
 
 
-def distance(dynamics: rd.Dynamics, q: np.ndarray, effect: rd.LineSpringDamper) -> np.ndarray:
+def distance(dynamics: rd.effects.Dynamics, q: np.ndarray, effect: rd.effects.LineSpringDamper) -> np.ndarray:
     """ℓ, by homogeneous coordinates."""
     ends = []
     for frame, point in ((effect.frame, effect.point), (effect.other_frame, effect.other_point)):
@@ -42,7 +42,7 @@ def distance(dynamics: rd.Dynamics, q: np.ndarray, effect: rd.LineSpringDamper) 
     return np.sqrt(((ends[0] - ends[1]) ** 2).sum())
 
 
-def slope(q: np.ndarray, along: np.ndarray, effect: rd.LineSpringDamper) -> float:
+def slope(q: np.ndarray, along: np.ndarray, effect: rd.effects.LineSpringDamper) -> float:
     """∂ℓ/∂q in a direction by differences in longdouble: h = 1e-6 leaves h² and 1e-19 / h, both about 1e-12."""
     wide, h = rd.Lagrangian(TREE, np.longdouble), np.longdouble(1e-6)
     q, along = q.astype(np.longdouble), along.astype(np.longdouble)
@@ -50,7 +50,7 @@ def slope(q: np.ndarray, along: np.ndarray, effect: rd.LineSpringDamper) -> floa
 
 
 @BOTH
-def test_virtual_work_is_that_of_the_force_on_the_line(effect: rd.LineSpringDamper) -> None:
+def test_virtual_work_is_that_of_the_force_on_the_line(effect: rd.effects.LineSpringDamper) -> None:
     """τᵀ δq = −(k (ℓ − ℓ₀) + c ℓ') δℓ for any δq, each factor by differences."""
     q, v = state()
     force = K * (distance(TREE, q, effect) - LENGTH) + C * slope(q, v, effect)
@@ -60,7 +60,7 @@ def test_virtual_work_is_that_of_the_force_on_the_line(effect: rd.LineSpringDamp
 
 
 @BOTH
-def test_the_damper_takes_the_power_of_its_force(effect: rd.LineSpringDamper) -> None:
+def test_the_damper_takes_the_power_of_its_force(effect: rd.effects.LineSpringDamper) -> None:
     """τᵀ v = −c ℓ'² ≤ 0, and the spring has the energy ½ k (ℓ − ℓ₀)²."""
     spring, damper = effect.parts
     for seed in range(20):
@@ -76,7 +76,9 @@ def test_two_masses_move_as_the_damped_oscillator() -> None:
     """The excess x = ℓ − ℓ₀ obeys μ x'' + c x' + k x = 0 with the reduced mass μ; the centre moves uniformly."""
     m, k, c, length, t_end = np.array([2.0, 0.5]), 37.0, 1.3, 0.8, 1.7
     robot = rd.Robot.from_text(MASSES).with_(gravity=(0.0, 0.0, 0.0))
-    strut = rd.LineSpringDamper("b", "a", [0.1, 0.0, 0.0], [-0.2, 0.0, 0.0], stiffness=k, damping=c, length=length)
+    strut = rd.effects.LineSpringDamper(
+        "b", "a", [0.1, 0.0, 0.0], [-0.2, 0.0, 0.0], stiffness=k, damping=c, length=length
+    )
     q0, v0 = np.array([-0.3, 0.7]), np.array([0.4, -0.9])
     mu = m.prod() / m.sum()
     a, x0, s0 = c / (2 * mu), q0[1] - q0[0] + 0.3 - length, v0[1] - v0[0]
@@ -108,14 +110,14 @@ NUMBERS = {
     [(BETWEEN, [*NUMBERS]), *long([*((BETWEEN, [name]) for name in NUMBERS), (TO_WORLD, ["other_point"])])],
 )
 def test_it_compiles_in_runs_and_rollouts_with_every_number_an_input(
-    effect: rd.LineSpringDamper, names: list[str]
+    effect: rd.effects.LineSpringDamper, names: list[str]
 ) -> None:
     """The engines agree to rounding over 100 steps; a run of rollouts is that of the effect with its values."""
     q, v = state()
 
-    def setup(effect: rd.LineSpringDamper, engine: str) -> rd.Setup:
+    def setup(effect: rd.effects.LineSpringDamper, engine: str) -> rd.Setup:
         plant = rd.Plant(TREE, [effect])
-        return rd.Setup(plant, q, v, 0.05, None, rd.method("rk4"), 1e-3, 0.01, False, engine=engine)
+        return rd.Setup(plant, q, v, 0.05, None, rd.integrate.method("rk4"), 1e-3, 0.01, False, engine=engine)
 
     runs = rd.rollouts(setup(effect, "auto"), params={f"line_spring_damper.{name}": NUMBERS[name] for name in names})
     for k in range(2):
@@ -138,19 +140,19 @@ def test_of_two_the_numbers_differ_from_run_to_run_under_their_numbers() -> None
 
 
 def test_it_runs_in_balls_that_hold_the_float_value() -> None:
-    own, (q, v) = rd.Lagrangian(TREE, rd.Ball(200)), state()
+    own, (q, v) = rd.Lagrangian(TREE, rd.studies.Ball(200)), state()
     torque = rd.Plant(own, [BETWEEN]).torque(0.0, q, v)
-    assert rd.radius(torque).max() < 1e-50
-    np.testing.assert_allclose(rd.Plant(TREE, [BETWEEN]).torque(0.0, q, v), rd.midpoint(torque), atol=1e-10)
+    assert rd.studies.radius(torque).max() < 1e-50
+    np.testing.assert_allclose(rd.Plant(TREE, [BETWEEN]).torque(0.0, q, v), rd.studies.midpoint(torque), atol=1e-10)
 
 
 def test_where_the_points_meet_there_is_no_direction() -> None:
     """An error that says so; a run that comes there in either engine ends, with the same words."""
     robot = rd.Robot.from_text(MASSES).with_(gravity=(0.0, 0.0, 0.0))
-    plant = rd.Plant(robot, [rd.LineSpringDamper("a", "b", stiffness=3.0, damping=1.0, length=0.1)])
+    plant = rd.Plant(robot, [rd.effects.LineSpringDamper("a", "b", stiffness=3.0, damping=1.0, length=0.1)])
     with pytest.raises(EffectError, match="line_spring_damper: its points of 'a' and 'b' meet"):
         plant.torque(0.0, np.zeros(2), np.zeros(2))
-    apart = rd.Plant(robot, [rd.LineSpringDamper("a", "b", stiffness=0.0, damping=0.0, length=0.1)])
+    apart = rd.Plant(robot, [rd.effects.LineSpringDamper("a", "b", stiffness=0.0, damping=0.0, length=0.1)])
     for engine in ("interpreted", "compiled"):
         run = rd.simulate(
             apart, q0=[-0.5, 0.5], v0=[1.0, -1.0], duration_s=1.0, integrator="explicit_euler", step_s=0.125,
@@ -163,8 +165,8 @@ def test_where_the_points_meet_there_is_no_direction() -> None:
 def test_ends_that_mean_nothing_are_refused() -> None:
     numbers = {"stiffness": 1.0, "damping": 1.0, "length": 1.0}
     with pytest.raises(EffectError, match="line_spring_damper: no frame 'left_tol'"):
-        rd.Plant(TREE, [rd.LineSpringDamper("left_tol", None, **numbers)])
+        rd.Plant(TREE, [rd.effects.LineSpringDamper("left_tol", None, **numbers)])
     with pytest.raises(EffectError, match="both points are fixed to 'torso'"):
-        rd.LineSpringDamper("torso", "torso", **numbers)
+        rd.effects.LineSpringDamper("torso", "torso", **numbers)
     with pytest.raises(EffectError, match="stiffness must not be negative"):
-        rd.LineSpringDamper("torso", None, **(numbers | {"stiffness": -1.0}))
+        rd.effects.LineSpringDamper("torso", None, **(numbers | {"stiffness": -1.0}))

@@ -14,14 +14,14 @@ from tests.long import long
 
 ARM = rd.load("planar_2r")
 Q = np.array([0.3, -0.5])
-TIGHT = rd.Adaptive("DOP853", 1e-12, 1e-14)
+TIGHT = rd.integrate.Adaptive("DOP853", 1e-12, 1e-14)
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 GAP, J, RATIO = 0.02, 0.002, 9.0  # in [m], [kg], 1
 REFLECTED = RATIO**2 * J
 
 
 def slide(restitution: float, engine: str, force: float, effects: tuple = ()) -> rd.Trajectory:
-    drive = rd.RigidBacklash(GAP, J, RATIO, restitution)
+    drive = rd.effects.RigidBacklash(GAP, J, RATIO, restitution)
     return rd.simulate(
         rd.Plant(SLIDER, [drive, *effects]), [0.0], duration_s=2.0, controller=Ramp(force), integrator=TIGHT,
         engine=engine, record_period_s=0.01, estimate_error=False,
@@ -66,7 +66,7 @@ def test_a_pushed_motor_bounces_at_an_end_of_the_gap_like_a_ball(restitution: fl
 
 
 @dataclass(frozen=True, eq=False)
-class Beats(rd.Stateless):
+class Beats(rd.control.Stateless):
     """A force of two frequencies on the motor, and on the joint as well where both are coordinates."""
 
     joints: int = 1
@@ -95,10 +95,10 @@ def test_a_motor_in_a_backlash_is_a_body_between_rigid_stops(restitution: float)
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
     )
     options = {"duration_s": 3.0, "integrator": TIGHT, "record_period_s": 0.01, "estimate_error": False}
-    stops = rd.RigidStops([-np.inf, -GAP], [np.inf, GAP], [0.0, restitution])
+    stops = rd.effects.RigidStops([-np.inf, -GAP], [np.inf, GAP], [0.0, restitution])
     theirs = rd.simulate(rd.Plant(both, [stops]), [0.0, 0.0], controller=Beats(2), **options)
     ours = rd.simulate(
-        rd.Plant(SLIDER, [rd.RigidBacklash(GAP, J, RATIO, restitution)]), [0.0], controller=Beats(), **options
+        rd.Plant(SLIDER, [rd.effects.RigidBacklash(GAP, J, RATIO, restitution)]), [0.0], controller=Beats(), **options
     )
     names = " ".join(each.name for each in ours.events)
     assert all(word in names for word in ("strikes the forward end", "strikes the backward end"))
@@ -110,17 +110,17 @@ def test_a_motor_in_a_backlash_is_a_body_between_rigid_stops(restitution: float)
 
 
 def arm_run(engine: str, effects: tuple = (), tolerance: float = 1e-11, period: float = 0.01) -> rd.Trajectory:
-    drive = rd.RigidBacklash([0.01, 0.02], [0.4, 0.05], [2.0, 4.0], [0.6, 0.3], viscous=0.2)
-    control = rd.PD(rd.quintic(Q, [0.6, 0.4], 0.5), [300.0, 90.0], [40.0, 9.0], period_s=period)
+    drive = rd.effects.RigidBacklash([0.01, 0.02], [0.4, 0.05], [2.0, 4.0], [0.6, 0.3], viscous=0.2)
+    control = rd.control.PD(rd.control.quintic(Q, [0.6, 0.4], 0.5), [300.0, 90.0], [40.0, 9.0], period_s=period)
     return rd.simulate(
         rd.Plant(ARM, [drive, *effects]), Q, duration_s=0.8, controller=control, engine=engine, record_period_s=0.01,
-        integrator=rd.Adaptive("DOP853", tolerance, tolerance / 100), estimate_error=False,
+        integrator=rd.integrate.Adaptive("DOP853", tolerance, tolerance / 100), estimate_error=False,
     )  # fmt: skip
 
 
 def test_an_arm_with_backlash_dry_friction_and_stops_closes_its_ledger_in_both_engines() -> None:
     """Two motors, joints that rub and a stop that is struck with a motor in contact; 1e-9, engines within 1e-9."""
-    effects = (rd.DryFriction([0.5, 0.3]), rd.RigidStops([-2.0, -0.6], [0.55, 2.0], 0.4))
+    effects = (rd.effects.DryFriction([0.5, 0.3]), rd.effects.RigidStops([-2.0, -0.6], [0.55, 2.0], 0.4))
     ours, theirs = (arm_run(engine, effects) for engine in ("compiled", "interpreted"))
     names = " ".join(each.name for each in ours.events)
     assert all(
@@ -150,7 +150,7 @@ def test_errors_fall_with_the_tolerance() -> None:
 
 def test_without_loss_the_energy_of_arm_and_motors_is_kept() -> None:
     """Under gravity alone, e = 1 at both joints: many impacts, and 1e-11 of the energy exchanged."""
-    drive = rd.RigidBacklash(0.02, [0.4, 0.05], [2.0, 4.0], 1.0)
+    drive = rd.effects.RigidBacklash(0.02, [0.4, 0.05], [2.0, 4.0], 1.0)
     run = rd.simulate(rd.Plant(ARM, [drive]), Q, [0.4, -1.0], duration_s=1.5, integrator=TIGHT, record_period_s=0.01)
     assert sum("strikes" in each.name for each in run.events) > 20
     E = run.ledger.energy + run.ledger.stored["rigid_backlash"]
@@ -160,9 +160,9 @@ def test_without_loss_the_energy_of_arm_and_motors_is_kept() -> None:
 @BOTH
 def test_a_motor_that_rests_at_an_end_is_an_armature(engine: str) -> None:
     """From its impact without restitution on, the arm with n² J at its second joint, driven there; 1e-10."""
-    law = rd.PD(rd.hold([0.3, 2.5]), [200.0, 40.0], [30.0, 3.0])
+    law = rd.control.PD(rd.control.hold([0.3, 2.5]), [200.0, 40.0], [30.0, 3.0])
     options = {"integrator": TIGHT, "estimate_error": False, "controller": law, "engine": engine}
-    drive = rd.RigidBacklash({"joint_2": 0.01}, {"joint_2": 0.05}, {"joint_2": 4.0})
+    drive = rd.effects.RigidBacklash({"joint_2": 0.01}, {"joint_2": 0.05}, {"joint_2": 4.0})
     run = rd.simulate(rd.Plant(ARM, [drive]), Q, duration_s=0.25, record_period_s=0.1, **options)
     (hit,) = run.events
     rest = rd.simulate(
@@ -182,7 +182,7 @@ def test_a_motor_that_rests_at_an_end_is_an_armature(engine: str) -> None:
 def test_a_payload_that_a_pushed_joint_picks_up_is_an_impact_of_its_motor_too(engine: str) -> None:
     """With the motor at an end, e = 0: (m + B + M) v⁺ = (m + B) v⁻; the slider, its motor and the ledger, 1e-12."""
     force, M, at = 1.3, 0.9, 0.5
-    body = rd.CarriedPayload(rd.Payload("cart", M), at)
+    body = rd.effects.CarriedPayload(rd.Payload("cart", M), at)
     run = slide(0.0, engine, force, (body,))
     whole = MASS + REFLECTED
     speed = force * at / whole
@@ -194,7 +194,7 @@ def test_a_payload_that_a_pushed_joint_picks_up_is_an_impact_of_its_motor_too(en
 
 
 def test_what_is_not_supported_is_refused_by_name() -> None:
-    plant = rd.Plant(ARM, [rd.RigidBacklash(0.01, 0.1)])
+    plant = rd.Plant(ARM, [rd.effects.RigidBacklash(0.01, 0.1)])
     for method in ("gauss_4", "time_stepping"):
         with pytest.raises(QueryError, match="rigid_backlash: "):
             rd.Setup(plant, Q, integrator=method)
@@ -203,8 +203,8 @@ def test_what_is_not_supported_is_refused_by_name() -> None:
     with pytest.raises(QueryError, match="advise: rigid_backlash frees and couples motors by turns"):
         rd.advise(plant, Q)
     with pytest.raises(EffectError, match="rigid_backlash: gap is 0 for all joints"):
-        rd.Plant(ARM, [rd.RigidBacklash(0.0, 0.1)])
+        rd.Plant(ARM, [rd.effects.RigidBacklash(0.0, 0.1)])
     with pytest.raises(EffectError, match="restitution must not be greater than 1"):
-        rd.RigidBacklash(0.1, 0.1, restitution=1.5)
+        rd.effects.RigidBacklash(0.1, 0.1, restitution=1.5)
     with pytest.raises(EffectError, match="joint 'joint_1' has two drives"):
-        rd.Setup(rd.Plant(ARM, [rd.RigidBacklash(0.1, 0.1), rd.SeriesElastic(9.0, 0.1)]), Q)
+        rd.Setup(rd.Plant(ARM, [rd.effects.RigidBacklash(0.1, 0.1), rd.effects.SeriesElastic(9.0, 0.1)]), Q)

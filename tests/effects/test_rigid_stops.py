@@ -17,7 +17,7 @@ ENGINES = ["interpreted", "compiled"]
 G = 9.80665
 RAIL = arms()["rail"]  # 1 kg on a vertical rail
 ARM = rd.load("planar_2r")
-TIGHT = rd.Adaptive(rtol=1e-12, atol=1e-12)
+TIGHT = rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)
 OPTIONS = {"estimate_error": False, "integrator": TIGHT}
 
 
@@ -26,7 +26,7 @@ OPTIONS = {"estimate_error": False, "integrator": TIGHT}
 def test_a_bouncing_joint_comes_to_rest_when_and_where_it_must(engine: str, e: float, most: int) -> None:
     """From height h: at T = √(2h/g) (1 + e) / (1 − e), to 1e-9, exactly at the stop; the energy it had is lost."""
     h = 0.8
-    plant = rd.Plant(RAIL, [rd.RigidStops(0.0, np.inf, e)])
+    plant = rd.Plant(RAIL, [rd.effects.RigidStops(0.0, np.inf, e)])
     T = np.sqrt(2 * h / G) * (1 + e) / (1 - e)
     run = rd.simulate(plant, [h], duration_s=T + 0.5, engine=engine, **OPTIONS)
     (rest,) = [each for each in run.events if "rest" in each.name]
@@ -42,7 +42,7 @@ def test_without_loss_energy_stays_over_a_thousand_impacts() -> None:
     """E = 1, prismatic: 1e-12 of the energy, to rounding of some ten thousand stages."""
     h = 0.3
     T = 1000 * 2 * np.sqrt(2 * h / G)
-    plant = rd.Plant(RAIL, [rd.RigidStops(0.0, np.inf, 1.0)])
+    plant = rd.Plant(RAIL, [rd.effects.RigidStops(0.0, np.inf, 1.0)])
     run = rd.simulate(plant, [h], duration_s=T, record_period_s=T / 200, engine="compiled", **OPTIONS)
     energy = run.ledger.kinetic + run.ledger.potential
     assert len(run.events) in (999, 1000, 1001)
@@ -50,17 +50,17 @@ def test_without_loss_energy_stays_over_a_thousand_impacts() -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class OneWay(rd.Dissipative):
+class OneWay(rd.effects.Dissipative):
     """A damper of motion upwards alone: its formula changes where v = 0."""
 
-    up: Any = field(metadata=rd.coefficient("N m s/rad", symbol="b", least=0))
-    down: Any = field(default=0.0, metadata=rd.coefficient("N m s/rad", symbol="b₋", least=0))
+    up: Any = field(metadata=rd.effects.coefficient("N m s/rad", symbol="b", least=0))
+    down: Any = field(default=0.0, metadata=rd.effects.coefficient("N m s/rad", symbol="b₋", least=0))
 
     def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:
         return -self.up * np.maximum(v, 0.0) - self.down * np.minimum(v, 0.0)
 
-    def thresholds(self, n: int) -> tuple[rd.Threshold, ...]:
-        return (rd.Threshold(0, 0.0, "damper", "taken along", "left", of_velocity=True),)
+    def thresholds(self, n: int) -> tuple[rd.effects.Threshold, ...]:
+        return (rd.effects.Threshold(0, 0.0, "damper", "taken along", "left", of_velocity=True),)
 
     def on_side(self, n: int, sides: Any) -> OneWay:
         ((_, side),) = sides.items()
@@ -72,7 +72,7 @@ class OneWay(rd.Dissipative):
 def test_an_impact_may_throw_a_velocity_over_the_threshold_of_another_effect(engine: str) -> None:
     """Down freely from h, up against b v: v₁ = e √(2 g h), at rest after t = ln(1 + b v₁/g)/b, (v₁ − g t)/b up."""
     h, b, e = 0.8, 3.1, 0.9
-    plant = rd.Plant(RAIL, [OneWay(b), rd.RigidStops(0.0, np.inf, e)])
+    plant = rd.Plant(RAIL, [OneWay(b), rd.effects.RigidStops(0.0, np.inf, e)])
     run = rd.simulate(plant, [h], duration_s=1.0, engine=engine, **OPTIONS)
     first, top, second = run.events[:3]
     v = e * np.sqrt(2 * G * h)
@@ -88,12 +88,13 @@ def panda_between_stops() -> tuple[rd.Plant, list[float], list[float], float]:
     """Stops without loss for the plant, q₀, v₀ and a duration, some 54 impacts."""
     panda = rd.load("panda")
     panda = panda.with_(lock=dict.fromkeys(panda.joint_names[7:], 0.0))
-    stops = rd.RigidStops([-1, -1.2, -1, -2.5, -1, 0.6, -1], [1, 0.4, 1, -1, 1, 2.2, 1], 1.0)
+    stops = rd.effects.RigidStops([-1, -1.2, -1, -2.5, -1, 0.6, -1], [1, 0.4, 1, -1, 1, 2.2, 1], 1.0)
     return rd.Plant(panda, [stops]), [0, -0.5, 0.2, -1.9, 0.1, 1.4, 0.5], [0.0] * 7, 2.0
 
 
 @pytest.mark.parametrize(
-    "case", [(rd.Plant(ARM, [rd.RigidStops(-1.0, 1.0, 1.0)]), [0.3, 0.4], [1.0, -0.5], 6.0), panda_between_stops()],
+    "case",
+    [(rd.Plant(ARM, [rd.effects.RigidStops(-1.0, 1.0, 1.0)]), [0.3, 0.4], [1.0, -0.5], 6.0), panda_between_stops()],
     ids=["planar_2r", "panda"],
 )  # fmt: skip
 def test_without_loss_the_energy_of_an_arm_drifts_by_its_tolerance(case) -> None:
@@ -106,7 +107,7 @@ def test_without_loss_the_energy_of_an_arm_drifts_by_its_tolerance(case) -> None
     for tolerance in (1e-6, 1e-9, 1e-12):
         run = rd.simulate(
             plant, q0, v0, duration_s=T, engine="compiled", estimate_error=False, record_period_s=T / 100,
-            integrator=rd.Adaptive(rtol=tolerance, atol=tolerance),
+            integrator=rd.integrate.Adaptive(rtol=tolerance, atol=tolerance),
         )  # fmt: skip
         energy = run.ledger.kinetic + run.ledger.potential
         drifts[tolerance] = np.abs(energy - energy[0]).max() / run.ledger.kinetic.max()
@@ -119,7 +120,7 @@ def test_without_loss_the_energy_of_an_arm_drifts_by_its_tolerance(case) -> None
 def test_an_impact_obeys_newtons_law_and_the_momentum_of_the_others_stays() -> None:
     """v⁺ = −e v⁻ at the joint that strikes; M (v⁺ − v⁻) has no entry at the other one; ΔK as booked."""
     e = 0.6
-    plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), [rd.RigidStops([-9.0, -9.0], [0.7, 9.0], e)])
+    plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), [rd.effects.RigidStops([-9.0, -9.0], [0.7, 9.0], e)])
     q0, v0 = np.array([0.2, 0.5]), np.array([1.3, -0.8])
     run = rd.simulate(plant, q0, v0, duration_s=0.6, **OPTIONS)
     struck = run.events[0]
@@ -135,7 +136,7 @@ def test_an_impact_obeys_newtons_law_and_the_momentum_of_the_others_stays() -> N
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_joint_rests_at_its_stop_under_load_and_leaves_it_when_pulled(engine: str) -> None:
     """1 kg at rest on a stop; a pull 4 t lifts it at t = g/4, and then q = ∫∫ (4 t − g)."""
-    plant = rd.Plant(RAIL, [rd.RigidStops(0.0, 5.0)])
+    plant = rd.Plant(RAIL, [rd.effects.RigidStops(0.0, 5.0)])
     run = rd.simulate(
         plant, [0.0], duration_s=3.0, controller=lambda t, q, v: np.array([4.0 * t]), engine=engine, **OPTIONS
     )
@@ -150,13 +151,15 @@ def test_stops_are_never_passed_and_the_ledger_closes() -> None:
     rng = np.random.default_rng(20261128)
     for k in range(20):
         lower, upper = -rng.uniform(0.3, 1.2, 2), rng.uniform(0.3, 1.2, 2)
-        stops = rd.RigidStops(lower, upper, rng.uniform(0, 1, 2))
+        stops = rd.effects.RigidStops(lower, upper, rng.uniform(0, 1, 2))
         level = rng.uniform(0, 4, 2)
-        plant = rd.Plant(ARM, [rd.DryFriction(level, level * rng.uniform(1, 1.5)), rd.ViscousFriction(0.1), stops])
+        plant = rd.Plant(
+            ARM, [rd.effects.DryFriction(level, level * rng.uniform(1, 1.5)), rd.effects.ViscousFriction(0.1), stops]
+        )
         q0 = rng.uniform(lower, upper)
         q0[0] = upper[0] if k % 3 == 0 else q0[0]
         run = rd.simulate(plant, q0, rng.normal(size=2), duration_s=1.5, engine="compiled", estimate_error=False,
-                          integrator=rd.Adaptive(rtol=1e-10, atol=1e-10))  # fmt: skip
+                          integrator=rd.integrate.Adaptive(rtol=1e-10, atol=1e-10))  # fmt: skip
         assert run.outcome.ending == "finished", (k, run.outcome)
         assert (run.q >= lower).all(), k
         assert (run.q <= upper).all(), k
@@ -170,7 +173,7 @@ def test_stops_are_never_passed_and_the_ledger_closes() -> None:
 
 def test_joints_that_strike_together_are_solved_together() -> None:
     """Both at once, v⁺ = −e v⁻ for each; with different restitution no energy is made."""
-    stops = rd.RigidStops([-9.0, -9.0], [0.5, 0.5], [0.2, 0.9])
+    stops = rd.effects.RigidStops([-9.0, -9.0], [0.5, 0.5], [0.2, 0.9])
     plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), [stops])
     run = rd.simulate(plant, [0.5, 0.5], [1.0, 2.0], duration_s=0.01, **OPTIONS)
     assert [each.t for each in run.events] == [0.0, 0.0]
@@ -181,11 +184,12 @@ def test_joints_that_strike_together_are_solved_together() -> None:
 def test_stops_that_are_struck_in_turn_come_to_rest_together() -> None:
     """A cart and its pole driven into a corner: each impact kicks the other joint off its stop, ever less."""
     arm = rd.load("cart_pole")
-    stops = rd.RigidStops([-0.6556, 0.5434], [-0.0705, 0.9402], [0.6, 0.0])
-    drive = rd.PD(rd.hold([-0.7727, 0.6249]), [370.0, 4.3], [17.3, 1.14])
+    stops = rd.effects.RigidStops([-0.6556, 0.5434], [-0.0705, 0.9402], [0.6, 0.0])
+    drive = rd.control.PD(rd.control.hold([-0.7727, 0.6249]), [370.0, 4.3], [17.3, 1.14])
     run = rd.simulate(
-        rd.Plant(arm, [rd.ViscousFriction([3.6, 0.52]), stops]), [-0.5163, 0.7435], [0.6811, 0.9512], duration_s=1.0,
-        controller=drive, estimate_error=False, integrator=rd.Adaptive(rtol=1e-4, atol=1e-6),
+        rd.Plant(arm, [rd.effects.ViscousFriction([3.6, 0.52]), stops]), [-0.5163, 0.7435], [0.6811, 0.9512],
+        duration_s=1.0,
+        controller=drive, estimate_error=False, integrator=rd.integrate.Adaptive(rtol=1e-4, atol=1e-6),
     )  # fmt: skip
     assert run.outcome.ending == "finished"
     assert len(run.events) < 300
@@ -209,7 +213,7 @@ def test_joints_that_stops_throw_at_each_other_end_at_rest_all_of_them() -> None
 
 
 def test_a_start_beyond_a_stop_is_refused_by_name() -> None:
-    plant = rd.Plant(ARM, [rd.RigidStops([-1.0, -1.0], [1.0, 1.0])])
+    plant = rd.Plant(ARM, [rd.effects.RigidStops([-1.0, -1.0], [1.0, 1.0])])
     with pytest.raises(QueryError, match=r"q0: 'joint_2' is 0\.2 beyond its upper stop"):
         rd.simulate(plant, [0.3, 1.2])
 
@@ -217,16 +221,16 @@ def test_a_start_beyond_a_stop_is_refused_by_name() -> None:
 @pytest.mark.parametrize(("method", "why"), [("gauss_4", "momenta"), ("explicit_euler", "order 1")])
 def test_methods_whose_steps_cannot_end_there_are_refused(method: str, why: str) -> None:
     with pytest.raises(QueryError, match=f"dry_friction: .* {why}.*DOP853"):
-        rd.simulate(rd.Plant(ARM, [rd.DryFriction(1.0)]), [0.3, 0.2], integrator=method)
+        rd.simulate(rd.Plant(ARM, [rd.effects.DryFriction(1.0)]), [0.3, 0.2], integrator=method)
     with pytest.raises(QueryError, match=f"dry_friction: .* {why}.*DOP853"):
-        rd.rollouts(rd.Plant(ARM, [rd.DryFriction(1.0)]), [0.3, 0.2], integrator=method)
+        rd.rollouts(rd.Plant(ARM, [rd.effects.DryFriction(1.0)]), [0.3, 0.2], integrator=method)
     with pytest.raises(QueryError, match="cuts=False: dry_friction holds joints and lets them go, where steps must"):
-        rd.rollouts(rd.Plant(ARM, [rd.DryFriction(1.0)]), [0.3, 0.2], integrator="rk4", cuts=False)
+        rd.rollouts(rd.Plant(ARM, [rd.effects.DryFriction(1.0)]), [0.3, 0.2], integrator="rk4", cuts=False)
 
 
 @pytest.mark.parametrize("method", ["time_stepping", "rk4", "DOP853"])
 def test_a_start_of_a_batch_beyond_a_stop_is_refused_by_number(method: str) -> None:
-    plant = rd.Plant(ARM, [rd.RigidStops([-1.0, -1.0], [1.0, 1.0])])
+    plant = rd.Plant(ARM, [rd.effects.RigidStops([-1.0, -1.0], [1.0, 1.0])])
     with pytest.raises(QueryError, match=r"q0 of run 1: 'joint_2' is 0\.2 beyond its upper stop"):
         rd.rollouts(plant, [[0.3, 0.2], [0.3, 1.2]], integrator=method)
     upper = [[1.0, 1.0], [1.0, 0.5]]
@@ -237,25 +241,25 @@ def test_a_start_of_a_batch_beyond_a_stop_is_refused_by_number(method: str) -> N
 @pytest.mark.parametrize("method", ["rk4", "DOP853"])
 def test_rollouts_are_the_runs_of_simulate(method: str) -> None:
     """To the last bit, friction swept."""
-    plant = rd.Plant(ARM, [rd.DryFriction([3.0, 1.0]), rd.RigidStops([-1.5, -2.0], [1.0, 2.0], 0.5)])
+    plant = rd.Plant(ARM, [rd.effects.DryFriction([3.0, 1.0]), rd.effects.RigidStops([-1.5, -2.0], [1.0, 2.0], 0.5)])
     setup = rd.Setup(plant, [0.3, 0.4], duration_s=1.0, record_period_s=0.1, engine="compiled", integrator=method,
                      estimate_error=False)  # fmt: skip
     levels = np.array([[3.0, 1.0], [0.5, 2.0]])
     runs = rd.rollouts(setup, params={"dry_friction.level": levels})
     for i, level in enumerate(levels):
-        one = rd.simulate(setup, plant=rd.Plant(ARM, [rd.DryFriction(level), plant.effects[1]]))
+        one = rd.simulate(setup, plant=rd.Plant(ARM, [rd.effects.DryFriction(level), plant.effects[1]]))
         assert runs.q is not None
         assert (runs.q[i] == one.q).all()
 
 
 def test_impacts_that_another_joint_feeds_come_to_an_end() -> None:
     """Joint 2 is pressed on a stop without loss, joint 1 sticks and slides at each of its ever smaller bounces."""
-    plant = rd.Plant(ARM, [rd.DryFriction([5.355, 0.0], [6.356, 0.0]), rd.ViscousFriction(0.1),
-                           rd.RigidStops([-0.2, -0.3], [0.6, 0.7], [0.5, 1.0])])  # fmt: skip
-    drive = rd.PD(rd.hold([0.322, -0.759]), [215.56, 19.219], [3.593, 0.32])
+    plant = rd.Plant(ARM, [rd.effects.DryFriction([5.355, 0.0], [6.356, 0.0]), rd.effects.ViscousFriction(0.1),
+                           rd.effects.RigidStops([-0.2, -0.3], [0.6, 0.7], [0.5, 1.0])])  # fmt: skip
+    drive = rd.control.PD(rd.control.hold([0.322, -0.759]), [215.56, 19.219], [3.593, 0.32])
     run = rd.simulate(
         plant, [0.3, 0.4], [0.238, 1.792], duration_s=2.0, controller=drive, engine="compiled", estimate_error=False,
-        integrator=rd.Adaptive(rtol=1e-9, atol=1e-9),
+        integrator=rd.integrate.Adaptive(rtol=1e-9, atol=1e-9),
     )  # fmt: skip
     assert run.outcome.ending == "finished"
     assert run.ledger.closure <= 1e-8
@@ -272,7 +276,7 @@ def test_a_joint_that_an_impact_kicks_off_its_stop_gives_its_momentum_back(speed
     """
     e, q = 0.7, np.array([0.3, 1.5])
     M = ARM.M(q)
-    stops = rd.RigidStops([-9.0, q[1]], [q[0], 9.0], [e, 0.5])
+    stops = rd.effects.RigidStops([-9.0, q[1]], [q[0], 9.0], [e, 0.5])
     run = rd.simulate(
         rd.Plant(ARM.with_(gravity=(0, 0, 0)), [stops]), [q[0] - speed / 100, q[1]], [speed, 0.0], duration_s=0.05,
         controller=lambda t, q, v: np.array([0.0, -5.0]), **OPTIONS,
@@ -289,7 +293,7 @@ def test_joints_that_impacts_kick_off_their_stops_strike_again_when_they_must() 
     """
     parts = []
     for speed in (1e-2, 1e-5):
-        stops = rd.RigidStops([-9.0, 0.4], [0.3, 9.0], [0.7, 0.5])
+        stops = rd.effects.RigidStops([-9.0, 0.4], [0.3, 9.0], [0.7, 0.5])
         run = rd.simulate(
             rd.Plant(ARM.with_(gravity=(0, 0, 0)), [stops]), [0.3 - speed / 100, 0.4], [speed, 0.0], duration_s=0.05,
             controller=lambda t, q, v: np.array([0.0, -5.0]), **OPTIONS,
@@ -303,7 +307,10 @@ def test_an_impact_may_throw_a_joint_against_the_load_that_just_let_it_go() -> N
 
     No energy is lost but by friction and the impact: the ledger closes to rounding.
     """
-    plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), [rd.DryFriction([0, 2.0], [0, 2.5]), rd.RigidStops(-9.0, 0.5, 0.5)])
+    plant = rd.Plant(
+        ARM.with_(gravity=(0, 0, 0)),
+        [rd.effects.DryFriction([0, 2.0], [0, 2.5]), rd.effects.RigidStops(-9.0, 0.5, 0.5)],
+    )
     run = rd.simulate(
         plant, [0.5, 0.4], [1.0, 0.0], duration_s=0.05, controller=lambda t, q, v: np.array([0.0, -6.0]), **OPTIONS
     )
@@ -314,21 +321,21 @@ def test_an_impact_may_throw_a_joint_against_the_load_that_just_let_it_go() -> N
 
 def test_the_stops_of_the_file_are_the_limits_of_its_joints() -> None:
     ur5 = rd.load("ur5")
-    (both,) = rd.Plant(ur5, [rd.RigidStops("urdf", "urdf")]).effects
-    (one,) = rd.Plant(ur5, [rd.RigidStops(-1.0, "urdf")]).effects
+    (both,) = rd.Plant(ur5, [rd.effects.RigidStops("urdf", "urdf")]).effects
+    (one,) = rd.Plant(ur5, [rd.effects.RigidStops(-1.0, "urdf")]).effects
     assert (both.lower == ur5.lower).all()
     assert (both.upper == ur5.upper).all()
     assert (one.upper == ur5.upper).all()
     with pytest.raises(EffectError, match="must lie below"):
-        rd.Plant(ur5, [rd.RigidStops(7.0, "urdf")])
+        rd.Plant(ur5, [rd.effects.RigidStops(7.0, "urdf")])
 
 
 def test_what_makes_no_sense_is_refused() -> None:
     with pytest.raises(EffectError, match="restitution must not be greater than 1"):
-        rd.RigidStops(-1.0, 1.0, 1.5)
+        rd.effects.RigidStops(-1.0, 1.0, 1.5)
     with pytest.raises(EffectError, match="must lie below"):
-        rd.RigidStops(1.0, -1.0)
+        rd.effects.RigidStops(1.0, -1.0)
     with pytest.raises(EffectError, match="static must not be less"):
-        rd.DryFriction(2.0, 1.0)
+        rd.effects.DryFriction(2.0, 1.0)
     with pytest.raises(EffectError, match="no effect without static"):
-        rd.DryFriction(2.0, stribeck_velocity=0.1)
+        rd.effects.DryFriction(2.0, stribeck_velocity=0.1)

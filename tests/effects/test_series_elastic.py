@@ -16,19 +16,19 @@ from tests.long import long
 
 ARM = rd.load("planar_2r")
 Q = np.array([0.3, -0.5])
-TIGHT = rd.Adaptive("DOP853", 1e-12, 1e-14)
+TIGHT = rd.integrate.Adaptive("DOP853", 1e-12, 1e-14)
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 K, J, RATIO, D, B = 80.0, 0.002, 9.0, 0.4, 0.3  # of the slider, in [N/m], [kg], 1, [N s/m], [N s/m]
 REFLECTED = RATIO**2 * J
 
 
-def slide(effect: rd.SeriesElastic, engine: str = "interpreted", **options) -> rd.Trajectory:
+def slide(effect: rd.effects.SeriesElastic, engine: str = "interpreted", **options) -> rd.Trajectory:
     options = {"integrator": TIGHT, "record_period_s": 0.05, "duration_s": 2.0, "estimate_error": False} | options
     return rd.simulate(rd.Plant(SLIDER, [effect]), [0.2], [0.5], engine=engine, **options)
 
 
 @pytest.mark.parametrize(
-    "method", [TIGHT, *long(["gauss_6", rd.Adaptive("Rosenbrock", 1e-11, 1e-13), "order_8"])], ids=str
+    "method", [TIGHT, *long(["gauss_6", rd.integrate.Adaptive("Rosenbrock", 1e-11, 1e-13), "order_8"])], ids=str
 )
 @BOTH
 def test_two_masses_and_a_spring_move_by_the_matrix_exponential(method, engine: str) -> None:
@@ -36,7 +36,7 @@ def test_two_masses_and_a_spring_move_by_the_matrix_exponential(method, engine: 
     F = 1.7
     options = {"step_s": 2e-3} if isinstance(method, str) else {}
     options |= {"controller": Ramp(F), "integrator": method, "duration_s": 1.0}
-    run = slide(rd.SeriesElastic(K, J, RATIO, D, B), engine, **options)
+    run = slide(rd.effects.SeriesElastic(K, J, RATIO, D, B), engine, **options)
     A = np.array(
         [
             [0, 1, 0, 0, 0],
@@ -57,7 +57,7 @@ def test_two_masses_and_a_spring_move_by_the_matrix_exponential(method, engine: 
 def test_without_damping_it_swings_at_the_frequency_of_the_reduced_mass() -> None:
     """√(k/μ), 1/μ = 1/m + 1/(n² J), and what motors and springs store comes back."""
     omega = np.sqrt(K * (1 / MASS + 1 / REFLECTED))
-    run = slide(rd.SeriesElastic(K, J, RATIO), controller=Ramp(1.0))
+    run = slide(rd.effects.SeriesElastic(K, J, RATIO), controller=Ramp(1.0))
     deflection = run.effect_states["series_elastic"][:, 0]
     still = 1.0 / REFLECTED / omega**2  # δ̈ = F/B − ω² δ
     np.testing.assert_allclose(deflection, still * (1 - np.cos(omega * run.t)), atol=1e-12)
@@ -68,7 +68,7 @@ def test_without_damping_it_swings_at_the_frequency_of_the_reduced_mass() -> Non
 
 def test_springs_and_motors_only_take_energy() -> None:
     """Work of its torque less that on its motors, plus what they store, never grows: dampers and friction take it."""
-    run = slide(rd.SeriesElastic(K, J, RATIO, D, B), controller=Ramp(1.7), record_period_s=0.01)
+    run = slide(rd.effects.SeriesElastic(K, J, RATIO, D, B), controller=Ramp(1.7), record_period_s=0.01)
     lost = run.ledger.work["series_elastic"] + run.ledger.stored["series_elastic"]
     assert np.diff(lost).max() < 1e-12 and lost[-1] - lost[0] < -0.1
 
@@ -102,9 +102,12 @@ def test_a_2r_with_one_elastic_joint_is_that_of_equations_written_out(engine: st
     exact = solve_ivp(
         f, (0, 1), [*Q, 0.4, -0.6, Q[1], -0.6], method="DOP853", rtol=1e-13, atol=1e-15, dense_output=True
     )
-    drive = rd.SeriesElastic({"joint_2": k}, {"joint_2": 0.05}, {"joint_2": 4.0}, {"joint_2": d}, {"joint_2": b})
+    drive = rd.effects.SeriesElastic(
+        {"joint_2": k}, {"joint_2": 0.05}, {"joint_2": 4.0}, {"joint_2": d}, {"joint_2": b}
+    )
     run = rd.simulate(
-        rd.Plant(ARM, [drive]), Q, [0.4, -0.6], duration_s=1.0, controller=rd.PD(rd.hold(target), kp, kd),
+        rd.Plant(ARM, [drive]), Q, [0.4, -0.6], duration_s=1.0,
+        controller=rd.control.PD(rd.control.hold(target), kp, kd),
         integrator=TIGHT, engine=engine, record_period_s=0.1, estimate_error=False,
     )  # fmt: skip
     x = np.array([exact.sol(t) for t in run.t])
@@ -118,15 +121,15 @@ def test_a_2r_with_one_elastic_joint_is_that_of_equations_written_out(engine: st
 @pytest.mark.long
 def test_stiff_springs_are_the_armature_of_gear_and_rotor() -> None:
     """The distance from M + n² J falls as 1/k: tenfold for a tenfold stiffness, within a tenth."""
-    control = rd.PD(rd.quintic(Q, [0.6, 0.4], 0.5), 100.0, 20.0)
+    control = rd.control.PD(rd.control.quintic(Q, [0.6, 0.4], 0.5), 100.0, 20.0)
     options = {
-        "duration_s": 0.5, "integrator": rd.Adaptive("Rosenbrock", 1e-10, 1e-12), "record_period_s": 0.5,
+        "duration_s": 0.5, "integrator": rd.integrate.Adaptive("Rosenbrock", 1e-10, 1e-12), "record_period_s": 0.5,
         "estimate_error": False, "controller": control,
     }  # fmt: skip
     rigid = rd.simulate(ARM.with_(armature=[0.4 * 2.0**2, 0.05 * 5.0**2]), Q, **options)
     far = []
     for k in (1e5, 1e6):
-        drive = rd.SeriesElastic(k, [0.4, 0.05], [2.0, 5.0], damping=1e-3 * k)
+        drive = rd.effects.SeriesElastic(k, [0.4, 0.05], [2.0, 5.0], damping=1e-3 * k)
         far.append(np.abs(rd.simulate(rd.Plant(ARM, [drive]), Q, **options).q[-1] - rigid.q[-1]).max())
     assert 1e-8 < far[1] < 1e-4
     assert far[0] / far[1] == pytest.approx(10, rel=0.1)
@@ -141,8 +144,8 @@ def test_beyond_the_gap_of_a_backlash_the_spring_turns_what_moved_freely_within_
     the joint: the other side.
     """
     beta, F = 0.02, 1.3
-    drive = rd.SeriesElastic(K, J, RATIO, backlash=beta)
-    push = rd.ExternalWrench("cart", [F, 0, 0, 0, 0, 0])
+    drive = rd.effects.SeriesElastic(K, J, RATIO, backlash=beta)
+    push = rd.effects.ExternalWrench("cart", [F, 0, 0, 0, 0, 0])
     run = rd.simulate(
         rd.Plant(SLIDER, [drive] if side == 1 else [drive, push]), [0.0], duration_s=2.0,
         controller=Ramp(F if side == 1 else 0.0), integrator=TIGHT, engine=engine, record_period_s=0.01,
@@ -172,11 +175,12 @@ def test_beyond_the_gap_of_a_backlash_the_spring_turns_what_moved_freely_within_
 @pytest.mark.parametrize("period", [*long([0.0]), 0.005])
 def test_both_engines_and_rollouts_make_the_same_run(period: float) -> None:
     """A stiffness of each run, with backlash; beside an actuator lag and an effort limit, the second joint direct."""
-    drive = rd.SeriesElastic([200.0, 0.0], 0.02, 6.0, 0.5, 0.2, 1e-3)
-    effects = [rd.EffortLimit(30.0), rd.ActuatorLag(0.02), drive]
+    drive = rd.effects.SeriesElastic([200.0, 0.0], 0.02, 6.0, 0.5, 0.2, 1e-3)
+    effects = [rd.effects.EffortLimit(30.0), rd.effects.ActuatorLag(0.02), drive]
     base = rd.Setup(
         rd.Plant(ARM, effects), Q, [0.2, 0.1], duration_s=0.3, record_period_s=0.01, integrator="rk4", step_s=5e-4,
-        controller=rd.PD(rd.quintic(Q, [0.6, -0.3], 0.3), 90.0, 15.0, period_s=period), estimate_error=False,
+        controller=rd.control.PD(rd.control.quintic(Q, [0.6, -0.3], 0.3), 90.0, 15.0, period_s=period),
+        estimate_error=False,
     )  # fmt: skip
     values = np.array([[200.0, 0.0], [90.0, 0.0]])
     runs = rd.rollouts(base, params={"series_elastic.stiffness": values}, record=("q", "u", "work"))
@@ -195,9 +199,10 @@ def test_both_engines_and_rollouts_make_the_same_run(period: float) -> None:
 def test_dry_friction_of_a_joint_holds_it_until_its_spring_has_the_load() -> None:
     """A motor at constant speed behind a spring: the joint sticks until k δ reaches the friction of rest; 1e-9."""
     speed, level = 0.3, 2.0
-    drive = rd.SeriesElastic(K, J, RATIO, friction=1e3)  # its friction keeps the speed u/b, to 1e-3 of it
+    drive = rd.effects.SeriesElastic(K, J, RATIO, friction=1e3)  # its friction keeps the speed u/b, to 1e-3 of it
     run = rd.simulate(
-        rd.Plant(SLIDER, [drive, rd.DryFriction(1.0, level)]), [0.0], duration_s=0.2, controller=Ramp(1e3 * speed),
+        rd.Plant(SLIDER, [drive, rd.effects.DryFriction(1.0, level)]), [0.0], duration_s=0.2,
+        controller=Ramp(1e3 * speed),
         integrator=TIGHT, record_period_s=0.01, estimate_error=False,
     )  # fmt: skip
     first = next(each for each in run.events if each.name == "slide slides")
@@ -210,7 +215,7 @@ def test_dry_friction_of_a_joint_holds_it_until_its_spring_has_the_load() -> Non
 
 def test_a_plant_that_is_asked_takes_relaxed_springs() -> None:
     """No torque on the joint of a drive, which the actuation does not reach; also compiled."""
-    plant, v = rd.Plant(ARM, [rd.SeriesElastic([0.0, 90.0], 0.02, damping=2.0)]), np.array([0.3, -0.7])
+    plant, v = rd.Plant(ARM, [rd.effects.SeriesElastic([0.0, 90.0], 0.02, damping=2.0)]), np.array([0.3, -0.7])
     np.testing.assert_array_equal(plant.torque(0.0, Q, v), [0.0, 0.0])
     expected = ARM.forward_dynamics(Q, v, [3.0, 0.0])
     np.testing.assert_allclose(plant.forward_dynamics(0.0, Q, v, [3.0, 5.0]), expected, rtol=1e-13)
@@ -219,12 +224,14 @@ def test_a_plant_that_is_asked_takes_relaxed_springs() -> None:
 
 def test_what_has_no_meaning_is_refused() -> None:
     with pytest.raises(EffectError, match="series_elastic: stiffness is 0 for all joints"):
-        rd.Plant(ARM, [rd.SeriesElastic(0.0, 0.1)])
+        rd.Plant(ARM, [rd.effects.SeriesElastic(0.0, 0.1)])
     with pytest.raises(EffectError, match="joint 'joint_2' has two drives; keep one"):
-        rd.Setup(rd.Plant(ARM, [rd.SeriesElastic({"joint_2": 9.0}, 1.0), rd.SeriesElastic(9.0, 1.0)]), Q)
+        rd.Setup(
+            rd.Plant(ARM, [rd.effects.SeriesElastic({"joint_2": 9.0}, 1.0), rd.effects.SeriesElastic(9.0, 1.0)]), Q
+        )
     with pytest.raises(QueryError, match="linearise: series_elastic has motors of its own"):
-        rd.linearise(rd.Plant(ARM, [rd.SeriesElastic(9.0, 1.0)]), Q)
+        rd.linearise(rd.Plant(ARM, [rd.effects.SeriesElastic(9.0, 1.0)]), Q)
     with pytest.raises(QueryError, match="series_elastic: time_stepping takes no motors of a drive"):
-        rd.Setup(rd.Plant(ARM, [rd.SeriesElastic(9.0, 1.0)]), Q, integrator="time_stepping")
+        rd.Setup(rd.Plant(ARM, [rd.effects.SeriesElastic(9.0, 1.0)]), Q, integrator="time_stepping")
     with pytest.raises(EffectError, match="inertia must be positive"):
-        rd.SeriesElastic(9.0, 0.0)
+        rd.effects.SeriesElastic(9.0, 0.0)

@@ -16,7 +16,7 @@ from tests.long import long
 
 ARM = rd.load("planar_2r")
 START = {"q0": [0.4, -0.7], "v0": [0.3, 0.5], "engine": "interpreted", "estimate_error": False}
-STIFF = rd.Adaptive("Rosenbrock", 1e-6, 1e-9)
+STIFF = rd.integrate.Adaptive("Rosenbrock", 1e-6, 1e-9)
 
 
 @pytest.mark.parametrize("width", [1e-3, 1e-6, 1e-9, 1e-12])
@@ -33,7 +33,7 @@ def test_a_jacobian_is_taken_inside_the_width_of_the_rate(width: float) -> None:
 @pytest.mark.parametrize("width", [1e-5, 1e-7, 1e-9])
 def test_the_jacobian_of_a_motion_knows_its_friction(width: float) -> None:
     """∂a/∂v of −f tanh(v / v_s) at v = 0 is −M⁻¹ f / v_s beside terms of order one; it errs by (1/100)² / 3."""
-    equation = StateEquation(rd.Plant(ARM, [rd.RegularisedCoulombFriction([3.0, 2.0], width)]), None)
+    equation = StateEquation(rd.Plant(ARM, [rd.effects.RegularisedCoulombFriction([3.0, 2.0], width)]), None)
     q = np.array([0.4, -0.7])
     setup = rd.Setup(equation.plant, q)
     functions, bounds = interpreted(equation, Watch(setup, equation)), np.array([0.0, 1.0])
@@ -46,7 +46,7 @@ def test_radau_slides_to_rest_whatever_the_width_of_dry_friction() -> None:
     """What differs is the creep inside the width, at most v_s T. The others are near a common limit: 1e-4 of 1e-3."""
     runs = [
         rd.simulate(
-            rd.Plant(ARM, [rd.RegularisedCoulombFriction([9.0, 6.0], width)]),
+            rd.Plant(ARM, [rd.effects.RegularisedCoulombFriction([9.0, 6.0], width)]),
             **START, duration_s=0.2, integrator=STIFF,
         )
         for width in (1e-4, 1e-7, 1e-9)
@@ -62,7 +62,7 @@ def test_rosenbrock_bounces_off_a_stop_whatever_its_stiffness(stiffness: float) 
     """At 1 m/s into an elastic stop and back: q = 2 q_stop − v T + v π √(m / k); the tolerance is 1e-6 a step."""
     cart = rd.load("cart_pole").with_(lock={"hinge": 0.3})
     run = rd.simulate(
-        rd.Plant(cart, [rd.JointStopSpring(-1.0, 0.1, stiffness)]), q0=[0.0], v0=[1.0], duration_s=0.15,
+        rd.Plant(cart, [rd.effects.JointStopSpring(-1.0, 0.1, stiffness)]), q0=[0.0], v0=[1.0], duration_s=0.15,
         engine="interpreted", estimate_error=False, integrator=STIFF,
     )  # fmt: skip
     assert run.outcome.ending == "finished"
@@ -74,14 +74,16 @@ def test_rosenbrock_bounces_off_a_stop_whatever_its_stiffness(stiffness: float) 
 @pytest.mark.parametrize(
     ("method", "verdict"),
     [
-        *long([(rd.Adaptive(), "is stiff; take Rosenbrock, softer effects")]),
-        (rd.method("sdirk_3"), "does not converge.*take a smaller step, or Rosenbrock"),
+        *long([(rd.integrate.Adaptive(), "is stiff; take Rosenbrock, softer effects")]),
+        (rd.integrate.method("sdirk_3"), "does not converge.*take a smaller step, or Rosenbrock"),
     ],
     ids=["DOP853", "sdirk_3"],
 )
 def test_a_run_that_does_not_get_on_ends_with_a_verdict(method, verdict: str) -> None:
     """Dry friction of a width that no step resolves: the outcome names the effect, the joint and the remedy."""
-    plant = rd.Plant(ARM, [rd.ViscousFriction(0.1), rd.RegularisedCoulombFriction([30.0, 20.0], [1.0, 1e-13])])
+    plant = rd.Plant(
+        ARM, [rd.effects.ViscousFriction(0.1), rd.effects.RegularisedCoulombFriction([30.0, 20.0], [1.0, 1e-13])]
+    )
     run = rd.simulate(plant, **START, duration_s=5.0, integrator=method)
     assert run.outcome.ending == "diverged"
     assert run.outcome.t < 5.0

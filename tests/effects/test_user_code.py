@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import dedent
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,20 @@ from robot_dyn.codegen.trace.symbolic import TraceError
 from robot_dyn.control.controller import ControlError
 from robot_dyn.errors import EffectError, QueryError, SceneError
 from robot_dyn.simulation.compiled.self_check import MachineError
-from robot_dyn.simulation.table import export_csv
+from robot_dyn.simulation.export.export import export
 from tests.long import long
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.9])
-METHODS = (rd.method("rk4"), rd.method("gauss_4"), rd.Adaptive())
-KINDS = (rd.Controller, rd.Stateless, rd.Conservative, rd.Dissipative, rd.Active, rd.Bound)
+METHODS = (rd.integrate.method("rk4"), rd.integrate.method("gauss_4"), rd.integrate.Adaptive())
+KINDS = (
+    rd.control.Controller,
+    rd.control.Stateless,
+    rd.effects.Conservative,
+    rd.effects.Dissipative,
+    rd.effects.Active,
+    rd.effects.Bound,
+)
 
 
 class LateError(Exception):
@@ -40,12 +48,12 @@ class Fails:
         return value
 
 
-class FailingForce(Fails, rd.Active):
+class FailingForce(Fails, rd.effects.Active):
     def torque(self, dynamics, t, q, v):
         return self._maybe(t, 0.1 * v)
 
 
-class FailingPotential(Fails, rd.Conservative):
+class FailingPotential(Fails, rd.effects.Conservative):
     def torque(self, dynamics, t, q, v):
         return 0 * v
 
@@ -53,14 +61,14 @@ class FailingPotential(Fails, rd.Conservative):
         return self._maybe(float(np.max(t)), 0.0 * q[..., 0])
 
 
-class FailingBound(rd.Bound):
+class FailingBound(rd.effects.Bound):
     def actuation(self, u):
         if u[0] > 0.05:
             raise LateError("own")
         return u
 
 
-class FailingController(Fails, rd.Controller):
+class FailingController(Fails, rd.control.Controller):
     n, state_size = 2, 1
 
     def torque(self, t, q, v, z):
@@ -116,7 +124,7 @@ def test_an_exception_at_the_start_and_in_a_query_is_the_users(error: type[Excep
             ask()
 
 
-class Mistaken(rd.Stateless):
+class Mistaken(rd.control.Stateless):
     n, period_s = 2, 0.0
 
     def __init__(self, period_s: float) -> None:
@@ -138,12 +146,14 @@ def test_an_overflow_in_a_users_code_is_an_outcome_of_the_run() -> None:
     def runaway(t, q, v):
         return ARM.inverse_dynamics(q, v, 1e4 * v)
 
-    run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.2, controller=runaway, integrator=rd.method("rk4"))
+    run = rd.simulate(
+        rd.Plant(ARM), q0=Q, v0=V, duration_s=0.2, controller=runaway, integrator=rd.integrate.method("rk4")
+    )
     assert run.outcome.ending == "diverged" and len(run.t) > 1
 
 
 def test_a_torque_of_a_wrong_shape_is_an_error_of_the_library() -> None:
-    class Wide(rd.Active):
+    class Wide(rd.effects.Active):
         def torque(self, dynamics, t, q, v):
             return np.ones(3)
 
@@ -155,7 +165,7 @@ def test_a_torque_of_a_wrong_shape_is_an_error_of_the_library() -> None:
         rd.Plant(ARM, [Wide()]).torque(0.0, Q, V)
     with pytest.raises(EffectError, match=r"Wide.torque returned shape \(3,\)"):
         rd.Setup(rd.Plant(ARM, [Wide()]), Q)
-    broken, plant = rd.ViscousFriction(0.1), rd.Plant(ARM)
+    broken, plant = rd.effects.ViscousFriction(0.1), rd.Plant(ARM)
     object.__setattr__(broken, "damping", np.ones(3))
     object.__setattr__(plant, "effects", (broken,))
     with pytest.raises(EffectError, match="viscous_friction does not fit"):
@@ -168,13 +178,13 @@ def opaque(t, q, v):
     return np.array([float(v[0]), 0.0])
 
 
-class Opaque(rd.Active):
+class Opaque(rd.effects.Active):
     def torque(self, dynamics, t, q, v):
         table = np.array([0.1, 0.2])
         return table[int(q[0])] * v
 
 
-class Raises(rd.Stateless):
+class Raises(rd.control.Stateless):
     n = 2
 
     def torque(self, t, q, v, z):
@@ -210,7 +220,13 @@ def test_a_function_is_the_controller_of_the_same_law() -> None:
         return 4.0 * (Q - 0.2 - q) - 1.5 * v
 
     setup = rd.Setup(
-        rd.Plant(ARM), Q, V, 0.1, rd.PD(rd.hold(Q - 0.2), 4.0, 1.5), engine="interpreted", integrator="rk4"
+        rd.Plant(ARM),
+        Q,
+        V,
+        0.1,
+        rd.control.PD(rd.control.hold(Q - 0.2), 4.0, 1.5),
+        engine="interpreted",
+        integrator="rk4",
     )
     run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.1, controller=law, integrator="rk4")
     assert np.array_equal(run.q, rd.simulate(setup).q)
@@ -233,7 +249,7 @@ def test_a_function_that_is_no_controller_is_refused(law, said: str) -> None:
     with pytest.raises(ControlError, match=said):
         rd.Setup(rd.Plant(ARM), Q, controller=law)
     with pytest.raises(QueryError, match="controller"):
-        rd.Setup(rd.Plant(ARM), Q, controller=rd.PD)  # a class is not a function of (t, q, v)
+        rd.Setup(rd.Plant(ARM), Q, controller=rd.control.PD)  # a class is not a function of (t, q, v)
 
 
 @pytest.mark.parametrize("engine", [*long(["interpreted"]), "compiled"])
@@ -244,8 +260,8 @@ def test_recorded_controller_states_obey_their_equation(
 ) -> None:
     """dz/dt = ki e without a limit; sampled, z⁺ = z + T ki e at each tick, exactly."""
     ki = 3.0
-    pid = rd.PID(rd.hold(Q - 0.2), 8.0, ki, 2.0, period_s=period_s)
-    method = rd.method("gauss_4" if canonical else "rk4")
+    pid = rd.control.PID(rd.control.hold(Q - 0.2), 8.0, ki, 2.0, period_s=period_s)
+    method = rd.integrate.method("gauss_4" if canonical else "rk4")
     run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.2, controller=pid, engine=engine, integrator=method)
     z, e = run.controller_states, Q - 0.2 - run.q
     assert z is not None and z.shape == (len(run.t), 2)
@@ -259,7 +275,7 @@ def test_recorded_controller_states_obey_their_equation(
         np.testing.assert_allclose(z[1:], np.cumsum(steps, axis=0), rtol=0, atol=0.2 * 1e-6 * 50 * ki / 12)
     again = rd.load_run(rd.save_run(run, tmp_path / "run"))
     assert np.array_equal(again.controller_states, z)  # pyright: ignore[reportArgumentType]
-    rows = export_csv(again, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
+    rows = export(again, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0].endswith("controller state 1,controller state 2")
     assert [float(x) for x in rows[-1].split(",")[-2:]] == z[-1].tolist()
 
@@ -274,11 +290,11 @@ def test_without_controller_states_nothing_is_recorded_of_them(tmp_path) -> None
 def test_interfaces_state_their_contract(kind: type) -> None:
     """Arguments with shapes and units, in the docstring or in that of the base that it names."""
     said = "\n".join(each.__doc__ or "" for each in kind.__mro__ if each.__module__.startswith("robot_dyn"))
-    assert kind.__name__ in rd.__all__
+    assert kind.__name__ in [*rd.effects.__all__, *rd.control.__all__]
     assert all(word in said for word in ("t: time", "q: position", "v: velocity", "in [s]", "[rad/s]", "symbols"))
 
 
-class Drag(rd.Dissipative):
+class Drag(rd.effects.Dissipative):
     """τ = −c |v| v."""
 
     def __init__(self, c: Any, on: bool = True) -> None:
@@ -299,7 +315,7 @@ def test_a_scene_names_effects_that_its_reader_names(keys: str, c: Any, tmp_path
     path = tmp_path / "scene.toml"
     path.write_text(f'{SCENE}[[effect]]\nkind = "gravity"\n[[effect]]\nkind = "drag"\n{keys}\n', encoding="utf-8")
     own = rd.read_scene(path, effects={"drag": Drag})
-    setup = rd.Setup(rd.Plant(ARM, [Drag(c)]), Q, V, 0.1, integrator=rd.Adaptive(rtol=1e-10, atol=1e-12))
+    setup = rd.Setup(rd.Plant(ARM, [Drag(c)]), Q, V, 0.1, integrator=rd.integrate.Adaptive(rtol=1e-10, atol=1e-12))
     expected = rd.simulate(setup, record_period_s=0.01, engine="interpreted")
     assert np.array_equal(rd.simulate(own).q, expected.q)
     with pytest.raises(SceneError, match=r"line 8: effect 2 \(drag\): kind: no kind 'drag'"):
@@ -325,7 +341,7 @@ def test_wrong_keys_of_an_effect_of_a_users_own_are_told(keys: str, said: str, t
 
 
 @dataclass(eq=False)
-class Changing(rd.Active):
+class Changing(rd.effects.Active):
     """An effect whose coefficient its owner changes between two runs."""
 
     stiffness: float
@@ -345,4 +361,32 @@ def test_machine_code_of_a_part_that_has_changed_since_is_refused() -> None:
     with pytest.raises(MachineError, match="differs from the interpreted one"):
         rd.simulate(setup)
     with pytest.raises(MachineError, match="differs from the interpreted one"):
-        rd.simulate(setup, integrator=rd.Adaptive())
+        rd.simulate(setup, integrator=rd.integrate.Adaptive())
+
+
+@pytest.mark.parametrize(
+    ("options", "remedy"),
+    [
+        (
+            {"controller": rd.control.ControlLaw(lambda t, q, v: ARM.N(q), len(Q))},
+            "make it an attribute of a rd.control.S",
+        ),
+        ({"events": [rd.Event(lambda t, q, v: ARM.total_energy(q, v))]}, "take engine='interpreted'"),
+    ],
+    ids=["controller", "event"],
+)
+def test_an_arm_inside_a_function_is_named_as_what_cannot_be_traced(options, remedy) -> None:
+    with pytest.raises(TraceError, match=rf"an arm inside a function cannot be traced[:;] {remedy}"):
+        rd.simulate(rd.Plant(ARM), Q, duration_s=0.1, engine="compiled", **options)
+
+
+def test_the_example_of_a_controller_can_be_swept_and_is_compiled() -> None:
+    """The one of `help(rd.control.Stateless)`: gravity and damping are compensated, so that a motion at rest stays."""
+    text = str(rd.control.Stateless.__doc__)
+    names: dict[str, Any] = {"rd": rd, "dataclass": dataclass, "field": field}
+    exec(dedent(text[text.index("        @dataclass") :]), names)
+    setup = rd.Setup(rd.Plant(ARM), Q, duration_s=0.1, controller=names["Damped"](ARM, 3.0), engine="compiled")
+    assert "damping" in repr(rd.sweepable(setup))
+    run = rd.simulate(setup)
+    assert run.statistics.engine == "compiled"
+    assert np.abs(run.q[-1] - Q).max() < 1e-12

@@ -40,11 +40,13 @@ def limited(seed: int, index: int) -> Limited:
     n, scale = arm.n, np.diag(arm.M(np.full(arm.n, 0.4)))
     q, fast = rng.uniform(-0.5, 0.5, n), 10 ** rng.uniform(2.0, 3.0)
     method = str(rng.choice(METHODS))
-    effects: list[rd.Effect] = [] if sampled else [rd.ViscousFriction(scale * fast * rng.uniform(0.3, 1.0, n))]
+    effects: list[rd.Effect] = [] if sampled else [rd.effects.ViscousFriction(scale * fast * rng.uniform(0.3, 1.0, n))]
     controller = None
     if sampled or rng.random() < 0.5:
-        gains = rd.gains_from(scale, fast * rng.uniform(0.1, 0.5), rng.uniform(0.7, 1.5))
-        controller = rd.PD(rd.hold(q + rng.uniform(-0.05, 0.05, n)), *gains, period_s=1e-4 if sampled else 0.0)
+        gains = rd.control.gains_from(scale, fast * rng.uniform(0.1, 0.5), rng.uniform(0.7, 1.5))
+        controller = rd.control.PD(
+            rd.control.hold(q + rng.uniform(-0.05, 0.05, n)), *gains, period_s=1e-4 if sampled else 0.0
+        )
     setup = rd.Setup(
         rd.Plant(arm, effects), q, np.zeros(n), 0.5, controller, method, 1e-4, estimate_error=False
     )  # fmt: skip

@@ -23,7 +23,9 @@ def asked_scene(seed: int, index: int) -> tuple[Scene, float]:
     plant = made.setup.plant
     if family == "stiff":
         n, scale = plant.dynamics.n, np.diag(plant.dynamics.M(made.setup.q0))
-        plant = rd.Plant(plant.dynamics, [*plant.effects, rd.ViscousFriction(scale * 10 ** rng.uniform(2, 4.3, n))])
+        plant = rd.Plant(
+            plant.dynamics, [*plant.effects, rd.effects.ViscousFriction(scale * 10 ** rng.uniform(2, 4.3, n))]
+        )
     setup = replace(made.setup, plant=plant, integrator="auto", step_s=None)
     return Scene(family, setup, made.label), float(10 ** rng.uniform(-10, -3))
 
@@ -77,18 +79,18 @@ def request(seed: int, index: int) -> tuple[Scene, float]:
     scale, duration = np.diag(arm.M(q)), float(np.round(rng.uniform(0.05, 1.2), 3))
     effects: list[rd.Effect] = []
     if rng.random() < 0.4:
-        effects.append(rd.ViscousFriction(scale * rng.uniform(0.1, 3, n)))
+        effects.append(rd.effects.ViscousFriction(scale * rng.uniform(0.1, 3, n)))
     if rng.random() < 0.2:
-        effects.append(rd.RegularisedCoulombFriction(scale * rng.uniform(0.3, 5, n), 10 ** rng.uniform(-2, -1)))
+        effects.append(rd.effects.RegularisedCoulombFriction(scale * rng.uniform(0.3, 5, n), 10 ** rng.uniform(-2, -1)))
     law, kind = None, rng.random()
     if kind < 0.6:
-        plan = rd.quintic(q, q + rng.uniform(-0.5, 0.5, n), duration * rng.uniform(0.4, 1.2))
+        plan = rd.control.quintic(q, q + rng.uniform(-0.5, 0.5, n), duration * rng.uniform(0.4, 1.2))
         period = float(rng.choice([0.002, 0.005, 0.01])) if kind < 0.2 else 0.0
         if rng.random() < 0.4:
-            gains = rd.gains_from(1.0, rng.uniform(3, 12))
-            law = rd.ComputedTorque(arm.with_(mass_scale=1.1), plan, *gains, period_s=period)
+            gains = rd.control.gains_from(1.0, rng.uniform(3, 12))
+            law = rd.control.ComputedTorque(arm.with_(mass_scale=1.1), plan, *gains, period_s=period)
         else:
-            law = rd.PD(plan, *rd.gains_from(scale, rng.uniform(3, 12), 0.7), period_s=period)
+            law = rd.control.PD(plan, *rd.control.gains_from(scale, rng.uniform(3, 12), 0.7), period_s=period)
     setup = rd.Setup(
         rd.Plant(arm, effects), q, v, duration, law, record_period_s=duration / 20, engine="interpreted"
     )  # fmt: skip

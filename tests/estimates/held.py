@@ -25,18 +25,18 @@ def held_scene(seed: int, index: int, of: str = "") -> tuple[Scene, float]:
     arm = arms()[name]
     n, q, v = arm.n, *rng.uniform(-1, 1, (2, arm.n))
     scale, duration = np.diag(arm.M(q)), float(np.round(rng.uniform(0.3, 1.2), 3))
-    effects: list[rd.Effect] = [rd.ViscousFriction(scale * rng.uniform(0.1, 1, n))]
+    effects: list[rd.Effect] = [rd.effects.ViscousFriction(scale * rng.uniform(0.1, 1, n))]
     if rng.random() < 0.5:
-        effects.append(rd.Spring(scale * rng.uniform(1, 30, n), rng.uniform(-1, 1, n)))
+        effects.append(rd.effects.Spring(scale * rng.uniform(1, 30, n), rng.uniform(-1, 1, n)))
     if family == "dry" or rng.random() < 0.4:
         effects.append(_friction(rng, scale * rng.uniform(0.3, 8, n)))
     if family == "rigid":
         lower, upper = q - rng.uniform(0.05, 0.6, n), q + rng.uniform(0.05, 0.6, n)
-        effects.append(rd.RigidStops(lower, upper, rng.uniform(0, 0.9, n) * (rng.random(n) < 0.7)))
+        effects.append(rd.effects.RigidStops(lower, upper, rng.uniform(0, 0.9, n) * (rng.random(n) < 0.7)))
     drive = None
     if rng.random() < 0.5:
         gains = scale * rng.uniform(5, 60, n), scale * rng.uniform(0.3, 3, n)
-        drive = rd.PD(rd.hold(q + rng.uniform(-0.5, 0.5, n)), *gains)
+        drive = rd.control.PD(rd.control.hold(q + rng.uniform(-0.5, 0.5, n)), *gains)
     setup = rd.Setup(rd.Plant(arm, effects), q, v, duration, drive, record_period_s=duration / 20)
     return Scene(family, setup, f"{seed}/{index} {family} {name} T={duration:g}"), float(10 ** rng.uniform(-10, -3))
 
@@ -45,10 +45,10 @@ def _friction(rng: np.random.Generator, level: np.ndarray) -> rd.Effect:
     """Of one level, of two, or by Stribeck's curve."""
     kind = rng.random()
     if kind < 0.5:
-        return rd.DryFriction(level)
+        return rd.effects.DryFriction(level)
     if kind < 0.8:
-        return rd.DryFriction(level, level * rng.uniform(1, 1.5, len(level)))
-    return rd.DryFriction(level, level * 1.3, 0.2)
+        return rd.effects.DryFriction(level, level * rng.uniform(1, 1.5, len(level)))
+    return rd.effects.DryFriction(level, level * 1.3, 0.2)
 
 
 def cut(made: Scene) -> Scene:

@@ -36,13 +36,13 @@ class Bodies:
     def __init__(self, setup: rd.Setup) -> None:
         model, self.n, self.law = setup.plant.dynamics.model, len(setup.q0), setup.controller
         self.model, self.data, effects = model, model.createData(), setup.plant.effects
-        self.friction = [each for each in effects if isinstance(each, rd.DryFriction)]
-        stops = [each for each in effects if isinstance(each, rd.RigidStops)]
+        self.friction = [each for each in effects if isinstance(each, rd.effects.DryFriction)]
+        stops = [each for each in effects if isinstance(each, rd.effects.RigidStops)]
         none = np.full(self.n, np.inf)
         known = (stops[0].lower, stops[0].upper, stops[0].restitution) if stops else (-none, none, 0)
         self.lower, self.upper, e = known
         self.e, self.stops = np.broadcast_to(np.asarray(e, float), self.n), bool(stops)
-        others = [each for each in effects if not isinstance(each, rd.DryFriction | rd.RigidStops)]
+        others = [each for each in effects if not isinstance(each, rd.effects.DryFriction | rd.effects.RigidStops)]
         self.several = False  # whether more than one mode was possible behind an event
         self.forces = [_force(model, self.data, each)(0.0) for each in others]
 

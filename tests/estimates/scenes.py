@@ -60,24 +60,24 @@ def scene(seed: int, index: int, of: str = "") -> Scene:
     scale = np.diag(arm.M(q))  # so that forces fit the arm
     effects: list[rd.Effect] = []
     if family != "impact" and rng.random() < 0.5:
-        effects.append(rd.ViscousFriction(scale * rng.uniform(0.1, 2.0, n)))
+        effects.append(rd.effects.ViscousFriction(scale * rng.uniform(0.1, 2.0, n)))
     if rng.random() < 0.3:
-        effects.append(rd.Spring(scale * rng.uniform(1, 30, n), rng.uniform(-1, 1, n)))
+        effects.append(rd.effects.Spring(scale * rng.uniform(1, 30, n), rng.uniform(-1, 1, n)))
     if family == "friction":
-        effects.append(rd.RegularisedCoulombFriction(scale * rng.uniform(0.3, 8, n), 10 ** rng.uniform(-3, -1)))
+        effects.append(rd.effects.RegularisedCoulombFriction(scale * rng.uniform(0.3, 8, n), 10 ** rng.uniform(-3, -1)))
     if family == "impact":
         effects += _stops(rng, arm, name, q, v, scale)
     if family == "window":
         effects += _windows(rng, arm, float(scale.max()), duration)
     controller = _controller(rng, arm, family, q, scale, duration)
     if rng.random() < 0.35:
-        method = rd.Adaptive(rtol=10 ** rng.uniform(-11, -5), atol=10 ** rng.uniform(-13, -8))
+        method = rd.integrate.Adaptive(rtol=10 ** rng.uniform(-11, -5), atol=10 ** rng.uniform(-13, -8))
         text = f"DOP853 {method.rtol:.0e}"
     else:
-        method = rd.method("rk4" if arm.n > 2 else str(rng.choice(METHODS)))
+        method = rd.integrate.method("rk4" if arm.n > 2 else str(rng.choice(METHODS)))
         text = method.name
     step = float(np.round(10 ** rng.uniform(-3.4, -1.9), 6))
-    fixed = {} if isinstance(method, rd.Adaptive) else {"step_s": step}
+    fixed = {} if isinstance(method, rd.integrate.Adaptive) else {"step_s": step}
     setup = rd.Setup(rd.Plant(arm, effects), q, v, duration, controller, method, engine="interpreted", **fixed)
     return Scene(family, setup, f"{seed}/{index} {family} {name} {text} h={step:g} T={duration:g}")
 
@@ -91,7 +91,7 @@ def _stops(rng: np.random.Generator, arm: rd.Robot, name: str, q, v, scale) -> l
         upper = q + v**2 / (2 * 9.80665) - 10 ** rng.uniform(-6, -2)
         lower = q - 50.0
     damping = stiffness * rng.choice([0.0, 0.1])
-    return list(rd.joint_stops(lower, upper, stiffness, damping))
+    return list(rd.effects.joint_stops(lower, upper, stiffness, damping))
 
 
 def _windows(rng: np.random.Generator, arm: rd.Robot, scale: float, duration: float) -> list[rd.Effect]:
@@ -100,7 +100,7 @@ def _windows(rng: np.random.Generator, arm: rd.Robot, scale: float, duration: fl
         start = rng.uniform(0, duration)
         length = duration * 10 ** rng.uniform(-5, -0.3)
         force = scale * rng.normal(size=6) * min(10.0, 1.0 / length)
-        made.append(rd.ExternalWrench(arm.frame_names[-1], force, start_s=start, end_s=start + length))
+        made.append(rd.effects.ExternalWrench(arm.frame_names[-1], force, start_s=start, end_s=start + length))
     return made
 
 
@@ -108,8 +108,10 @@ def _controller(rng: np.random.Generator, arm: rd.Robot, family: str, q, scale, 
     period = float(rng.choice([0.002, 0.005, 0.01, 0.02])) if family == "sampled" else 0.0
     if family != "sampled" and rng.random() < 0.6:
         return None
-    plan = rd.quintic(q, q + rng.uniform(-0.5, 0.5, arm.n), duration * rng.uniform(0.4, 1.2))
+    plan = rd.control.quintic(q, q + rng.uniform(-0.5, 0.5, arm.n), duration * rng.uniform(0.4, 1.2))
     omega = rng.uniform(3, 12)
     if rng.random() < 0.3:
-        return rd.ComputedTorque(arm.with_(mass_scale=1.1), plan, *rd.gains_from(1.0, omega), period_s=period)
-    return rd.PD(plan, *rd.gains_from(scale, omega, 0.7), period_s=period)
+        return rd.control.ComputedTorque(
+            arm.with_(mass_scale=1.1), plan, *rd.control.gains_from(1.0, omega), period_s=period
+        )
+    return rd.control.PD(plan, *rd.control.gains_from(scale, omega, 0.7), period_s=period)

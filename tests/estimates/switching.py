@@ -28,19 +28,19 @@ def switching_scene(seed: int, index: int) -> Scene:
     arm = arms()[name]
     n, q, v = arm.n, *rng.uniform(-1, 1, (2, arm.n))
     scale, duration = np.diag(arm.M(q)), float(np.round(rng.uniform(0.2, 0.6), 3))
-    effects: list[rd.Effect] = [rd.ViscousFriction(scale * rng.uniform(0.1, 1, n))] * int(rng.integers(2))
+    effects: list[rd.Effect] = [rd.effects.ViscousFriction(scale * rng.uniform(0.1, 1, n))] * int(rng.integers(2))
     if rng.random() < 0.5:
-        effects.append(rd.Spring(scale * rng.uniform(1, 30, n), rng.uniform(-1, 1, n)))
+        effects.append(rd.effects.Spring(scale * rng.uniform(1, 30, n), rng.uniform(-1, 1, n)))
     if family == "bristles":
         effects.append(_bristles(rng, scale))
     if family == "stops" or rng.random() < 0.2:
         stiffness = scale * 10 ** rng.uniform(2, 6)
         lower, upper = q - rng.uniform(0.02, 0.5, n), q + rng.uniform(0.02, 0.5, n)
-        effects += rd.joint_stops(lower, upper, stiffness, stiffness * rng.choice([0.0, 0.1]))
+        effects += rd.effects.joint_stops(lower, upper, stiffness, stiffness * rng.choice([0.0, 0.1]))
     drive = None
     if rng.random() < 0.4:
-        plan = rd.quintic(q, q + rng.uniform(-0.5, 0.5, n), duration * rng.uniform(0.4, 1.2))
-        drive = rd.PD(plan, *rd.gains_from(scale, rng.uniform(3, 12), 0.7))
+        plan = rd.control.quintic(q, q + rng.uniform(-0.5, 0.5, n), duration * rng.uniform(0.4, 1.2))
+        drive = rd.control.PD(plan, *rd.control.gains_from(scale, rng.uniform(3, 12), 0.7))
     text = str(rng.choice([*METHODS, "order_8", "order_8", "rk4", "gauss_6"]))
     step = float(np.round(10 ** rng.uniform(-3.3, -2.1), 6))
     setup = rd.Setup(rd.Plant(arm, effects), q, v, duration, drive, text, step, engine="interpreted")
@@ -52,7 +52,7 @@ def _bristles(rng: np.random.Generator, scale: np.ndarray) -> rd.Effect:
     level = scale * rng.uniform(0.3, 8, len(scale))
     stiffness = scale * 10 ** rng.uniform(2, 5)
     if rng.random() < 0.3:
-        return rd.DahlFriction(stiffness, level)
+        return rd.effects.DahlFriction(stiffness, level)
     damping = scale * np.sqrt(stiffness / scale) * rng.uniform(0, 2)
     viscous, more = scale * rng.uniform(0, 1), rng.uniform(1, 1.5)
-    return rd.LuGreFriction(stiffness, damping, viscous, level, level * more, 10 ** rng.uniform(-2, -0.7))
+    return rd.effects.LuGreFriction(stiffness, damping, viscous, level, level * more, 10 ** rng.uniform(-2, -0.7))

@@ -20,7 +20,10 @@ from scipy.optimize import brentq
 
 import robot_dyn as rd
 
-STOPS, BRISTLES = (rd.JointStopSpring, rd.JointStopDamper), (rd.LuGreFriction, rd.DahlFriction)
+STOPS, BRISTLES = (
+    (rd.effects.JointStopSpring, rd.effects.JointStopDamper),
+    (rd.effects.LuGreFriction, rd.effects.DahlFriction),
+)
 _LOOKS = np.linspace(0, 1, 9)  # of a step: where guards are looked at
 _DEEP, _SLOW = 1e-15, 1e-12  # [rad], [rad/s]: by which a level is passed
 
@@ -42,7 +45,7 @@ def truth(setup: rd.Setup, times: np.ndarray, tolerance: float = 3e-14, longest:
     ends = [t for t, after in zip(ends, [*ends[1:], np.inf], strict=True) if after - t > 1e-12]
     least = np.full((2 + len(bristles)) * n, tolerance / 10)
     for each in stops:
-        if isinstance(each, rd.JointStopSpring):
+        if isinstance(each, rd.effects.JointStopSpring):
             least[n : 2 * n] = np.maximum(least[n : 2 * n], _rounding(model, setup.q0, each.stiffness))
     y = np.concatenate([setup.q0, setup.v0, *(none for _ in bristles)])
     held, result = None, np.empty((len(times), n))
@@ -167,7 +170,7 @@ class Bristles:
         """Torque and rate of the deflection."""
         e = self.effect
         stiffness = e.bristle_stiffness
-        if isinstance(e, rd.DahlFriction):
+        if isinstance(e, rd.effects.DahlFriction):
             w = 1 - stiffness * z / e.coulomb * way
             return -stiffness * z, np.abs(w) ** (1.0 if e.exponent is None else e.exponent) * np.sign(w) * v
         level = e.coulomb + (e.breakaway - e.coulomb) * np.exp(-((v / e.stribeck_velocity) ** 2))
@@ -180,7 +183,7 @@ def _stop(stop, q, v, low, high) -> np.ndarray:
     below, above = np.where(low, stop.lower - q, 0.0), np.where(high, q - stop.upper, 0.0)
     return (
         stop.stiffness * (below - above)
-        if isinstance(stop, rd.JointStopSpring)
+        if isinstance(stop, rd.effects.JointStopSpring)
         else -stop.damping * (below + above) * v
     )
 
@@ -199,13 +202,13 @@ def _rounding(model, q, stiffness) -> float:
 
 def _force(model, data, effect) -> Callable[[float], Callable]:
     """Torque of an effect on (q, v), for the time at which it is asked."""
-    if isinstance(effect, rd.ViscousFriction):
+    if isinstance(effect, rd.effects.ViscousFriction):
         return lambda t: lambda q, v: -effect.damping * v
-    if isinstance(effect, rd.Spring):
+    if isinstance(effect, rd.effects.Spring):
         return lambda t: lambda q, v: -effect.stiffness * (q - effect.rest)
-    if isinstance(effect, rd.RegularisedCoulombFriction):
+    if isinstance(effect, rd.effects.RegularisedCoulombFriction):
         return lambda t: lambda q, v: -effect.friction * np.tanh(v / effect.velocity_scale)
-    assert isinstance(effect, rd.ExternalWrench)
+    assert isinstance(effect, rd.effects.ExternalWrench)
     frame = model.getFrameId(effect.frame)
 
     def wrench(t: float) -> Callable:
@@ -227,7 +230,7 @@ def _control(law, model, data, t: float, q, v, middle: float) -> np.ndarray:
     plan = law.reference
     t = min(max(t, 0.0), np.nextafter(plan.breaks[-1], 0)) if middle < plan.breaks[-1] else t
     q_d, v_d, a_d = plan.at(t)
-    if isinstance(law, rd.PD):
+    if isinstance(law, rd.control.PD):
         return law.kp * (q_d - q) + law.kd * (v_d - v)
     own = law.model.model
     return pin.rnea(own, own.createData(), q, v, a_d + law.kp * (q_d - q) + law.kd * (v_d - v))

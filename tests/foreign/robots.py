@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from tests.foreign.files import ARM, Foreign, arm, inside
-from tests.hostile.kinds import LIMIT, PARENT, joint
+from tests.hostile.kinds import BODY, LIMIT, MOMENTS, PARENT, POINT, joint
 
 SAFETY = '<safety_controller k_velocity="-1" soft_lower_limit="nan"/>'
 CAPSULE = """<link name="tool"><visual><geometry><capsule radius="1"/></geometry></visual>
   <visual><geometry><mesh filename="http://x/y.stl"/></geometry></visual></link>"""
+NO_MOMENTS = 'ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"'
 BASE = '  <link name="base"/>\n'
 ROOT = ("parent link 'base' is not defined", "taken as the root", "add <link")
 ONE_BODY = """<ros2_control name="a" type="system"><joint name="elbow"><command_interface name="position"/></joint>
@@ -50,6 +51,18 @@ FILES = [
             sound=arm((LIMIT, '<limit effort="9"/>'))),
     Foreign("a limit that is not a number", arm((LIMIT, taken("effort", 'effort="nan"'))),
             refused=("effort", "'nan'")),
+    Foreign("two inertials of a link, the second one light", ARM.replace("</inertial>", "</inertial>" + POINT, 1),
+            (("link 'upper'", "2 <inertial> elements", "the first is taken", "keep one"),)),
+    Foreign("two limits of a joint", arm((LIMIT, LIMIT + '<limit lower="0" upper="0.1" effort="1" velocity="1"/>')),
+            (("joint 'shoulder'", "2 <limit> elements", "the first is taken", "keep one"),)),
+    Foreign("a mass without inertia", arm((f"<inertia {MOMENTS}/>", "")),
+            (("link 'upper'", "no <inertia>", "taken as 0", "add it"),), sound=arm((MOMENTS, NO_MOMENTS))),
+    Foreign("products of inertia left out", arm((MOMENTS, 'ixx="0.02" iyy="0.02" izz="0.01"')),
+            (("link 'upper'", "no ixy, ixz, iyz", "taken as 0"),)),
+    Foreign("a link beside the arm", inside(f'<link name="table">{BODY}</link>'),
+            (("link 'table'", "no joint connects it", "left out", "connect it by a joint"),)),
+    Foreign("links beside a root that is not defined, which may be misspelt",
+            inside('<link name="table"/>').replace(BASE, ""), refused=("'base' is not defined",)),
     Foreign("elements of other programs", inside(ONE_BODY)),
     Foreign("a version of the format", ARM.replace("<robot ", '<robot version="1.0" ')),
     Foreign("elements of ROS 1 in a joint",
@@ -58,8 +71,8 @@ FILES = [
     Foreign("links after joints", ARM.replace(BASE, "").replace("</robot>", BASE + "</robot>")),
     Foreign("a closed loop", inside(joint("strut", "base", "fore")), refused=("link 'fore'", "two parents")),
     Foreign("a robot without name", ARM.replace(' name="arm"', "", 1), refused=("<robot>", "has no name")),
-    Foreign("SDF", '<sdf version="1.7"><model name="arm"/></sdf>', refused=("<sdf>", "give a URDF file")),
-    Foreign("MJCF", '<mujoco model="arm"><worldbody/></mujoco>', refused=("<mujoco>", "give a URDF file")),
+    Foreign("SDF", '<sdf version="1.7"><model name="arm"/></sdf>', refused=("is SDF, not URDF", "no converter")),
+    Foreign("MJCF", '<mujoco model="arm"><worldbody/></mujoco>', refused=("is MJCF, not URDF", ".xml")),
     Foreign("a ball joint", arm(('name="elbow" type="revolute"', 'name="elbow" type="ball"')),
             refused=("'ball'", "revolute")),
     Foreign("a page of the web", "<!DOCTYPE html><html></html>",

@@ -19,9 +19,9 @@ import numpy as np
 import robot_dyn as rd
 from robot_dyn.errors import RobotDynError
 from robot_dyn.scene.starters import starter
+from robot_dyn.simulation.export.export import export
 from robot_dyn.simulation.results import archive
 from robot_dyn.simulation.results.provenance import robot_of
-from robot_dyn.simulation.table import export_csv
 from robot_dyn.view.document import document
 from robot_dyn.view.plots.plots import PLOTS, PlotError, _view
 from tests.fuzz.bytes import WORDS, damage
@@ -67,11 +67,11 @@ def attempt(mutant: bytes, folder: Path) -> str:
     run = rd.load_run(path)
     assert isinstance(run.summary, str)
     (folder / "mutant.csv").unlink(missing_ok=True)
-    export_csv(run, folder / "mutant.csv")
+    export(run, folder / "mutant.csv")
     rd.save_run(run, path)
     robot_of(run)
     with suppress(RobotDynError):  # of a run that plots or replays refuse
-        view = _view(run, None, None)
+        view = _view(run, run.joint_names, None, 180.0)
         for panel in PLOTS.values():
             with suppress(PlotError), np.errstate(all="ignore"):
                 panel(view)

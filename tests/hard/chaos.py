@@ -36,15 +36,15 @@ METHODS: dict[str, Any] = {
     "planar_2r": {
         "rk4": ("rk4", 0.01), "gauss_4": ("gauss_4", 0.01), "midpoint": ("midpoint", 1e-3),
         "semi_implicit_euler": ("semi_implicit_euler", 1e-3), "sdirk_3": ("sdirk_3", 2e-3),
-        "DOP853 of rtol 1e-7": (rd.Adaptive("DOP853", 1e-7, 1e-9), 0.0),
-        "Rosenbrock of rtol 1e-6": (rd.Adaptive("Rosenbrock", 1e-6, 1e-8), 0.0),
+        "DOP853 of rtol 1e-7": (rd.integrate.Adaptive("DOP853", 1e-7, 1e-9), 0.0),
+        "Rosenbrock of rtol 1e-6": (rd.integrate.Adaptive("Rosenbrock", 1e-6, 1e-8), 0.0),
     },
-    "panda": {"rk4": ("rk4", 2e-3), "DOP853 of rtol 1e-6": (rd.Adaptive("DOP853", 1e-6, 1e-8), 0.0)},
+    "panda": {"rk4": ("rk4", 2e-3), "DOP853 of rtol 1e-6": (rd.integrate.Adaptive("DOP853", 1e-6, 1e-8), 0.0)},
 }  # fmt: skip
 FINE = {
     "order_8": ("order_8", 2e-3), "gauss_6": ("gauss_6", 5e-3),
-    "DOP853 of rtol 1e-11": (rd.Adaptive("DOP853", 1e-11, 1e-13), 0.0),
-    "DOP853 of rtol 3e-14": (rd.Adaptive("DOP853", 3e-14, 1e-15), 0.0),
+    "DOP853 of rtol 1e-11": (rd.integrate.Adaptive("DOP853", 1e-11, 1e-13), 0.0),
+    "DOP853 of rtol 3e-14": (rd.integrate.Adaptive("DOP853", 3e-14, 1e-15), 0.0),
 }  # fmt: skip
 SLOW = ("sdirk_3", "Rosenbrock of rtol 1e-6")  # their steps are not compiled: 4 starts
 SHORT = {"planar_2r": ("rk4", "semi_implicit_euler", "DOP853 of rtol 1e-7"), "panda": ("rk4", "DOP853 of rtol 1e-6")}
@@ -161,7 +161,7 @@ def _lyapunov(seed: int) -> Iterator[Row]:
     """Of a run half of whose samples are middles of steps."""
     robot, duration, small, h = arm("planar_2r"), 3.0, 1e-6, PERIOD / 4
     q0, v0 = start(seed, 2)
-    method = rd.Adaptive("DOP853", 1e-11, 1e-13)
+    method = rd.integrate.Adaptive("DOP853", 1e-11, 1e-13)
     run = rd.simulate(robot, q0, v0, duration_s=duration, integrator=method, record_period_s=h / 2)
     A = [rd.linearise(robot, q, v, np.zeros(2))[0] for q, v in zip(run.q, run.v, strict=True)]
     aside = np.array([1.0, -1.0])

@@ -76,7 +76,7 @@ def errors(
     robot: rd.Robot, engines: dict[str, Any], at: list[dict[str, np.ndarray]], queries: tuple[Quantity, ...] = QUERIES
 ) -> Iterator[Error]:
     """Of each implementation and quantity at each state; of forward dynamics where an engine has it."""
-    own, truth = rd.Lagrangian(robot), rd.Lagrangian(robot, rd.Ball(BITS))
+    own, truth = rd.Lagrangian(robot), rd.Lagrangian(robot, rd.studies.Ball(BITS))
     for state in at:
         size, absolute = magnitudes(own.linkage, state["q"]), {key: np.abs(x) for key, x in state.items()}
         exact = {each.name: each.ask(truth, state) for each in QUERIES}

@@ -45,7 +45,7 @@ def loaded(name: str) -> rd.Robot:
 def implementations(robot: rd.Robot) -> Implementations:
     """Of a robot whose right angles are written out in full."""
     engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}
-    return Implementations(robot, engines, rd.Lagrangian(robot, rd.Ball(BITS)))
+    return Implementations(robot, engines, rd.Lagrangian(robot, rd.studies.Ball(BITS)))
 
 
 def error(of: Implementations, implementation: str, quantity: Quantity, state: dict[str, np.ndarray]) -> float:

@@ -153,7 +153,7 @@ def oil(seed: int) -> Iterator[Row]:
     def implicit(module: Any, model: Any) -> None:
         model.opt.integrator, model.dof_damping[:] = module.mjtIntegrator.mjINT_IMPLICITFAST, c
 
-    effects = [rd.ViscousFriction(c)]
+    effects = [rd.effects.ViscousFriction(c)]
     yield from judged(
         "a pendulum in oil, c = 1e4, 10 s", "q, rad", 1e-6, lambda end: abs(end.q[0] - known),
         {
@@ -184,9 +184,9 @@ def rest(seed: int) -> Iterator[Row]:
     yield from judged(
         "a block held by friction 1 % above its weight, 10 s", "moved, m", 0.0, lambda end: abs(end.q[0]),
         {
-            f"{OURS}, default": lambda: ours(robot, [0.0], 10.0, [rd.DryFriction(force)]),
+            f"{OURS}, default": lambda: ours(robot, [0.0], 10.0, [rd.effects.DryFriction(force)]),
             f"{OURS}, time_stepping, 1 ms": lambda: ours(
-                robot, [0.0], 10.0, [rd.DryFriction(force)], integrator="time_stepping", step_s=STEP_S
+                robot, [0.0], 10.0, [rd.effects.DryFriction(force)], integrator="time_stepping", step_s=STEP_S
             ),
             "MuJoCo, frictionloss, solref 2 h, solimp 0.9999, 1 ms": lambda: mujoco(robot, 0.0, 10.0, stiffest),
             "Drake, runge_kutta5, accuracy 1e-10": no_friction,
@@ -204,7 +204,7 @@ def stopped(seed: int) -> Iterator[Row]:
         model.jnt_solref[:], model.jnt_solimp[:] = [2 * STEP_S, 1.0], [0.9999, 0.9999, 0.001, 0.5, 2.0]
         model.opt.tolerance, model.opt.iterations = 0.0, 100
 
-    stops = [rd.RigidStops(-FALL, 10.0)]
+    stops = [rd.effects.RigidStops(-FALL, 10.0)]
     yield from judged(
         "a block that falls on a stop, 2 s", "from the stop at the end, m", 1e-9, lambda end: abs(end.q[0] + FALL),
         {

@@ -48,13 +48,13 @@ def _of_bar(effect: Any, q0: float, v0: float, duration: float, q: Callable[[flo
 def damper(b: float) -> Motion:
     """A joint that comes to rest."""
     decay = b / INERTIA
-    return _of_bar(rd.ViscousFriction(b), 0.3, SPEED, 0.5, lambda t: 0.3 - SPEED / decay * np.expm1(-decay * t))
+    return _of_bar(rd.effects.ViscousFriction(b), 0.3, SPEED, 0.5, lambda t: 0.3 - SPEED / decay * np.expm1(-decay * t))
 
 
 def spring(k: float) -> Motion:
     """A joint that swings, some 80 times at most."""
     rate = np.sqrt(k / INERTIA)
-    return _of_bar(rd.Spring(k), 1e-2, 0.0, float(min(0.5, 500 / rate)), lambda t: 1e-2 * np.cos(rate * t))
+    return _of_bar(rd.effects.Spring(k), 1e-2, 0.0, float(min(0.5, 500 / rate)), lambda t: 1e-2 * np.cos(rate * t))
 
 
 def stop(k: float) -> Motion:
@@ -67,7 +67,7 @@ def stop(k: float) -> Motion:
             return SPEED * (t - touch)
         return SPEED / rate * np.sin(inside) if inside < np.pi else -SPEED * (t - touch - np.pi / rate)
 
-    return _of_bar(rd.JointStopSpring(-9.0, 0.0, k), -SPEED * touch, SPEED, 0.5, q)
+    return _of_bar(rd.effects.JointStopSpring(-9.0, 0.0, k), -SPEED * touch, SPEED, 0.5, q)
 
 
 def dry(width: float) -> Motion:
@@ -82,7 +82,7 @@ def dry(width: float) -> Motion:
         speed = near * width
         return INERTIA / friction * ((SPEED - speed) * (SPEED + speed) / 2 + width**2 * rest)
 
-    return _of_bar(rd.RegularisedCoulombFriction(friction, width), 0.0, SPEED, 0.5, q)
+    return _of_bar(rd.effects.RegularisedCoulombFriction(friction, width), 0.0, SPEED, 0.5, q)
 
 
 def of_arm(

@@ -57,7 +57,7 @@ def _asked(case: str, motion: Motion, setup: rd.Setup) -> Row:
 
 
 def _controlled(case: str, motion: Motion, setup: rd.Setup) -> Row:
-    run = rd.simulate(setup, integrator=rd.Adaptive("Rosenbrock", ASKED, ASKED / 100))
+    run = rd.simulate(setup, integrator=rd.integrate.Adaptive("Rosenbrock", ASKED, ASKED / 100))
     error = true_error(run, motion)
     scale = ASKED * float(np.abs(run.q).max()) + ASKED / 100
     said = str(run.error) if run.error.final >= LEAST * error else ""
@@ -95,7 +95,7 @@ def _explicit(case: str, motion: Motion, setup: rd.Setup) -> Iterator[Row]:
 
 def _driven(name: str, k: float) -> Motion:
     d = np.sqrt(k)
-    law = rd.PD(rd.hold(np.full(rd.load(name).n, 0.3)), k, d)
+    law = rd.control.PD(rd.control.hold(np.full(rd.load(name).n, 0.3)), k, d)
     return of_arm(name, [], lambda q, v: k * (0.3 - q) - d * v, law)
 
 
@@ -106,13 +106,15 @@ ONE: dict[str, Any] = {
     **{f"tanh friction of width {w:g} rad/s": partial(dry, w) for w in (1e-2, 1e-6)},
 }
 ARMS: dict[str, Any] = {
-    "2R, dampers of 1e4 N m s/rad": partial(of_arm, "planar_2r", [rd.ViscousFriction(1e4)], lambda q, v: -1e4 * v),
+    "2R, dampers of 1e4 N m s/rad": partial(
+        of_arm, "planar_2r", [rd.effects.ViscousFriction(1e4)], lambda q, v: -1e4 * v
+    ),
     "2R, PD of 1e6 N m/rad": partial(_driven, "planar_2r", 1e6),
     "2R, tanh friction of width 1e-4 rad/s": partial(
-        of_arm, "planar_2r", [rd.RegularisedCoulombFriction(30.0, 1e-4)], lambda q, v: -30.0 * np.tanh(v / 1e-4)
+        of_arm, "planar_2r", [rd.effects.RegularisedCoulombFriction(30.0, 1e-4)], lambda q, v: -30.0 * np.tanh(v / 1e-4)
     ),
     "2R, inertia of motors 1e3 kg m²": partial(
-        of_arm, "planar_2r", [rd.ViscousFriction(10.0)], lambda q, v: -10.0 * v, armature=1e3
+        of_arm, "planar_2r", [rd.effects.ViscousFriction(10.0)], lambda q, v: -10.0 * v, armature=1e3
     ),
 }
 _DAMPER = "damper of 1e+06 N m s/rad"

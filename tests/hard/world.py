@@ -104,7 +104,7 @@ def held(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
     """What friction above the weight lets the arm move."""
     q = np.random.default_rng((53, seed)).uniform(-0.5, 0.5, robot.n)
     weight = np.abs(robot.N(q))
-    effects = [rd.DryFriction(1.01 * weight + 1e-3 * weight.max() + 1e-9)]
+    effects = [rd.effects.DryFriction(1.01 * weight + 1e-3 * weight.max() + 1e-9)]
     run = rd.simulate(rd.Plant(robot, effects), q, duration_s=HELD_S)
     yield Row(name, "held by friction: moved", float(np.abs(run.q - q).max()), 0.0, run.outcome.advice)
 

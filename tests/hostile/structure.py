@@ -21,7 +21,11 @@ KINDS = [
         text(inside('<link name="hand"/>' + joint("elbow", "fore", "hand"))),
         ("joint 'elbow'", "defined twice", "rename or remove"),
     ),
-    Kind("two roots", text(inside('<link name="table"/>')), ("robot", "2 roots", "'base', 'table'", "join them")),
+    Kind(
+        "two trees",
+        text(inside('<link name="table"/><link name="leg"/>' + joint("bolt", "table", "leg"))),
+        ("robot", "2 roots", "'base', 'table'", "join them"),
+    ),
     Kind(
         "a cycle beside the root",
         text(inside('<link name="a"/><link name="b"/>' + joint("ab", "a", "b") + joint("ba", "b", "a"))),

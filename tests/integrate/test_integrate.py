@@ -205,7 +205,7 @@ def test_importing_the_package_loads_no_scipy() -> None:
 
 
 def test_one_list_of_names_serves_all_that_take_a_method() -> None:
-    """Setup, and with it simulate and rollouts, scenes and rd.method."""
+    """Setup, and with it simulate and rollouts, scenes and rd.integrate.method."""
     plant = rd.Plant(rd.load("pendulum"))
     for name in METHODS:
         assert method(name).name == name
@@ -221,7 +221,7 @@ def test_one_list_of_names_serves_all_that_take_a_method() -> None:
 def test_scenes_and_python_have_the_same_defaults() -> None:
     scene = parse_scene('robot = "pendulum"\nduration_s = 1.0\n', "scene.toml")
     setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1])
-    assert scene.integrator() == setup.integrator == rd.Adaptive("auto")
+    assert scene.integrator() == setup.integrator == rd.integrate.Adaptive("auto")
     assert scene.step_s == setup.nominal_step_s
     for name in ("estimate_error", "engine"):
         assert getattr(scene, name) == getattr(setup, name), name

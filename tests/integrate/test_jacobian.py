@@ -19,12 +19,14 @@ HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52
 ARM = rd.load("planar_2r")
 START: dict[str, Any] = {"q0": [0.4, -0.7], "v0": [0.3, 0.5]}
 EFFECTS = (
-    rd.ViscousFriction([0.4, 0.2]),
-    rd.RegularisedCoulombFriction([1.3, 0.7], 0.2),
-    rd.Spring([3.0, 5.0], [0.1, 0.2]),
-    *rd.joint_stops([-1.0, -0.6], [0.3, 1.0], 1e5, 1e4),  # both joints lie beyond one
+    rd.effects.ViscousFriction([0.4, 0.2]),
+    rd.effects.RegularisedCoulombFriction([1.3, 0.7], 0.2),
+    rd.effects.Spring([3.0, 5.0], [0.1, 0.2]),
+    *rd.effects.joint_stops([-1.0, -0.6], [0.3, 1.0], 1e5, 1e4),  # both joints lie beyond one
 )
-LAW = rd.PID(rd.quintic([0.0, 0.1], [0.5, 0.9], 1.0, v0=0.3, v1=[0.2, 0.4]), [20.0, 9.0], [4.0, 2.0], [3.0, 1.0])
+LAW = rd.control.PID(
+    rd.control.quintic([0.0, 0.1], [0.5, 0.9], 1.0, v0=0.3, v1=[0.2, 0.4]), [20.0, 9.0], [4.0, 2.0], [3.0, 1.0]
+)
 STATE = np.array([0.4, -0.7, 0.13, -0.25, 0.02, -0.03, 0.5, -0.1, -0.2, -0.3])
 
 
@@ -100,14 +102,14 @@ def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_it_is_made_only_for_methods_that_need_it() -> None:
     equation = equation_of(setup())
-    assert "jacobian" not in build.compiled_equation(equation, rd.method("rk4")).functions.programs
+    assert "jacobian" not in build.compiled_equation(equation, rd.integrate.method("rk4")).functions.programs
     assert build.compiled_equation(equation, None).in_python.jacobian == 0
     assert "jacobian" in build.compiled_equation(equation, None, jacobian=True).functions.programs
 
 
 def test_runs_in_lock_step_have_each_their_own() -> None:
     """With parameters that differ from run to run, and to the last bits of one run alone."""
-    law = rd.PD(LAW.reference, LAW.kp, LAW.kd)
+    law = rd.control.PD(LAW.reference, LAW.kp, LAW.kd)
     made, lanes = setup(controller=law), 16
     rng = np.random.default_rng(3)
     damping = rng.uniform(0.1, 9.0, (lanes, 2))
@@ -119,7 +121,7 @@ def test_runs_in_lock_step_have_each_their_own() -> None:
     run_parameters = machine.run_parameters({"viscous_friction.damping": damping})
     machine.in_python.jacobian(0.37, y, segment_table(made).parameters[0], run_parameters, out)
     for b in (0, 7, 15):
-        effects = rd.ViscousFriction(damping[b]), *EFFECTS[1:]
+        effects = rd.effects.ViscousFriction(damping[b]), *EFFECTS[1:]
         alone = exact_jacobian(replace(made, plant=rd.Plant(ARM, effects)), 0.37, y[:, b])
         np.testing.assert_allclose(out[:, :, b], alone, rtol=0, atol=1e-13 * np.abs(alone).max())
 

@@ -216,7 +216,7 @@ def test_elimination_in_machine_code_gives_equal_bits(runs: int) -> None:
 @pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 def test_a_run_converges_to_that_of_rk4_at_small_steps(engine: str) -> None:
     """planar_2r with friction: half the step leaves 1/32 of the difference, within a quarter."""
-    plant = rd.Plant(ARM, [rd.ViscousFriction(0.3)])
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3)])
     fine = rd.simulate(plant, **OPTIONS | {"integrator": "rk4", "step_s": 1e-4}, engine="compiled")
     runs = [rd.simulate(plant, **OPTIONS, step_s=step, engine=engine) for step in (0.025, 0.0125)]
     far, near = (np.abs(run.q - fine.q).max() for run in runs)
@@ -227,7 +227,7 @@ def test_a_run_converges_to_that_of_rk4_at_small_steps(engine: str) -> None:
 @pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 def test_steps_are_not_bounded_by_stiff_damping(engine: str) -> None:
     """With b = 1e5 N m s/rad and h |λ| of some 1e4, the arm creeps: b v = −N(q), to M a / N = 1e-8."""
-    plant = rd.Plant(ARM, [rd.ViscousFriction(1e5)])
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction(1e5)])
     run = rd.simulate(plant, **OPTIONS, step_s=0.01, engine=engine)
     np.testing.assert_allclose(run.v[-1], -ARM.N(run.q[-1]) / 1e5, rtol=1e-6)
     explicit = rd.simulate(plant, **OPTIONS | {"integrator": "rk4"}, step_s=0.01, engine=engine)
@@ -236,8 +236,8 @@ def test_steps_are_not_bounded_by_stiff_damping(engine: str) -> None:
 
 def test_both_engines_make_the_same_steps() -> None:
     """To 4 κ u, of κ the condition of 1 − h γ J, where both have one Jacobian: stiff, with a moving reference."""
-    law = rd.PD(rd.quintic([0.0, 0.1], [0.5, 0.9], 1.0, v0=0.3), [2000.0, 900.0], [40.0, 20.0])
-    plant, h = rd.Plant(ARM, [rd.ViscousFriction([1e3, 1e4]), rd.Spring(1e4)]), 0.01
+    law = rd.control.PD(rd.control.quintic([0.0, 0.1], [0.5, 0.9], 1.0, v0=0.3), [2000.0, 900.0], [40.0, 20.0])
+    plant, h = rd.Plant(ARM, [rd.effects.ViscousFriction([1e3, 1e4]), rd.effects.Spring(1e4)]), 0.01
     options: dict[str, Any] = {"controller": law, "integrator": "rosenbrock_5", "step_s": h, "duration_s": h}
     setup, equation = rd.Setup(plant, **START, **options), StateEquation(plant, law)
     machine, m = build.compiled_equation(equation, None, jacobian=True), equation.size
@@ -261,23 +261,25 @@ def test_both_engines_make_the_same_steps() -> None:
 
 def test_the_error_follows_the_tolerance() -> None:
     """Samples between the ends of steps included; a hundredth of the tolerance takes 100^(1/5) = 2.5 times as many."""
-    plant = rd.Plant(ARM, [rd.RegularisedCoulombFriction([1.0, 0.6], 0.3), rd.Spring([40.0, 20.0])])
+    plant = rd.Plant(ARM, [rd.effects.RegularisedCoulombFriction([1.0, 0.6], 0.3), rd.effects.Spring([40.0, 20.0])])
     options = OPTIONS | {"duration_s": 2.0, "record_period_s": 0.003, "engine": "compiled"}
-    exact = rd.simulate(plant, **options | {"integrator": rd.Adaptive(rtol=1e-13, atol=1e-13)})
+    exact = rd.simulate(plant, **options | {"integrator": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)})
     steps = []
     for tolerance in (1e-5, 1e-7, 1e-9):
-        run = rd.simulate(plant, **options | {"integrator": rd.Adaptive("Rosenbrock", tolerance, tolerance)})
+        run = rd.simulate(plant, **options | {"integrator": rd.integrate.Adaptive("Rosenbrock", tolerance, tolerance)})
         assert np.abs(run.q - exact.q).max() < 30 * tolerance
         steps.append(run.statistics.steps)
     np.testing.assert_allclose(np.divide(steps[1:], steps[:-1]), 2.5, rtol=0.2)
 
 
-@pytest.mark.parametrize("segments", [{}, {"controller": rd.PD(rd.hold([0.2, 0.1]), [40.0, 20.0], 3.0, period_s=0.01)}])
+@pytest.mark.parametrize(
+    "segments", [{}, {"controller": rd.control.PD(rd.control.hold([0.2, 0.1]), [40.0, 20.0], 3.0, period_s=0.01)}]
+)
 def test_both_engines_choose_the_same_steps(segments: dict[str, Any]) -> None:
     """Though one has differences for its Jacobian: right to 1e-10, which the error of a step does not see."""
-    plant = rd.Plant(ARM, [rd.ViscousFriction([100.0, 300.0])])
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction([100.0, 300.0])])
     options = OPTIONS | segments | {"duration_s": 0.1, "record_period_s": 0.003}
-    method = {"integrator": rd.Adaptive("Rosenbrock", 1e-7, 1e-9)}
+    method = {"integrator": rd.integrate.Adaptive("Rosenbrock", 1e-7, 1e-9)}
     ours, theirs = (rd.simulate(plant, **options | method, engine=engine) for engine in ("compiled", "interpreted"))
     assert ours.statistics.steps == theirs.statistics.steps
     assert ours.statistics.evaluations == theirs.statistics.evaluations
@@ -292,11 +294,13 @@ def test_stiffness_does_not_bound_its_steps() -> None:
     many; then at rest, but for what gravity bends, 1e-7 rad.
     """
     rest = np.array([0.4, -0.7])
-    plant = rd.Plant(ARM, [rd.ViscousFriction(1e5), rd.Spring(1e8, rest)])
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction(1e5), rd.effects.Spring(1e8, rest)])
     options: dict[str, Any] = {"record_period_s": 1e-4, "estimate_error": False, "engine": "compiled"}
-    run = rd.simulate(plant, rest + 0.1, **options, duration_s=1.0, integrator=rd.Adaptive("Rosenbrock", 1e-6, 1e-6))
+    run = rd.simulate(
+        plant, rest + 0.1, **options, duration_s=1.0, integrator=rd.integrate.Adaptive("Rosenbrock", 1e-6, 1e-6)
+    )
     explicit = rd.simulate(
-        plant, rest + 0.1, **options, duration_s=0.01, integrator=rd.Adaptive("DOP853", 1e-12, 1e-12)
+        plant, rest + 0.1, **options, duration_s=0.01, integrator=rd.integrate.Adaptive("DOP853", 1e-12, 1e-12)
     )
     np.testing.assert_allclose(run.q[:101], explicit.q, rtol=0, atol=1e-6)
     np.testing.assert_allclose(run.q[-1], rest, rtol=0, atol=1e-6)
@@ -309,12 +313,12 @@ def test_runs_in_lock_step_are_those_of_simulate() -> None:
     del options["q0"], options["v0"], options["estimate_error"]
     rng = np.random.default_rng(0)
     starts, damping = rng.normal(size=(70, 2)), 10 ** rng.uniform(-1, 5, (70, 2))
-    friction = rd.RegularisedCoulombFriction([1.0, 0.6], 0.1)
-    plant = rd.Plant(ARM, [friction, rd.ViscousFriction(1.0)])
+    friction = rd.effects.RegularisedCoulombFriction([1.0, 0.6], 0.1)
+    plant = rd.Plant(ARM, [friction, rd.effects.ViscousFriction(1.0)])
     runs = rd.rollouts(plant, starts, params={"viscous_friction.damping": damping}, **options)
     assert runs.q is not None
     assert not runs.diverged.any()
     for i in (0, 35, 69):
-        run_parameters = rd.Plant(ARM, [friction, rd.ViscousFriction(damping[i])])
+        run_parameters = rd.Plant(ARM, [friction, rd.effects.ViscousFriction(damping[i])])
         alone = rd.simulate(run_parameters, starts[i], **options, engine="compiled", estimate_error=False)
         np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-13)

@@ -30,7 +30,8 @@ def panda() -> rd.Robot:
 def test_what_friction_holds_stays_for_any_number_of_steps(load: float) -> None:
     """A block on a rail for an hour, with the load at its limit to the last bit too: 0.0."""
     run = rd.simulate(
-        rd.Plant(RAIL, [rd.DryFriction(G / load)]), [0.25], duration_s=3600.0, step_s=1e-3, record_period_s=900.0,
+        rd.Plant(RAIL, [rd.effects.DryFriction(G / load)]), [0.25], duration_s=3600.0, step_s=1e-3,
+        record_period_s=900.0,
         engine="compiled", **FIXED,
     )  # fmt: skip
     assert run.statistics.steps == 3_600_000
@@ -43,7 +44,7 @@ def test_a_sliding_block_stops_within_a_step_of_where_it_must(engine: str) -> No
     """Its velocity falls by (f + g) h in each step, and is 0.0 from the step on in which it would change its sign."""
     f, v0, h = 11.0, 1.7, 1e-3
     run = rd.simulate(
-        rd.Plant(RAIL, [rd.DryFriction(f)]), [0.1], [v0], duration_s=0.2, step_s=h, engine=engine, **FIXED
+        rd.Plant(RAIL, [rd.effects.DryFriction(f)]), [0.1], [v0], duration_s=0.2, step_s=h, engine=engine, **FIXED
     )
     slows = f + G
     k = np.arange(len(run.t))
@@ -58,8 +59,8 @@ def test_a_sliding_block_stops_within_a_step_of_where_it_must(engine: str) -> No
 @pytest.mark.parametrize("period_s", [0.0, 0.02], ids=["continuous", "sampled"])
 def test_the_actuation_of_every_step_is_seen_by_both_engines(period_s: float) -> None:
     """Its extremes are those of the samples at each tick, or at each step to O(h); machine code is as Python."""
-    plant = rd.Plant(ARM, [rd.DryFriction([0.5, 0.2]), rd.ViscousFriction([0.1, 0.1])])
-    control = rd.PD(rd.hold([0.4, -0.2]), [30.0, 20.0], [3.0, 2.0], period_s=period_s)
+    plant = rd.Plant(ARM, [rd.effects.DryFriction([0.5, 0.2]), rd.effects.ViscousFriction([0.1, 0.1])])
+    control = rd.control.PD(rd.control.hold([0.4, -0.2]), [30.0, 20.0], [3.0, 2.0], period_s=period_s)
     runs = [
         rd.simulate(
             plant, [0.9, 0.3], [0.4, -0.7], duration_s=0.4, step_s=1e-3, record_period_s=0.0, controller=control,
@@ -79,7 +80,7 @@ def test_an_impact_turns_the_velocity_by_its_restitution(e: float) -> None:
     """A block thrown at a stop without friction: v⁺ = −e v, and the ledger has ½ (1 − e²) v²."""
     level = RAIL.with_(gravity=(0, 0, 0))
     run = rd.simulate(
-        rd.Plant(level, [rd.RigidStops(-np.inf, 0.5, e)]), [0.0], [2.0], duration_s=0.5, step_s=1e-3, **FIXED
+        rd.Plant(level, [rd.effects.RigidStops(-np.inf, 0.5, e)]), [0.0], [2.0], duration_s=0.5, step_s=1e-3, **FIXED
     )
     assert run.v[-1, 0] == -2.0 * e
     assert run.ledger.work["rigid_stops"][-1] == pytest.approx(-(1 - e**2) * 2.0, rel=1e-14, abs=1e-15)
@@ -89,7 +90,13 @@ def test_an_impact_turns_the_velocity_by_its_restitution(e: float) -> None:
 def test_works_close_the_ledger_where_the_mass_is_constant() -> None:
     """½ v² + g q − Σ W changes by rounding alone: impulses work at the mean velocity, two frictions by their shares."""
     plant = rd.Plant(
-        RAIL, [rd.DryFriction(2.0), rd.RigidStops(0.0, 0.6, 0.4), rd.DryFriction(1.0), rd.ViscousFriction(0.7)]
+        RAIL,
+        [
+            rd.effects.DryFriction(2.0),
+            rd.effects.RigidStops(0.0, 0.6, 0.4),
+            rd.effects.DryFriction(1.0),
+            rd.effects.ViscousFriction(0.7),
+        ],
     )
     run = rd.simulate(plant, [0.3], [2.4], duration_s=2.0, step_s=1e-3, **FIXED)
     ledger = run.ledger
@@ -104,7 +111,7 @@ def test_no_stop_adds_energy_whatever_the_restitutions() -> None:
     rng = np.random.default_rng(9)
     q, v = rng.uniform(-0.3, 0.3, (64, 2)), 5 * rng.normal(size=(64, 2))
     setup = rd.Setup(
-        rd.Plant(ARM, [rd.RigidStops(-0.35, 0.35, [0.25, 0.9])]), q[0], duration_s=2.0, step_s=4e-3, **FIXED
+        rd.Plant(ARM, [rd.effects.RigidStops(-0.35, 0.35, [0.25, 0.9])]), q[0], duration_s=2.0, step_s=4e-3, **FIXED
     )
     work = rd.rollouts(setup, q, v, record=("work",)).work["rigid_stops"]
     assert np.diff(work).max() <= 10 * np.finfo(float).eps * np.abs(work).max()
@@ -112,7 +119,7 @@ def test_no_stop_adds_energy_whatever_the_restitutions() -> None:
 
 
 def test_of_two_stops_the_nearer_one_works() -> None:
-    plant = rd.Plant(RAIL.with_(gravity=(0, 0, 0)), [rd.RigidStops(-1, 0.8), rd.RigidStops(-1, 0.5)])
+    plant = rd.Plant(RAIL.with_(gravity=(0, 0, 0)), [rd.effects.RigidStops(-1, 0.8), rd.effects.RigidStops(-1, 0.5)])
     run = rd.simulate(plant, [0.0], [1.0], duration_s=0.7, step_s=1e-3, **FIXED)
     assert run.ledger.work["rigid_stops"][-1] == 0
     assert run.ledger.work["rigid_stops 2"][-1] == pytest.approx(-0.5, rel=1e-14)
@@ -122,7 +129,7 @@ def test_without_what_holds_it_is_the_method_of_stormer_and_verlet() -> None:
     """Of order 2 for forces of the position, and reversible: a pendulum there and back, to rounding."""
     pendulum = ARM.with_(lock={ARM.joint_names[1]: 0.0})
     errors = []
-    exact = rd.simulate(pendulum, [0.4], duration_s=1.0, integrator=rd.Adaptive(rtol=1e-12, atol=1e-12)).q[-1]
+    exact = rd.simulate(pendulum, [0.4], duration_s=1.0, integrator=rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)).q[-1]
     for h in (2e-3, 1e-3):
         run = rd.simulate(pendulum, [0.4], duration_s=1.0, step_s=h, **FIXED)
         errors.append(np.abs(run.q[-1] - exact).max())
@@ -141,9 +148,9 @@ def test_its_limit_is_that_of_the_events() -> None:
     def drive(t, q, v):
         return 0.8 * N0 + A * np.sin(w * t + 0.3)
 
-    plant = rd.Plant(arm, [rd.ViscousFriction(0.1), rd.DryFriction(levels)])
+    plant = rd.Plant(arm, [rd.effects.ViscousFriction(0.1), rd.effects.DryFriction(levels)])
     given = {"duration_s": 2.0, "controller": drive, "estimate_error": False, "engine": "compiled"}
-    exact = rd.simulate(plant, q0, integrator=rd.Adaptive(rtol=1e-8, atol=1e-8), record_period_s=0.1, **given)
+    exact = rd.simulate(plant, q0, integrator=rd.integrate.Adaptive(rtol=1e-8, atol=1e-8), record_period_s=0.1, **given)
     steps = 4e-3 / 2.0 ** np.arange(6)
     errors = [
         np.abs(
@@ -155,11 +162,16 @@ def test_its_limit_is_that_of_the_events() -> None:
 
 
 HELD = {
-    "levels": [rd.DryFriction([1.5, 0.4], static=[2.0, 0.5])],
-    "Stribeck": [rd.DryFriction([1.5, 0.4], static=[2.0, 0.5], stribeck_velocity=0.1)],
-    "stops": [rd.RigidStops([-0.6, -0.7], [0.6, 0.5], [0.3, 0.8]), rd.ViscousFriction(0.1)],
-    "all": [rd.DryFriction([0.8, 0.2]), rd.RigidStops(-0.6, 0.5, 0.5), rd.DryFriction(0.1), rd.RigidStops(-0.5, 0.7)],
-    "bristles": [rd.RigidStops(-0.6, 0.6), rd.LuGreFriction(100.0, 0.5, 0.1, 0.3, 0.5, 0.1)],
+    "levels": [rd.effects.DryFriction([1.5, 0.4], static=[2.0, 0.5])],
+    "Stribeck": [rd.effects.DryFriction([1.5, 0.4], static=[2.0, 0.5], stribeck_velocity=0.1)],
+    "stops": [rd.effects.RigidStops([-0.6, -0.7], [0.6, 0.5], [0.3, 0.8]), rd.effects.ViscousFriction(0.1)],
+    "all": [
+        rd.effects.DryFriction([0.8, 0.2]),
+        rd.effects.RigidStops(-0.6, 0.5, 0.5),
+        rd.effects.DryFriction(0.1),
+        rd.effects.RigidStops(-0.5, 0.7),
+    ],
+    "bristles": [rd.effects.RigidStops(-0.6, 0.6), rd.effects.LuGreFriction(100.0, 0.5, 0.1, 0.3, 0.5, 0.1)],
 }
 
 
@@ -168,7 +180,7 @@ def test_rollouts_are_the_runs_of_simulate(name: str, sampled: bool) -> None:
     """In both engines and in lanes, with equal events: they differ by rounding that the motion has magnified."""
     rng = np.random.default_rng(7)
     q, v = rng.uniform(-0.45, 0.45, (70, 2)), rng.normal(size=(70, 2))
-    control = rd.PID(rd.hold([0.2, -0.1]), 40.0, 20.0, 4.0, period_s=0.004 if sampled else 0.0)
+    control = rd.control.PID(rd.control.hold([0.2, -0.1]), 40.0, 20.0, 4.0, period_s=0.004 if sampled else 0.0)
     setup = rd.Setup(rd.Plant(ARM, HELD[name]), q[0], duration_s=0.6, controller=control, step_s=1e-3, **FIXED)
     many = rd.rollouts(setup, q, v, record=("q", "v", "u", "energy", "work"))
     for run in (0, 33, 69):
@@ -226,7 +238,9 @@ def test_it_estimates_no_error_and_finds_no_events() -> None:
     with pytest.raises(QueryError, match="time_stepping are not cut; take integrator='DOP853'"):
         rd.simulate(plant, [0.3, 0.2], step_s=1e-3, integrator="time_stepping", events=[event])
     with pytest.raises(QueryError, match="1e-06 beyond its upper stop"):
-        rd.simulate(rd.Plant(ARM, [rd.RigidStops(-1, 0.3)]), [0.3 + 1e-6, 0.0], step_s=1e-3, integrator="time_stepping")
+        rd.simulate(
+            rd.Plant(ARM, [rd.effects.RigidStops(-1, 0.3)]), [0.3 + 1e-6, 0.0], step_s=1e-3, integrator="time_stepping"
+        )
     with pytest.raises(QueryError, match=r"cuts=False: .* where steps must end"):
         rd.rollouts(plant, [0.3, 0.2], integrator="rk4", step_s=1e-3, cuts=False)
 
@@ -237,7 +251,7 @@ def test_it_takes_over_where_events_accumulate(monkeypatch: pytest.MonkeyPatch) 
 
     monkeypatch.setattr(event_run, "_ACCUMULATED", 12)
     monkeypatch.setattr(event_run, "_BRIEF", 1e-2)
-    plant = rd.Plant(RAIL, [rd.RigidStops(0.0, 2.0, 0.5)])
+    plant = rd.Plant(RAIL, [rd.effects.RigidStops(0.0, 2.0, 0.5)])
     run = rd.simulate(plant, [0.4], duration_s=2.0)
     assert run.outcome.ending == "finished"
     assert run.statistics.method == "time_stepping"
@@ -252,7 +266,7 @@ def test_it_takes_over_where_events_accumulate(monkeypatch: pytest.MonkeyPatch) 
 def test_a_run_far_beyond_its_stable_step_ends_as_diverged() -> None:
     """Positions of 1e16 rad and more, where M by Pinocchio is rounding and no longer positive definite."""
     robot, q = rd.load("panda"), np.full(8, 0.3)
-    law = rd.PDGravity(robot, rd.hold(q), 1e3, 50.0)
+    law = rd.control.PDGravity(robot, rd.control.hold(q), 1e3, 50.0)
     run = rd.simulate(
         robot, q + 1e-3, controller=law, duration_s=0.5, integrator="time_stepping", step_s=0.01, engine="interpreted",
         estimate_error=False,

@@ -38,7 +38,7 @@ def state(robot: rd.Robot, seed: int = 5) -> dict[str, np.ndarray]:
 def test_truth_by_other_recursions_in_400_bits_lies_inside(name: str) -> None:
     """Newton–Euler for inverse dynamics and for M, column by column; articulated bodies for forward dynamics."""
     robot = rd.load(name)
-    own, x = rd.Lagrangian(robot, rd.Ball(400)), state(robot)
+    own, x = rd.Lagrangian(robot, rd.studies.Ball(400)), state(robot)
     exact = Exact(robot)
     with own.arithmetic.scope():
         q, v, a, tau = (own.arithmetic.array(x[name]) for name in ("q", "v", "a", "tau"))
@@ -54,7 +54,9 @@ def test_truth_by_other_recursions_in_400_bits_lies_inside(name: str) -> None:
         truth = exact.at(quantity, x)
         with ctx.workprec(400):
             assert all(ball.overlaps(each) for ball, each in zip(truth.values.flat, other.flat, strict=True))
-        assert np.all(truth.scale.relative(0 * rd.midpoint(truth.values), rd.radius(truth.values)) <= RESOLUTION)
+        assert np.all(
+            truth.scale.relative(0 * rd.studies.midpoint(truth.values), rd.studies.radius(truth.values)) <= RESOLUTION
+        )
         assert truth.error(other) <= 2 * RESOLUTION
 
 
@@ -67,7 +69,9 @@ def test_bits_are_doubled_until_the_balls_are_narrow(monkeypatch, quantity) -> N
     monkeypatch.setattr(exact_module, "_FIRST_BITS", 16)
     truth = Exact(robot).at(quantity, x)
     assert truth.bits in (few, few * 2)
-    assert np.all(truth.scale.relative(0 * rd.midpoint(truth.values), rd.radius(truth.values)) <= RESOLUTION)
+    assert np.all(
+        truth.scale.relative(0 * rd.studies.midpoint(truth.values), rd.studies.radius(truth.values)) <= RESOLUTION
+    )
     assert fine.error(truth.values) <= 2 * RESOLUTION
 
 

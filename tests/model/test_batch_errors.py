@@ -127,7 +127,7 @@ def planar_chain(n: int) -> rd.Robot:
 
 @pytest.mark.parametrize(
     ("n", "dtype", "rounding", "enough"),
-    [(64, np.float32, "float32", np.float64), (16, rd.Ball(20), "balls of 20 bits", rd.Ball(300))],
+    [(64, np.float32, "float32", np.float64), (16, rd.studies.Ball(20), "balls of 20 bits", rd.studies.Ball(300))],
     ids=["float32", "balls"],
 )
 def test_a_pivot_lost_in_rounding_accuses_no_joint(n: int, dtype: Any, rounding: str, enough: Any) -> None:
@@ -140,8 +140,8 @@ def test_a_pivot_lost_in_rounding_accuses_no_joint(n: int, dtype: Any, rounding:
     assert own.arithmetic.asarray(own.forward_dynamics(np.stack([q, q]), v, tau, errors="nan")).shape == (2, n)
     answer = rd.Lagrangian(robot, enough).forward_dynamics(q, v, tau)
     assert robot.joint_without_inertia is None
-    if isinstance(enough, rd.Ball):
-        answer = rd.midpoint(answer)
+    if isinstance(enough, rd.studies.Ball):
+        answer = rd.studies.midpoint(answer)
         with own.arithmetic.scope(), pytest.raises(UndecidedError, match=rounding):
             articulated_body(own.linkage, *(own.arithmetic.array(x) for x in (q, v, tau)))
     np.testing.assert_allclose(answer, robot.forward_dynamics(q, v, tau), rtol=0, atol=1e-8 * np.abs(answer).max())

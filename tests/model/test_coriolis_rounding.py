@@ -42,11 +42,13 @@ def excess(robot: rd.Robot, model: object, seed: int, count: int) -> float:
     couplings, own = robot.couplings, regrouped(robot.model)
     bound, D, worst = rounding(robot.model, own, couplings), reach(own).max(), 0.0
     assert bound < np.inf
-    true, data = rd.Lagrangian(robot, rd.Ball(128)), robot.model.createData()
+    true, data = rd.Lagrangian(robot, rd.studies.Ball(128)), robot.model.createData()
     per_speed = np.where(joint_axes(own)[:, 3:].any(axis=1), 1.0, 1 / max(D, 1e-300))
     for q, v in states(robot, seed, count):
         position, velocity = couplings.position(q), couplings.velocity(v)
-        error = couplings.matrix(pin.computeCoriolisMatrix(model, data, position, velocity)) - rd.midpoint(true.C(q, v))
+        error = couplings.matrix(pin.computeCoriolisMatrix(model, data, position, velocity)) - rd.studies.midpoint(
+            true.C(q, v)
+        )
         units = np.sqrt(robot.M(q).diagonal())
         allowed = bound * (np.abs(velocity) @ per_speed) * units * units[:, None]
         worst = max(worst, np.max(np.abs(error) / allowed))
@@ -139,7 +141,7 @@ def test_beyond_the_limits_of_a_prismatic_joint_c_keeps_its_digits() -> None:
     robot = rd.load("cart_pole")
     assert robot.coriolis.regrouped is not None
     q, v = np.array([1e7, 0.7]), np.array([0.3, -1.1])
-    true = rd.midpoint(rd.Lagrangian(robot, rd.Ball(200)).C(q, v))
+    true = rd.studies.midpoint(rd.Lagrangian(robot, rd.studies.Ball(200)).C(q, v))
     scale = magnitudes(rd.Lagrangian(robot).linkage, np.array([0.0, 0.7])).C(v)
     assert np.all(np.abs(robot.C(q, v) - true) <= 4.5e-16 * scale)
     in_world_axes = pin.computeCoriolisMatrix(robot.coriolis.regrouped, robot.model.createData(), q, v)

@@ -78,15 +78,15 @@ def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(implem
     ]
     q = np.full((19, 2), 0.3)
     q[5], q[7] = 3e6, 1e15
-    truth = rd.Lagrangian(robot, rd.Ball(200))
+    truth = rd.Lagrangian(robot, rd.studies.Ball(200))
     with pytest.raises(OverflowedError, match=r"rounding hides where the joints that follow .* in row 7 of the batch"):
         engine.M(q)
     with pytest.raises(OverflowedError, match="rounding hides"):
         engine.M(q[7])
     M = engine.M(q, errors="nan")
     assert np.isnan(M[7]).all() and np.isfinite(np.delete(M, 7, axis=0)).all()
-    assert_allclose(M[5], rd.midpoint(truth.M(q[5])), rtol=1e-7)
-    assert np.isfinite(rd.midpoint(truth.M(q[7]))).all()
+    assert_allclose(M[5], rd.studies.midpoint(truth.M(q[5])), rtol=1e-7)
+    assert np.isfinite(rd.studies.midpoint(truth.M(q[7]))).all()
 
 
 @pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")

@@ -8,7 +8,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.errors import SceneError
 from robot_dyn.scene.effects import BY_KIND
-from robot_dyn.scene.explain import explain
+from robot_dyn.scene.explain import of_scene
 from robot_dyn.scene.scene import parse_scene, read_both
 from robot_dyn.scene.starters import starter, starters
 from tests.long import long
@@ -117,26 +117,32 @@ def test_effect_of_a_scene_is_that_of_python(write, kind: str) -> None:
     robot = rd.load("planar_2r").with_(gravity=(0, 0, 0))
     by_hand = {
         "gravity": lambda: rd.Plant(rd.load("planar_2r")),
-        "viscous_friction": lambda: rd.Plant(robot, [rd.ViscousFriction(0.3)]),
-        "regularised_coulomb_friction": lambda: rd.Plant(robot, [rd.RegularisedCoulombFriction([0.2, 0.0])]),
-        "spring": lambda: rd.Plant(robot, [rd.Spring(2.0, [0.1, 0.2])]),
-        "joint_stops": lambda: rd.Plant(robot, rd.joint_stops([-1.0, -1.0], [1.0, 1e9])),
+        "viscous_friction": lambda: rd.Plant(robot, [rd.effects.ViscousFriction(0.3)]),
+        "regularised_coulomb_friction": lambda: rd.Plant(robot, [rd.effects.RegularisedCoulombFriction([0.2, 0.0])]),
+        "spring": lambda: rd.Plant(robot, [rd.effects.Spring(2.0, [0.1, 0.2])]),
+        "joint_stops": lambda: rd.Plant(robot, rd.effects.joint_stops([-1.0, -1.0], [1.0, 1e9])),
         "line_spring_damper": lambda: rd.Plant(
             robot,
-            [rd.LineSpringDamper("tip", None, [0.1, 0, 0.2], [0.5, 0, 0.4], stiffness=30.0, damping=2.0, length=0.7)],
+            [
+                rd.effects.LineSpringDamper(
+                    "tip", None, [0.1, 0, 0.2], [0.5, 0, 0.4], stiffness=30.0, damping=2.0, length=0.7
+                )
+            ],
         ),
-        "external_wrench": lambda: rd.Plant(robot, [rd.ExternalWrench("tip", [1, 0, 0, 0, 0, 0])]),
-        "effort_limit": lambda: rd.Plant(robot, [rd.EffortLimit(3.0)]),
-        "actuator_lag": lambda: rd.Plant(robot, [rd.ActuatorLag([0.02, 0.05])]),
-        "lugre_friction": lambda: rd.Plant(robot, [rd.LuGreFriction(300.0, 1.0, 0.4, [0.7, 1.0], [1.1, 1.2], 0.1)]),
-        "dahl_friction": lambda: rd.Plant(robot, [rd.DahlFriction(300.0, [0.7, 1.0], 1.5)]),
+        "external_wrench": lambda: rd.Plant(robot, [rd.effects.ExternalWrench("tip", [1, 0, 0, 0, 0, 0])]),
+        "effort_limit": lambda: rd.Plant(robot, [rd.effects.EffortLimit(3.0)]),
+        "actuator_lag": lambda: rd.Plant(robot, [rd.effects.ActuatorLag([0.02, 0.05])]),
+        "lugre_friction": lambda: rd.Plant(
+            robot, [rd.effects.LuGreFriction(300.0, 1.0, 0.4, [0.7, 1.0], [1.1, 1.2], 0.1)]
+        ),
+        "dahl_friction": lambda: rd.Plant(robot, [rd.effects.DahlFriction(300.0, [0.7, 1.0], 1.5)]),
         "carried_payload": lambda: rd.Plant(
-            robot, [rd.CarriedPayload(rd.Payload("tip", 0.5), end_s=0.07, at_rest=False)]
+            robot, [rd.effects.CarriedPayload(rd.Payload("tip", 0.5), end_s=0.07, at_rest=False)]
         ),
-        "series_elastic": lambda: rd.Plant(robot, [rd.SeriesElastic([0.0, 80.0], 0.02, 5.0, backlash=0.01)]),
-        "rigid_backlash": lambda: rd.Plant(robot, [rd.RigidBacklash([0.0, 0.01], 0.02, 5.0, 0.4)]),
-        "dry_friction": lambda: rd.Plant(robot, [rd.DryFriction([0.4, 0.2], 0.6)]),
-        "rigid_stops": lambda: rd.Plant(robot, [rd.RigidStops(-1.0, [1.0, np.inf], 0.3)]),
+        "series_elastic": lambda: rd.Plant(robot, [rd.effects.SeriesElastic([0.0, 80.0], 0.02, 5.0, backlash=0.01)]),
+        "rigid_backlash": lambda: rd.Plant(robot, [rd.effects.RigidBacklash([0.0, 0.01], 0.02, 5.0, 0.4)]),
+        "dry_friction": lambda: rd.Plant(robot, [rd.effects.DryFriction([0.4, 0.2], 0.6)]),
+        "rigid_stops": lambda: rd.Plant(robot, [rd.effects.RigidStops(-1.0, [1.0, np.inf], 0.3)]),
         "payload": lambda: rd.Plant(robot.with_(payload=rd.Payload("tip", 0.5))),
         "armature": lambda: rd.Plant(robot.with_(armature=[0.002 * 81.0, 0.001])),
         "lock": lambda: rd.Plant(robot.with_(lock={"joint_1": 0.2})),
@@ -158,7 +164,7 @@ def test_every_joint_controller_follows_its_plan(write, kind: str) -> None:
 
 
 def test_explanation_names_each_term_and_its_source(write) -> None:
-    text = "\n".join(explain(*read_both(write(starter("panda_payload")))))
+    text = repr(of_scene(*read_both(write(starter("panda_payload")))))
     for said in ("N = ∂V/∂q", "mass_kg = 1.5  (scene)", "limit_N_m = urdf  (the robot's file)", "not simulated"):
         assert said in text
     assert "as it acts: u_max = 87 N m, 87 N m, 87 N m, 87 N m, 12 N m, 12 N m, 12 N m" in text
@@ -189,7 +195,7 @@ stiffness_N_per_m = 30.0
 damping_N_s_per_m = 2.0
 length_m = 0.7
 """
-    said = [line.strip() for line in explain(*read_both(write(text))) if "as it acts" in line]
+    said = [line.strip() for line in repr(of_scene(*read_both(write(text)))).splitlines() if "as it acts" in line]
     assert said[0] == "as it acts: b = 0.8 N s/m, 0.02 N m s/rad"
     assert "Lower stop = -1 m, -1 rad; Upper stop = 1 m, none" in said[1] and "k = 10000 N/m, 10000 N m/rad" in said[1]
     assert said[2] == "as it acts: b = 0.3 N s/m, 0.3 N m s/rad"
@@ -262,7 +268,7 @@ def test_a_scene_is_checked_before_its_robot_is_loaded() -> None:
 def test_an_explanation_holds_no_key_that_is_not_read(write) -> None:
     """A PD with kp and kd reads neither frame, integral rate, effort limit nor damping ratio; one joint is one."""
     gains = '[control]\nkind = "pd"\nkp = 3.0\nkd = 1.0\n'
-    text = "\n".join(explain(*read_both(write(f'robot = "pendulum"\nduration_s = 0.1\n{gains}'))))
+    text = repr(of_scene(*read_both(write(f'robot = "pendulum"\nduration_s = 0.1\n{gains}'))))
     assert "None" not in text
     for key in ("frame =", "integral_rate", "effort_limit_N_m", "damping_ratio", "frequency"):
         assert key not in text

@@ -61,12 +61,16 @@ q = [0.5, 0.1]
 """
 
 
-def by_hand() -> rd.Loop:
-    q = rd.hold([0.5, 0.1])
-    return rd.Loop(
-        rd.Multirate(rd.PD(q, 50.0, [5.0, 4.0], 0.004), rd.PDGravity(rd.load("planar_2r"), q, 0.0, 0.1, 0.012)),
-        [rd.Noise(1e-3), rd.Quantisation([1e-4, 2e-4])], [rd.Differences(), rd.LowPass(300.0, 1)],
-        [rd.LowPass(400.0), rd.Quantisation(0.01), rd.RateLimit(2000.0)], 1.0, 0.4, 5,
+def by_hand() -> rd.control.Loop:
+    q = rd.control.hold([0.5, 0.1])
+    return rd.control.Loop(
+        rd.control.Multirate(
+            rd.control.PD(q, 50.0, [5.0, 4.0], 0.004),
+            rd.control.PDGravity(rd.load("planar_2r"), q, 0.0, 0.1, 0.012),
+        ),
+        [rd.control.Noise(1e-3), rd.control.Quantisation([1e-4, 2e-4])],
+        [rd.control.Differences(), rd.control.LowPass(300.0, 1)],
+        [rd.control.LowPass(400.0), rd.control.Quantisation(0.01), rd.control.RateLimit(2000.0)], 1.0, 0.4, 5,
     )  # fmt: skip
 
 

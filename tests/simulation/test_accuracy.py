@@ -92,10 +92,10 @@ def test_a_trial_step_that_goes_too_far_does_not_end_a_run(index: int) -> None:
 
 
 def test_stiff_and_sampled_runs_are_made_by_their_methods() -> None:
-    stiff = rd.simulate(rd.Plant(ARM, [rd.ViscousFriction(1e5)]), START, duration_s=1.0, accuracy=1e-6)
+    stiff = rd.simulate(rd.Plant(ARM, [rd.effects.ViscousFriction(1e5)]), START, duration_s=1.0, accuracy=1e-6)
     assert stiff.statistics.method == "Rosenbrock"
     assert stiff.statistics.steps < 200
-    law = rd.PD(rd.hold([0.0, 0.0]), 30.0, 8.0, period_s=0.005)
+    law = rd.control.PD(rd.control.hold([0.0, 0.0]), 30.0, 8.0, period_s=0.005)
     sampled = rd.simulate(ARM, START, duration_s=0.5, controller=law, accuracy=1e-6)
     assert sampled.statistics.method == "rk4"
     assert sampled.statistics.steps == 100  # one in each period
@@ -120,7 +120,7 @@ def test_the_best_that_is_named_can_be_had() -> None:
 
 def test_a_run_that_diverges_says_so() -> None:
     """No accuracy is claimed of it."""
-    law = rd.PD(rd.hold([0.0, 0.0]), 1e6, 1.0, period_s=0.05)
+    law = rd.control.PD(rd.control.hold([0.0, 0.0]), 1e6, 1.0, period_s=0.05)
     run = rd.simulate(ARM, START, duration_s=5.0, controller=law, accuracy=1e-3)
     assert run.outcome.ending == "diverged"
     assert run.accuracy is None
@@ -134,7 +134,7 @@ def test_a_run_that_diverges_says_so() -> None:
         ({"accuracy": {"deg": 1.0}}, "no unit 'deg'; give 'rad', 'm' or both"),
         ({"accuracy": {"m": 1e-3}}, "none is given for joints in rad"),
         ({"accuracy": 1e-6, "integrator": "rk4"}, "chooses method and tolerance; leave out integrator"),
-        ({"accuracy": 1e-6, "integrator": rd.Adaptive(rtol=1e-6)}, "leave out integrator"),
+        ({"accuracy": 1e-6, "integrator": rd.integrate.Adaptive(rtol=1e-6)}, "leave out integrator"),
         ({"accuracy": 1e-6, "estimate_error": False}, "leave out estimate_error=False"),
     ],
 )

@@ -29,28 +29,28 @@ from tests.long import long
 ARM = rd.load("planar_2r")
 UR5 = completed(rd.load("ur5"))[0]  # its file states right angles with too few digits
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
-REFERENCE = rd.via_points([0.05, 0.1, 0.2], [Q, Q + 0.3, Q - 0.2], kind="cubic")
+REFERENCE = rd.control.via_points([0.05, 0.1, 0.2], [Q, Q + 0.3, Q - 0.2], kind="cubic")
 CONTROLLERS = {
     "none": None,
-    "PD": rd.PD(rd.hold(Q), 40.0, [4.0, 3.0]),
-    "PD, sampled": rd.PD(REFERENCE, 40.0, 4.0, period_s=0.01),
-    "PID": rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0),
-    "PID, sampled": rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=[3.0, np.inf], period_s=0.004),
-    "PD and gravity": rd.PDGravity(ARM, REFERENCE, 40.0, 4.0),
-    "feed forward": rd.FeedForward(ARM, REFERENCE, 40.0, 4.0),
-    "computed torque": rd.ComputedTorque(ARM.with_(gravity=(0.0, 0.0, -9.0)), REFERENCE, 40.0, 9.0),
+    "PD": rd.control.PD(rd.control.hold(Q), 40.0, [4.0, 3.0]),
+    "PD, sampled": rd.control.PD(REFERENCE, 40.0, 4.0, period_s=0.01),
+    "PID": rd.control.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0),
+    "PID, sampled": rd.control.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=[3.0, np.inf], period_s=0.004),
+    "PD and gravity": rd.control.PDGravity(ARM, REFERENCE, 40.0, 4.0),
+    "feed forward": rd.control.FeedForward(ARM, REFERENCE, 40.0, 4.0),
+    "computed torque": rd.control.ComputedTorque(ARM.with_(gravity=(0.0, 0.0, -9.0)), REFERENCE, 40.0, 9.0),
 }
 LINK = ARM.frame_names[-1]
 EFFECTS = {
-    "viscous friction": [rd.ViscousFriction([0.3, 0.1])],
-    "dry friction": [rd.RegularisedCoulombFriction(0.4, 0.1)],
-    "spring": [rd.Spring([3.0, 1.0], 0.2)],
-    "stops": rd.joint_stops([-0.5, -0.75], [0.45, 2.0], 1e3, 1e2),
-    "effort limit": [rd.EffortLimit([2.0, np.inf])],
-    "wrench": [rd.ExternalWrench(LINK, [3, 2, 1, 0.1, 0.2, 0.3], "body", start_s=0.04, end_s=0.13)],
+    "viscous friction": [rd.effects.ViscousFriction([0.3, 0.1])],
+    "dry friction": [rd.effects.RegularisedCoulombFriction(0.4, 0.1)],
+    "spring": [rd.effects.Spring([3.0, 1.0], 0.2)],
+    "stops": rd.effects.joint_stops([-0.5, -0.75], [0.45, 2.0], 1e3, 1e2),
+    "effort limit": [rd.effects.EffortLimit([2.0, np.inf])],
+    "wrench": [rd.effects.ExternalWrench(LINK, [3, 2, 1, 0.1, 0.2, 0.3], "body", start_s=0.04, end_s=0.13)],
     "two wrenches": [
-        rd.ExternalWrench(LINK, [3, 2, 1, 0.1, 0.2, 0.3]),
-        rd.ExternalWrench(LINK, [0, 2, 1, 0.1, 0.2, 0.3], "world", start_s=0.1),
+        rd.effects.ExternalWrench(LINK, [3, 2, 1, 0.1, 0.2, 0.3]),
+        rd.effects.ExternalWrench(LINK, [0, 2, 1, 0.1, 0.2, 0.3], "world", start_s=0.1),
     ],
 }
 WHOLE = [name for name in FIXED_STEP if name not in ("linearly_implicit_euler", "sdirk_3")]
@@ -87,7 +87,7 @@ def check_equal(ours: rd.Trajectory, theirs: rd.Trajectory, tolerance: float) ->
 @pytest.mark.parametrize("name", [*SOME, *long(name for name in WHOLE if name not in SOME)])
 def test_each_method_makes_the_interpreted_step(name: str) -> None:
     """One step from equal states: the machine's own check, 1e-13 of the state's size, and a run of 60 steps."""
-    ours, theirs = both(integrator=rd.method(name), duration_s=0.06, controller=CONTROLLERS["PD"])
+    ours, theirs = both(integrator=rd.integrate.method(name), duration_s=0.06, controller=CONTROLLERS["PD"])
     check_equal(ours, theirs, 1e-12)  # 60 steps of rounding, amplified by the gains
     assert ours.statistics.engine == "compiled" and ", compiled\n" in ours.summary
     assert theirs.statistics.engine.startswith("interpreted")
@@ -115,10 +115,14 @@ def test_each_effect_acts_alike(name: str) -> None:
 @pytest.mark.parametrize("method", ["rk4", *long(["gauss_4"])])
 def test_six_joints_under_all_at_once(method: str) -> None:
     q = np.array([0.3, -0.6, 0.4, -1.2, 0.5, 1.1])
-    effects = [rd.ViscousFriction(0.5), rd.EffortLimit("urdf"), rd.ExternalWrench("tool0", [5, 3, 1, 0.1, 0.2, 0.3])]
-    controller = rd.ComputedTorque(UR5, rd.quintic(q, q + 0.4, 0.1), 100.0, 20.0)
+    effects = [
+        rd.effects.ViscousFriction(0.5),
+        rd.effects.EffortLimit("urdf"),
+        rd.effects.ExternalWrench("tool0", [5, 3, 1, 0.1, 0.2, 0.3]),
+    ]
+    controller = rd.control.ComputedTorque(UR5, rd.control.quintic(q, q + 0.4, 0.1), 100.0, 20.0)
     options = {"q0": q, "v0": 0 * q, "robot": UR5, "effects": effects, "controller": controller, "duration_s": 0.12}
-    check_equal(*both(integrator=rd.method(method), **options), 1e-11)
+    check_equal(*both(integrator=rd.integrate.method(method), **options), 1e-11)
 
 
 @pytest.mark.parametrize("period", [0.0, 0.0025, 0.01, 0.07])
@@ -126,7 +130,9 @@ def test_samples_lie_at_the_record_period(period: float) -> None:
     check_equal(*both(record_period_s=period), 1e-12)
 
 
-@pytest.mark.parametrize("method", [*long([rd.method("sdirk_3")]), rd.method("linearly_implicit_euler")])
+@pytest.mark.parametrize(
+    "method", [*long([rd.integrate.method("sdirk_3")]), rd.integrate.method("linearly_implicit_euler")]
+)
 def test_other_methods_take_the_rate_in_machine_code(method) -> None:
     """Their steps depend on rounding through tolerances and Jacobians by differences."""
     ours, theirs = both(integrator=method, controller=CONTROLLERS["PID"], duration_s=0.1)
@@ -137,15 +143,18 @@ def test_other_methods_take_the_rate_in_machine_code(method) -> None:
 
 
 DIVERGING = {
-    "a number overflows": {"controller": rd.PD(rd.hold(Q), 1e9, 1e7)},
+    "a number overflows": {"controller": rd.control.PD(rd.control.hold(Q), 1e9, 1e7)},
     "energy grows": {
-        "controller": rd.PD(rd.hold(Q), 3e4, 0.0),
+        "controller": rd.control.PD(rd.control.hold(Q), 3e4, 0.0),
         "integrator": "rk4",
         "step_s": 0.05,
         "duration_s": 20.0,
     },
-    "stages are not found": {"controller": rd.PD(rd.hold(Q), 1e7, 0.0), "integrator": rd.method("gauss_2")},
-    "a tick asks for no finite torque": {"controller": rd.PD(rd.hold(Q), 1e9, 1e7, period_s=0.01)},
+    "stages are not found": {
+        "controller": rd.control.PD(rd.control.hold(Q), 1e7, 0.0),
+        "integrator": rd.integrate.method("gauss_2"),
+    },
+    "a tick asks for no finite torque": {"controller": rd.control.PD(rd.control.hold(Q), 1e9, 1e7, period_s=0.01)},
 }
 
 
@@ -206,9 +215,14 @@ def test_an_undeclared_controller_runs_interpreted_unless_it_is_asked_for() -> N
 
 def test_a_reference_that_jumps_between_rests() -> None:
     """Steps end at the jump, so that both engines see the same constant on either side."""
-    jump = rd.PiecewisePolynomial([0, 0.1, 0.2], [[Q], [Q + 1]])
+    jump = rd.control.PiecewisePolynomial([0, 0.1, 0.2], [[Q], [Q + 1]])
     setup = rd.Setup(
-        rd.Plant(ARM), Q, duration_s=0.2, controller=rd.PD(jump, 10.0, 1.0), estimate_error=False, integrator="rk4"
+        rd.Plant(ARM),
+        Q,
+        duration_s=0.2,
+        controller=rd.control.PD(jump, 10.0, 1.0),
+        estimate_error=False,
+        integrator="rk4",
     )
     run = rd.simulate(replace(setup, engine="interpreted"))
     assert np.abs(run.q[-1] - Q).max() > 0.01
@@ -269,7 +283,7 @@ def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
     from robot_dyn.simulation.compiled import build
 
     setup = rd.Setup(rd.Plant(ARM), Q)
-    made = build.compiled_equation(StateEquation(setup.plant, None), rd.method("rk4"))
+    made = build.compiled_equation(StateEquation(setup.plant, None), rd.integrate.method("rk4"))
     check(made, setup)
     functions = replace(made.functions, checked={})
     other = replace(

@@ -11,21 +11,22 @@ from tests.long import long
 DOUBLE = rd.load("planar_2r")
 PANDA = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
 READY = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
-REACH = rd.quintic(READY, READY + np.array([0.4, -0.3, 0.5, 0.2, -0.6, 0.3, 0.4]), 0.5)
+REACH = rd.control.quintic(READY, READY + np.array([0.4, -0.3, 0.5, 0.2, -0.6, 0.3, 0.4]), 0.5)
 
 # plant, controller, q0, v0, duration, step of RK4
 SCENES = {
     "pendulum": (rd.Plant(rd.load("pendulum")), None, [2.5], [0.7], 2.0, 4e-3),
     "planar_2r with friction": (
-        rd.Plant(DOUBLE, [rd.ViscousFriction([0.4, 0.2])]), None, [0.4, -0.7], [0.3, 0.5], 1.0, 5e-3,
+        rd.Plant(DOUBLE, [rd.effects.ViscousFriction([0.4, 0.2])]), None, [0.4, -0.7], [0.3, 0.5], 1.0, 5e-3,
     ),
     "panda, free swing": (rd.Plant(PANDA), None, READY, np.zeros(7), 1.0, 2e-3),
     "panda, computed torque": (
-        rd.Plant(PANDA), rd.ComputedTorque(PANDA, REACH, *rd.gains_from(1.0, 8.0, 0.9)),
+        rd.Plant(PANDA), rd.control.ComputedTorque(PANDA, REACH, *rd.control.gains_from(1.0, 8.0, 0.9)),
         READY + 0.1, np.full(7, -0.2), 0.5, 5e-3,
     ),
     "cart_pole with spring": (
-        rd.Plant(rd.load("cart_pole"), [rd.Spring([30.0, 0.0], [0.2, 0.0])]), None, [0.1, 0.8], [0.3, -0.5], 1.0, 5e-3,
+        rd.Plant(rd.load("cart_pole"), [rd.effects.Spring([30.0, 0.0], [0.2, 0.0])]), None, [0.1, 0.8], [0.3, -0.5],
+        1.0, 5e-3,
     ),
 }  # fmt: skip
 
@@ -47,9 +48,9 @@ CASES = [pytest.param(scene, id=name) for name, scene in SCENES.items()]
 def test_estimate_is_within_a_factor_of_ten_of_the_true_error(scene) -> None:
     """At its end and at most times on the way; order 8 at half the step is exact to 1e-4 of that, and says so."""
     run = rd.simulate(setup(*scene))
-    reference = rd.simulate(setup(*scene), integrator=rd.method("order_8"), step_s=scene[-1] / 2,
+    reference = rd.simulate(setup(*scene), integrator=rd.integrate.method("order_8"), step_s=scene[-1] / 2,
                             record_period_s=scene[-1], estimate_error=False)  # fmt: skip
-    tight = rd.simulate(setup(*scene), integrator=rd.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False)
+    tight = rd.simulate(setup(*scene), integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False)
     error, estimate = true_error(run, reference), run.error
     assert estimate is not None
     assert np.abs(reference.q[-1] - tight.q[-1]).max() < 1e-3 * error[-1]  # the references agree
@@ -68,8 +69,10 @@ def test_estimate_is_within_a_factor_of_ten_of_the_true_error(scene) -> None:
 def test_estimate_holds_for_methods_of_every_order(name: str) -> None:
     plant, law, q0, v0, duration, _ = SCENES["planar_2r with friction"]
     step = {"explicit_euler": 5e-4, "midpoint": 2e-3}.get(name, 4e-3)
-    run = rd.simulate(setup(plant, law, q0, v0, duration, step), integrator=rd.method(name))
-    tight = rd.simulate(setup(plant, law, q0, v0, duration, step), integrator=rd.Adaptive(rtol=1e-13, atol=1e-14))
+    run = rd.simulate(setup(plant, law, q0, v0, duration, step), integrator=rd.integrate.method(name))
+    tight = rd.simulate(
+        setup(plant, law, q0, v0, duration, step), integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-14)
+    )
     error = np.abs(run.q[-1] - tight.q[-1]).max()
     assert run.error is not None
     assert run.error.resolved_until == duration
@@ -79,9 +82,11 @@ def test_estimate_holds_for_methods_of_every_order(name: str) -> None:
 def test_estimate_of_a_sampled_controller_is_that_of_the_same_ticks() -> None:
     """Companions take longer steps, never fewer ticks: order 4 shows although the torque jumps."""
     plant, _, q0, v0, duration, _ = SCENES["planar_2r with friction"]
-    law = rd.PD(rd.quintic(q0, [0.9, 0.2], 0.5), [60.0, 20.0], [4.0, 1.0], period_s=0.05)
+    law = rd.control.PD(rd.control.quintic(q0, [0.9, 0.2], 0.5), [60.0, 20.0], [4.0, 1.0], period_s=0.05)
     run = rd.simulate(setup(plant, law, q0, v0, duration, 5e-3))
-    exact = rd.simulate(setup(plant, law, q0, v0, duration, 5e-3), integrator=rd.method("order_8"), step_s=2e-3)
+    exact = rd.simulate(
+        setup(plant, law, q0, v0, duration, 5e-3), integrator=rd.integrate.method("order_8"), step_s=2e-3
+    )
     assert run.error is not None
     assert run.error.note == ""
     error = np.abs(run.q[-1] - exact.q[-1]).max()
@@ -91,8 +96,10 @@ def test_estimate_of_a_sampled_controller_is_that_of_the_same_ticks() -> None:
 def test_estimate_of_an_adaptive_run_is_near_its_error() -> None:
     """A run of a tenth of the tolerance errs about eight times less, so the difference is the error to some 15 %."""
     for scene in SCENES.values():
-        run = rd.simulate(setup(*scene), integrator=rd.Adaptive())
-        tight = rd.simulate(setup(*scene), integrator=rd.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False)
+        run = rd.simulate(setup(*scene), integrator=rd.integrate.Adaptive())
+        tight = rd.simulate(
+            setup(*scene), integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False
+        )
         error = np.abs(run.q - tight.q).max()
         assert run.error is not None
         assert 0.3 * error < run.error.final < 3 * max(error, 2e-12)
@@ -104,7 +111,7 @@ def test_chaos_at_a_coarse_step_is_not_resolved(step: float) -> None:
     chaos = setup(rd.Plant(DOUBLE), None, [2.5, 0.7], [0.3, 0.5], 20.0, step)
     run = rd.simulate(chaos)
     reference = rd.simulate(
-        chaos, integrator=rd.method("order_8"), step_s=step / 10, record_period_s=step, estimate_error=False
+        chaos, integrator=rd.integrate.method("order_8"), step_s=step / 10, record_period_s=step, estimate_error=False
     )
     error, estimate = true_error(run, reference), run.error
     assert error[-1] > 1.0  # the end of the run is fiction
@@ -120,7 +127,7 @@ def test_chaos_at_a_coarse_step_is_not_resolved(step: float) -> None:
 
 def test_a_long_adaptive_run_of_chaos_is_not_resolved() -> None:
     chaos = setup(rd.Plant(DOUBLE), None, [2.5, 0.7], [0.3, 0.5], 20.0, 0.01)
-    run = rd.simulate(chaos, integrator=rd.Adaptive(rtol=1e-4, atol=1e-6))
+    run = rd.simulate(chaos, integrator=rd.integrate.Adaptive(rtol=1e-4, atol=1e-6))
     assert run.error is not None
     assert run.error.resolved_until < 20.0
     assert "take rtol = 1e-06" in run.error.note
@@ -145,7 +152,7 @@ def test_rounding_that_the_motion_magnifies_is_in_the_estimate_of_an_adaptive_ru
     """
     arm, v0, T = rd.load("pendulum"), (k + 1) * 1e-11, 5.0
     omega = np.sqrt(rd.linearise(arm, [np.pi], [0.0], [0.0])[0][1, 0])
-    tight = rd.Adaptive("DOP853", 1e-13, 1e-15)
+    tight = rd.integrate.Adaptive("DOP853", 1e-13, 1e-15)
     run = rd.simulate(arm, [np.pi], [v0], duration_s=T, integrator=tight, engine="interpreted")
     off = -1.2246467991473532e-16  # of the float nearest to π from π
     exact = off * (np.cosh(omega * T) - 1) + v0 * np.sinh(omega * T) / omega

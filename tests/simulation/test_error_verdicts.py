@@ -69,7 +69,7 @@ def test_halved_steps_are_shortened_where_they_are_still_in_a_stop_that_the_run_
     """A stop of 1e9 N m/rad for 57 µs, and steps of 3 ms behind it: a companion leaves it a little later."""
     motion = stop(1e9)
     setup = replace(motion.setup, duration_s=0.25, engine="interpreted")
-    run = rd.simulate(setup, integrator=rd.Adaptive("Rosenbrock", 1e-6, 1e-8))
+    run = rd.simulate(setup, integrator=rd.integrate.Adaptive("Rosenbrock", 1e-6, 1e-8))
     assert run.statistics.companion_evaluations < 3 * run.statistics.evaluations
     assert run.error.final == pytest.approx(np.abs(run.q - motion.exact(run.t)).max(), rel=0.1)  # 1 − 2⁻⁴
 
@@ -77,7 +77,7 @@ def test_halved_steps_are_shortened_where_they_are_still_in_a_stop_that_the_run_
 def toss(gap: float, stiffness: float, speed: float = 10.0, **options) -> rd.Trajectory:
     """1 kg tossed up, a stop `gap` below its apex."""
     apex = speed**2 / (2 * 9.80665)
-    plant = rd.Plant(TOSS, rd.joint_stops([-50.0], [apex - gap], stiffness, 0.0))
+    plant = rd.Plant(TOSS, rd.effects.joint_stops([-50.0], [apex - gap], stiffness, 0.0))
     return rd.simulate(plant, q0=[0.0], v0=[speed], duration_s=2.0, **options)
 
 
@@ -102,7 +102,7 @@ def rebound(run: rd.Trajectory, gap: float, stiffness: float, speed: float = 10.
 
 def test_a_graze_of_a_stop_is_not_stepped_over() -> None:
     """0.1 mm below the apex of a toss of 10 m/s: DOP853's own steps of 0.4 s would fly past, 78 mm wrong in silence."""
-    run = toss(1e-4, 1e7, integrator=rd.Adaptive())
+    run = toss(1e-4, 1e7, integrator=rd.integrate.Adaptive())
     error = rebound(run, 1e-4, 1e7)
     assert np.diff(run.t).max() <= 0.01
     assert error < 1e-6
@@ -121,7 +121,7 @@ def test_long_steps_that_miss_the_order_speak_of_no_run_that_has_it(gap: float, 
 def test_a_switch_in_the_last_step_ends_the_estimate() -> None:
     """Touched 2.6 ms before the end, of which run and companions make one step: ω h = 2.6, and no order."""
     apex = 10.0**2 / (2 * 9.80665)
-    plant = rd.Plant(TOSS, rd.joint_stops([-50.0], [apex - 0.5], 1e6, 0.0))
+    plant = rd.Plant(TOSS, rd.effects.joint_stops([-50.0], [apex - 0.5], 1e6, 0.0))
     run = rd.simulate(plant, [0.0], [10.0], duration_s=0.703, integrator="order_8", step_s=0.01, engine="interpreted")
     exact = rebound(run, 0.5, 1e6)
     assert run.error.final >= LEAST * exact or "switches in the last step" in run.error.note
@@ -138,25 +138,31 @@ def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None
 
 
 @pytest.mark.parametrize(
-    "method", [rd.Adaptive(), *long([rd.Adaptive(rtol=1e-6, atol=1e-8), rd.method("rk4"), rd.method("gauss_4")])]
+    "method",
+    [
+        rd.integrate.Adaptive(),
+        *long(
+            [rd.integrate.Adaptive(rtol=1e-6, atol=1e-8), rd.integrate.method("rk4"), rd.integrate.method("gauss_4")]
+        ),
+    ],
 )
 def test_random_grazes_are_met_or_told(method) -> None:
     rng, met = np.random.default_rng(105), 0
     for _ in range(5):
         gap, stiffness, speed = 10 ** rng.uniform(-7, -3), 10 ** rng.uniform(5, 7.5), rng.uniform(5, 10)
-        options = {} if isinstance(method, rd.Adaptive) else {"step_s": 0.02}
+        options = {} if isinstance(method, rd.integrate.Adaptive) else {"step_s": 0.02}
         run = toss(gap, stiffness, speed, integrator=method, **options)
         error = rebound(run, gap, stiffness, speed)
         silent = run.outcome.ending == "finished" and not run.error.note and not run.leak
         assert not silent or run.error.final >= LEAST * error, (gap, stiffness, speed, error, str(run.error))
         met += silent
-    assert met > 2 or not isinstance(method, rd.Adaptive)
+    assert met > 2 or not isinstance(method, rd.integrate.Adaptive)
 
 
 def test_an_impulse_in_a_long_run_is_not_merged_away() -> None:
     """1 N s in 1 µs of 1000 s, 1e-9 of the run: v = 1 m/s from 333 s on; only the rounding of t and q is left."""
     start, length = 333.0, 1e-6
-    push = rd.ExternalWrench("block", [0, 0, 1 / length, 0, 0, 0], start_s=start, end_s=start + length)
+    push = rd.effects.ExternalWrench("block", [0, 0, 1 / length, 0, 0, 0], start_s=start, end_s=start + length)
     real = (start + length) - start  # as floats have it
     run = rd.simulate(
         rd.Plant(RAIL, [push]), q0=[0.0], duration_s=1000.0, integrator="rk4", step_s=0.1, record_period_s=1.0
@@ -169,15 +175,15 @@ def test_an_impulse_in_a_long_run_is_not_merged_away() -> None:
 
 def test_switches_closer_than_floats_can_tell_are_refused() -> None:
     start = 333.0
-    push = rd.ExternalWrench("block", np.ones(6), start_s=start, end_s=start + 2 * np.spacing(start))
+    push = rd.effects.ExternalWrench("block", np.ones(6), start_s=start, end_s=start + 2 * np.spacing(start))
     with pytest.raises(QueryError, match=r"switches at 333\.0 s and .* merge them, or move them apart"):
         rd.simulate(rd.Plant(RAIL, [push]), q0=[0.0], duration_s=1000.0)
 
 
 def test_a_tick_within_rounding_of_a_switch_moves_onto_it() -> None:
     """3 · 0.1 is not 0.3: one end of a segment, at the switch, and the controller acts there."""
-    push = rd.ExternalWrench("block", np.ones(6), start_s=0.3, end_s=0.7)
-    law = rd.PD(rd.hold([0.0]), 1.0, 1.0, period_s=0.1)
+    push = rd.effects.ExternalWrench("block", np.ones(6), start_s=0.3, end_s=0.7)
+    law = rd.control.PD(rd.control.hold([0.0]), 1.0, 1.0, period_s=0.1)
     segments = rd.Setup(rd.Plant(RAIL, [push]), [0.1], duration_s=1.0, controller=law).segments
     starts = [each.start for each in segments]
     assert len(starts) == 10
@@ -188,8 +194,10 @@ def test_a_tick_within_rounding_of_a_switch_moves_onto_it() -> None:
 
 def test_control_at_the_default_step_is_estimated() -> None:
     """1 kHz control has one step a tick: only shorter steps can tell, and they do."""
-    law = rd.PD(rd.hold(READY), *rd.gains_from(np.diag(PANDA.M(READY)), 10.0), period_s=1e-3)
-    setup = rd.Setup(rd.Plant(PANDA), READY + 0.1, duration_s=0.1, controller=law, integrator=rd.method("midpoint"))
+    law = rd.control.PD(rd.control.hold(READY), *rd.control.gains_from(np.diag(PANDA.M(READY)), 10.0), period_s=1e-3)
+    setup = rd.Setup(
+        rd.Plant(PANDA), READY + 0.1, duration_s=0.1, controller=law, integrator=rd.integrate.method("midpoint")
+    )
     run = rd.simulate(setup)
     error = np.abs(run.q - truth(setup, run.t)).max()
     assert run.error.note == ""
@@ -198,8 +206,8 @@ def test_control_at_the_default_step_is_estimated() -> None:
 
 def test_one_short_segment_leaves_the_estimate_of_the_others() -> None:
     arm = rd.load("planar_2r")
-    push = rd.ExternalWrench(arm.frame_names[-1], 0.1 * np.ones(6), start_s=0.2003, end_s=0.2004)
-    setup = rd.Setup(rd.Plant(arm, [push]), [0.4, -0.7], [0.3, 0.5], 0.5, integrator=rd.method("midpoint"))
+    push = rd.effects.ExternalWrench(arm.frame_names[-1], 0.1 * np.ones(6), start_s=0.2003, end_s=0.2004)
+    setup = rd.Setup(rd.Plant(arm, [push]), [0.4, -0.7], [0.3, 0.5], 0.5, integrator=rd.integrate.method("midpoint"))
     run = rd.simulate(setup)
     error = np.abs(run.q - truth(setup, run.t)).max()
     assert run.error.verdict is Verdict.ORDER
@@ -210,12 +218,16 @@ def test_one_short_segment_leaves_the_estimate_of_the_others() -> None:
 def test_a_usable_run_with_stiff_friction_is_bounded_not_refused() -> None:
     """RK4 is near its stability limit, so that no order shows; the run is right to 1e-6 all the same."""
     plant = rd.Plant(PANDA, "urdf")
-    law = rd.PDGravity(PANDA, rd.quintic(READY, READY + 0.2, 0.2), *rd.gains_from(np.diag(PANDA.M(READY)), 10.0))
+    law = rd.control.PDGravity(
+        PANDA, rd.control.quintic(READY, READY + 0.2, 0.2), *rd.control.gains_from(np.diag(PANDA.M(READY)), 10.0)
+    )
     run = rd.simulate(
         plant, q0=READY, duration_s=0.2, controller=law, integrator="rk4", step_s=2.5e-4, record_period_s=1e-3
     )
-    tight = rd.simulate(plant, q0=READY, duration_s=0.2, controller=law, integrator=rd.Adaptive(rtol=1e-12, atol=1e-13),
-                        record_period_s=1e-3, estimate_error=False)  # fmt: skip
+    tight = rd.simulate(
+        plant, q0=READY, duration_s=0.2, controller=law, integrator=rd.integrate.Adaptive(rtol=1e-12, atol=1e-13),
+        record_period_s=1e-3, estimate_error=False,
+    )  # fmt: skip
     error = np.abs(run.q - tight.q).max()
     assert error < 1e-6
     assert run.error.note == ""
@@ -225,7 +237,9 @@ def test_a_usable_run_with_stiff_friction_is_bounded_not_refused() -> None:
 @pytest.mark.parametrize("far", [1e13, *long([1e9, 1e16])])
 def test_rounding_of_a_far_position_is_in_the_estimate(far: float) -> None:
     """Q += h v loses what is below half a unit of q's last place, in every step and every companion run alike."""
-    run = rd.simulate(rd.Plant(RAIL), q0=[far], v0=[0.7], duration_s=1.0, integrator=rd.method("semi_implicit_euler"))
+    run = rd.simulate(
+        rd.Plant(RAIL), q0=[far], v0=[0.7], duration_s=1.0, integrator=rd.integrate.method("semi_implicit_euler")
+    )
     error = abs(run.q[-1, 0] - (far + 0.7))
     assert run.error.final >= LEAST * error or "rounding" in run.error.note
     assert (far == 1e9) == (run.error.note == "")
@@ -238,7 +252,7 @@ def test_rounding_of_a_far_position_is_in_the_estimate(far: float) -> None:
 def test_rounding_that_the_motion_magnifies_is_in_the_estimate(start: float, duration: float, method: str) -> None:
     """Upright, a pendulum leaves its start as e^(3.8 t): a unit of rounding is a radian after 10 s."""
     plant = rd.Plant(rd.load("pendulum"))
-    run = rd.simulate(plant, q0=[start], duration_s=duration, integrator=rd.method(method))
+    run = rd.simulate(plant, q0=[start], duration_s=duration, integrator=rd.integrate.method(method))
     exact = upright(start, run.t)
     known = run.t <= run.error.resolved_until
     error = np.abs(run.q[:, 0] - exact)[known].max()
@@ -272,19 +286,19 @@ def test_an_oscillation_that_a_method_damps_has_no_estimate(method: str) -> None
     """Of q = q₀ cos ω t with ω h = 17 each step leaves next to nothing of it, at any length near h."""
     bar = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
     options = {"duration_s": 0.02, "integrator": method, "engine": "interpreted"}
-    run = rd.simulate(rd.Plant(bar, [rd.Spring(1e8)]), [1e-2], step_s=1e-3, **options)
+    run = rd.simulate(rd.Plant(bar, [rd.effects.Spring(1e8)]), [1e-2], step_s=1e-3, **options)
     assert run.error.verdict is Verdict.NONE
     assert "joint 'pivot', by 'spring'" in run.error.note
-    slow = rd.simulate(rd.Plant(bar, [rd.Spring(1e4)]), [1e-2], step_s=1e-3, **options)  # ω h = 0.17
+    slow = rd.simulate(rd.Plant(bar, [rd.effects.Spring(1e4)]), [1e-2], step_s=1e-3, **options)  # ω h = 0.17
     exact = 1e-2 * np.cos(np.sqrt(3e4) * slow.t[:, None])
     assert slow.error.final >= LEAST * np.abs(slow.q - exact).max()
 
 
 def test_a_record_that_meets_every_turning_point_accuses_no_run() -> None:
     """Samples at rest alone: the energy exchanged and the motion are those between them."""
-    plant = rd.Plant(RAIL, [rd.Spring(1.0)])
+    plant = rd.Plant(RAIL, [rd.effects.Spring(1.0)])
     period = 2 * np.pi  # of 1 kg on 1 N/m
-    for method in (rd.method("rk4"), rd.Adaptive(rtol=1e-6, atol=1e-8)):
+    for method in (rd.integrate.method("rk4"), rd.integrate.Adaptive(rtol=1e-6, atol=1e-8)):
         run = rd.simulate(plant, q0=[1.0], duration_s=period, record_period_s=period, integrator=method)
         assert run.leak == ""
         assert run.error.note == ""
@@ -314,11 +328,16 @@ class Pulse(Active):
 
 
 @pytest.mark.parametrize(
-    "method", [rd.method("rk4"), rd.Adaptive(), *long([rd.method("gauss_6"), rd.method("semi_implicit_euler")])]
+    "method",
+    [
+        rd.integrate.method("rk4"),
+        rd.integrate.Adaptive(),
+        *long([rd.integrate.method("gauss_6"), rd.integrate.method("semi_implicit_euler")]),
+    ],
 )
 def test_code_that_acts_between_steps_is_looked_at_there(method) -> None:
     """A pulse of 1 ms inside steps of 10 ms, at no node: no method sees it."""
-    options = {} if isinstance(method, rd.Adaptive) else {"step_s": 0.01}
+    options = {} if isinstance(method, rd.integrate.Adaptive) else {"step_s": 0.01}
     run = rd.simulate(
         rd.Plant(RAIL, [Pulse(0.5016, 1e-3, 1e3)]), q0=[0.0], v0=[0.2], duration_s=2.0, integrator=method, **options
     )
@@ -372,7 +391,7 @@ def test_metadata_of_packages_are_read_once(monkeypatch) -> None:
 @pytest.mark.parametrize("period", [-0.1, np.nan, np.inf, "a", None, True])
 def test_a_period_of_control_that_is_not_a_time_is_refused(period) -> None:
     """Also that of a class which the library did not write: a negative one would run as continuous control."""
-    law = rd.PD(rd.hold([0.0]), 1.0, 1.0)
+    law = rd.control.PD(rd.control.hold([0.0]), 1.0, 1.0)
     object.__setattr__(law, "period_s", period)
     with pytest.raises(QueryError, match="period_s of the controller"):
         rd.Setup(rd.Plant(RAIL), [0.1], controller=law)

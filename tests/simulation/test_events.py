@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
 from robot_dyn.errors import QueryError, TraceError
@@ -15,14 +17,14 @@ G = 9.80665
 BALL = arms()["rail"]  # 1 kg on a vertical rail
 ARM = rd.load("planar_2r")
 ENGINES = ["interpreted", "compiled"]
-TIGHT = rd.Adaptive(rtol=1e-12, atol=1e-12)
+TIGHT = rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)
 
 
 def tossed(rise: float, excess: float, k: float, after: float, **options) -> tuple[rd.Trajectory, float]:
     """1 kg thrown up for `rise` s to `excess` m above a stop of k N/m, and the closed form of its place at the end."""
     v0 = G * rise
     stop = v0**2 / (2 * G) - excess
-    plant = rd.Plant(BALL, rd.joint_stops([-50.0], [stop], k, 0.0))
+    plant = rd.Plant(BALL, rd.effects.joint_stops([-50.0], [stop], k, 0.0))
     options = {"integrator": TIGHT, "estimate_error": False} | options
     run = rd.simulate(plant, [0.0], [v0], duration_s=rise + after, **options)
     left = v0**2 - 2 * G * stop
@@ -48,7 +50,7 @@ def test_grazed_and_struck_stops_are_met_as_in_closed_form(seed: int) -> None:
 
 def test_a_run_that_ends_far_from_its_start_has_an_estimate() -> None:
     """Of fixed steps that are cut: how far a joint turns in a step is told from its path, which begins at the start."""
-    plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), rd.joint_stops([-9.0, -9.0], [9.0, 9.0]))
+    plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), rd.effects.joint_stops([-9.0, -9.0], [9.0, 9.0]))
     run = rd.simulate(plant, [0.1, 0.2], [3.0, 0.5], duration_s=2.5, integrator="rk4", step_s=0.01)
     assert np.abs(run.q[-1] - run.q[0]).max() > np.pi
     assert run.error is not None
@@ -93,7 +95,7 @@ def test_a_function_of_the_users_own_is_an_event_where_it_vanishes(engine: str, 
 def test_a_terminal_event_ends_the_run_there(engine: str) -> None:
     """Run until the arm hangs at rest to 1 mrad/s: the run is finished, its last sample is the event."""
     slow = rd.Event(lambda t, q, v: v[0] ** 2 + v[1] ** 2 - 1e-6, direction=-1, terminal=True, name="at rest")
-    plant = rd.Plant(ARM, [rd.ViscousFriction(8.0)])
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction(8.0)])
     run = rd.simulate(plant, [0.3, 0.4], duration_s=60.0, engine=engine, events=[slow], record_period_s=0.1)
     assert run.outcome.ending == "finished"
     assert run.outcome.t == run.t[-1] == run.events[-1].t < 60
@@ -102,18 +104,44 @@ def test_a_terminal_event_ends_the_run_there(engine: str) -> None:
     assert np.isfinite(run.a[-1]).all()
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("level", [1e-2, 1e-6, 1e-10])
+def test_a_function_that_dips_below_0_between_two_looks_is_seen(engine: str, level: float) -> None:
+    """V² − ε falls below 0 at each turning point, for 2 µs at 1e-10: all are found, by SciPy's times of v = 0."""
+
+    def rate(t: float, x: np.ndarray) -> list[float]:  # of a rod of 1 kg and 1 m
+        return [x[1], 3 * (-0.05 * x[1] - G / 2 * np.sin(x[0]))]
+
+    truth = solve_ivp(rate, (0, 6), [0.9, 2.0], "DOP853", events=lambda t, x: x[1], rtol=1e-12, atol=1e-13)
+    slow = rd.Event(lambda t, q, v: (v**2).sum() - level, name="slow")
+    plant = rd.Plant(rd.load("pendulum"), [rd.effects.ViscousFriction(0.05)])
+    options = {"engine": engine, "estimate_error": False, "events": [slow]}
+    run = rd.simulate(plant, [0.9], [2.0], duration_s=6.0, **options)
+    assert [each.direction for each in run.events] == [-1, 1] * len(truth.t_events[0])
+    times = np.array([each.t for each in run.events]).reshape(-1, 2)
+    # the speed is linear about a turning point, but for a part of the order of the time within the dip
+    assert times.mean(axis=1) == pytest.approx(truth.t_events[0], abs=level + 1e-8)
+    run = rd.simulate(plant, [0.9], [2.0], duration_s=6.0, **options | {"events": [replace(slow, function=above)]})
+    assert run.events == ()
+
+
+def above(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Least at each turning point, and never 0."""
+    return (v**2).sum() + 1e-10
+
+
 def test_events_that_never_occur_do_not_change_the_steps() -> None:
     """Stops out of reach: the same steps, the same bits, and no evaluation more."""
     options = {"q0": [0.3, 0.4], "v0": [0.2, 0.1], "duration_s": 1.0, "estimate_error": False, "record_period_s": 1.0}
     bare = rd.simulate(ARM, **options, engine="interpreted")
-    far = rd.simulate(rd.Plant(ARM, rd.joint_stops([-9.0, -9.0], [9.0, 9.0])), **options, engine="interpreted")
+    far = rd.simulate(rd.Plant(ARM, rd.effects.joint_stops([-9.0, -9.0], [9.0, 9.0])), **options, engine="interpreted")
     assert far.statistics.evaluations == bare.statistics.evaluations
     assert np.array_equal(far.q[-1], bare.q[-1])
 
 
 def test_a_start_on_a_stop_and_one_within_it() -> None:
     """Resting on a lower stop exactly, weight sinks in by m g / k; a start within is in contact from the first step."""
-    stops = rd.joint_stops([0.0], [5.0], 1e4, 0.0)
+    stops = rd.effects.joint_stops([0.0], [5.0], 1e4, 0.0)
     on = rd.simulate(rd.Plant(BALL, stops), [0.0], duration_s=0.1, integrator=TIGHT)
     omega = 100.0
     exact = -G / omega**2 * (1 - np.cos(omega * on.t))
@@ -131,7 +159,10 @@ def test_two_joints_that_meet_their_stops_at_once() -> None:
     <limit lower="-9" upper="9" effort="9" velocity="9"/></joint>"""
     pair = rd.Robot.from_text(text.format(one.format(1) + one.format(2)))
     run = rd.simulate(
-        rd.Plant(pair, rd.joint_stops([-0.5, -0.5], [9.0, 9.0], 1e6, 0.0)), [0.0, 0.0], duration_s=1.0, integrator=TIGHT
+        rd.Plant(pair, rd.effects.joint_stops([-0.5, -0.5], [9.0, 9.0], 1e6, 0.0)),
+        [0.0, 0.0],
+        duration_s=1.0,
+        integrator=TIGHT,
     )
     times = [each.t for each in run.events]
     assert len(times) >= 4
@@ -144,7 +175,7 @@ def test_machine_code_paused_at_every_third_step_gives_the_same_bits(monkeypatch
     from robot_dyn.simulation.run.event_run import EventRun
 
     options = {"q0": [0.3, 0.4], "v0": [0.2, 0.1], "duration_s": 2.0, "engine": "compiled", "estimate_error": False}
-    plant = rd.Plant(ARM, rd.joint_stops([-1.0, -1.0], [1.0, 1.0], 1e5))
+    plant = rd.Plant(ARM, rd.effects.joint_stops([-1.0, -1.0], [1.0, 1.0], 1e5))
     whole = rd.simulate(plant, **options)
     go = EventRun._go
     monkeypatch.setattr(EventRun, "_go", lambda self, budget: go(self, 3))
@@ -182,11 +213,13 @@ def test_meaningless_events_are_refused(make, message: str) -> None:
 
 def test_a_run_that_takes_more_steps_than_was_guessed_goes_on_in_machine_code() -> None:
     """Its length is guessed by its duration; a stiff damper takes many more steps. The count decides, not a clock."""
-    plant = rd.Plant(ARM, [rd.ViscousFriction(3e4)])
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction(3e4)])
     run = rd.simulate(plant, [0.3, 0.4], duration_s=0.05, estimate_error=False, integrator="DOP853")
     assert run.statistics.evaluations > 20_000
     assert run.statistics.engine == "compiled"
-    other = rd.Plant(ARM, [rd.ViscousFriction(3e4), rd.ViscousFriction(1.0)])  # no machine code is there yet
+    other = rd.Plant(
+        ARM, [rd.effects.ViscousFriction(3e4), rd.effects.ViscousFriction(1.0)]
+    )  # no machine code is there yet
     assert rd.simulate(other, [0.3, 0.4], duration_s=1e-4, estimate_error=False).statistics.engine != "compiled"
 
 
@@ -203,7 +236,7 @@ def test_a_long_run_that_cannot_be_compiled_is_made_in_python(monkeypatch: pytes
     monkeypatch.setattr("robot_dyn.simulation.compiled.engine_choice._COMPILED", 500)
     count = [0.0]  # evaluations of runs before, which other tests may have made
     monkeypatch.setattr("robot_dyn.simulation.compiled.engine_choice.interpreted", lambda *_: count)
-    tight = rd.Adaptive(rtol=3e-14, atol=1e-15)
+    tight = rd.integrate.Adaptive(rtol=3e-14, atol=1e-15)
     run = rd.simulate(ARM, [0.3, 0.4], duration_s=0.4, estimate_error=False, integrator=tight)
     assert run.statistics.evaluations > 500
     assert run.statistics.engine == "interpreted (not here)"

@@ -15,11 +15,11 @@ from tests.long import long
 DOUBLE = rd.load("planar_2r")
 SKEW, CART_POLE = rd.load("skew_tree"), rd.load("cart_pole")
 FORCE = [3.0, -0.7, -2.0, 0.3, 4.0, 0.5]
-FRICTION, SPRING = rd.ViscousFriction([0.4, 0.2]), rd.Spring([8.0, 5.0], [0.2, -0.3])
-DRY = rd.RegularisedCoulombFriction([0.5, 0.2], 0.5)  # smooth on the scale of a step
-WINDOW = rd.ExternalWrench("tip", FORCE, start_s=0.12, end_s=0.24)
-PD = rd.PD(rd.quintic([0.4, -0.7], [0.9, 0.2], 0.3), [60.0, 20.0], [4.0, 1.0])
-SAMPLED = rd.PD(PD.reference, PD.kp, PD.kd, period_s=0.02)
+FRICTION, SPRING = rd.effects.ViscousFriction([0.4, 0.2]), rd.effects.Spring([8.0, 5.0], [0.2, -0.3])
+DRY = rd.effects.RegularisedCoulombFriction([0.5, 0.2], 0.5)  # smooth on the scale of a step
+WINDOW = rd.effects.ExternalWrench("tip", FORCE, start_s=0.12, end_s=0.24)
+PD = rd.control.PD(rd.control.quintic([0.4, -0.7], [0.9, 0.2], 0.3), [60.0, 20.0], [4.0, 1.0])
+SAMPLED = rd.control.PD(PD.reference, PD.kp, PD.kd, period_s=0.02)
 START = {"q0": [0.4, -0.7], "v0": [0.9, -0.5], "duration_s": 0.4}
 
 SCENES = {
@@ -44,7 +44,7 @@ def test_residual_shrinks_with_the_order_of_the_method(name: str, step: float, p
 
     Switches lie at multiples of 4 h, so that h is halved everywhere.
     """
-    method, residuals = rd.method(name), []
+    method, residuals = rd.integrate.method(name), []
     for h in (step, step / 2):
         run = rd.simulate(plant, **START, controller=law, integrator=method, step_s=h, estimate_error=False)
         residuals.append(np.abs(run.ledger.residual).max())
@@ -53,10 +53,12 @@ def test_residual_shrinks_with_the_order_of_the_method(name: str, step: float, p
 
 
 @scenes
-@pytest.mark.parametrize("method", [rd.method("order_8"), rd.Adaptive()], ids=["order_8", "Adaptive"])
+@pytest.mark.parametrize(
+    "method", [rd.integrate.method("order_8"), rd.integrate.Adaptive()], ids=["order_8", "Adaptive"]
+)
 def test_the_ledger_closes_to_a_billionth_of_the_energy_exchanged(method, plant, law) -> None:
     """Order 8 at 5 ms is at rounding; tolerances of 1e-10 leave less than 1e-9."""
-    step = {} if isinstance(method, rd.Adaptive) else {"step_s": 5e-3}
+    step = {} if isinstance(method, rd.integrate.Adaptive) else {"step_s": 5e-3}
     run = rd.simulate(plant, **START, **step, controller=law, integrator=method, estimate_error=False)
     ledger = run.ledger
     assert run.outcome.ending == "finished"
@@ -68,7 +70,7 @@ def test_the_ledger_closes_to_a_billionth_of_the_energy_exchanged(method, plant,
 @scenes
 def test_energy_and_work_are_those_of_their_definitions(plant, law) -> None:
     """E of the recorded states; W = ∫ τᵀ v dt by Simpson's rule over the samples between switches, error O(h⁴)."""
-    run = rd.simulate(plant, **START, controller=law, integrator=rd.method("order_8"), step_s=1e-3)
+    run = rd.simulate(plant, **START, controller=law, integrator=rd.integrate.method("order_8"), step_s=1e-3)
     ledger, robot = run.ledger, DOUBLE
     M = robot.M(run.q)
     np.testing.assert_allclose(ledger.kinetic, (run.v * np.matvec(M, run.v)).sum(axis=1) / 2, rtol=1e-12)
@@ -95,7 +97,7 @@ def test_energy_and_work_are_those_of_their_definitions(plant, law) -> None:
 def test_power_is_the_derivative_of_work() -> None:
     """Central differences over 0.5 ms err by h²/6 · W‴, and W‴ is below 1e5 W/s² here."""
     plant, law = SCENES["all"][0], SCENES["all"][1]
-    run = rd.simulate(plant, **START, controller=law, integrator=rd.method("rk4"), step_s=5e-4)
+    run = rd.simulate(plant, **START, controller=law, integrator=rd.integrate.method("rk4"), step_s=5e-4)
     for source, work in run.ledger.work.items():
         slope = (work[2:] - work[:-2]) / (run.t[2:] - run.t[:-2])
         cuts = np.array([0.12, 0.24, 0.3])
@@ -108,7 +110,7 @@ def test_power_is_the_derivative_of_work() -> None:
 @pytest.mark.parametrize("effect", [FRICTION, DRY], ids=lambda e: e.name)
 @pytest.mark.parametrize("name", ["rk4", *long(["gauss_4", "linearly_implicit_euler"])])
 def test_work_of_a_dissipative_effect_only_falls(name: str, effect) -> None:
-    run = rd.simulate(rd.Plant(DOUBLE, [effect]), **START, integrator=rd.method(name), estimate_error=False)
+    run = rd.simulate(rd.Plant(DOUBLE, [effect]), **START, integrator=rd.integrate.method(name), estimate_error=False)
     work = run.ledger.work[effect.name]
     assert work[0] == 0.0
     assert (np.diff(work) < 0).all()
@@ -118,9 +120,9 @@ def test_work_of_a_dissipative_effect_only_falls(name: str, effect) -> None:
 
 def test_conservative_effects_are_in_the_potential_and_do_no_work() -> None:
     """With a spring and stops only, E is constant, by the error of order 8."""
-    stops, _ = rd.joint_stops([-0.5, -1.0], [0.6, -0.2], stiffness=200.0)
+    stops, _ = rd.effects.joint_stops([-0.5, -1.0], [0.6, -0.2], stiffness=200.0)
     plant = rd.Plant(DOUBLE, [SPRING, stops])
-    run = rd.simulate(plant, **START, integrator=rd.method("order_8"), step_s=1e-3, estimate_error=False)
+    run = rd.simulate(plant, **START, integrator=rd.integrate.method("order_8"), step_s=1e-3, estimate_error=False)
     assert list(run.ledger.work) == list(run.power) == ["control"]
     assert not run.ledger.work["control"].any()
     own = DOUBLE.potential_energy(run.q) + sum(e.potential(DOUBLE, 0.0, run.q) for e in (SPRING, stops))
@@ -132,7 +134,7 @@ def test_conservative_effects_are_in_the_potential_and_do_no_work() -> None:
 
 def test_effects_of_one_name_keep_their_own_accounts() -> None:
     """Half the friction twice is the whole of it."""
-    halves = rd.Plant(DOUBLE, [rd.ViscousFriction([0.2, 0.1]), SPRING, rd.ViscousFriction([0.2, 0.1])])
+    halves = rd.Plant(DOUBLE, [rd.effects.ViscousFriction([0.2, 0.1]), SPRING, rd.effects.ViscousFriction([0.2, 0.1])])
     one = rd.simulate(rd.Plant(DOUBLE, [FRICTION, SPRING]), **START, estimate_error=False).ledger
     two = rd.simulate(halves, **START, estimate_error=False).ledger
     assert len(two.work) == 3
@@ -142,7 +144,7 @@ def test_effects_of_one_name_keep_their_own_accounts() -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Grease(rd.Dissipative):
+class Grease(rd.effects.Dissipative):
     """Its name has a space."""
 
     name = "grease drag"
@@ -176,7 +178,7 @@ def test_a_dissipative_effect_that_gains_is_told_whatever_its_name() -> None:
 def test_a_lift_at_constant_force_does_the_work_of_mechanics() -> None:
     """On a rail, W = F x for a constant force: the wrench pushes, E rises by as much; rounding, 1e-12."""
     cart = CART_POLE.with_(lock={"hinge": 0.4}, gravity=(0.0, 0.0, 0.0))
-    push = rd.ExternalWrench("cart", [7.0, 1.0, 2.0, 0.0, 0.0, 0.0])
+    push = rd.effects.ExternalWrench("cart", [7.0, 1.0, 2.0, 0.0, 0.0, 0.0])
     run = rd.simulate(rd.Plant(cart, [push]), q0=[0.2], v0=[-0.3], duration_s=1.0, estimate_error=False)
     np.testing.assert_allclose(run.ledger.work["external_wrench"], 7.0 * (run.q[:, 0] - 0.2), atol=1e-12)
     np.testing.assert_allclose(run.ledger.kinetic, 3.1 * run.v[:, 0] ** 2, atol=1e-12)
@@ -192,14 +194,18 @@ def test_nothing_moves_and_nothing_is_exchanged() -> None:
 def test_gauss_keeps_the_energy_of_a_long_swing_and_euler_does_not() -> None:
     """Symplectic in (q, p): no drift over 20 s, the error of E stays within twice that of the first 4 s."""
     start = {"q0": [-1.0, 0.5], "v0": [0.0, 0.0], "step_s": 0.01, "estimate_error": False}
-    gauss = rd.simulate(rd.Plant(DOUBLE), **start, duration_s=20.0, integrator=rd.method("gauss_4")).ledger.residual
+    gauss = rd.simulate(
+        rd.Plant(DOUBLE), **start, duration_s=20.0, integrator=rd.integrate.method("gauss_4")
+    ).ledger.residual
     assert np.abs(gauss[1600:]).max() < 2 * np.abs(gauss[:400]).max() < 1e-4
-    euler = rd.simulate(rd.Plant(DOUBLE), **start, duration_s=5.0, integrator=rd.method("explicit_euler")).ledger
+    euler = rd.simulate(
+        rd.Plant(DOUBLE), **start, duration_s=5.0, integrator=rd.integrate.method("explicit_euler")
+    ).ledger
     assert euler.residual[-1] > 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Lopsided(rd.Conservative):
+class Lopsided(rd.effects.Conservative):
     """A spring whose potential is too large by a half, and whose rest may move: d(E − W)/dt is not 0."""
 
     share: float = 1.0
@@ -227,14 +233,14 @@ def test_long_steps_are_the_cause_of_a_ledger_that_does_not_close() -> None:
     assert run.leak == "it does not close: the steps are too long for the motion; take step_s = 5e-03"
     finer = rd.simulate(DOUBLE, [0.4, 0.2], [3.0, 2.0], duration_s=0.6, integrator="explicit_euler", step_s=0.005)
     assert finer.ledger.closure < run.ledger.closure / 2
-    loose = rd.Adaptive(rtol=3e-2, atol=1e-1)
+    loose = rd.integrate.Adaptive(rtol=3e-2, atol=1e-1)
     run = rd.simulate(DOUBLE, [0.4, 0.2], [3.0, 2.0], duration_s=3.0, integrator=loose)
     assert run.leak == "it does not close: the tolerance is too loose; take rtol = 3e-04"
 
 
 def test_a_stop_passed_within_a_step_is_the_cause_of_a_ledger_that_does_not_close() -> None:
     """Half an oscillation in the stop takes 36 ms, less than three steps; sdirk_3 damps it."""
-    plant = rd.Plant(DOUBLE, rd.joint_stops(-0.5, 0.6, 1e3, 0.0))
+    plant = rd.Plant(DOUBLE, rd.effects.joint_stops(-0.5, 0.6, 1e3, 0.0))
     run = rd.simulate(
         plant, [0.4, 0.2], [3.0, 2.0], duration_s=0.4, integrator="sdirk_3", step_s=0.02, estimate_error=False
     )
@@ -245,7 +251,20 @@ def test_a_stop_passed_within_a_step_is_the_cause_of_a_ledger_that_does_not_clos
 def test_rounding_at_rest_is_no_leak() -> None:
     """Held by gravity compensation, K is 1e-30 J and the residual 1e-14 J of potentials of 10 J: rounding of these."""
     arm, q = rd.load("ur5"), [0.3, -0.6, 0.4, -1.2, 0.5, 1.1]
-    run = rd.simulate(arm, q, duration_s=0.1, controller=rd.PDGravity(arm, rd.hold(q), 10.0, 1.0))
+    run = rd.simulate(arm, q, duration_s=0.1, controller=rd.control.PDGravity(arm, rd.control.hold(q), 10.0, 1.0))
     assert run.ledger.closure > 1e-3
     assert run.leak == ""
     assert "does not close" not in run.summary
+
+
+def test_an_arm_that_stands_exchanges_no_energy() -> None:
+    """Held by its own weight's torque: what is left of power is rounding, and no part of it is stated."""
+    q = np.array([0.4, -0.7])
+    held = rd.simulate(
+        rd.Plant(DOUBLE), q, duration_s=0.2, controller=rd.control.PDGravity(DOUBLE, rd.control.hold(q), 9, 3)
+    )
+    assert not held.ledger.exchanges
+    assert "J, no energy exchanged" in held.summary
+    moved = rd.simulate(rd.Plant(DOUBLE), q, [1e-3, 0.0], duration_s=0.2)
+    assert moved.ledger.exchanges
+    assert "of the energy exchanged" in moved.summary

@@ -19,7 +19,7 @@ F = np.array([12.0, -5.0, 7.0, 0.6, -0.4, 0.9])
 def test_a_wrench_in_base_axes_does_the_same_work(axes: str) -> None:
     """τ = Jᵀ F is one torque, in whatever axes F was given: rounding of a few hundred N m, 1e-12."""
     arm = rd.load("ur5")
-    effect = rd.ExternalWrench("tool0", F, expressed_in=axes, end_s=1.0)
+    effect = rd.effects.ExternalWrench("tool0", F, expressed_in=axes, end_s=1.0)
     plant = rd.Plant(arm, [effect])
     recorded = wrenches(plant, np.array([0.0, 0.5]), Q)["tool0"][:, 1:]
     J = arm.jacobian(Q, "tool0", expressed_in="world_aligned")
@@ -30,7 +30,10 @@ def test_a_wrench_in_base_axes_does_the_same_work(axes: str) -> None:
 def test_wrenches_on_one_link_add_up_and_act_in_their_windows() -> None:
     """Both sides of a switch are kept, though no sample lies there."""
     arm = rd.load("ur5")
-    effects = [rd.ExternalWrench("tool0", F, end_s=0.5), rd.ExternalWrench("tool0", 2 * F, start_s=0.2, end_s=0.3)]
+    effects = [
+        rd.effects.ExternalWrench("tool0", F, end_s=0.5),
+        rd.effects.ExternalWrench("tool0", 2 * F, start_s=0.2, end_s=0.3),
+    ]
     rows = wrenches(rd.Plant(arm, effects), np.array([0.0, 1.0]), Q)["tool0"]
     np.testing.assert_allclose(rows[:, 0], [0, 0.2, 0.2, 0.3, 0.3, 0.5, 0.5, 1.0], rtol=1e-6)
     np.testing.assert_allclose(rows[:, 1:], np.outer([1, 1, 3, 3, 1, 1, 0, 0], F))
@@ -39,7 +42,7 @@ def test_wrenches_on_one_link_add_up_and_act_in_their_windows() -> None:
 
 def test_a_joint_is_at_its_stop_exactly_where_the_stop_pushes() -> None:
     arm = rd.load("ur5")
-    spring, damper = rd.joint_stops(np.full(6, -1.0), np.full(6, 0.8))
+    spring, damper = rd.effects.joint_stops(np.full(6, -1.0), np.full(6, 0.8))
     plant = rd.Plant(arm, [spring, damper])
     np.testing.assert_array_equal(at_stop(plant, Q), spring.torque(arm, 0.0, Q, 0 * Q) != 0)
     assert at_stop(rd.Plant(arm), Q) is None

@@ -30,21 +30,30 @@ def setup(x: float, kind: str = "computed torque") -> rd.Setup:
     """A setup whose numbers all depend on x, and whose structure does not."""
     arm = loaded(1.0 + x, (0.05 + x / 10, 0.02, 0.03 + x), gravity=(0.3 + x, 0.2, -9.7))
     effects = [
-        rd.ViscousFriction(0.3 + x),
-        rd.RegularisedCoulombFriction([0.2, 0.1 + x], 0.05 + x),
-        rd.Spring(1.0 + x, 0.2 - x),
-        *rd.joint_stops([-1.0, -0.75 + x / 10], [1.2, 1.0 + x], 300.0 + x, 20.0 + x),
-        rd.ExternalWrench(TIP, [1.0, 0.2 + x, 0.7, 0.1, 0.4 + x, 0.2], start_s=0.05 + x / 100, end_s=0.15),
-        rd.EffortLimit(30.0 + x),
+        rd.effects.ViscousFriction(0.3 + x),
+        rd.effects.RegularisedCoulombFriction([0.2, 0.1 + x], 0.05 + x),
+        rd.effects.Spring(1.0 + x, 0.2 - x),
+        *rd.effects.joint_stops([-1.0, -0.75 + x / 10], [1.2, 1.0 + x], 300.0 + x, 20.0 + x),
+        rd.effects.ExternalWrench(TIP, [1.0, 0.2 + x, 0.7, 0.1, 0.4 + x, 0.2], start_s=0.05 + x / 100, end_s=0.15),
+        rd.effects.EffortLimit(30.0 + x),
     ]
-    reference = rd.quintic(Q + x / 10, Q + 0.3, 0.2)
+    reference = rd.control.quintic(Q + x / 10, Q + 0.3, 0.2)
     model = loaded(0.8 + x, (0.01, 0.02, 0.01 + x))
     controllers = {
-        "computed torque": rd.ComputedTorque(model, reference, 60.0 + x, [9.0, 8.0 + x]),
-        "PID": rd.PID(reference, 60.0 + x, 20.0 + x, 9.0, effort_limit=25.0 + x, period_s=0.01),
+        "computed torque": rd.control.ComputedTorque(model, reference, 60.0 + x, [9.0, 8.0 + x]),
+        "PID": rd.control.PID(reference, 60.0 + x, 20.0 + x, 9.0, effort_limit=25.0 + x, period_s=0.01),
     }
     return rd.Setup(
-        rd.Plant(arm, effects), Q, V, 0.2, controllers[kind], rd.method("rk4"), 1e-3, 0.01, False, engine="compiled"
+        rd.Plant(arm, effects),
+        Q,
+        V,
+        0.2,
+        controllers[kind],
+        rd.integrate.method("rk4"),
+        1e-3,
+        0.01,
+        False,
+        engine="compiled",
     )
 
 
@@ -72,7 +81,7 @@ def test_other_numbers_compile_nothing(kind: str, monkeypatch: pytest.MonkeyPatc
 
 def test_another_structure_is_compiled() -> None:
     """What is not a number, such as a locked joint or the link that a wrench acts on, is not taken for one."""
-    at = {name: rd.ExternalWrench(name, [1.0, 0.2, 0.7, 0.1, 0.4, 0.2]) for name in ARM.frame_names[1:3]}
+    at = {name: rd.effects.ExternalWrench(name, [1.0, 0.2, 0.7, 0.1, 0.4, 0.2]) for name in ARM.frame_names[1:3]}
     ends = {
         name: rd.simulate(plant_with(each), q0=Q, duration_s=0.1, engine="compiled", integrator="rk4").q[-1]
         for name, each in at.items()
@@ -86,7 +95,7 @@ def test_another_structure_is_compiled() -> None:
     assert np.abs(np.subtract(*ends.values())).max() > 1e-3
 
 
-def plant_with(effect: rd.Active) -> rd.Plant:
+def plant_with(effect: rd.effects.Active) -> rd.Plant:
     return rd.Plant(ARM, [effect])
 
 
@@ -159,23 +168,23 @@ def test_sweeps_are_held_to_what_is_declared() -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Drag(rd.Dissipative):
+class Drag(rd.effects.Dissipative):
     """A user's own effect with declared coefficients, in a controller's neighbourhood of other names."""
 
-    strength: np.ndarray = field(metadata=rd.coefficient("N m", symbol="s", least=0, stated="damping"))
-    scale: float = field(default=0.1, metadata=rd.coefficient("rad/s", above=0))
+    strength: np.ndarray = field(metadata=rd.effects.coefficient("N m", symbol="s", least=0, stated="damping"))
+    scale: float = field(default=0.1, metadata=rd.effects.coefficient("rad/s", above=0))
 
     def torque(self, dynamics, t, q, v):
         return -self.strength * tanh(v / self.scale)
 
 
 @dataclass(frozen=True, eq=False)
-class Follower(rd.Stateless):
+class Follower(rd.control.Stateless):
     """A user's own controller: what it follows and its model are found whatever they are called."""
 
-    path: rd.PiecewisePolynomial
+    path: rd.control.PiecewisePolynomial
     arm: rd.Robot
-    gain: np.ndarray = field(metadata=rd.coefficient("1/s²", least=0))
+    gain: np.ndarray = field(metadata=rd.effects.coefficient("1/s²", least=0))
     n: int = 2
 
     def torque(self, t, q, v, z):
@@ -189,9 +198,16 @@ def test_parts_of_a_users_own_have_all_of_it() -> None:
         Drag(-1.0)
     by_name = rd.Plant(ARM, [Drag({ARM.joint_names[1]: 0.5})])
     np.testing.assert_array_equal(by_name.effects[0].strength, [0.0, 0.5])
-    path = rd.quintic(Q, Q + 0.2, 0.1)
+    path = rd.control.quintic(Q, Q + 0.2, 0.1)
     base = rd.Setup(
-        by_name, Q, V, 0.2, Follower(path, ARM, 50.0), rd.method("rk4"), record_period_s=0.01, estimate_error=False
+        by_name,
+        Q,
+        V,
+        0.2,
+        Follower(path, ARM, 50.0),
+        rd.integrate.method("rk4"),
+        record_period_s=0.01,
+        estimate_error=False,
     )
     theirs = rd.simulate(base, engine="interpreted")
     assert np.abs(rd.simulate(base, engine="compiled").q - theirs.q).max() < 1e-12
@@ -200,7 +216,7 @@ def test_parts_of_a_users_own_have_all_of_it() -> None:
     assert np.abs(runs.q[0] - theirs.q).max() < 1e-12 < np.abs(runs.q[1] - theirs.q).max()
 
 
-class Shaken(rd.PiecewisePolynomial):
+class Shaken(rd.control.PiecewisePolynomial):
     """A reference of a user's own that is not the polynomial that it is made of."""
 
     def at(self, t):
@@ -210,11 +226,11 @@ class Shaken(rd.PiecewisePolynomial):
 
 def test_a_reference_of_a_users_own_is_not_taken_for_its_polynomial() -> None:
     """Its own `at` would be lost in machine code; "auto" runs it interpreted."""
-    path = rd.quintic(Q, Q + 0.2, 0.1)
+    path = rd.control.quintic(Q, Q + 0.2, 0.1)
     shaken = Shaken(path.breaks, path.coefficients)
-    base = rd.Setup(rd.Plant(ARM), Q, V, 0.2, rd.PD(path, 40.0, 4.0), "rk4", estimate_error=False)
+    base = rd.Setup(rd.Plant(ARM), Q, V, 0.2, rd.control.PD(path, 40.0, 4.0), "rk4", estimate_error=False)
     rd.simulate(base, engine="compiled")
-    own = replace(base, controller=rd.PD(shaken, 40.0, 4.0))
+    own = replace(base, controller=rd.control.PD(shaken, 40.0, 4.0))
     assert rd.simulate(own).statistics.engine.startswith("interpreted (Shaken declares no knots")
     with pytest.raises(TraceError, match=r"Shaken cannot be compiled: its at\(t\) is not that of its polynomials"):
         rd.simulate(own, engine="compiled")
@@ -232,11 +248,11 @@ def test_operational_space_is_compiled(turn: str) -> None:
     c, s = np.cos(2.0), np.sin(2.0)
     end = R @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     turns = {"free": {}, "kept": {"rotation": R}, "turning": {"rotation": R, "rotation_end": end}}
-    control = rd.OperationalSpace(
-        UR5, "tool0", rd.line(p, p + np.array([0.1, 0.05, -0.1]), 0.2, **turns[turn]), 100.0, 20.0
+    control = rd.control.OperationalSpace(
+        UR5, "tool0", rd.control.line(p, p + np.array([0.1, 0.05, -0.1]), 0.2, **turns[turn]), 100.0, 20.0
     )
     base = rd.Setup(
-        rd.Plant(UR5), START, duration_s=0.2, controller=control, integrator=rd.method("rk4"), step_s=2e-3,
+        rd.Plant(UR5), START, duration_s=0.2, controller=control, integrator=rd.integrate.method("rk4"), step_s=2e-3,
         estimate_error=False,
     )  # fmt: skip
     ours, theirs = rd.simulate(base, engine="compiled"), rd.simulate(base, engine="interpreted")

@@ -11,14 +11,14 @@ import robot_dyn as rd
 from robot_dyn.simulation.observation.remarks import Kind, Remark
 
 ARM = rd.load("planar_2r")
-PLANT = rd.Plant(ARM, [rd.ViscousFriction(0.3)])
+PLANT = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3)])
 TIMES = np.array([0.0, 0.2, 0.5, 0.7, 1.0])
 POINTS = np.stack([0.1 + np.sin(3 * TIMES), np.cos(2 * TIMES) - 1.2], axis=1)  # from (0.1, −0.2)
 START, END = POINTS[0], [0.9, 0.3]
 
 
 def found(kind: Kind, reference: Any, v0: Any = None, plant: rd.Plant = PLANT, kp: Any = 20.0) -> tuple[Remark, ...]:
-    law = rd.PD(reference, kp, 3.0)
+    law = rd.control.PD(reference, kp, 3.0)
     run = rd.simulate(plant, START, v0, duration_s=0.8, controller=law, estimate_error=False, engine="interpreted")
     return tuple(each for each in run.remarks if each.kind is kind)
 
@@ -26,23 +26,27 @@ def found(kind: Kind, reference: Any, v0: Any = None, plant: rd.Plant = PLANT, k
 def test_way_points_as_samples_jump_in_velocity() -> None:
     """Through five points goes one polynomial of degree 4, whose slope at the start is known."""
     slope = np.array([np.polyder(np.polyfit(TIMES, column, 4))[-1] for column in POINTS.T])
-    remarks = found(Kind.JUMPS, rd.Samples(TIMES, POINTS))
+    remarks = found(Kind.JUMPS, rd.control.Samples(TIMES, POINTS))
     assert [(each.joint, each.quantity, each.at, each.limit) for each in remarks] == [("joint_1", "v", 0.0, 0.0)]
     assert remarks[0].value == pytest.approx(slope[0], rel=1e-9) and abs(slope[0]) > 2.5
-    assert "joint_1 from 0 to 2.9" in remarks[0].text and "rd.via_points" in remarks[0].remedy
+    assert "joint_1 from 0 to 2.9" in remarks[0].text and "rd.control.via_points" in remarks[0].remedy
 
 
 @pytest.mark.parametrize(
     ("reference", "v0", "jumps"),
     [
-        (rd.via_points(TIMES, POINTS), None, []),
-        (rd.quintic(START, END, 0.5, start_s=0.1), None, []),
-        (rd.hold(END), None, []),  # a set point
-        (rd.Samples(TIMES, POINTS, np.stack([3 * np.cos(3 * TIMES), -2 * np.sin(2 * TIMES)], axis=1)), [3.0, 0.0], []),
-        (rd.via_points(TIMES, POINTS), [0.0, 0.4], [("joint_2", "v", 0.0, 0.0, 0.4)]),
-        (rd.quintic(START + np.array([0.0, 0.2]), END, 0.5), None, [("joint_2", "q", 0.0, 0.0, -0.2)]),
-        (rd.quintic(START, END, 0.5, start_s=0.1, v0=[0.7, 0.0]), None, [("joint_1", "v", 0.1, 0.7, 0.0)]),
-        (rd.quintic(START, END, 0.5, start_s=0.9, v0=[0.7, 0.0]), None, []),  # after the end
+        (rd.control.via_points(TIMES, POINTS), None, []),
+        (rd.control.quintic(START, END, 0.5, start_s=0.1), None, []),
+        (rd.control.hold(END), None, []),  # a set point
+        (
+            rd.control.Samples(TIMES, POINTS, np.stack([3 * np.cos(3 * TIMES), -2 * np.sin(2 * TIMES)], axis=1)),
+            [3.0, 0.0],
+            [],
+        ),
+        (rd.control.via_points(TIMES, POINTS), [0.0, 0.4], [("joint_2", "v", 0.0, 0.0, 0.4)]),
+        (rd.control.quintic(START + np.array([0.0, 0.2]), END, 0.5), None, [("joint_2", "q", 0.0, 0.0, -0.2)]),
+        (rd.control.quintic(START, END, 0.5, start_s=0.1, v0=[0.7, 0.0]), None, [("joint_1", "v", 0.1, 0.7, 0.0)]),
+        (rd.control.quintic(START, END, 0.5, start_s=0.9, v0=[0.7, 0.0]), None, []),  # after the end
     ],
     ids=["from rest", "later", "set point", "as fast", "moving", "elsewhere", "later and moving", "never"],
 )
@@ -61,8 +65,8 @@ def test_a_joint_that_friction_holds_throughout_is_remarked(stiffness: float, ho
     With kd = 0 the level of 5 N m holds it up to kp = 10 N m/rad.
     """
     still = ARM.with_(gravity=(0.0, 0.0, 0.0), lock={"joint_1": 0.3})
-    plant, q0 = rd.Plant(still, [rd.DryFriction(5.0)]), np.array([-0.2])
-    law = rd.PD(rd.quintic(q0, [0.3], 0.4), stiffness, 0.0)
+    plant, q0 = rd.Plant(still, [rd.effects.DryFriction(5.0)]), np.array([-0.2])
+    law = rd.control.PD(rd.control.quintic(q0, [0.3], 0.4), stiffness, 0.0)
     run = rd.simulate(plant, q0, duration_s=0.8, controller=law, estimate_error=False, engine="interpreted")
     assert (np.ptp(run.q) == 0) == holds
     said = [each for each in run.remarks if each.kind is Kind.HELD]
@@ -75,8 +79,8 @@ def test_a_joint_that_friction_holds_throughout_is_remarked(stiffness: float, ho
 def test_a_batch_tells_in_which_runs_a_joint_is_held_or_the_reference_jumps() -> None:
     """Each run as `simulate` does: held up to kp = 10 N m/rad, as above; from elsewhere the reference jumps."""
     still = ARM.with_(gravity=(0.0, 0.0, 0.0), lock={"joint_1": 0.3})
-    law = rd.PD(rd.quintic([-0.2], [0.3], 0.4), 9.0, 0.0)
-    setup = rd.Setup(rd.Plant(still, [rd.DryFriction(5.0)]), [-0.2], duration_s=0.6, controller=law)
+    law = rd.control.PD(rd.control.quintic([-0.2], [0.3], 0.4), 9.0, 0.0)
+    setup = rd.Setup(rd.Plant(still, [rd.effects.DryFriction(5.0)]), [-0.2], duration_s=0.6, controller=law)
     starts, stiffness = np.array([[-0.2], [-0.2], [-0.1], [-0.35]]), np.array([9.0, 14.0, 9.5, 8.0])
     runs = rd.rollouts(setup, starts, params={"kp": stiffness}, engine="interpreted")
     said = {each.kind: each for each in runs.remarks if each.kind in (Kind.JUMPS, Kind.HELD)}
@@ -96,7 +100,11 @@ def test_the_summary_says_how_often_the_estimate_calls_code_of_the_user() -> Non
         calls[0] += 1
         return -20 * (q - END) - 3 * v
 
-    for name, control, estimate in (("bare", law, False), ("law", law, True), ("PD", rd.PD(rd.hold(END), 20, 3), True)):
+    for name, control, estimate in (
+        ("bare", law, False),
+        ("law", law, True),
+        ("PD", rd.control.PD(rd.control.hold(END), 20, 3), True),
+    ):
         calls[0] = 0
         run = rd.simulate(PLANT, START, duration_s=0.05, controller=control, estimate_error=estimate)
         runs[name] = run.summary, run.statistics, calls[0]

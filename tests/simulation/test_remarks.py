@@ -32,11 +32,11 @@ def joint():
 
 def damped(joint, ratio: float, **options) -> rd.Setup:
     """Sampled damping with kd T/M = ratio, disturbed by a little stiffness; a sample every 10 ticks."""
-    control = rd.PD(rd.hold([0.3]), kp=0.05, kd=ratio * INERTIA / PERIOD, period_s=PERIOD)
+    control = rd.control.PD(rd.control.hold([0.3]), kp=0.05, kd=ratio * INERTIA / PERIOD, period_s=PERIOD)
     given = {"duration_s": 0.5, "record_period_s": 10 * PERIOD, "engine": "interpreted"}
-    if not isinstance(options.get("integrator"), rd.Adaptive):
+    if not isinstance(options.get("integrator"), rd.integrate.Adaptive):
         given |= {"integrator": "rk4", "step_s": PERIOD / 4}
-    plant = rd.Plant(joint, [rd.EffortLimit(LIMIT)])
+    plant = rd.Plant(joint, [rd.effects.EffortLimit(LIMIT)])
     return rd.Setup(plant, [0.2], [0.02], controller=control, estimate_error=False, **given | options)
 
 
@@ -47,10 +47,10 @@ def kinds(run) -> list[Kind]:
 @pytest.mark.parametrize(
     ("ratio", "integrator", "chatters"),
     [
-        (0.9, rd.method("rk4"), False),
-        (2.2, rd.method("rk4"), True),
-        (0.9, rd.Adaptive(), False),
-        (2.2, rd.Adaptive(), True),
+        (0.9, rd.integrate.method("rk4"), False),
+        (2.2, rd.integrate.method("rk4"), True),
+        (0.9, rd.integrate.Adaptive(), False),
+        (2.2, rd.integrate.Adaptive(), True),
     ],
 )
 def test_sampled_damping_chatters_above_two(joint, ratio: float, integrator, chatters: bool) -> None:
@@ -88,9 +88,16 @@ def test_extremes_are_those_of_all_steps(method: str) -> None:
     arm = rd.load("ur5")
     q0, v0 = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4]), np.array([0.5, 0.4, -0.3, 0.2, 0.6, -0.5])
     setup = rd.Setup(
-        rd.Plant(arm, [rd.ViscousFriction(2.0)]), q0, v0, duration_s=0.05, estimate_error=False, integrator="rk4"
+        rd.Plant(arm, [rd.effects.ViscousFriction(2.0)]),
+        q0,
+        v0,
+        duration_s=0.05,
+        estimate_error=False,
+        integrator="rk4",
     )
-    setup = replace(setup, integrator=rd.method(method), controller=rd.PD(rd.hold(q0), 50.0, 5.0))
+    setup = replace(
+        setup, integrator=rd.integrate.method(method), controller=rd.control.PD(rd.control.hold(q0), 50.0, 5.0)
+    )
     every, few = rd.simulate(setup), rd.simulate(setup, record_period_s=0.05)
     np.testing.assert_array_equal(every.extremes, few.extremes)
     # a step in (q, p) has its velocity at its stages only
@@ -122,9 +129,9 @@ def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
     """The limit L acts while kp (e − L t²/2M) − kd L t/M > L: the positive root of a quadratic, to a step of 1 ms."""
     kp, kd, e = 20.0, 10.0, 1.0
     a = LIMIT / INERTIA
-    control = rd.PD(rd.hold([e]), kp, kd)
+    control = rd.control.PD(rd.control.hold([e]), kp, kd)
     setup = rd.Setup(
-        rd.Plant(joint, [rd.EffortLimit(LIMIT)]), [0.0], duration_s=1.0, controller=control, integrator="rk4"
+        rd.Plant(joint, [rd.effects.EffortLimit(LIMIT)]), [0.0], duration_s=1.0, controller=control, integrator="rk4"
     )
     run = rd.simulate(setup, record_period_s=0.5, estimate_error=False)
     root = np.roots([kp * a / 2, kd * a, LIMIT - kp * e]).max()
@@ -136,12 +143,12 @@ def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
 @pytest.fixture(scope="module")
 def cart():
     """A cart pushed beyond 2 m, 5 m/s and 100 N, the limits of its file, with a sample at both ends only."""
-    plan = rd.quintic(np.zeros(2), np.array([2.5, 0.0]), 0.8)
+    plan = rd.control.quintic(np.zeros(2), np.array([2.5, 0.0]), 0.8)
     setup = rd.Setup(
         rd.Plant(rd.load("cart_pole")),
         np.zeros(2),
         duration_s=1.0,
-        controller=rd.PD(plan, 4e3, 400.0),
+        controller=rd.control.PD(plan, 4e3, 400.0),
         integrator="rk4",
     )
     return replace(setup, record_period_s=1.0, estimate_error=False)
@@ -165,7 +172,7 @@ def test_what_passes_the_limits_of_the_file_is_said(cart) -> None:
 def test_a_limit_that_the_plant_enforces_is_reached_not_passed(cart) -> None:
     """A stop at the limit holds the cart up to its softness, an effort limit holds the actuation."""
     arm = cart.plant.dynamics
-    effects = [*rd.joint_stops(arm.lower, arm.upper, 1e6), rd.EffortLimit("urdf")]
+    effects = [*rd.effects.joint_stops(arm.lower, arm.upper, 1e6), rd.effects.EffortLimit("urdf")]
     said = {(remark.kind, remark.quantity) for remark in rd.simulate(cart, plant=rd.Plant(arm, effects)).remarks}
     assert (Kind.EFFORT_REACHED, "u") in said
     assert (Kind.STOP_REACHED, "q") in said
@@ -184,8 +191,8 @@ def test_an_adaptive_run_is_watched_at_its_steps() -> None:
     setup = rd.Setup(
         rd.Plant(rd.load("cart_pole")), np.array([0.0, 0.4]), duration_s=2.0, estimate_error=False, integrator="rk4"
     )
-    fine = rd.simulate(setup, integrator=rd.method("order_8"), step_s=1e-3)
-    run = rd.simulate(setup, integrator=rd.Adaptive(), record_period_s=1.0)
+    fine = rd.simulate(setup, integrator=rd.integrate.method("order_8"), step_s=1e-3)
+    run = rd.simulate(setup, integrator=rd.integrate.Adaptive(), record_period_s=1.0)
     span = np.ptp(fine.extremes[:2], axis=1)
     assert np.abs(run.extremes[:2] - fine.extremes[:2]).max() < 0.05 * span.max()
 
@@ -195,7 +202,7 @@ def test_a_record_that_hides_an_oscillation_is_said(joint, per_turn: int, said: 
     """Sampled once a period T = 2π √(M/k) an oscillation of ±0.4 rad looks like rest at 0.4 rad."""
     stiffness = 30.0
     turn = 2 * np.pi * np.sqrt(INERTIA / stiffness)
-    plant = rd.Plant(joint, [rd.Spring(stiffness)])
+    plant = rd.Plant(joint, [rd.effects.Spring(stiffness)])
     run = rd.simulate(
         plant,
         q0=[0.4],
@@ -213,7 +220,7 @@ def test_a_record_that_hides_an_oscillation_is_said(joint, per_turn: int, said: 
 
 
 @dataclass(frozen=True, eq=False)
-class Push(rd.Dissipative):
+class Push(rd.effects.Dissipative):
     """A torque along the velocity, declared against it."""
 
     damping: float
@@ -281,14 +288,14 @@ def test_regularised_friction_that_creeps_is_named_with_its_speed(joint) -> None
     """Under a load τ < f at v_s artanh(τ / f), once v has settled; dry friction, and a load above f, give no remark."""
     f, scale, tau = 2.0, 0.01, 1.2
     load = {"controller": lambda t, q, v: np.array([tau]), "duration_s": 0.5, "estimate_error": False}
-    run = rd.simulate(rd.Plant(joint, [rd.RegularisedCoulombFriction(f, scale)]), [0.1], **load)
+    run = rd.simulate(rd.Plant(joint, [rd.effects.RegularisedCoulombFriction(f, scale)]), [0.1], **load)
     (remark,) = run.remarks
     assert remark.kind is Kind.CREEPS
     assert remark.value == pytest.approx(scale * np.arctanh(tau / f), rel=1e-3)
     assert "under 1.2 of 2 N m; dry_friction would hold" in run.summary
-    assert rd.simulate(rd.Plant(joint, [rd.DryFriction(f)]), [0.1], **load).remarks == ()
+    assert rd.simulate(rd.Plant(joint, [rd.effects.DryFriction(f)]), [0.1], **load).remarks == ()
     load["controller"] = lambda t, q, v: np.array([3.0])
-    assert rd.simulate(rd.Plant(joint, [rd.RegularisedCoulombFriction(f, scale)]), [0.1], **load).remarks == ()
+    assert rd.simulate(rd.Plant(joint, [rd.effects.RegularisedCoulombFriction(f, scale)]), [0.1], **load).remarks == ()
 
 
 @pytest.mark.parametrize("engine", ["interpreted", "compiled"])
@@ -309,7 +316,7 @@ def test_a_sampled_loop_that_grows_says_so_though_nothing_chatters(
         middle = np.sqrt(low * high)
         low, high = (middle, high) if radius(middle) < 1 else (low, middle)
     period = part * low
-    loop = rd.Loop(rd.PD(rd.hold([0.0]), kp, kd, period), actuation_delay=1.0)
+    loop = rd.control.Loop(rd.control.PD(rd.control.hold([0.0]), kp, kd, period), actuation_delay=1.0)
     run = rd.simulate(
         joint, [1e-6], duration_s=1000 * period, controller=loop, integrator="rk4", step_s=period, engine=engine,
         estimate_error=False,
@@ -330,7 +337,7 @@ def test_a_task_that_is_damped_says_so_between_samples_too(steps) -> None:
     for bend, says in ((1e-3, True), (1.0, False)):
         q = np.array([0.4, bend])
         at = arm.placement(q, frame)[:3, 3]
-        law = rd.OperationalSpace(arm, frame, rd.line(at, at, 1.0), 50.0, 10.0, rows=(0, 2))
+        law = rd.control.OperationalSpace(arm, frame, rd.control.line(at, at, 1.0), 50.0, 10.0, rows=(0, 2))
         run = rd.simulate(arm, q, duration_s=0.3, controller=law, estimate_error=False, **steps)
         assert (Kind.DAMPED in kinds(run)) == says
         if says:

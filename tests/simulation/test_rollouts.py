@@ -17,19 +17,26 @@ from tests.command import refusal, said
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
-REFERENCE = rd.quintic(Q, Q + 0.5, 0.1, start_s=0.05)
-PLANT = rd.Plant(ARM, [rd.ViscousFriction([0.3, 0.1]), rd.RegularisedCoulombFriction(0.2, 0.1), rd.EffortLimit(30.0)])
+REFERENCE = rd.control.quintic(Q, Q + 0.5, 0.1, start_s=0.05)
+PLANT = rd.Plant(
+    ARM,
+    [
+        rd.effects.ViscousFriction([0.3, 0.1]),
+        rd.effects.RegularisedCoulombFriction(0.2, 0.1),
+        rd.effects.EffortLimit(30.0),
+    ],
+)
 SETUP = rd.Setup(
     PLANT,
     Q,
     V,
     0.2,
-    rd.PD(REFERENCE, 40.0, [4.0, 3.0]),
+    rd.control.PD(REFERENCE, 40.0, [4.0, 3.0]),
     integrator="rk4",
     step_s=2e-3,
     record_period_s=0.01,
 )
-PID = replace(SETUP, controller=rd.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
+PID = replace(SETUP, controller=rd.control.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
 ARM_TIP, INERTIA = "tip", ((0.01, 0.0, 0.0), (0.0, 0.02, 0.001), (0.0, 0.001, 0.03))
 NOMINAL = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
 EVERYTHING = ("q", "v", "u", "energy", "work")
@@ -45,7 +52,7 @@ def arrays(runs: rd.Rollouts) -> list[np.ndarray]:
     return [x for x in given if x is not None]
 
 
-@pytest.mark.parametrize("setup", [SETUP, PID, replace(SETUP, integrator=rd.method("gauss_2"))])
+@pytest.mark.parametrize("setup", [SETUP, PID, replace(SETUP, integrator=rd.integrate.method("gauss_2"))])
 def test_each_run_is_that_of_simulate(setup: rd.Setup) -> None:
     """To rounding: B = 1, B of one tile and a bit more."""
     for count in (1, 70):
@@ -76,7 +83,7 @@ def test_threads_change_nothing() -> None:
 @pytest.mark.parametrize("method", ["rk4", "gauss_2"])
 def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str) -> None:
     """Bit for bit; its own samples are those of simulate up to its end, then nan."""
-    setup = replace(SETUP, integrator=rd.method(method), record_period_s=0.0)
+    setup = replace(SETUP, integrator=rd.integrate.method(method), record_period_s=0.0)
     q0, v0 = starts(40), np.broadcast_to(V, (40, 2)).copy()
     wild = [3, 17]
     quiet = rd.rollouts(setup, q0, v0, record=EVERYTHING)
@@ -130,8 +137,10 @@ def test_values_that_differ_from_run_to_run() -> None:
     runs = rd.rollouts(SETUP, params=params, record=EVERYTHING)
     for i in range(5):
         kp, kd, damping, limit = (x[i] for x in params.values())
-        effects = [rd.ViscousFriction(damping), PLANT.effects[1], rd.EffortLimit(limit)]
-        setup = replace(SETUP, plant=rd.Plant(ARM, effects), controller=rd.PD(REFERENCE, kp, kd), estimate_error=False)
+        effects = [rd.effects.ViscousFriction(damping), PLANT.effects[1], rd.effects.EffortLimit(limit)]
+        setup = replace(
+            SETUP, plant=rd.Plant(ARM, effects), controller=rd.control.PD(REFERENCE, kp, kd), estimate_error=False
+        )
         alone = rd.simulate(setup)
         np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-12)
         np.testing.assert_allclose(runs.u[i], alone.u, rtol=0, atol=1e-11)
@@ -145,7 +154,7 @@ def test_masses_of_payloads_that_differ_from_run_to_run(model: bool) -> None:
 
     def setup(mass: float) -> rd.Setup:
         loaded = ARM.with_(payload=rd.Payload(ARM_TIP, mass, (0.05, 0.02, 0.0), INERTIA))
-        controller = rd.PDGravity(NOMINAL, REFERENCE, 40.0, 4.0) if model else SETUP.controller
+        controller = rd.control.PDGravity(NOMINAL, REFERENCE, 40.0, 4.0) if model else SETUP.controller
         return replace(SETUP, plant=rd.Plant(loaded, PLANT.effects), controller=controller, estimate_error=False)
 
     rng = np.random.default_rng(6)
@@ -154,7 +163,7 @@ def test_masses_of_payloads_that_differ_from_run_to_run(model: bool) -> None:
     for i in (0, 40, 69):
         mass, damping = (x[i] for x in params.values())
         alone = setup(mass)
-        plant = rd.Plant(alone.plant.dynamics, [rd.ViscousFriction(damping), *PLANT.effects[1:]])
+        plant = rd.Plant(alone.plant.dynamics, [rd.effects.ViscousFriction(damping), *PLANT.effects[1:]])
         alone = rd.simulate(replace(alone, plant=plant))
         for ours, theirs in ((runs.q, alone.q), (runs.u, alone.u), (runs.potential, alone.ledger.potential)):
             np.testing.assert_allclose(ours[i], theirs, rtol=0, atol=1e-11 * (1 + np.abs(theirs).max()))
@@ -193,13 +202,13 @@ def assert_alike(ours: np.ndarray, theirs: np.ndarray) -> None:
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-10 * (1 + np.abs(theirs).max()))
 
 
-@pytest.mark.parametrize("setup", [SETUP, PID, replace(SETUP, integrator=rd.method("gauss_2"))])
+@pytest.mark.parametrize("setup", [SETUP, PID, replace(SETUP, integrator=rd.integrate.method("gauss_2"))])
 @pytest.mark.parametrize("record", [EVERYTHING, ("q", "v")])
 def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record: tuple[str, ...]) -> None:
     """In all that was recorded or follows from it; what neither tells is nan, and nothing is in its place."""
     params = {"viscous_friction.damping": np.array([[0.3, 0.1], [0.7, 0.2], [0.0, 0.4]])}
     runs = rd.rollouts(setup, starts(3), params=params, record=record)
-    effects = [rd.ViscousFriction(params["viscous_friction.damping"][-1]), *PLANT.effects[1:]]
+    effects = [rd.effects.ViscousFriction(params["viscous_friction.damping"][-1]), *PLANT.effects[1:]]
     alone = rd.simulate(setup, q0=starts(3)[-1], plant=rd.Plant(ARM, effects), estimate_error=False)
     run = runs[-1]
     for name in ("t", "q", "v", "desired", "deviation"):
@@ -243,7 +252,7 @@ def test_runs_are_numbered_as_lists_are() -> None:
 
 def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
     """Noise is of the number of a run in its batch, whatever its number in a slice, a slice of one, or backwards."""
-    loop = rd.Loop(rd.PD(REFERENCE, 40.0, 4.0, period_s=4e-3), position=[rd.Noise(0.01)])
+    loop = rd.control.Loop(rd.control.PD(REFERENCE, 40.0, 4.0, period_s=4e-3), position=[rd.control.Noise(0.01)])
     runs = rd.rollouts(replace(SETUP, controller=loop), [Q] * 6)
     for some in (runs[2:5], runs[1:][1:4], runs[::-2]):
         for i in range(3):
@@ -255,7 +264,7 @@ def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
 def test_a_diverged_run_names_its_joint_its_time_and_what_to_do(method: str) -> None:
     """The joint that moved fastest in its last sample; each run its own. Nothing cuts their steps."""
     plant = rd.Plant(ARM, PLANT.effects[:2])
-    setup = replace(SETUP, plant=plant, integrator=rd.method(method), record_period_s=0.0)
+    setup = replace(SETUP, plant=plant, integrator=rd.integrate.method(method), record_period_s=0.0)
     v0 = np.array([V, [1e5, 3e7], V, [3e7, 1e4]])
     runs = rd.rollouts(setup, starts(4), v0)
     for i in (1, 3):
@@ -373,17 +382,18 @@ def test_what_has_no_meaning_is_refused() -> None:
 
 def test_runs_of_chosen_steps_are_those_of_simulate() -> None:
     """One after the other on each thread: gains and stops that differ, events included, to rounding of two engines."""
-    stops = rd.joint_stops([-1.0, -1.0], [0.4, 1.0], 1e4)
+    stops = rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 1e4)
     setup = replace(
-        SETUP, plant=rd.Plant(ARM, [rd.ViscousFriction(0.5), *stops]), integrator=rd.Adaptive(), step_s=None,
+        SETUP, plant=rd.Plant(ARM, [rd.effects.ViscousFriction(0.5), *stops]), integrator=rd.integrate.Adaptive(),
+        step_s=None,
         record_period_s=0.05,
     )  # fmt: skip
     upper, kp, q0 = np.array([[0.4, 1.0], [0.3, 0.8], [0.35, 0.9]]), np.array([20.0, 30.0, 40.0]), starts(3)
     params = {"joint_stops.upper": upper, "kp": kp}
     runs = rd.rollouts(setup, q0, params=params, record=("q", "v", "u", "energy", "work"), threads=2)
     for i in range(3):
-        stops = rd.joint_stops([-1.0, -1.0], upper[i], 1e4)
-        plant, law = rd.Plant(ARM, [rd.ViscousFriction(0.5), *stops]), replace(setup.controller, kp=kp[i])
+        stops = rd.effects.joint_stops([-1.0, -1.0], upper[i], 1e4)
+        plant, law = rd.Plant(ARM, [rd.effects.ViscousFriction(0.5), *stops]), replace(setup.controller, kp=kp[i])
         own = replace(setup, plant=plant, controller=law, q0=q0[i], estimate_error=False, engine="interpreted")
         theirs = rd.simulate(own)
         np.testing.assert_array_equal(runs.t, theirs.t)
@@ -410,7 +420,7 @@ def test_a_joint_strikes_its_stops_in_a_batch_as_it_does_alone() -> None:
 
     The runs that stay between the stops are those of lock step, bit for bit.
     """
-    plant = rd.Plant(ARM.with_(gravity=(0.0, 0.0, 0.0)), rd.joint_stops(-0.1, 0.5, 1e5, 0.0))
+    plant = rd.Plant(ARM.with_(gravity=(0.0, 0.0, 0.0)), rd.effects.joint_stops(-0.1, 0.5, 1e5, 0.0))
     setup = rd.Setup(plant, Q, duration_s=1.0, integrator="rk4", step_s=2e-3, estimate_error=False)
     q0, v0 = np.tile([0.2, 0.15], (70, 1)), np.full((70, 2), [0.05, -0.1])
     strikes = [2, 65]
@@ -432,8 +442,8 @@ def test_a_joint_strikes_its_stops_in_a_batch_as_it_does_alone() -> None:
 
 def test_a_joint_that_starts_from_rest_has_not_reversed() -> None:
     """Bristles under a steady push, away from v = 0: lock step makes these runs, and they are those of simulate."""
-    plant = rd.Plant(ARM.with_(gravity=(0.0, 0.0, 0.0)), [rd.LuGreFriction(1.0, 1.0, 0.1, 0.2, 0.3, 0.1)])
-    push = rd.PD(rd.hold(Q + 3.0), [20.0, 0.8], 0.0)
+    plant = rd.Plant(ARM.with_(gravity=(0.0, 0.0, 0.0)), [rd.effects.LuGreFriction(1.0, 1.0, 0.1, 0.2, 0.3, 0.1)])
+    push = rd.control.PD(rd.control.hold(Q + 3.0), [20.0, 0.8], 0.0)
     setup = rd.Setup(plant, Q, duration_s=0.2, controller=push, integrator="rk4", estimate_error=False)
     runs = rd.rollouts(setup, starts(3, 0.01))
     assert "repeated" not in runs.statistics.engine
@@ -442,12 +452,12 @@ def test_a_joint_that_starts_from_rest_has_not_reversed() -> None:
 
 def test_levels_that_differ_from_run_to_run() -> None:
     """Also where a run has none, and where the setup has none: each run is cut at its own."""
-    arm, stops = ARM.with_(gravity=(0.0, 0.0, 0.0)), rd.joint_stops([-1.0, -1.0], [0.4, 1.0], 0.0, 0.0)
+    arm, stops = ARM.with_(gravity=(0.0, 0.0, 0.0)), rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 0.0, 0.0)
     setup = rd.Setup(rd.Plant(arm, stops), Q, V, 0.5, integrator="rk4", record_period_s=0.1, estimate_error=False)
     stiffness, upper = np.array([0.0, 1e4, 1e4]), np.array([[0.5, 1.0], [0.5, 1.0], [0.45, 0.6]])
     runs = rd.rollouts(setup, params={"joint_stops.stiffness": stiffness, "joint_stops.upper": upper})
     for i in range(3):
-        plant = rd.Plant(arm, rd.joint_stops([-1.0, -1.0], upper[i], stiffness[i], 0.0))
+        plant = rd.Plant(arm, rd.effects.joint_stops([-1.0, -1.0], upper[i], stiffness[i], 0.0))
         alone = rd.simulate(setup, plant=plant)
         assert bool(alone.events) is bool(stiffness[i])
         np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-11)
@@ -455,9 +465,9 @@ def test_levels_that_differ_from_run_to_run() -> None:
 
 def test_samples_between_the_ends_of_steps_are_those_of_simulate() -> None:
     """A period that the run does not hold a whole number of times: where steps are cut at its multiples, else not."""
-    bristles = rd.LuGreFriction(100.0, 1.0, 0.05, 0.2, 0.3, 0.05)  # steps in (q, p) end nowhere for them
+    bristles = rd.effects.LuGreFriction(100.0, 1.0, 0.05, 0.2, 0.3, 0.05)  # steps in (q, p) end nowhere for them
     for effects, method in ((PLANT.effects, "rk4"), (PLANT.effects[:2], "rk4"), ([bristles], "gauss_4")):
-        of = {"duration_s": 0.123, "record_period_s": 0.0101, "integrator": rd.method(method)}
+        of = {"duration_s": 0.123, "record_period_s": 0.0101, "integrator": rd.integrate.method(method)}
         setup = replace(SETUP, plant=rd.Plant(ARM, effects), **of)
         runs, alone = rd.rollouts(setup, starts(2)), rd.simulate(setup, q0=starts(2)[1], estimate_error=False)
         np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
@@ -470,7 +480,7 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
     setup = replace(SETUP, controller=None, events=[down], estimate_error=False, duration_s=0.3)
     q0 = np.array([[0.4, -0.7], [0.5, -0.7], [3.0, 0.2]])
     for method in ("rk4", "DOP853"):
-        runs = rd.rollouts(setup, q0, 0 * q0, integrator=rd.method(method) if method == "rk4" else method)
+        runs = rd.rollouts(setup, q0, 0 * q0, integrator=rd.integrate.method(method) if method == "rk4" else method)
         back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / method))
         for i in range(3):
             alone = rd.simulate(runs.setup, q0=q0[i], v0=[0.0, 0.0])
@@ -486,7 +496,7 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
 
 def test_payloads_come_and_go_in_a_batch_as_they_do_alone() -> None:
     """By RK4, which ends steps there: to rounding, gravity swept."""
-    body = rd.CarriedPayload(rd.Payload(ARM_TIP, 0.7), 0.05, 0.12)
+    body = rd.effects.CarriedPayload(rd.Payload(ARM_TIP, 0.7), 0.05, 0.12)
     setup = rd.Setup(rd.Plant(ARM, [body]), Q, V, 0.2, integrator="rk4", record_period_s=0.01, estimate_error=False)
     g = np.array([[0.0, 0.0, -9.8], [1.0, 0.0, -1.6]])
     runs = rd.rollouts(setup, params={"gravity": g}, record=EVERYTHING)
@@ -542,7 +552,7 @@ def test_a_run_that_was_not_begun_has_its_start(monkeypatch) -> None:
             raise KeyboardInterrupt
         return wait(*args, **options)
 
-    setup = replace(SETUP, integrator=rd.method("DOP853"), step_s=None)
+    setup = replace(SETUP, integrator=rd.integrate.method("DOP853"), step_s=None)
     rd.rollouts(setup, starts(1))  # compiled before
     monkeypatch.setattr(pool, "wait", once)
     runs = rd.rollouts(setup, starts(200), record=EVERYTHING, threads=2)
@@ -557,7 +567,7 @@ def test_params_are_held_to_what_their_effect_takes() -> None:
     """A coefficient that the effect itself refuses, or one of two effects alike, is refused before anything runs."""
     with pytest.raises(rd.RobotDynError, match="velocity_scale"):
         rd.rollouts(SETUP, starts(2), params={"regularised_coulomb_friction.velocity_scale": np.zeros(2)})
-    two = replace(SETUP, plant=rd.Plant(ARM, [rd.ViscousFriction(0.3), rd.ViscousFriction(0.1)]))
+    two = replace(SETUP, plant=rd.Plant(ARM, [rd.effects.ViscousFriction(0.3), rd.effects.ViscousFriction(0.1)]))
     with pytest.raises(QueryError, match=r"several effects of the plant; give 'viscous_friction 1\.damping' and 'visc"):
         rd.rollouts(two, starts(2), params={"viscous_friction.damping": np.ones(2)})
     for params in ([1], {3: np.ones(2)}):

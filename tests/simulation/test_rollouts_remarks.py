@@ -11,18 +11,20 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import QueryError
+from robot_dyn.simulation.export.export import export
 from robot_dyn.simulation.observation.remarks import Kind, lines
-from robot_dyn.simulation.table import export_csv
 
 COUNTED = (Kind.CHATTER, Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND, Kind.JUMPS, Kind.HELD)
 CART = rd.load("cart_pole")  # 2 m, 5 m/s and 100 N are the limits of its slide
 Q, V, B = np.array([0.1, 0.3]), np.array([0.2, -0.4]), 6
-GOAL = rd.quintic(Q, np.array([1.9, 0.8]), 0.5)
-DAMPED = rd.Plant(CART, [rd.ViscousFriction([0.4, 0.05])])
-LIMITED = rd.Plant(CART, [*DAMPED.effects, rd.EffortLimit(90.0)])
-STOPPED = rd.Plant(CART, [*DAMPED.effects, *rd.joint_stops([-2.5, -4.0], [1.2, 4.0], 2e3, 1.0)])
-HELD = rd.Plant(CART, [*DAMPED.effects, rd.DryFriction([2.0, 0.01]), rd.RigidStops([-2.5, -4.0], [1.2, 4.0])])
-LATE = rd.Loop(rd.PD(GOAL, 500.0, [60.0, 0.1], period_s=0.02), actuation_delay=1.0)
+GOAL = rd.control.quintic(Q, np.array([1.9, 0.8]), 0.5)
+DAMPED = rd.Plant(CART, [rd.effects.ViscousFriction([0.4, 0.05])])
+LIMITED = rd.Plant(CART, [*DAMPED.effects, rd.effects.EffortLimit(90.0)])
+STOPPED = rd.Plant(CART, [*DAMPED.effects, *rd.effects.joint_stops([-2.5, -4.0], [1.2, 4.0], 2e3, 1.0)])
+HELD = rd.Plant(
+    CART, [*DAMPED.effects, rd.effects.DryFriction([2.0, 0.01]), rd.effects.RigidStops([-2.5, -4.0], [1.2, 4.0])]
+)
+LATE = rd.control.Loop(rd.control.PD(GOAL, 500.0, [60.0, 0.1], period_s=0.02), actuation_delay=1.0)
 SWEEP = np.linspace(0.2, 1.6, B)
 
 
@@ -33,20 +35,26 @@ def setup(plant: rd.Plant, controller: object, method: str = "rk4", **options) -
 
 SCENES = {
     "late": (setup(LIMITED, LATE), {"kp": 500 * SWEEP, "effort_limit.limit": 150.0 * SWEEP}),
-    "continuous": (setup(DAMPED, rd.PD(GOAL, 400.0, 20.0)), {"kp": 500 * SWEEP}),
-    "chattering": (setup(LIMITED, rd.PD(GOAL, 10.0, 150.0, period_s=0.02)), {"effort_limit.limit": 100.0 * SWEEP}),
-    "canonical": (setup(DAMPED, rd.PD(GOAL, 400.0, 20.0), "gauss_2"), {"kp": 500 * SWEEP}),
-    "cut at stops": (setup(STOPPED, rd.PD(GOAL, 300.0, 20.0)), {"kp": 300 * SWEEP, "joint_stops.upper": 0.8 + SWEEP}),
-    "time stepping": (setup(HELD, rd.PD(GOAL, 400.0, 20.0), "time_stepping"), {"kp": 400 * SWEEP}),
+    "continuous": (setup(DAMPED, rd.control.PD(GOAL, 400.0, 20.0)), {"kp": 500 * SWEEP}),
+    "chattering": (
+        setup(LIMITED, rd.control.PD(GOAL, 10.0, 150.0, period_s=0.02)),
+        {"effort_limit.limit": 100.0 * SWEEP},
+    ),
+    "canonical": (setup(DAMPED, rd.control.PD(GOAL, 400.0, 20.0), "gauss_2"), {"kp": 500 * SWEEP}),
+    "cut at stops": (
+        setup(STOPPED, rd.control.PD(GOAL, 300.0, 20.0)),
+        {"kp": 300 * SWEEP, "joint_stops.upper": 0.8 + SWEEP},
+    ),
+    "time stepping": (setup(HELD, rd.control.PD(GOAL, 400.0, 20.0), "time_stepping"), {"kp": 400 * SWEEP}),
     "one by one": (
-        setup(STOPPED, rd.PID(GOAL, 300.0, 30.0, 20.0, effort_limit=80.0), "DOP853"),
+        setup(STOPPED, rd.control.PID(GOAL, 300.0, 30.0, 20.0, effort_limit=80.0), "DOP853"),
         {"effort_limit": 60 * SWEEP},
     ),
 }
 
 
 SPACING = 4e-3  # of the instants at which u is seen in lock step under continuous control: 8 of 1600 steps
-LAGGING = rd.Plant(CART, [*DAMPED.effects, rd.ActuatorLag([0.02, 0.01])])
+LAGGING = rd.Plant(CART, [*DAMPED.effects, rd.effects.ActuatorLag([0.02, 0.01])])
 
 
 @pytest.fixture(scope="module", params=SCENES)
@@ -117,7 +125,7 @@ def test_a_batch_tells_of_each_run_what_simulate_does(batch) -> None:
 @pytest.mark.parametrize("sampled", [False, True], ids=["continuous", "sampled with a lag"])
 def test_actuation_that_changes_between_ticks_is_seen_at_instants(sampled: bool) -> None:
     """Its extremes are those of a record of all steps, at each eighth and at samples; behind a lag at all of them."""
-    of = setup(LAGGING, rd.PD(GOAL, 300.0, 20.0, period_s=0.02 if sampled else 0.0))
+    of = setup(LAGGING, rd.control.PD(GOAL, 300.0, 20.0, period_s=0.02 if sampled else 0.0))
     of = replace(of, step_s=5e-4, record_period_s=0.0145)
     starts, record = Q + 0.3 * np.random.default_rng(5).normal(size=(B, 2)), ("u",)
     runs = rd.rollouts(of, starts, record=record)
@@ -156,12 +164,12 @@ def test_remarks_survive_files_and_slices(batch, tmp_path: Path) -> None:
 def test_a_table_of_runs_has_a_row_for_each(batch, tmp_path: Path) -> None:
     """Parameters, outcomes, tracking errors, remarks and extremes, read back as text; another kind of file is kept."""
     runs, _ = batch
-    path = export_csv(runs, tmp_path / "table")
+    path = export(runs, tmp_path / "table")
     rows = [*csv.DictReader(path.read_text(encoding="utf-8").splitlines())]
     assert [row["run"] for row in rows] == [str(i) for i in range(B)]
     of_slide = [float(row["largest u slide [N]"]) for row in rows]
     np.testing.assert_array_equal(of_slide, runs.observed.extremes[:, 2, 1, 0])
-    np.testing.assert_array_equal([float(row["tracking error [rad or m]"]) for row in rows], runs.tracking_error)
+    np.testing.assert_array_equal([float(row["tracking error [m or rad]"]) for row in rows], runs.tracking_error)
     for i, row in enumerate(rows):
         assert float(row["start q slide [m]"]) == runs.q0[i, 0]
         assert float(row["start v hinge [rad/s]"]) == runs.v0[i, 1]
@@ -169,7 +177,7 @@ def test_a_table_of_runs_has_a_row_for_each(batch, tmp_path: Path) -> None:
         about = {f"{kind} {quantity} {joint}" for kind, joint, quantity in told(runs[i])}
         assert about <= set(row["remarks"].split("; "))
     with pytest.raises(rd.RobotDynError, match=r"table\.csv"):
-        export_csv(runs[0], path)
+        export(runs[0], path)
 
 
 def test_a_sampled_loop_is_linearised_in_the_worst_run() -> None:
@@ -190,7 +198,9 @@ def test_tracking_errors_of_a_frame() -> None:
     arm = rd.load("planar_2r")
     q = np.array([0.4, 0.9])
     at = arm.placement(q, "tip")[:3, 3]
-    law = rd.OperationalSpace(arm, "tip", rd.line(at, np.add(at, [0.1, 0, 0.1]), 0.2), 50.0, 10.0, rows=(0, 2))
+    law = rd.control.OperationalSpace(
+        arm, "tip", rd.control.line(at, np.add(at, [0.1, 0, 0.1]), 0.2), 50.0, 10.0, rows=(0, 2)
+    )
     given = rd.Setup(rd.Plant(arm), q, duration_s=0.2, controller=law, integrator="rk4", step_s=4e-3)
     runs = rd.rollouts(given, np.add(q, [[0.0, 0.1], [0.2, -0.1], [0.1, 0.3]]), [[0.1, 0.2], [0.3, 0.1], [1e5, 3e7]])
     assert list(runs.diverged) == [False, False, True]
@@ -213,8 +223,10 @@ def test_a_batch_of_one_speaks_of_a_run() -> None:
 
 def test_a_limit_of_no_effort_is_reached_all_the_time_once() -> None:
     """Both sides of a limit of 0 are one: u = 0 is at it throughout, which is as long as the run, not twice that."""
-    given = rd.Setup(rd.Plant(CART, [rd.EffortLimit([0.0, 1.0])]), Q, V, 0.2, rd.PD(GOAL, 40.0, 4.0, period_s=0.02))
-    runs = rd.rollouts(replace(given, integrator=rd.method("rk4")))
+    given = rd.Setup(
+        rd.Plant(CART, [rd.effects.EffortLimit([0.0, 1.0])]), Q, V, 0.2, rd.control.PD(GOAL, 40.0, 4.0, period_s=0.02)
+    )
+    runs = rd.rollouts(replace(given, integrator=rd.integrate.method("rk4")))
     for remarks in (runs.remarks, rd.simulate(given, estimate_error=False).remarks):
         (at,) = (each for each in remarks if each.kind is Kind.EFFORT_REACHED and each.joint == "slide")
         assert at.duration == pytest.approx(0.2, rel=1e-9)
@@ -222,11 +234,11 @@ def test_a_limit_of_no_effort_is_reached_all_the_time_once() -> None:
 
 def test_growth_over_a_run_counts_its_periods() -> None:
     """0.3 s are three periods of 0.1 s, though floats divide to less; beyond 1e299 only a bound is told."""
-    arm, goal = rd.load("pendulum"), rd.hold([0.0])
+    arm, goal = rd.load("pendulum"), rd.control.hold([0.0])
     told = {}
     for duration in (0.3, 60.0):
         setup = rd.Setup(
-            rd.Plant(arm), [1e-3], None, duration, rd.PD(goal, 40.0, 100.0, period_s=0.1), estimate_error=False
+            rd.Plant(arm), [1e-3], None, duration, rd.control.PD(goal, 40.0, 100.0, period_s=0.1), estimate_error=False
         )
         (told[duration],) = (each for each in rd.simulate(setup).remarks if each.kind is Kind.UNSTABLE)
     assert f"by {told[0.3].value ** 3:.4g} over the run" in told[0.3].text

@@ -16,10 +16,10 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.scene.starters import starter
+from robot_dyn.simulation.export.export import export
 from robot_dyn.simulation.results import archive
 from robot_dyn.simulation.results.run_file import RunFileError
 from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.table import export_csv
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +47,12 @@ def assert_same(after, before) -> None:
 
 
 def test_a_run_comes_back_as_it_was(run, tmp_path) -> None:
-    """Every array to the bit, every text."""
+    """Every array to the bit, every text; the name of the file is added, and is not stored in another one."""
     back = rd.load_run(rd.save_run(run, tmp_path / "run"))
-    assert_same(replace(back, about=back.about | {"source": run.about["source"]}), run)
+    again = rd.load_run(rd.save_run(back, tmp_path / "again"))
+    assert (back.about["file"], again.about["file"]) == ("run.npz", "again.npz")
+    texts = {name: text for name, text in back.about.items() if name != "file"}
+    assert_same(replace(back, about=texts | {"source": run.about["source"]}), run)
     assert back.summary == run.summary
 
 
@@ -83,11 +86,26 @@ def test_other_files_are_refused(tmp_path) -> None:
 
 
 def test_a_table_has_names_units_and_all_samples(run, tmp_path) -> None:
-    rows = list(csv.reader(export_csv(run, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()))
+    rows = list(csv.reader(export(run, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()))
     assert rows[0][:2] == ["t [s]", "q slide [m]"]
     assert len(rows) == 1 + len(run.t)
     assert [float(row[0]) for row in rows[1:]] == run.t.tolist()
     assert [float(row[2]) for row in rows[1:]] == run.q[:, 1].tolist()
+
+
+def test_swept_numbers_of_joints_have_columns_by_joint(tmp_path) -> None:
+    """Of a batch in the order of the joints, unquoted; what is not of joints is numbered, and numbers are exact."""
+    arm = rd.load("planar_2r")
+    plant = rd.Plant(arm, [rd.effects.ViscousFriction(0.5)])
+    swept = {"viscous_friction.damping": [[0.1, 1 / 3], [0.3, 0.4]], "gravity": [[0.0, 0.0, -9.81], [0.0, 0.0, -1.6]]}
+    batch = rd.rollouts(plant, [0.1, 0.2], params=swept, duration_s=0.01, integrator="rk4", step_s=1e-3)
+    text = export(batch, tmp_path / "runs.csv").read_text(encoding="utf-8")
+    first, second = arm.joint_names
+    heads = [f"viscous_friction.damping {name} [N m s/rad]" for name in (first, second)]
+    rows = list(csv.DictReader(text.splitlines()))
+    assert '"' not in text.splitlines()[0]
+    assert [[float(row[head]) for head in heads] for row in rows] == swept["viscous_friction.damping"]
+    assert [float(row["gravity 3"]) for row in rows] == [-9.81, -1.6]
 
 
 def test_a_damaged_file_is_refused_or_whole(run, tmp_path) -> None:

@@ -8,12 +8,20 @@ import robot_dyn as rd
 from robot_dyn.errors import QueryError
 from robot_dyn.simulation.setup.size import check_record, samples, segments, steps
 
-ARM = rd.Plant(rd.load("planar_2r"), [rd.ExternalWrench("tip", [1.0] * 6, start_s=0.3, end_s=0.7)])
-LAW = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.01)
+ARM = rd.Plant(rd.load("planar_2r"), [rd.effects.ExternalWrench("tip", [1.0] * 6, start_s=0.3, end_s=0.7)])
+LAW = rd.control.PD(rd.control.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.01)
 
 
 @pytest.mark.parametrize("duration", [1e9, 1e18, 1e300])
-@pytest.mark.parametrize("method", [rd.method("rk4"), rd.method("gauss_4"), rd.method("sdirk_3"), rd.Adaptive()])
+@pytest.mark.parametrize(
+    "method",
+    [
+        rd.integrate.method("rk4"),
+        rd.integrate.method("gauss_4"),
+        rd.integrate.method("sdirk_3"),
+        rd.integrate.Adaptive(),
+    ],
+)
 @pytest.mark.parametrize(
     ("options", "remedy"),
     [
@@ -25,9 +33,9 @@ LAW = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.01)
 )
 def test_a_run_that_fits_no_memory_is_refused_before_it_starts(duration, method, options, remedy) -> None:
     """Some 1e11 numbers or ticks and more: an attempt to hold them would not return."""
-    if isinstance(method, rd.Adaptive) and not options:
+    if isinstance(method, rd.integrate.Adaptive) and not options:
         return  # it keeps 1000 samples and chooses its steps
-    if isinstance(method, rd.Adaptive) and "controller" not in options and duration > 1e13:
+    if isinstance(method, rd.integrate.Adaptive) and "controller" not in options and duration > 1e13:
         remedy = "floats resolve"  # with no record either
     with pytest.raises(QueryError, match=f"{remedy}.*shorter duration_s"):
         rd.simulate(ARM, q0=[0.1, 0.2], duration_s=duration, integrator=method, **options)
@@ -36,7 +44,7 @@ def test_a_run_that_fits_no_memory_is_refused_before_it_starts(duration, method,
 @pytest.mark.parametrize("duration", [1e13, 1e154, 1e300, 1e308])
 def test_a_run_that_ends_at_a_time_that_floats_do_not_tell_is_refused(duration: float) -> None:
     """A method that chooses its steps is bounded by no number of them; from 2^43 s floats lie 2 ms apart and more."""
-    for run in (rd.simulate, rd.rollouts, rd.work_precision):
+    for run in (rd.simulate, rd.rollouts, rd.studies.work_precision):
         with pytest.raises(QueryError, match=r"ends at a time that floats resolve to .* take a shorter duration_s, "):
             run(ARM, [0.1, 0.2], duration_s=duration)
 
@@ -51,7 +59,7 @@ def test_a_batch_that_fits_no_memory_is_refused_before_it_starts() -> None:
 
 @pytest.mark.parametrize("period", [0.0, 0.01, 0.0237])
 @pytest.mark.parametrize("law", [None, LAW], ids=["free", "sampled"])
-@pytest.mark.parametrize("method", [rd.method("rk4"), rd.Adaptive()])
+@pytest.mark.parametrize("method", [rd.integrate.method("rk4"), rd.integrate.Adaptive()])
 def test_the_size_that_is_told_bounds_the_run(method, law, period: float) -> None:
     """Not below what the run has, and not above it by more than the four steps a segment that rounding may add."""
     setup = rd.Setup(
@@ -61,12 +69,12 @@ def test_the_size_that_is_told_bounds_the_run(method, law, period: float) -> Non
     many = segments(setup)
     assert len(setup.segments) <= many <= len(setup.segments) + 6
     assert len(run.t) <= samples(setup) <= len(run.t) + 4 * many + 3
-    if not isinstance(method, rd.Adaptive):
+    if not isinstance(method, rd.integrate.Adaptive):
         assert run.statistics.steps <= steps(setup) <= run.statistics.steps + 4 * many
 
 
 def test_what_fits_is_not_refused() -> None:
     """An hour of 1 kHz control with samples of 10 ms: 3.6e6 ticks, 3.6e5 samples."""
-    law = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.001)
+    law = rd.control.PD(rd.control.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.001)
     setup = rd.Setup(ARM, [0.1, 0.2], duration_s=3600.0, controller=law, record_period_s=0.01)
     check_record(setup)

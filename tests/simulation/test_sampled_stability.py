@@ -27,7 +27,7 @@ def test_a_loop_is_stable_up_to_where_the_radius_of_a_period_passes_1(seed: int,
 @pytest.mark.parametrize(("period", "duration"), [(0.11, 0.5), (0.15, 2.0), (0.3, 2.0), (0.3, 0.2)])
 def test_a_short_run_makes_no_loop_stable(period: float, duration: float) -> None:
     """A mass under PD is stable for T < 2 m/kd, here 0.05 s, and the run grows by ρ in each whole period of it."""
-    law = rd.PD(rd.hold([0.0]), 100.0, 40.0, period)
+    law = rd.control.PD(rd.control.hold([0.0]), 100.0, 40.0, period)
     advice = rd.advise(BLOCK, [0.1], duration_s=duration, controller=law, engine="interpreted")
     u = np.array([-100.0, -40.0])
     made = np.array([[1, period], [0, 1]]) + np.outer([period**2 / 2, period], u)
@@ -47,7 +47,7 @@ def test_a_period_is_judged_itself_where_a_shorter_one_is_unstable() -> None:
     A, one = np.array([[0.0, 1.0], [-k, -d]]), np.ones(1)
     arm = Arm(
         "spring",
-        rd.Plant(BLOCK, [rd.Spring([k]), rd.ViscousFriction([d])]),
+        rd.Plant(BLOCK, [rd.effects.Spring([k]), rd.effects.ViscousFriction([d])]),
         A,
         np.array([[0.0], [1.0]]),
         one,
@@ -75,7 +75,9 @@ def test_what_neither_grows_nor_decays_is_marginal_and_hides_no_limit() -> None:
         made = np.array([[1, T], [0, 1]]) + np.outer([M * T**2 / 2, M * T], [-kp[1], -kd[1]])
         return float(np.abs(np.linalg.eigvals(made)).max())
 
-    advice = rd.advise(arm, q, duration_s=0.05, controller=rd.PD(rd.hold(q), *map(np.array, (kp, kd)), 1e-3))
+    advice = rd.advise(
+        arm, q, duration_s=0.05, controller=rd.control.PD(rd.control.hold(q), *map(np.array, (kp, kd)), 1e-3)
+    )
     assert advice.stable
     assert "control period 0.001 s: marginal, some deviations neither decay nor grow; the loop is up to" in advice.text
     assert radius(advice.longest_period_s) <= 1 < radius(1.001 * advice.longest_period_s)
@@ -84,11 +86,11 @@ def test_what_neither_grows_nor_decays_is_marginal_and_hides_no_limit() -> None:
 @pytest.mark.parametrize(
     ("law", "remedy"),
     [
-        (rd.PD(rd.hold([0.0]), 100.0, 0.0, 1e-3), "lower gains, or less delay"),
-        (rd.PID(rd.hold([0.0]), 100.0, 1500.0, 10.0, period_s=1e-3), "other gains"),
+        (rd.control.PD(rd.control.hold([0.0]), 100.0, 0.0, 1e-3), "lower gains, or less delay"),
+        (rd.control.PID(rd.control.hold([0.0]), 100.0, 1500.0, 10.0, period_s=1e-3), "other gains"),
     ],
 )
-def test_a_loop_that_is_unstable_at_every_period_says_why(law: rd.Controller, remedy: str) -> None:
+def test_a_loop_that_is_unstable_at_every_period_says_why(law: rd.control.Controller, remedy: str) -> None:
     """P control of a mass has ρ² = 1 + kp T²/2m; a PID with ki > kp kd/m is unstable at all times, by Routh."""
     advice = rd.advise(BLOCK, [0.1], duration_s=0.02, controller=law)
     assert advice.longest_period_s == 0.0
@@ -99,7 +101,7 @@ def test_a_loop_that_is_unstable_at_every_period_says_why(law: rd.Controller, re
 
 def test_a_step_has_its_limit_however_short_the_run() -> None:
     """1 kg with a damper of 100 N s/m: RK4 is stable up to 2.785/100 s, also where a run is two steps long."""
-    plant = rd.Plant(BLOCK, [rd.ViscousFriction(100.0)])
+    plant = rd.Plant(BLOCK, [rd.effects.ViscousFriction(100.0)])
     for duration in (0.1, 10.0):
         advice = rd.advise(plant, [0.0], [1.0], duration_s=duration, integrator="rk4", step_s=0.05)
         assert advice.limits["rk4"] == pytest.approx(0.02785293563405282, rel=1e-3)
@@ -109,7 +111,7 @@ def test_a_step_has_its_limit_however_short_the_run() -> None:
 @pytest.mark.parametrize("options", [{"integrator": "rk4", "step_s": 1e-3}, {"integrator": "DOP853"}])
 def test_a_run_that_its_loop_ends_says_so_and_not_to_take_a_smaller_step(options) -> None:
     """A pendulum with a spring of 1e8 N m/rad on ticks of 10 ms, whatever the step."""
-    joint, law = rd.load("pendulum"), rd.PD(rd.hold([0.0]), 1e8, 0.0, 0.01)
+    joint, law = rd.load("pendulum"), rd.control.PD(rd.control.hold([0.0]), 1e8, 0.0, 0.01)
     run = rd.simulate(joint, [0.1], duration_s=5.0, controller=law, estimate_error=False, **options)
     runs = rd.rollouts(joint, [[0.1], [0.2]], duration_s=5.0, controller=law, **options)
     for outcome in (run.outcome, runs.outcome(0), runs.outcome(1)):
@@ -121,7 +123,10 @@ def test_a_run_that_its_loop_ends_says_so_and_not_to_take_a_smaller_step(options
 
 def test_a_run_that_its_step_ends_under_a_stable_loop_says_so() -> None:
     """A damper of 1e5 per second, which RK4 follows with steps of 28 µs; the loop is stable up to 2 b/kp."""
-    plant, law = rd.Plant(BLOCK, [rd.ViscousFriction(1e5)]), rd.PD(rd.hold([0.0]), 100.0, 0.0, 0.01)
+    plant, law = (
+        rd.Plant(BLOCK, [rd.effects.ViscousFriction(1e5)]),
+        rd.control.PD(rd.control.hold([0.0]), 100.0, 0.0, 0.01),
+    )
     run = rd.simulate(
         plant, [0.1], [1.0], duration_s=0.5, controller=law, integrator="rk4", step_s=1e-3, estimate_error=False
     )
@@ -137,10 +142,10 @@ def test_sampling_is_told_apart_from_an_arm_that_falls_anyway() -> None:
     """
     arm, kd = rd.load("pendulum"), 20.0
     limit = 2 * float(arm.M([np.pi])[0, 0]) / kd
-    plant, upright = rd.Plant(arm), rd.hold([np.pi])
+    plant, upright = rd.Plant(arm), rd.control.hold([np.pi])
 
     def remarks(period: float) -> list:
-        law = rd.PD(upright, 0.0, kd, period_s=period)
+        law = rd.control.PD(upright, 0.0, kd, period_s=period)
         run = rd.simulate(
             plant, [np.pi - 0.01], duration_s=0.3, controller=law, integrator="rk4", step_s=1e-3, estimate_error=False
         )

@@ -15,9 +15,9 @@ PENDULUM, CART_POLE = rd.load("pendulum"), rd.load("cart_pole")
 DOUBLE = rd.load("planar_2r")
 SKEW = rd.load("skew_tree")
 CART = CART_POLE.with_(lock={"hinge": 0.4})  # 6.2 kg on a rail
-TIGHT = rd.Adaptive(rtol=1e-13, atol=1e-14)
+TIGHT = rd.integrate.Adaptive(rtol=1e-13, atol=1e-14)
 START = {"q0": [0.4, -0.7], "v0": [0.9, -0.5]}
-SMOOTH = rd.Plant(DOUBLE, [rd.ViscousFriction([0.4, 0.2]), rd.Spring([3.0, 5.0], [0.2, -0.3])])
+SMOOTH = rd.Plant(DOUBLE, [rd.effects.ViscousFriction([0.4, 0.2]), rd.effects.Spring([3.0, 5.0], [0.2, -0.3])])
 
 
 @pytest.mark.parametrize("amplitude", [0.01, 1.0, 3.0])
@@ -26,7 +26,12 @@ def test_pendulum_swings_with_the_exact_period(amplitude: float) -> None:
     k, omega = np.sin(amplitude / 2), np.sqrt(1.5 * G)
     period = 4 * ellipk(k**2) / omega
     run = rd.simulate(
-        rd.Plant(PENDULUM), q0=[amplitude], v0=[0.0], duration_s=period, integrator=rd.method("order_8"), step_s=0.01
+        rd.Plant(PENDULUM),
+        q0=[amplitude],
+        v0=[0.0],
+        duration_s=period,
+        integrator=rd.integrate.method("order_8"),
+        step_s=0.01,
     )
     _, cn, dn, _ = ellipj(omega * run.t, k**2)
     np.testing.assert_allclose(run.q[:, 0], 2 * np.arcsin(k * cn / dn), atol=1e-10)
@@ -39,7 +44,7 @@ def test_pendulum_swings_with_the_exact_period(amplitude: float) -> None:
 def test_free_fall_on_a_rail_is_a_parabola(name: str) -> None:
     """Motion x = x₀ + v₀ t + g t²/2, a polynomial that order 2 keeps exactly: rounding of some 100 steps, 1e-13."""
     falling = rd.Plant(CART.with_(gravity=(1.7, 0.0, -G)))
-    method = rd.method(name)
+    method = rd.integrate.method(name)
     run = rd.simulate(
         falling, q0=[0.3], v0=[-0.8], duration_s=1.0, integrator=method, step_s=0.01, estimate_error=False
     )
@@ -52,8 +57,8 @@ def test_cart_with_spring_and_damper_is_the_damped_oscillator() -> None:
     """The law m ẍ + b ẋ + k (x − x₀) = 0; order 8 at 5 ms leaves rounding, 1e-12."""
     m, b, k, rest, x0, v0 = 6.2, 2.5, 80.0, 0.15, 0.5, -0.4
     run = rd.simulate(
-        rd.Plant(CART, [rd.ViscousFriction(b), rd.Spring(k, rest)]),
-        q0=[x0], v0=[v0], duration_s=2.0, integrator=rd.method("order_8"), step_s=5e-3, estimate_error=False,
+        rd.Plant(CART, [rd.effects.ViscousFriction(b), rd.effects.Spring(k, rest)]),
+        q0=[x0], v0=[v0], duration_s=2.0, integrator=rd.integrate.method("order_8"), step_s=5e-3, estimate_error=False,
     )  # fmt: skip
     decay, t, away = b / (2 * m), run.t, x0 - rest
     omega = np.sqrt(k / m - decay**2)
@@ -69,7 +74,7 @@ def test_cart_pole_keeps_the_momentum_along_its_rail() -> None:
     np.testing.assert_allclose(centre, centre[0] + momentum[0] / 6.2 * run.t, atol=1e-10)  # not kept: error O(h⁴)
     assert np.ptp(run.q[:, 1]) > 1.0
     canonical = rd.simulate(
-        rd.Plant(CART_POLE), q0=[0.1, 0.8], v0=[0.3, -0.5], duration_s=1.0, integrator=rd.method("gauss_4"),
+        rd.Plant(CART_POLE), q0=[0.1, 0.8], v0=[0.3, -0.5], duration_s=1.0, integrator=rd.integrate.method("gauss_4"),
         step_s=0.01, estimate_error=False,
     )  # fmt: skip
     np.testing.assert_allclose(CART_POLE.momentum(canonical.q, canonical.v)[:, 0], momentum[0], rtol=1e-12)
@@ -83,7 +88,7 @@ def truth() -> rd.Trajectory:
 @pytest.mark.parametrize(("name", "step"), [("midpoint", 4e-3), ("sdirk_3", 0.01), ("rk4", 5e-3), ("gauss_4", 0.01)])
 def test_whole_runs_converge_with_the_order_of_the_method(name: str, step: float, truth) -> None:
     """Error(h)/error(h/2) → 2ᵖ; the next term of the error is O(h) of it, so p ± 0.25 at these steps."""
-    method = rd.method(name)
+    method = rd.integrate.method(name)
     errors = []
     for h in (step, step / 2, step / 4):
         run = rd.simulate(SMOOTH, **START, duration_s=1.0, integrator=method, step_s=h, estimate_error=False)
@@ -92,13 +97,15 @@ def test_whole_runs_converge_with_the_order_of_the_method(name: str, step: float
     np.testing.assert_allclose(np.diff(np.log2(errors)), -method.order, atol=0.25)
 
 
-@pytest.mark.parametrize("effects", [(), (rd.ViscousFriction(0.3), rd.Spring(4.0, 0.1))], ids=["free", "effects"])
+@pytest.mark.parametrize(
+    "effects", [(), (rd.effects.ViscousFriction(0.3), rd.effects.Spring(4.0, 0.1))], ids=["free", "effects"]
+)
 def test_canonical_and_velocity_coordinates_give_one_trajectory(effects) -> None:
     """Equations p = M v with ṗ = Cᵀ v − N + τ, and v' = M⁻¹ (…): both within 1e-11 of the flow, on general axes."""
     q0, v0 = np.linspace(0.2, -0.5, SKEW.n), np.linspace(-0.8, 0.9, SKEW.n)
     common = {"q0": q0, "v0": v0, "duration_s": 0.32, "record_period_s": 0.02, "estimate_error": False}
     canonical, velocity = (
-        rd.simulate(rd.Plant(SKEW, effects), **common, integrator=rd.method(name), step_s=h)
+        rd.simulate(rd.Plant(SKEW, effects), **common, integrator=rd.integrate.method(name), step_s=h)
         for name, h in (("gauss_6", 2e-3), ("order_8", 4e-3))
     )
     assert len(canonical.t) == 17
@@ -117,7 +124,9 @@ def test_every_engine_gives_the_same_run() -> None:
 
 def test_a_sample_keeps_the_equation_of_motion() -> None:
     """M a + C v + N = τ at each sample, with the acceleration that is recorded; v = dq/dt and a = dv/dt."""
-    run = rd.simulate(SMOOTH, **START, duration_s=0.5, controller=rd.PD(rd.hold([0.1, 0.2]), [20.0, 9.0], 2.0))
+    run = rd.simulate(
+        SMOOTH, **START, duration_s=0.5, controller=rd.control.PD(rd.control.hold([0.1, 0.2]), [20.0, 9.0], 2.0)
+    )
     for t, q, v, a, u in zip(run.t, run.q, run.v, run.a, run.u, strict=True):
         np.testing.assert_allclose(SMOOTH.inverse_dynamics(t, q, v, a), u, atol=1e-11)
     h = run.t[1] - run.t[0]  # central differences err by h²/6 of the third derivative, below 1e4 here
@@ -128,12 +137,12 @@ def test_a_sample_keeps_the_equation_of_motion() -> None:
 def test_a_wrench_window_is_three_runs_one_after_the_other() -> None:
     """Its ends are ends of steps, so the parts are the same sequence of steps, up to rounding of their length."""
     force, start, end = [3.0, -0.7, -2.0, 0.3, 4.0, 0.5], 0.1234, 0.30017
-    push = rd.ExternalWrench("tip", force, start_s=start, end_s=end)
+    push = rd.effects.ExternalWrench("tip", force, start_s=start, end_s=end)
     whole = rd.simulate(rd.Plant(DOUBLE, [push]), **START, duration_s=0.4, integrator="rk4", step_s=2e-3)
     assert {start, end} <= set(whole.t)
     assert whole.error is not None
     assert whole.error.final < 1e-9  # no order is lost at the ends
-    state, always = START, rd.Plant(DOUBLE, [rd.ExternalWrench("tip", force)])
+    state, always = START, rd.Plant(DOUBLE, [rd.effects.ExternalWrench("tip", force)])
     for plant, duration in ((rd.Plant(DOUBLE), start), (always, end - start), (rd.Plant(DOUBLE), 0.4 - end)):
         part = rd.simulate(plant, **state, duration_s=duration, integrator="rk4", step_s=2e-3, estimate_error=False)
         state = {"q0": part.q[-1], "v0": part.v[-1]}
@@ -178,8 +187,8 @@ def test_a_frame_that_follows_a_circle_has_a_deviation_in_metres() -> None:
     arm = rd.load("ur5")
     q0 = np.array([0.3, -1.3, 1.6, -1.9, -1.5, 0.2])
     g = arm.placement(q0, "tool0")
-    path = rd.circle(g[:3, 3] + [0.0, 0.05, 0.0], 0.05, [0, 0, 1], 1.0, toward=[0, -1, 0], rotation=g[:3, :3])
-    law = rd.OperationalSpace(arm, "tool0", path, 400.0, 40.0)
+    path = rd.control.circle(g[:3, 3] + [0.0, 0.05, 0.0], 0.05, [0, 0, 1], 1.0, toward=[0, -1, 0], rotation=g[:3, :3])
+    law = rd.control.OperationalSpace(arm, "tool0", path, 400.0, 40.0)
     run = rd.simulate(arm, q0=q0, duration_s=0.2, controller=law, integrator="rk4", step_s=4e-3, estimate_error=False)
     desired, p = path.at(run.t)[0], arm.placement(run.q, "tool0")[:, :3, 3]
     assert run.desired is None
@@ -203,8 +212,10 @@ def test_the_summary_says_what_acted_and_nothing_else() -> None:
     start = {"q0": [0.3, 0.4], "duration_s": 0.01, "estimate_error": False}
     assert "\neffects: none\n" in rd.simulate(bare, **start).summary
     loaded = bare.with_(gravity=(0.0, 3.0, -4.0), payload=rd.Payload("tip", 0.5), armature=0.1, mass_scale=1.1)
-    plant = rd.Plant(loaded, [rd.EffortLimit(5.0), *rd.joint_stops(-2.0, 2.0), rd.ViscousFriction(0.1)])
-    run = rd.simulate(plant, controller=rd.PD(rd.hold([0.3, 0.4]), 1.0, 1.0), **start)
+    plant = rd.Plant(
+        loaded, [rd.effects.EffortLimit(5.0), *rd.effects.joint_stops(-2.0, 2.0), rd.effects.ViscousFriction(0.1)]
+    )
+    run = rd.simulate(plant, controller=rd.control.PD(rd.control.hold([0.3, 0.4]), 1.0, 1.0), **start)
     acting = "gravity 5 m/s²", "payload 0.5 kg on tip", "mass_scale 1.1", "armature"
     assert run.acting == (*acting, "effort_limit", "joint_stops", "viscous_friction", "control")
     assert f"\neffects: {', '.join(run.acting)}\n" in run.summary
@@ -215,7 +226,7 @@ def test_the_summary_says_what_acted_and_nothing_else() -> None:
 @pytest.mark.parametrize(("name", "unit"), [("planar_2r", "rad"), ("cart_pole", "m or rad")])
 def test_the_summary_states_units(name: str, unit: str) -> None:
     """Of the errors of q; m and rad where both kinds of joints are."""
-    law = rd.PD(rd.hold([0.1, 0.2]), 1.0, 1.0)
+    law = rd.control.PD(rd.control.hold([0.1, 0.2]), 1.0, 1.0)
     text = rd.simulate(rd.load(name), q0=[0.1, 0.2], duration_s=0.05, controller=law).summary
     assert f"\nerror of q [{unit}]: " in text and f"\ntracking error of q [{unit}]: " in text
     assert " of the energy exchanged" in text

@@ -14,26 +14,29 @@ import robot_dyn as rd
 from robot_dyn.effects.effect import Active
 
 DOUBLE = rd.load("planar_2r")
-PLANT = rd.Plant(DOUBLE, [rd.ViscousFriction([0.4, 0.2])])
+PLANT = rd.Plant(DOUBLE, [rd.effects.ViscousFriction([0.4, 0.2])])
 START = {"q0": [0.4, -0.7], "v0": [0.3, 0.5]}
-GOAL = rd.quintic([0.4, -0.7], [0.9, 0.2], 0.2)
-METHODS = [rd.method("rk4"), rd.method("gauss_4"), rd.Adaptive()]
+GOAL = rd.control.quintic([0.4, -0.7], [0.9, 0.2], 0.2)
+METHODS = [rd.integrate.method("rk4"), rd.integrate.method("gauss_4"), rd.integrate.Adaptive()]
 
 
 def controllers(period: float) -> list:
     """Every law of joint space, with gains that are not round."""
-    kp, kd = rd.gains_from([3.0, 0.4], 9.0, 0.8)
+    kp, kd = rd.control.gains_from([3.0, 0.4], 9.0, 0.8)
     laws = [
-        rd.PD(GOAL, kp, kd, period_s=period),
-        rd.PID(GOAL, kp, 40.0, kd, effort_limit=[30.0, 12.0], period_s=period),
+        rd.control.PD(GOAL, kp, kd, period_s=period),
+        rd.control.PID(GOAL, kp, 40.0, kd, effort_limit=[30.0, 12.0], period_s=period),
     ]
-    laws += [law(DOUBLE, GOAL, kp, kd, period_s=period) for law in (rd.ComputedTorque, rd.PDGravity, rd.FeedForward)]
+    laws += [
+        law(DOUBLE, GOAL, kp, kd, period_s=period)
+        for law in (rd.control.ComputedTorque, rd.control.PDGravity, rd.control.FeedForward)
+    ]
     return laws
 
 
 def stepped(method, step: float) -> dict:
     """A method and its step; an adaptive one has none."""
-    return {"integrator": method} | ({} if isinstance(method, rd.Adaptive) else {"step_s": step})
+    return {"integrator": method} | ({} if isinstance(method, rd.integrate.Adaptive) else {"step_s": step})
 
 
 def name(each) -> str:
@@ -44,7 +47,7 @@ def name(each) -> str:
 def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> None:
     """At a tick it is the law's, of the state there; up to the next one, the same to the last bit."""
     period, count = 0.012, 20
-    law = rd.PDGravity(DOUBLE, GOAL, [80.0, 20.0], [9.0, 2.0], period_s=period)
+    law = rd.control.PDGravity(DOUBLE, GOAL, [80.0, 20.0], [9.0, 2.0], period_s=period)
     common = {**START, "duration_s": period * count, "controller": law, "record_period_s": 1e-4}
     run = rd.simulate(PLANT, **common, **stepped(method, 2e-3))
     ticks = np.searchsorted(run.t, period * np.arange(count + 1) - 1e-12)
@@ -62,7 +65,7 @@ def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> Non
 @pytest.mark.parametrize("step", [0.012, 1e-3], ids=["a step a tick", "twelve steps a tick"])
 def test_states_of_a_sampled_pid_advance_once_a_tick(method, step: float) -> None:
     """z⁺ = z + period · ż at the tick, z = 0 at the first: τ at each tick is that of the recursion, to rounding."""
-    law = rd.PID(GOAL, [80.0, 20.0], [900.0, 400.0], [9.0, 2.0], effort_limit=[25.0, 8.0], period_s=0.012)
+    law = rd.control.PID(GOAL, [80.0, 20.0], [900.0, 400.0], [9.0, 2.0], effort_limit=[25.0, 8.0], period_s=0.012)
     run = rd.simulate(PLANT, **START, duration_s=0.24, controller=law, **stepped(method, step))
     assert run.outcome.ending == "finished", run.outcome.advice
     ticks = np.searchsorted(run.t, 0.012 * np.arange(21) - 1e-12)
@@ -92,7 +95,7 @@ def test_continuous_control_is_the_limit_of_a_small_period(kind: int) -> None:
 def test_exact_computed_torque_makes_each_joint_a_linear_oscillator() -> None:
     """ë + 2 ζ ω ė + ω² e = 0 from e(0), whatever the arm: the closed form within the 1e-10 of its estimate."""
     omega, zeta = 9.0, 0.6
-    law = rd.ComputedTorque(DOUBLE, rd.hold([0.9, 0.2]), *rd.gains_from(1.0, omega, zeta))
+    law = rd.control.ComputedTorque(DOUBLE, rd.control.hold([0.9, 0.2]), *rd.control.gains_from(1.0, omega, zeta))
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.5, controller=law, integrator="rk4", step_s=5e-4)
     e0, de0, decay = np.array([0.5, 0.9]), -np.array(START["v0"]), zeta * omega
     damped, t = omega * np.sqrt(1 - zeta**2), run.t[:, None]
@@ -108,8 +111,8 @@ def test_exact_computed_torque_makes_each_joint_a_linear_oscillator() -> None:
 def test_recorded_torque_is_within_the_effort_limit(period: float) -> None:
     """What is recorded is what acts, cut at the limit where the law asks for more, and the motion is that of it."""
     limit = np.array([20.0, 3.0])
-    law = rd.PD(GOAL, [900.0, 300.0], [20.0, 8.0], period_s=period)
-    plant = rd.Plant(DOUBLE, [rd.EffortLimit(limit)])
+    law = rd.control.PD(GOAL, [900.0, 300.0], [20.0, 8.0], period_s=period)
+    plant = rd.Plant(DOUBLE, [rd.effects.EffortLimit(limit)])
     run = rd.simulate(plant, **START, duration_s=0.3, controller=law, estimate_error=False)
     assert (np.abs(run.u) <= limit).all()
     assert (np.abs(run.u) == limit).any(axis=0).all()
@@ -125,8 +128,8 @@ def test_recorded_torque_is_within_the_effort_limit(period: float) -> None:
 @pytest.mark.parametrize("edge", [0.3, 0.6, 0.7])
 def test_a_switch_on_a_tick_is_one_cut(edge: float) -> None:
     """3 · 0.1 = 0.30000000000000004 is not 0.3: the two are one end of a step, and companions are not lost to it."""
-    push = rd.ExternalWrench("tip", [1.0, 0.0, -2.0, 0.0, -0.5, 0.0], start_s=0.1, end_s=edge)
-    law = rd.PD(GOAL, [8.0, 2.0], [1.0, 0.2], period_s=0.1)  # slow enough for 10 Hz
+    push = rd.effects.ExternalWrench("tip", [1.0, 0.0, -2.0, 0.0, -0.5, 0.0], start_s=0.1, end_s=edge)
+    law = rd.control.PD(GOAL, [8.0, 2.0], [1.0, 0.2], period_s=0.1)  # slow enough for 10 Hz
     run = rd.simulate(rd.Plant(DOUBLE, [push]), **START, duration_s=0.9, controller=law, integrator="rk4", step_s=5e-3)
     assert np.diff(run.t).min() > 1e-3
     assert run.error is not None
@@ -149,7 +152,7 @@ class Counted(Active):
 def test_a_run_evaluates_what_its_method_declares_and_nothing_it_does_not_name(method: str) -> None:
     """48 steps; besides them an effect is asked at the two samples only, for their acceleration and power."""
     on, off = Counted(), Counted()
-    integrator = rd.method(method)
+    integrator = rd.integrate.method(method)
     run = rd.simulate(
         rd.Plant(DOUBLE, [on]), **START, duration_s=0.048, integrator=integrator, record_period_s=0.048,
         estimate_error=False,
@@ -163,7 +166,9 @@ def test_a_run_evaluates_what_its_method_declares_and_nothing_it_does_not_name(m
     assert off.calls == []
 
 
-@pytest.mark.parametrize("method", [rd.method("rk4"), rd.method("gauss_2"), rd.Adaptive()], ids=name)
+@pytest.mark.parametrize(
+    "method", [rd.integrate.method("rk4"), rd.integrate.method("gauss_2"), rd.integrate.Adaptive()], ids=name
+)
 def test_companions_that_are_off_cost_nothing(method) -> None:
     """Of 2, 3 and 5 times the step: 1/2 + 1/3 + 1/5 of the steps more, and looks between them; the run is the same."""
     runs, calls = [], []
@@ -181,8 +186,9 @@ def test_companions_that_are_off_cost_nothing(method) -> None:
     assert without.statistics.evaluations == with_companions.statistics.evaluations
     more = calls[1] - calls[0]
     assert more > 0.3 * without.statistics.evaluations
-    if method == rd.method("rk4"):
+    if method == rd.integrate.method("rk4"):
         steps = without.statistics.steps
         looks = steps + 1 + 4000 // (steps + 1) * steps  # at the ends of steps and between them
         pushed = 4 * ceil(steps / 3)  # from a start moved by rounding
-        assert more == 4 * (ceil(steps / 2) + ceil(steps / 3) + ceil(steps / 5)) + pushed + looks
+        samples = len(without.t)  # at which the run holds what its effects exerted
+        assert more == 4 * (ceil(steps / 2) + ceil(steps / 3) + ceil(steps / 5)) + pushed + looks + samples

@@ -20,7 +20,7 @@ from tests.long import long
 DOUBLE = rd.load("planar_2r")
 UR5 = rd.load("ur5")
 START = {"q0": [0.4, -0.7], "v0": [0.3, 0.5]}
-METHODS = [rd.method(name) for name in ("rk4", "gauss_4", "sdirk_3")] + [rd.Adaptive()]
+METHODS = [rd.integrate.method(name) for name in ("rk4", "gauss_4", "sdirk_3")] + [rd.integrate.Adaptive()]
 
 
 def name(each) -> str:
@@ -56,7 +56,7 @@ class InterruptedEffect(Active):
 
 def slack(method, period: float) -> float:
     """How much earlier a run may end: a fixed step, or one that an adaptive method chose."""
-    return 0.04 if isinstance(method, rd.Adaptive) and period == 0 else 2e-3
+    return 0.04 if isinstance(method, rd.integrate.Adaptive) and period == 0 else 2e-3
 
 
 def check_kept(run: rd.Trajectory, until: float, early: float = 2e-3) -> None:
@@ -75,9 +75,9 @@ def test_a_finished_run_says_so() -> None:
 
 
 LAWS = {
-    "PD": rd.PD(rd.hold(np.full(6, 0.3)), 1e4, 1e3),
-    "sampled PD": rd.PD(rd.hold(np.full(6, 0.3)), 1e4, 1e3, period_s=0.05),
-    "computed torque": rd.ComputedTorque(UR5, rd.hold(np.full(6, 0.3)), 1e6, 1e3),
+    "PD": rd.control.PD(rd.control.hold(np.full(6, 0.3)), 1e4, 1e3),
+    "sampled PD": rd.control.PD(rd.control.hold(np.full(6, 0.3)), 1e4, 1e3, period_s=0.05),
+    "computed torque": rd.control.ComputedTorque(UR5, rd.control.hold(np.full(6, 0.3)), 1e6, 1e3),
 }
 
 
@@ -88,7 +88,7 @@ def test_stiff_gains_at_too_large_a_step_diverge_and_the_run_says_what_to_do(met
     """kd/M ≈ 1e5/s at 10 ms is far outside the region of stability, 2/h: the state grows until it overflows."""
     run = rd.simulate(
         rd.Plant(UR5), q0=np.linspace(0.1, 1.0, 6), v0=np.zeros(6), duration_s=10.0, controller=law,
-        integrator=rd.method(method), step_s=0.01, estimate_error=estimate,
+        integrator=rd.integrate.method(method), step_s=0.01, estimate_error=estimate,
     )  # fmt: skip
     assert run.outcome.ending == "diverged"
     assert 0 <= run.outcome.t < 10.0
@@ -166,10 +166,10 @@ GOOD = {**START, "duration_s": 0.1}
         ({"step_s": 0}, "step_s must be a positive number of seconds, 1e-12 at least; got 0"),
         ({"step_s": "fine"}, "step_s must be a real number, got 'fine'"),
         ({"record_period_s": -0.1}, "record_period_s must"),
-        ({"controller": rd.PD(rd.hold([0.0, 0.0, 0.0]), 1.0, 1.0)}, "drives 3 joints, the plant has 2"),
+        ({"controller": rd.control.PD(rd.control.hold([0.0, 0.0, 0.0]), 1.0, 1.0)}, "drives 3 joints, the plant has 2"),
         ({"controller": 3}, "controller"),
         ({"integrator": "rk44"}, "no integration method 'rk44'; nearest: rk4"),
-        ({"integrator": rd.Adaptive}, "integrator: give a name"),
+        ({"integrator": rd.integrate.Adaptive}, "integrator: give a name"),
     ],
     ids=str,
 )
@@ -180,7 +180,7 @@ def test_a_setup_without_meaning_is_refused(options: dict, message: str) -> None
 
 def test_an_unknown_method_is_refused_with_the_nearest() -> None:
     with pytest.raises(QueryError, match=r"no integration method 'rk5'.*rk4"):
-        rd.method("rk5")
+        rd.integrate.method("rk5")
 
 
 def test_a_robot_alone_is_a_plant_without_effects() -> None:
@@ -190,17 +190,19 @@ def test_a_robot_alone_is_a_plant_without_effects() -> None:
 @pytest.mark.parametrize(
     ("effect", "message"),
     [
-        (rd.ViscousFriction([0.1, 0.2, 0.3]), "viscous_friction: damping is of 3 joints, the arm has 2"),
-        (rd.Spring([0.1, 0.2, 0.3]), "spring: stiffness is of 3 joints, the arm has 2"),
-        (rd.EffortLimit([0.1, 0.2, 0.3]), "effort_limit: limit is of 3 joints, the arm has 2"),
-        (rd.ExternalWrench("tipp", np.ones(6)), "no frame 'tipp'; nearest: tip"),
+        (rd.effects.ViscousFriction([0.1, 0.2, 0.3]), "viscous_friction: damping is of 3 joints, the arm has 2"),
+        (rd.effects.Spring([0.1, 0.2, 0.3]), "spring: stiffness is of 3 joints, the arm has 2"),
+        (rd.effects.EffortLimit([0.1, 0.2, 0.3]), "effort_limit: limit is of 3 joints, the arm has 2"),
+        (rd.effects.ExternalWrench("tipp", np.ones(6)), "no frame 'tipp'; nearest: tip"),
     ],
     ids=lambda each: getattr(each, "name", ""),
 )
-@pytest.mark.parametrize("method", [rd.method("rk4"), rd.method("gauss_4"), rd.Adaptive()], ids=name)
+@pytest.mark.parametrize(
+    "method", [rd.integrate.method("rk4"), rd.integrate.method("gauss_4"), rd.integrate.Adaptive()], ids=name
+)
 def test_an_effect_that_does_not_fit_the_robot_is_refused(method, effect, message: str) -> None:
     """A mistake of the caller, not a run that diverged."""
-    law = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0)
+    law = rd.control.PD(rd.control.hold([0.1, 0.2]), 3.0, 1.0)
     with pytest.raises(rd.RobotDynError, match=message):
         rd.simulate(rd.Plant(DOUBLE, [effect]), **GOOD, controller=law, integrator=method)
 
@@ -260,14 +262,16 @@ def test_a_period_of_ones_own_controller_is_a_time(period: object) -> None:
 def test_a_plant_in_ball_arithmetic_is_refused() -> None:
     """Runs are floats: balls in a float array are not numbers at all."""
     with pytest.raises(QueryError, match="plant: runs are computed in floats"):
-        rd.Setup(rd.Plant(rd.Lagrangian(DOUBLE, rd.Ball(60))), [0.3, -0.4])
+        rd.Setup(rd.Plant(rd.Lagrangian(DOUBLE, rd.studies.Ball(60))), [0.3, -0.4])
 
 
 def test_a_companion_whose_energy_overflows_is_no_end_of_the_run() -> None:
     """RK4 is stable at ω h = 2.5; at 4 h a step multiplies q by 400, and in 64 steps ½ k q² overflows, q does not."""
     cart = rd.load("cart_pole").with_(lock={"hinge": 0.3})
     k = float(cart.M([0.0])[0, 0]) * 2.5e3**2
-    run = rd.simulate(rd.Plant(cart, [rd.Spring(k)]), q0=[0.4], duration_s=1.0, engine="interpreted", integrator="rk4")
+    run = rd.simulate(
+        rd.Plant(cart, [rd.effects.Spring(k)]), q0=[0.4], duration_s=1.0, engine="interpreted", integrator="rk4"
+    )
     assert run.outcome.ending == "finished"
     assert run.error is not None and "step" in run.error.note
 
@@ -294,7 +298,7 @@ def test_a_look_at_the_energy_that_fails_ends_the_run(engine: str) -> None:
     assert "the potential has no value" in run.outcome.advice
 
 
-@pytest.mark.parametrize("method", [rd.method("rk4"), rd.Adaptive()], ids=name)
+@pytest.mark.parametrize("method", [rd.integrate.method("rk4"), rd.integrate.Adaptive()], ids=name)
 def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(method, monkeypatch) -> None:
     """All samples are there, no other companion starts, and the outcome says where the interrupt came."""
     ran = []
@@ -322,7 +326,7 @@ def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(met
 @pytest.mark.parametrize("period", [0.0, 0.01])
 def test_an_interrupt_before_the_first_step_leaves_the_start(engine: str, period: float, monkeypatch) -> None:
     """One sample, the state at 0 s; what a controller would have held is not known."""
-    law = rd.PD(rd.hold([0.1, 0.2]), 3.0, 1.0, period_s=period)
+    law = rd.control.PD(rd.control.hold([0.1, 0.2]), 3.0, 1.0, period_s=period)
     setup = rd.Setup(rd.Plant(DOUBLE), integrator="rk4", **START, duration_s=0.2, controller=law, engine=engine)
     rd.simulate(setup)  # compiled, and looked at, before
 

@@ -19,7 +19,7 @@ ARM = rd.load("planar_2r")
 STATE = np.array([0.4, -0.7, 0.13, -0.25])
 
 
-def found(effects: list[rd.Effect], controller: rd.Controller | None = None, held: np.ndarray | None = None):
+def found(effects: list[rd.Effect], controller: rd.control.Controller | None = None, held: np.ndarray | None = None):
     equation = StateEquation(rd.Plant(ARM, effects), controller)
     return fastest(equation, 0.2, np.concatenate([STATE, np.zeros(equation.size - 4)]), held)
 
@@ -27,7 +27,7 @@ def found(effects: list[rd.Effect], controller: rd.Controller | None = None, hel
 @pytest.mark.parametrize(("b", "joint"), [([1e5, 1.0], "joint_1"), ([1.0, 1e5], "joint_2")])
 def test_a_damper_is_named_with_its_joint(b: list[float], joint: str) -> None:
     """λ is that of −M⁻¹ b but for other motions, 1e-4 of it."""
-    made = found([rd.Spring(3.0), rd.ViscousFriction(b)])
+    made = found([rd.effects.Spring(3.0), rd.effects.ViscousFriction(b)])
     expected = np.linalg.eigvals(-np.linalg.solve(ARM.M(STATE[:2]), np.diag(b)))
     assert made.eigenvalue == pytest.approx(expected.real.min(), rel=1e-4)
     assert (made.joint, made.source) == (joint, "viscous_friction")
@@ -35,18 +35,18 @@ def test_a_damper_is_named_with_its_joint(b: list[float], joint: str) -> None:
 
 
 def test_springs_control_and_narrow_friction_are_told_apart() -> None:
-    damper = rd.ViscousFriction(0.3)
-    made = found([damper, rd.Spring([1.0, 1e8])])
+    damper = rd.effects.ViscousFriction(0.3)
+    made = found([damper, rd.effects.Spring([1.0, 1e8])])
     assert (made.joint, made.source) == ("joint_2", "spring")
     assert abs(made.eigenvalue) == pytest.approx(abs(made.eigenvalue.imag), rel=1e-3)
     assert "changes with" in str(made)
-    law = rd.PD(rd.hold([0.1, 0.2]), [10.0, 10.0], [1e6, 1.0])
+    law = rd.control.PD(rd.control.hold([0.1, 0.2]), [10.0, 10.0], [1e6, 1.0])
     made = found([damper], law)
     assert (made.joint, made.source) == ("joint_1", "control")
     slow = found([damper], law, held=np.zeros(2))  # in zero-order hold it has no slope
     assert slow.source in ("viscous_friction", BODIES)
     assert abs(slow.eigenvalue) < 100
-    friction = rd.RegularisedCoulombFriction([1.0, 2.0], [0.5, 1e-6])
+    friction = rd.effects.RegularisedCoulombFriction([1.0, 2.0], [0.5, 1e-6])
     near = StateEquation(rd.Plant(ARM, [damper, friction]), None)
     made = fastest(near, 0.0, np.array([0.4, -0.7, 0.1, 3e-7, 0.0, 0.0, 0.0]), None)
     assert (made.joint, made.source) == ("joint_2", "regularised_coulomb_friction")
@@ -60,20 +60,22 @@ def test_a_run_says_that_stability_bounds_its_steps() -> None:
     """With the joint and the effect, where a damper is stiff and motion has decayed; not where the tolerance does."""
     options: dict[str, Any] = {"q0": STATE[:2], "duration_s": 0.1, "engine": "compiled", "estimate_error": False}
     options |= {"integrator": "DOP853"}
-    stiff = rd.simulate(rd.Plant(ARM, [rd.ViscousFriction([1.0, 1e4])]), **options)
+    stiff = rd.simulate(rd.Plant(ARM, [rd.effects.ViscousFriction([1.0, 1e4])]), **options)
     (remark,) = (each for each in stiff.remarks if each.kind is Kind.STIFF)
     assert stiff.statistics.steps > 1000
     assert remark.joint == "joint_2"
     assert "steps bounded by stability: the fastest motion decays with" in stiff.summary
     assert "by 'viscous_friction'; take integrator='Rosenbrock'" in stiff.summary
-    short = rd.simulate(ARM, **options | {"duration_s": 20.0, "integrator": rd.Adaptive(rtol=1e-13, atol=1e-13)})
+    short = rd.simulate(
+        ARM, **options | {"duration_s": 20.0, "integrator": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)}
+    )
     assert short.statistics.steps > 1000
     assert not [each for each in short.remarks if each.kind is Kind.STIFF]
 
 
 @pytest.mark.parametrize("engine", ["compiled", "interpreted"])
 def test_a_run_that_stability_would_keep_for_hours_ends_with_the_reason(engine: str) -> None:
-    plant = rd.Plant(ARM, [rd.ViscousFriction([1.0, 1e6])])
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction([1.0, 1e6])])
     run = rd.simulate(plant, STATE[:2], duration_s=100.0, engine=engine, estimate_error=False, integrator="DOP853")
     assert run.outcome.ending == "diverged"
     assert run.outcome.t < 1.0
@@ -82,7 +84,7 @@ def test_a_run_that_stability_would_keep_for_hours_ends_with_the_reason(engine: 
 
 def test_a_stiff_run_is_made_by_the_stiff_method_unless_another_is_named() -> None:
     """Both are right to their estimates; the first takes a few of the steps, and says why."""
-    plant = rd.Plant(ARM, [rd.ViscousFriction([1.0, 1e4])])
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction([1.0, 1e4])])
     chosen, named = (rd.simulate(plant, STATE[:2], duration_s=0.5, integrator=name) for name in ("auto", "DOP853"))
     assert chosen.statistics.method == "Rosenbrock"
     assert 20 * chosen.statistics.steps < named.statistics.steps
@@ -94,14 +96,14 @@ def test_a_stiff_run_is_made_by_the_stiff_method_unless_another_is_named() -> No
 
 @pytest.mark.parametrize(
     ("effects", "tolerance"),
-    [([], 1e-13), ([rd.Spring(1e6)], 1e-10)],
+    [([], 1e-13), ([rd.effects.Spring(1e6)], 1e-10)],
     ids=["bounded by its tolerance", "stiff springs, which an L-stable method would damp"],
 )
 def test_other_runs_are_those_of_the_explicit_method(effects: list[rd.Effect], tolerance: float) -> None:
     """To the last bit, looks included: both take more steps than the first look waits for."""
     options: dict[str, Any] = {"q0": STATE[:2], "duration_s": 5.0 if effects else 20.0, "estimate_error": False}
     chosen, named = (
-        rd.simulate(rd.Plant(ARM, effects), **options, integrator=rd.Adaptive(name, tolerance, tolerance))
+        rd.simulate(rd.Plant(ARM, effects), **options, integrator=rd.integrate.Adaptive(name, tolerance, tolerance))
         for name in ("auto", "DOP853")
     )
     assert chosen.statistics.steps > 600
@@ -114,4 +116,4 @@ def test_rollouts_are_made_by_the_explicit_method_and_equations_name_one() -> No
     chosen, named = (rd.rollouts(ARM, [STATE[:2]], duration_s=0.2, integrator=name) for name in ("auto", "DOP853"))
     np.testing.assert_array_equal(chosen.q, named.q)
     with pytest.raises(QueryError, match="name 'DOP853' or 'Rosenbrock' here"):
-        rd.Adaptive("auto").solve(System(lambda t, y: -y, 1), 0.0, np.ones(2), 1.0)
+        rd.integrate.Adaptive("auto").solve(System(lambda t, y: -y, 1), 0.0, np.ones(2), 1.0)

@@ -9,17 +9,17 @@ import robot_dyn as rd
 from tests.effects.test_effect_states import ARM
 
 START = [0.3, -0.2]
-ROUGH = rd.PiecewisePolynomial(  # its velocity jumps
+ROUGH = rd.control.PiecewisePolynomial(  # its velocity jumps
     [0.0, 0.21, 0.53, 1.0],
     [[[0.3, -0.2], [1.0, 0.4]], [[0.51, -0.116], [-0.6, 1.2]], [[0.318, 0.268], [0.9, -0.7]]],
 )
-FRICTION = rd.LuGreFriction([60.0, 40.0], [2.0, 1.0], [1.0, 0.5], [1.5, 0.8], [2.0, 1.0], 1.0)
-PD = rd.PD(rd.quintic([0.1, 0.2], [0.9, -0.4], 0.5), [150.0, 60.0], [12.0, 5.0])
-PUSH = rd.ExternalWrench("tip", [30.0, -20.0, 0.0, 0.0, 0.0, 2.0], "world_aligned", 0.3137, 0.3149)
+FRICTION = rd.effects.LuGreFriction([60.0, 40.0], [2.0, 1.0], [1.0, 0.5], [1.5, 0.8], [2.0, 1.0], 1.0)
+PD = rd.control.PD(rd.control.quintic([0.1, 0.2], [0.9, -0.4], 0.5), [150.0, 60.0], [12.0, 5.0])
+PUSH = rd.effects.ExternalWrench("tip", [30.0, -20.0, 0.0, 0.0, 0.0, 2.0], "world_aligned", 0.3137, 0.3149)
 SCENES = {
-    "break of the reference": ([], rd.PD(ROUGH, [150.0, 60.0], [12.0, 5.0])),
+    "break of the reference": ([], rd.control.PD(ROUGH, [150.0, 60.0], [12.0, 5.0])),
     "window shorter than a step": ([PUSH], PD),
-    "stops struck": (rd.joint_stops([-1.2, -0.9], [0.35, 0.8], 2e3, 20.0), None),
+    "stops struck": (rd.effects.joint_stops([-1.2, -0.9], [0.35, 0.8], 2e3, 20.0), None),
     "bristles that reverse": ([FRICTION], PD),
 }
 
@@ -33,7 +33,7 @@ def run(scene: str, **options) -> rd.Trajectory:
 @pytest.mark.parametrize("scene", SCENES)
 def test_halved_steps_keep_the_order(scene: str) -> None:
     """The same events, and in the mean of five halvings order 4 ± 0.15; order 8 down to 7.5, or to rounding."""
-    exact = run(scene, integrator=rd.Adaptive("DOP853", 1e-13, 1e-13))
+    exact = run(scene, integrator=rd.integrate.Adaptive("DOP853", 1e-13, 1e-13))
     names = [each.name for each in exact.events]
     assert (len(names) > 1) is (scene in ("stops struck", "bristles that reverse"))
     errors = []
@@ -51,7 +51,7 @@ def test_bristles_at_rest_reverse_no_more() -> None:
     effects, controller = SCENES["bristles that reverse"]
     still = rd.simulate(
         rd.Plant(ARM, effects), START, duration_s=20.0, controller=controller, engine="compiled", record_period_s=20.0,
-        integrator=rd.Adaptive("DOP853", 1e-10, 1e-10), estimate_error=False,
+        integrator=rd.integrate.Adaptive("DOP853", 1e-10, 1e-10), estimate_error=False,
     )  # fmt: skip
     assert 2 < len(still.events) < 100
     assert still.events[-1].t < 10.0
@@ -60,7 +60,7 @@ def test_bristles_at_rest_reverse_no_more() -> None:
 
 def test_companions_of_a_run_that_an_event_ends_go_on_past_it() -> None:
     """The event falls on times at which runs are compared, ± 3e-8 s: a companion may meet it before, the run behind."""
-    options = {"duration_s": 2.0, "integrator": rd.Adaptive("DOP853", 1e-6, 1e-6), "record_period_s": 0.1}
+    options = {"duration_s": 2.0, "integrator": rd.integrate.Adaptive("DOP853", 1e-6, 1e-6), "record_period_s": 0.1}
     free = rd.simulate(ARM, START, estimate_error=False, **options)
     for k in range(2, 10):
         way = np.sign(free.v[k, 0])

@@ -38,13 +38,14 @@ from tests.long import long
 ARM = rd.load("planar_2r")
 PLAIN = [name for name in FIXED_STEP if method(name).plain]
 Q0, V0 = np.array([0.31, -0.73]), np.array([0.9, -1.7])
-SAMPLED = rd.Loop(
-    rd.PD(rd.hold([0.4, -0.2]), [9.0, 5.0], [0.7, 0.4], 0.03), actuation=rd.Noise(0.2), actuation_delay=0.5
+SAMPLED = rd.control.Loop(
+    rd.control.PD(rd.control.hold([0.4, -0.2]), [9.0, 5.0], [0.7, 0.4], 0.03), actuation=rd.control.Noise(0.2),
+    actuation_delay=0.5
 )  # fmt: skip
-CONTINUOUS = rd.PD(rd.hold([0.4, -0.2]), [9.0, 5.0], [0.7, 0.4])
-SMOOTH = [rd.ViscousFriction([0.3, 0.2]), rd.RegularisedCoulombFriction([0.2, 0.1], 0.05)]
-BOUNDED = [*rd.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0, 4.0), rd.ViscousFriction([0.1, 0.2])]
-BODY = rd.CarriedPayload(rd.Payload("tip", 0.3, (0.1, 0.0, 0.05)), 0.2, 0.4)
+CONTINUOUS = rd.control.PD(rd.control.hold([0.4, -0.2]), [9.0, 5.0], [0.7, 0.4])
+SMOOTH = [rd.effects.ViscousFriction([0.3, 0.2]), rd.effects.RegularisedCoulombFriction([0.2, 0.1], 0.05)]
+BOUNDED = [*rd.effects.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0, 4.0), rd.effects.ViscousFriction([0.1, 0.2])]
+BODY = rd.effects.CarriedPayload(rd.Payload("tip", 0.3, (0.1, 0.0, 0.05)), 0.2, 0.4)
 
 
 def numbers(value: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
@@ -123,15 +124,15 @@ def test_a_run_with_events_gives_the_same_bits(name: str, sampled: bool) -> None
 
 def test_modes_of_dry_friction_and_rigid_stops_give_the_same_bits() -> None:
     """Sticking, sliding, impacts: the right-hand side changes at each."""
-    effects = [rd.DryFriction([0.4, 0.2]), rd.RigidStops([-0.8, -1.2], [0.7, 1.0], 0.5)]
+    effects = [rd.effects.DryFriction([0.4, 0.2]), rd.effects.RigidStops([-0.8, -1.2], [0.7, 1.0], 0.5)]
     ours, theirs = both(setup(effects, "DOP853", duration_s=2.0))
     assert len(ours.events) == len(theirs.events) > 5
     assert_same_bits((ours.runs, ours.stepper.work, ours.control), (theirs.runs, theirs.stepper.work, theirs.control))
 
 
-HELD = [rd.DryFriction([0.4, 0.2], [0.7, 0.3]), rd.RigidStops([-0.8, -1.2], [0.7, 1.0], [0.5, 0.8])]
-GEAR = [rd.RigidBacklash([0.02, 0.0], 0.003, 8.0, 0.4), *HELD]
-SOFT = [*HELD, *rd.joint_stops([-0.75, -9.0], [0.6, 9.0], 900.0, 4.0), BODY]
+HELD = [rd.effects.DryFriction([0.4, 0.2], [0.7, 0.3]), rd.effects.RigidStops([-0.8, -1.2], [0.7, 1.0], [0.5, 0.8])]
+GEAR = [rd.effects.RigidBacklash([0.02, 0.0], 0.003, 8.0, 0.4), *HELD]
+SOFT = [*HELD, *rd.effects.joint_stops([-0.75, -9.0], [0.6, 9.0], 900.0, 4.0), BODY]
 
 
 @pytest.mark.parametrize(
@@ -144,7 +145,9 @@ SOFT = [*HELD, *rd.joint_stops([-0.75, -9.0], [0.6, 9.0], 900.0, 4.0), BODY]
     ],
     ids=["a gear", "soft stops and a payload", "a gear, sampled", "stiff"],
 )
-def test_all_that_ends_a_mode_gives_the_same_bits(name: str, what: list[Any], controller: rd.Controller) -> None:
+def test_all_that_ends_a_mode_gives_the_same_bits(
+    name: str, what: list[Any], controller: rd.control.Controller
+) -> None:
     """Impacts and the bounces behind them, jumps over thresholds of other effects, a payload, and the events told."""
     events = [rd.Event(lambda t, q, v: v[0] - 0.3, name="speed")]
     ours, theirs = both(setup(what, name, duration_s=1.0, controller=controller, events=events))
@@ -159,8 +162,8 @@ def test_all_that_ends_a_mode_gives_the_same_bits(name: str, what: list[Any], co
 
 def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
     """One joint or two, one threshold or four: no array has a type of its own."""
-    made = [setup([*HELD, *rd.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0)], "rk4", step_s=0.01)]
-    rail = rd.Plant(arms()["rail"], [rd.RigidStops(0.0, 5.0), *rd.joint_stops([0.1], [9.0], 900.0)])
+    made = [setup([*HELD, *rd.effects.joint_stops([-0.5, -0.9], [0.6, 0.8], 900.0)], "rk4", step_s=0.01)]
+    rail = rd.Plant(arms()["rail"], [rd.effects.RigidStops(0.0, 5.0), *rd.effects.joint_stops([0.1], [9.0], 900.0)])
     made.append(replace(made[0], plant=rail, q0=[0.3], v0=[0.0]))
     loops = []
     for each in made:
@@ -174,7 +177,9 @@ def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
 
 def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
     """Hundreds of impacts, of sticking and of sliding: the loop returns for progress and for room alone."""
-    made = setup(HELD, "DOP853", duration_s=6.0, controller=rd.PD(rd.hold([1.4, -1.9]), [60.0, 30.0], [0.1, 0.1]))
+    made = setup(
+        HELD, "DOP853", duration_s=6.0, controller=rd.control.PD(rd.control.hold([1.4, -1.9]), [60.0, 30.0], [0.1, 0.1])
+    )
     equation = StateEquation(made.plant, made.controller)
     run, calls = make_run(made, equation, choose(made, equation)[0]), []
     inner = run.advance
@@ -189,7 +194,7 @@ def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
     ("name", "controller"),
     [("rk4", CONTINUOUS), ("gauss_4", SAMPLED), *long((name, SAMPLED) for name in PLAIN if name != "gauss_4")],
 )
-def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.Controller) -> None:
+def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.control.Controller) -> None:
     """64 runs, of which some diverge, with ticks or with instants at every third step, and samples; 100 steps."""
     W, of = 64, method(name)
     made = setup(SMOOTH, name, duration_s=0.2, step_s=0.002, controller=controller)

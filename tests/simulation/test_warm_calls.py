@@ -29,7 +29,7 @@ from robot_dyn.simulation.run.outcome import Ending
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.3, -0.4]), np.array([0.5, -0.2])
-PLAN = rd.quintic(Q, Q + 0.4, 0.2)
+PLAN = rd.control.quintic(Q, Q + 0.4, 0.2)
 NAMES = [each.name for each in fields(Trajectory)]
 WITHOUT_TIMES = [name for name in NAMES if name != "statistics"]
 
@@ -37,12 +37,12 @@ WITHOUT_TIMES = [name for name in NAMES if name != "statistics"]
 @cache
 def setups() -> dict[str, rd.Setup]:
     """Setups of values: levels that are passed, ticks, thresholds, states, what comes and goes, an open ledger."""
-    plant = rd.Plant(ARM, [rd.ViscousFriction(0.3), rd.EffortLimit([4.0, 2.0])])
-    sampled = rd.PD(PLAN, [60.0, 30.0], [6.0, 3.0], period_s=0.01)
-    stops = rd.joint_stops([-0.5, -0.5], [0.5, 0.5], 2e3, 0.1)
-    held = [rd.DryFriction([1.5, 0.5]), rd.RigidStops(-0.6, 0.6)]
-    tool = rd.CarriedPayload(rd.Payload("tip", 0.5), 0.05, 0.12)
-    pid = rd.PID(PLAN, 60.0, 20.0, 6.0)
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3), rd.effects.EffortLimit([4.0, 2.0])])
+    sampled = rd.control.PD(PLAN, [60.0, 30.0], [6.0, 3.0], period_s=0.01)
+    stops = rd.effects.joint_stops([-0.5, -0.5], [0.5, 0.5], 2e3, 0.1)
+    held = [rd.effects.DryFriction([1.5, 0.5]), rd.effects.RigidStops(-0.6, 0.6)]
+    tool = rd.effects.CarriedPayload(rd.Payload("tip", 0.5), 0.05, 0.12)
+    pid = rd.control.PID(PLAN, 60.0, 20.0, 6.0)
     compiled: dict[str, Any] = {"engine": "compiled", "duration_s": 0.2}
     short: dict[str, Any] = {
         "engine": "interpreted",
@@ -53,17 +53,17 @@ def setups() -> dict[str, rd.Setup]:
     return {
         "free swing": rd.Setup(rd.Plant(ARM), Q, V, integrator="DOP853", **compiled),
         "computed torque": rd.Setup(
-            plant, Q, V, controller=rd.ComputedTorque(ARM, PLAN, 90.0, 15.0), **compiled, about={"author": "me"}
+            plant, Q, V, controller=rd.control.ComputedTorque(ARM, PLAN, 90.0, 15.0), **compiled, about={"author": "me"}
         ),
         "sampled, rk4": rd.Setup(plant, Q, V, controller=sampled, integrator="rk4", **compiled),
         "steps too long": rd.Setup(
             rd.Plant(ARM), Q, 10 * V, 1.0, integrator="rk4", step_s=0.05, engine="interpreted"
         ),
-        "stops": rd.Setup(rd.Plant(ARM, [*stops, rd.Spring(3.0)]), Q, 10 * V, estimate_error=False, **short),
+        "stops": rd.Setup(rd.Plant(ARM, [*stops, rd.effects.Spring(3.0)]), Q, 10 * V, estimate_error=False, **short),
         "held": rd.Setup(rd.Plant(ARM, held), Q, 4 * V, estimate_error=False, **short),
         "payload": rd.Setup(rd.Plant(ARM, [tool]), Q, V, estimate_error=False, **short),
         "pid, lag": rd.Setup(
-            rd.Plant(ARM, [rd.ActuatorLag(0.02), rd.ExternalWrench("tip", [1, 2, 3, 0, 0, 1])]), Q, V,
+            rd.Plant(ARM, [rd.effects.ActuatorLag(0.02), rd.effects.ExternalWrench("tip", [1, 2, 3, 0, 0, 1])]), Q, V,
             controller=pid, estimate_error=False, **short,
         ),
     }  # fmt: skip
@@ -208,13 +208,14 @@ def test_a_second_call_computes_nothing_that_depends_on_the_setup_alone(name: st
         "StateEquation.energies", "rules_of", "observations_of",
     }  # fmt: skip
     late = {
-        "remarks", "ledger", "origin", "Observer.close", "deviation_of", "acting", "wrenches", "at_stop", "unstable",
+        "remarks", "ledger", "origin", "Observer.close", "tracking_of", "settings_of", "acting", "wrenches",
+        "at_stop", "unstable",
     }  # fmt: skip
     assert not (alone | late) & found.keys()
     assert sum(found.values()) < most
 
 
-class Driven(rd.Stateless):
+class Driven(rd.control.Stateless):
     """A controller whose gain may be set, and so may change between two calls."""
 
     n = 2  # pyright: ignore[reportAssignmentType, reportIncompatibleMethodOverride]
@@ -226,7 +227,7 @@ class Driven(rd.Stateless):
         return -self.gain * q
 
 
-class Pushed(rd.Active):
+class Pushed(rd.effects.Active):
     """An effect whose times may change between two calls."""
 
     def __init__(self, times: tuple[float, ...]) -> None:
@@ -259,7 +260,7 @@ def test_nothing_waits_of_a_run_with_parts_of_the_users_own() -> None:
     run = rd.simulate(ARM, Q, V, controller=Driven(), duration_s=0.05, integrator="DOP853", estimate_error=False)
     assert vars(run).keys() == set(NAMES)
 
-    class Stores(rd.Dissipative, rd.Stateful):
+    class Stores(rd.effects.Dissipative, rd.effects.Stateful):
         def state_size(self, n):
             return 1
 
@@ -280,7 +281,7 @@ def test_nothing_waits_of_a_run_with_parts_of_the_users_own() -> None:
 
 def test_a_robot_that_warns_warns_in_each_run_and_in_none_of_what_is_read() -> None:
     arm = ARM.warn_below(15.9)  # of the 16 of a float: the start has fewer
-    control = rd.PD(PLAN, 10.0, 1.0, period_s=0.01)
+    control = rd.control.PD(PLAN, 10.0, 1.0, period_s=0.01)
     changes: dict[str, Any] = {"plant": rd.Plant(arm), "controller": control, "estimate_error": False}
     counts = []
     with pytest.warns(rd.PrecisionWarning):  # so do the checks of the setup, and of its machine code
@@ -295,7 +296,7 @@ def test_a_robot_that_warns_warns_in_each_run_and_in_none_of_what_is_read() -> N
 
 
 def test_nothing_waits_of_a_run_that_did_not_finish() -> None:
-    plant = rd.Plant(ARM, [rd.ViscousFriction(1e4)])
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction(1e4)])
     run = rd.simulate(plant, Q, V, duration_s=0.1, integrator="rk4", engine="interpreted", estimate_error=False)
     assert run.outcome.ending is Ending.DIVERGED and vars(run).keys() == set(NAMES)
 
@@ -331,7 +332,7 @@ def test_setups_of_parts_of_the_library_are_values() -> None:
     """And those of a user's own class, or of a function, are not: even where it is frozen, its code may be another."""
 
     @dataclass(frozen=True)
-    class Own(rd.Active):
+    class Own(rd.effects.Active):
         gain: float = 1.0
 
         def thresholds(self, n):

@@ -37,7 +37,7 @@ def test_an_effect_that_is_neither_a_torque_nor_a_bound_is_never_evaluated_and_s
 
 @pytest.mark.parametrize("start_s", [0.0, 0.05, 99.0])
 def test_a_wrench_on_an_unknown_link_is_refused_also_where_its_window_is_not_open_yet(start_s: float) -> None:
-    wrench = rd.ExternalWrench("tipp", [1.0, 0, 0, 0, 0, 0], start_s=start_s)
+    wrench = rd.effects.ExternalWrench("tipp", [1.0, 0, 0, 0, 0, 0], start_s=start_s)
     for dynamics in (ARM, rd.Lagrangian(ARM)):
         with pytest.raises(EffectError, match=r"external_wrench: .*'tipp'; nearest: tip"):
             rd.Plant(dynamics, [wrench])
@@ -46,10 +46,10 @@ def test_a_wrench_on_an_unknown_link_is_refused_also_where_its_window_is_not_ope
 @pytest.mark.parametrize(
     ("robot", "effect", "message"),
     [
-        (UR5, rd.ViscousFriction("urdf"), "damping='urdf' has no effect: the file of ur5 states none"),
-        (UR5, rd.RegularisedCoulombFriction("urdf"), "friction='urdf' has no effect"),
-        (rd.load("pendulum"), rd.EffortLimit("urdf"), "limit='urdf' has no effect"),
-        (rd.load("pendulum"), rd.JointStopSpring("urdf", "urdf", 1e4), "lower='urdf' has no effect"),
+        (UR5, rd.effects.ViscousFriction("urdf"), "damping='urdf' has no effect: the file of ur5 states none"),
+        (UR5, rd.effects.RegularisedCoulombFriction("urdf"), "friction='urdf' has no effect"),
+        (rd.load("pendulum"), rd.effects.EffortLimit("urdf"), "limit='urdf' has no effect"),
+        (rd.load("pendulum"), rd.effects.JointStopSpring("urdf", "urdf", 1e4), "lower='urdf' has no effect"),
     ],
 )
 def test_a_coefficient_that_the_file_does_not_state_is_no_effect(robot, effect, message: str) -> None:
@@ -94,17 +94,19 @@ def test_an_unknown_option_of_simulate_is_answered_with_the_nearest() -> None:
 
 
 def test_a_step_for_a_method_that_chooses_its_own_is_refused() -> None:
-    with pytest.raises(QueryError, match=r"step_s has no effect on DOP853, .* rd.Adaptive\(max_step_s=…\)"):
-        rd.Setup(rd.Plant(ARM), **START, integrator=rd.Adaptive(), step_s=2e-3)
+    with pytest.raises(QueryError, match=r"step_s has no effect on DOP853, .* rd.integrate.Adaptive\(max_step_s=…\)"):
+        rd.Setup(rd.Plant(ARM), **START, integrator=rd.integrate.Adaptive(), step_s=2e-3)
     stepped = rd.Setup(rd.Plant(ARM), **START, integrator="rk4", step_s=2e-3)
-    adaptive = rd.simulate(stepped, integrator=rd.Adaptive(), estimate_error=False)  # the step was for the other method
+    adaptive = rd.simulate(
+        stepped, integrator=rd.integrate.Adaptive(), estimate_error=False
+    )  # the step was for the other method
     assert adaptive.statistics.step_s == 0
 
 
 def test_a_controller_whose_model_has_other_joints_than_the_plant_is_refused() -> None:
     """Two arms of six of the UR5's joints each, as many as the plant has, but not the same ones."""
     plant, model = (UR5.with_(lock={name: 0.3}) for name in ("wrist_3_joint", "shoulder_pan_joint"))
-    law = rd.ComputedTorque(model, rd.hold(np.zeros(5)), 100.0, 20.0)
+    law = rd.control.ComputedTorque(model, rd.control.hold(np.zeros(5)), 100.0, 20.0)
     with pytest.raises(QueryError, match="model has the joint 'shoulder_lift_joint' where the plant has 'shoulder_pan"):
         rd.Setup(rd.Plant(plant), np.zeros(5), controller=law)
 
@@ -115,14 +117,14 @@ def test_a_frame_under_control_that_the_plant_lacks_is_told_before_the_run(tmp_p
     plant = rd.Plant(rd.load(tmp_path / "arm.urdf"))
     q0 = np.array([0.3, 0.9])
     p = ARM.placement(q0, "tip")[:3, 3]
-    law = rd.OperationalSpace(ARM, "tip", rd.line(p, p, 1.0), 100.0, 20.0, rows=(0, 2))
+    law = rd.control.OperationalSpace(ARM, "tip", rd.control.line(p, p, 1.0), 100.0, 20.0, rows=(0, 2))
     with pytest.raises(QueryError, match="'tip'"):
         rd.Setup(plant, q0, controller=law)
 
 
 def test_anti_windup_without_a_limit_is_refused() -> None:
     with pytest.raises(ControlError, match="tracking_time_s has no effect without an effort_limit"):
-        rd.PID(rd.hold([0.0]), 1.0, 1.0, 1.0, tracking_time_s=0.3)
+        rd.control.PID(rd.control.hold([0.0]), 1.0, 1.0, 1.0, tracking_time_s=0.3)
 
 
 # --- scenes

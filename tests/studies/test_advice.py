@@ -29,7 +29,7 @@ OSCILLATOR = np.array([[0.0, 1.0], [-400.0, 0.0]])  # ω = 20/s
 )
 def test_limits_on_a_decay_are_those_of_the_stability_function(name: str, limit: float) -> None:
     """|R(z)| = 1 at z = −2, and −2.785… for RK4 [Hairer, Wanner 1996, IV.2]; the others are A-stable."""
-    found = longest_step(rd.method(name), np.diag([-100.0, -1.0]), 1)
+    found = longest_step(rd.integrate.method(name), np.diag([-100.0, -1.0]), 1)
     assert found == pytest.approx(limit / 100, rel=2e-3)  # it is bisected to 1e-3
 
 
@@ -38,20 +38,29 @@ def test_an_oscillation_bounds_some_methods_only() -> None:
 
     With a damping ratio ζ that is 1 at ω h = 2 ζ; growth of e in a million radians is not told from none.
     """
-    of = {name: longest_step(rd.method(name), OSCILLATOR, 1) for name in ("semi_implicit_euler", "rk4", "sdirk_3")}
+    of = {
+        name: longest_step(rd.integrate.method(name), OSCILLATOR, 1)
+        for name in ("semi_implicit_euler", "rk4", "sdirk_3")
+    }
     assert of["semi_implicit_euler"] * 20 == pytest.approx(2.0, rel=2e-3)
     assert of["rk4"] * 20 == pytest.approx(2 * np.sqrt(2), rel=2e-3)
     assert of["sdirk_3"] == inf
     for ratio in (0.0, 1e-2, 0.3):
         J = OSCILLATOR - np.diag([0.0, 40.0 * ratio])
-        assert longest_step(rd.method("explicit_euler"), J, 1) * 20 == pytest.approx(2 * ratio, rel=2e-3, abs=2.1e-6)
+        assert longest_step(rd.integrate.method("explicit_euler"), J, 1) * 20 == pytest.approx(
+            2 * ratio, rel=2e-3, abs=2.1e-6
+        )
 
 
 @pytest.mark.parametrize("ki", [*long([0.0]), 900.0])
 def test_the_period_of_a_loop_about_a_block_is_that_of_its_discrete_matrix(ki: float) -> None:
     """A mass under PID in zero-order hold, q and v in closed form between ticks."""
     kp, kd = 100.0, 20.0
-    law = rd.PID(rd.hold([0.0]), kp, ki, kd, period_s=0.02) if ki else rd.PD(rd.hold([0.0]), kp, kd, period_s=0.02)
+    law = (
+        rd.control.PID(rd.control.hold([0.0]), kp, ki, kd, period_s=0.02)
+        if ki
+        else rd.control.PD(rd.control.hold([0.0]), kp, kd, period_s=0.02)
+    )
     advice = rd.advise(BLOCK, [0.1], duration_s=5.0, controller=law)
 
     def radius(T: float) -> float:
@@ -70,7 +79,7 @@ def test_the_panda_under_sampled_control() -> None:
     """Values by the exponential of the sampled system, found apart from this library."""
     arm = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
     q0 = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
-    law = rd.PDGravity(arm, rd.hold(q0), 1000.0, 60.0, period_s=2.5e-4)
+    law = rd.control.PDGravity(arm, rd.control.hold(q0), 1000.0, 60.0, period_s=2.5e-4)
     advice = rd.advise(arm, q0, controller=law, integrator="rk4", duration_s=0.2)
     assert advice.longest_period_s == pytest.approx(0.211e-3, rel=0.01)  # three digits
     assert advice.fastest.joint == "panda_joint7"
@@ -100,8 +109,8 @@ def test_the_period_of_a_loop_with_delays_is_that_of_its_exact_map(name: str, la
     q = 0.3 * np.cos(np.arange(arm.n) + 0.4)
     inertia = np.diag(arm.M(q))
     gains = 400 * inertia, 36 * inertia
-    law = rd.PD(rd.hold(q + arm.N(q) / gains[0]), *gains, 1e-3)  # which holds the arm where it is
-    loop = rd.Loop(law, measurement_delay=late[0], actuation_delay=late[1])
+    law = rd.control.PD(rd.control.hold(q + arm.N(q) / gains[0]), *gains, 1e-3)  # which holds the arm where it is
+    loop = rd.control.Loop(law, measurement_delay=late[0], actuation_delay=late[1])
     found = linearised(rd.Plant(arm), loop, 0.0, np.concatenate([q, 0 * q])).longest_period()
     assert growth(arm, q, gains, 0.999 * found, late) <= 1 + 1e-6  # gravity's slope is by differences
     assert growth(arm, q, gains, 1.001 * found, late) > 1 + 1e-5
@@ -110,10 +119,15 @@ def test_the_period_of_a_loop_with_delays_is_that_of_its_exact_map(name: str, la
 def test_blocks_and_rates_of_a_loop_bound_its_period() -> None:
     """A mass under PD by differences through a filter, with a slow spring beside: its exact map, over two periods."""
     mass, kp, kd, slow, cutoff = 1.0, 100.0, 14.0, 60.0, 150.0
-    law = rd.PD(rd.hold([0.0]), kp, kd, 0.002)
-    both = rd.Multirate(law, rd.PD(rd.hold([0.0]), slow, 0.0, 0.004))
-    blocks: dict[str, Any] = {"velocity": [rd.Differences(), rd.LowPass(cutoff, 1)], "position": rd.Quantisation(1e-4)}
-    loop = rd.Loop(both, **blocks, actuation=[rd.RateLimit(9.0), rd.Noise(0.1)], measurement_delay=1.0)
+    law = rd.control.PD(rd.control.hold([0.0]), kp, kd, 0.002)
+    both = rd.control.Multirate(law, rd.control.PD(rd.control.hold([0.0]), slow, 0.0, 0.004))
+    blocks: dict[str, Any] = {
+        "velocity": [rd.control.Differences(), rd.control.LowPass(cutoff, 1)],
+        "position": rd.control.Quantisation(1e-4),
+    }
+    loop = rd.control.Loop(
+        both, **blocks, actuation=[rd.control.RateLimit(9.0), rd.control.Noise(0.1)], measurement_delay=1.0
+    )
     found = linearised(rd.Plant(BLOCK), loop, 0.0, np.zeros(2)).longest_period()
 
     def radius(T: float) -> float:
@@ -137,12 +151,16 @@ def test_blocks_and_rates_of_a_loop_bound_its_period() -> None:
 def test_friction_a_thousand_times_faster_than_the_period_does_not_hide_its_limit() -> None:
     """Of m v̇ = u − b v with m/b ≪ T gives q⁺ = (1 − kp T/b) q: |·| = 1 at T = 2 b/kp, but for m/b."""
     b, kp = 1e6, 5e8
-    law, plant = rd.PD(rd.hold([0.0]), kp, 0.0, 1e-3), rd.Plant(BLOCK, [rd.ViscousFriction(b)])
+    law, plant = rd.control.PD(rd.control.hold([0.0]), kp, 0.0, 1e-3), rd.Plant(BLOCK, [rd.effects.ViscousFriction(b)])
     assert linearised(plant, law, 0.0, np.zeros(2)).longest_period() == pytest.approx(2 * b / kp, rel=1e-3)
 
 
 def test_a_loop_that_no_period_makes_stable_says_so() -> None:
-    loop = rd.Loop(rd.PD(rd.hold([0.0]), 1e4, 20.0, 1e-3), velocity=rd.LowPass(5.0), actuation=rd.LowPass(30.0))
+    loop = rd.control.Loop(
+        rd.control.PD(rd.control.hold([0.0]), 1e4, 20.0, 1e-3),
+        velocity=rd.control.LowPass(5.0),
+        actuation=rd.control.LowPass(30.0),
+    )
     advice = rd.advise(BLOCK, [0.1], duration_s=0.1, controller=loop)
     assert advice.longest_period_s == 0.0
     assert not advice.stable
@@ -150,10 +168,10 @@ def test_a_loop_that_no_period_makes_stable_says_so() -> None:
 
 
 def test_a_step_that_is_short_enough_is_told_with_its_error() -> None:
-    plant = rd.Plant(rd.load("planar_2r"), [rd.ViscousFriction(60.0)])
+    plant = rd.Plant(rd.load("planar_2r"), [rd.effects.ViscousFriction(60.0)])
     fine = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-4, duration_s=0.05)
     assert fine.stable
-    assert f"error of q to expect: {fine.run.error}" in fine.text
+    assert f"error of q [rad] to expect: {fine.run.error}" in fine.text
     coarse = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-2, duration_s=0.05)
     assert coarse.limits == fine.limits
     assert not coarse.stable
@@ -187,7 +205,7 @@ def test_the_command_prints_it_and_its_exit_code_tells(tmp_path: Path) -> None:
 def test_a_stop_that_samples_miss_bounds_the_step(k: float) -> None:
     """On a stop ω = √(k / I), for half a period only; RK4 is stable up to h ω = √8 there."""
     bar = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
-    plant = rd.Plant(bar, [rd.JointStopSpring(-9.0, 0.0, k)])
+    plant = rd.Plant(bar, [rd.effects.JointStopSpring(-9.0, 0.0, k)])
     advice = rd.advise(plant, [-0.3], [1.5], duration_s=0.5, integrator="rk4", step_s=1e-3)
     omega = np.sqrt(3 * k)
     assert advice.limits["rk4"] == pytest.approx(np.sqrt(8) / omega, rel=2e-3)
@@ -206,6 +224,6 @@ def test_free_flight_bounds_no_step() -> None:
 
 def test_a_loop_that_is_damped_critically_has_a_fastest_motion() -> None:
     """Of x'' = −ω² x − 2 ω x': both eigenvalues are −ω, with one eigenvector."""
-    advice = rd.advise(BLOCK, [0.0], duration_s=0.1, controller=rd.PD(rd.hold([0.0]), 400.0, 40.0))
+    advice = rd.advise(BLOCK, [0.0], duration_s=0.1, controller=rd.control.PD(rd.control.hold([0.0]), 400.0, 40.0))
     assert abs(advice.fastest.eigenvalue) == pytest.approx(20.0, rel=1e-3)  # of a double root, of the root of rounding
     assert advice.fastest.source == "control"

@@ -13,6 +13,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.errors import QueryError
+from robot_dyn.shapes.masses import Masses
 from robot_dyn.studies.doctor.check import checked
 from robot_dyn.studies.doctor.finding import Severity
 from tests.broken_files import BROKEN, LINKS, SOUND
@@ -59,23 +60,23 @@ def test_what_the_file_still_says_is_restored(name: str) -> None:
 def test_a_unit_that_is_only_suspected_is_converted_on_request_alone(name: str) -> None:
     """Numbers that nobody measured, as of sensors in the files of the world, look like numbers of other units."""
     made = checked(BROKEN[name].change(SOUND).encode(), "rig.urdf")
-    (finding,) = made.findings
+    (finding,) = [each for each in made.findings if each.changes]
     assert finding.supposed
-    assert finding.changes
     assert made.repaired is None
 
 
+@pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")  # that it is estimated
 def test_an_inertial_is_estimated_at_a_density() -> None:
     """A box of the density that its stated mass is: the moments of the closed form, and M of the sound file."""
     mass, _, edges = LINKS["hand"]
     text = BROKEN["no inertial"].change(SOUND).encode()
-    made = checked(text, "rig.urdf", density=float(mass / np.prod(edges)))
+    made = checked(text, "rig.urdf", known=Masses({}, density=float(mass / np.prod(edges))))
     assert made.repaired is not None
     x, y = rd.Robot.from_text(SOUND).M(Q), rd.Robot.from_text(made.repaired).M(Q)
-    assert np.abs(x - y).max() <= 1e-6 * np.abs(x).max()  # shapes are drawn in float32
+    assert np.abs(x - y).max() <= 1e-12 * np.abs(x).max()
     assert checked(text, "rig.urdf").repaired is None
     with pytest.raises(QueryError, match="density"):
-        checked(text, "rig.urdf", density=-1.0)
+        Masses({}, density=-1.0)
 
 
 @pytest.mark.parametrize("name", ["ns:ha;nd", "o'hand", "ha: nd; x"])
@@ -144,6 +145,89 @@ def test_known_files_of_the_catalog() -> None:
     assert rd.check("planar_2r").ok
 
 
+@pytest.mark.parametrize(
+    ("ratio", "severity"), [(1.0, None), (1.5, Severity.WARNING), (2.9, Severity.WARNING), (3.1, Severity.ERROR)]
+)
+def test_an_inertia_is_an_error_from_three_times_what_its_shape_allows(ratio: float, severity: Severity | None) -> None:
+    """½ tr I = ratio · m d², d from the centre of mass to the farthest corner of the box: (0.15, 0.04, 0.03)."""
+    mass, _, edges = LINKS["upper"]
+    moment = 2 / 3 * ratio * mass * sum((each / 2) ** 2 for each in edges)  # a third of tr I
+    start = SOUND.index("<inertia ", SOUND.index('<link name="upper"'))
+    stated = f'<inertia ixx="{moment}" ixy="0" ixz="0" iyy="{moment}" iyz="0" izz="{moment}"/>'
+    made = checked((SOUND[:start] + stated + SOUND[SOUND.index("/>", start) + 2 :]).encode(), "rig.urdf")
+    assert [each.severity for each in made.findings] == ([] if severity is None else [severity])
+
+
+def test_a_joint_that_cannot_hold_the_arm_is_an_error_of_the_limit_just_below_the_torque_of_gravity() -> None:
+    """The elbow carries 1.2 kg at 0.12 m and 0.4 kg at 0.24 + 0.06 m, turned by 0.3 rad: m g r cos 0.3."""
+    load = 9.80665 * (1.2 * 0.12 + 0.4 * (0.24 + 0.06)) * np.cos(0.3)
+    for factor, kinds in ((0.999, ["effort_gravity"]), (1.001, [])):
+        start = SOUND.index("effort=", SOUND.index('<joint name="elbow"'))
+        text = SOUND[:start] + SOUND[start:].replace('effort="40"', f'effort="{factor * load}"', 1)
+        assert [each.kind for each in checked(text.encode(), "rig.urdf").findings] == kinds
+
+
+def test_a_misspelt_limit_is_a_warning_since_it_is_not_in_M() -> None:
+    (found,) = checked(SOUND.replace("upper=", "uper=", 1).encode(), "rig.urdf").findings
+    assert (found.severity, found.kind) == (Severity.WARNING, "unknown_attribute")
+
+
+def test_findings_of_one_kind_are_one_line_with_their_number_and_the_first_three_places() -> None:
+    text = SOUND.replace("1.5707963267948966", "1.5708").replace('rpy="0 0 0.3"', 'rpy="1.5708 0 0.3"')
+    text = text.replace(
+        "</robot>", text[text.index('<joint name="wrist"') :].replace("wrist", "w2").replace("hand", "h2")
+    )
+    text = text.replace("</robot>", '<link name="h2"/></robot>').replace('type="revolute"', 'type="fixed"')
+    made = checked(text.replace('type="fixed"', 'type="revolute"', 2).encode(), "rig.urdf")
+    lines = repr(made).splitlines()
+    assert sum(each.kind == "near_right_angle" for each in made.findings) == 4
+    (line,) = [line for line in lines if "near_right_angle" in line]
+    assert line.startswith("  warning: near_right_angle, 4 times: joint 'shoulder' (line")
+    assert line.count("(line ") == 3
+    assert json.loads(made.to_json())["findings"][3]["kind"] == "near_right_angle"
+
+
+def test_the_line_and_the_text_of_a_finding_are_those_of_the_file_though_another_one_is_repaired() -> None:
+    text = BROKEN["kg mm²"].change(BROKEN["decimal comma"].change(BROKEN["crossed limits"].change(SOUND)))
+    of_kind = {each.kind: each for each in checked(text.encode(), "rig.urdf").findings}
+    assert of_kind["inertia_shape"].line == 1 + text[: text.index("<inertial", text.index('"upper"'))].count("\n")
+    assert 'lower limit "2.5" is above its upper one "-2.5"' in of_kind["limits_crossed"].what
+
+
+def test_what_is_left_is_what_a_check_of_the_repaired_file_finds() -> None:
+    text = BROKEN["weak joint"].change(BROKEN["1.57"].change(BROKEN["no axis"].change(SOUND)))
+    made = checked(text.encode(), "rig.urdf")
+    assert made.repaired is not None
+    assert {each.kind for each in made.left} == {"effort_gravity", "axis_missing"}
+    again = checked(made.repaired, "rig.urdf").findings
+    assert [(each.kind, each.where) for each in again] == [(each.kind, each.where) for each in made.left]
+
+
+def test_the_exit_code_after_a_repair_is_that_of_what_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("arm.urdf").write_text(BROKEN["misspelt origin"].change(BROKEN["no axis"].change(SOUND)), encoding="utf-8")
+    mended = run("check", "arm.urdf", "--fix")
+    assert mended.returncode == 0
+    assert "written to arm.fixed.urdf: repaired 1 error; left 1 warning" in mended.stdout
+    Path("weak.urdf").write_text(BROKEN["misspelt origin"].change(BROKEN["weak joint"].change(SOUND)), encoding="utf-8")
+    assert run("check", "weak.urdf", "--fix").returncode == 1
+
+
+def test_a_xacro_file_is_checked_as_what_it_expands_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    head = '<robot name="rig" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="m" default="2.0"/>'
+    text = SOUND.replace('<robot name="rig">', head).replace('<mass value="2.0"/>', '<mass value="$(arg m)"/>')
+    Path("rig.urdf.xacro").write_text(text, encoding="utf-8")
+    assert not rd.check("rig.urdf.xacro").loads
+    assert rd.check("rig.urdf.xacro", xacro={}).findings == ()
+    told = run("check", "rig.urdf.xacro", "--xacro", "m=2000", "--fix", "--units")
+    assert told.returncode == 0
+    assert 'its mass of "2000" kg' in told.stdout
+    assert "(line" not in told.stdout
+    x, y = (rd.Robot.from_text(each).M(Q) for each in (SOUND, Path("rig.fixed.urdf").read_text(encoding="utf-8")))
+    assert np.abs(x - y).max() <= 1e-12 * np.abs(x).max()
+
+
 def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("arm.urdf").write_text(BROKEN["misspelt origin"].change(SOUND), encoding="utf-8")
@@ -170,3 +254,25 @@ def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.M
     both = run("check", "arm.urdf", "other/arm.urdf", "--fix", "--force")
     assert both.returncode == 2
     assert "under one name" in both.stderr
+
+
+@pytest.mark.parametrize(
+    ("word", "named"),
+    [("1.5708", "π/2"), ("-1.5708", "−π/2"), ("3.14159265359", "π"), ("-3.14159", "−π"), ("4.71239", "3π/2")],
+)
+def test_the_multiple_of_a_right_angle_that_is_meant_is_named(word: str, named: str) -> None:
+    text = SOUND.replace('xyz="0.3 0 0" rpy="0 0 0.3"', f'xyz="0.3 0 0" rpy="0 {word} 0"')
+    (finding,) = checked(text.encode(), "rig.urdf").findings
+    assert f'rpy "0 {word} 0" is off {named} by' in finding.what
+    assert finding.remedy == f"write {named} to 16 digits"
+
+
+def test_what_was_not_checked_is_said() -> None:
+    """Of a file that is not read, and whose repairs do not make it so; a repaired one is checked."""
+    unread = "masses, inertias and shapes were not checked"
+    refused = SOUND.replace('xyz="0.3 0 0" rpy="0 0 0.3"', 'xyz="0.3 0 0" rpy="a 0 0"')
+    assert checked(refused.encode(), "rig.urdf").sentence.endswith(f"it does not load; {unread}")
+    assert unread not in checked(SOUND.encode(), "rig.urdf").sentence
+    repaired = checked(BROKEN["decimal comma"].change(SOUND).encode(), "rig.urdf")
+    assert not repaired.loads
+    assert unread not in repaired.sentence

@@ -20,14 +20,14 @@ from robot_dyn.result import json_text
 from robot_dyn.scene.starters import starter
 from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.costs import step_cost
 from robot_dyn.studies.costs.ab_comparison import ABComparison, Pair, Version, Way, in_turns
 from robot_dyn.studies.costs.query_cost import QueryCost
+from robot_dyn.studies.time_budget import Budget
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
-FRICTION, SPRING = rd.ViscousFriction([0.3, 0.2]), rd.Spring([3.0, 2.0], [0.1, -0.2])
+FRICTION, SPRING = rd.effects.ViscousFriction([0.3, 0.2]), rd.effects.Spring([3.0, 2.0], [0.1, -0.2])
 TINY: dict[str, Any] = {"budget_s": 1e-9, "repeats": 1}  # nothing is timed
 
 
@@ -37,13 +37,14 @@ def setup(*effects: Any, **options: Any) -> rd.Setup:
 
 def compiled(of: rd.Setup) -> dict[str, int]:
     """Instructions of the programs that `simulate` runs, by name."""
-    made = compiled_equation(StateEquation(of.plant, of.controller), rd.method("rk4"))
+    made = compiled_equation(StateEquation(of.plant, of.controller), rd.integrate.method("rk4"))
     return {name: len(program) for name, program in made.functions.programs.items()}
 
 
 CONTROLLERS = {
-    "none": None, "continuous": rd.PD(rd.hold(Q), 10.0, 1.0), "sampled": rd.PD(rd.hold(Q), 10.0, 1.0, period_s=0.01),
-    "states": rd.PID(rd.hold(Q), 10.0, 2.0, 1.0, period_s=0.01),
+    "none": None, "continuous": rd.control.PD(rd.control.hold(Q), 10.0, 1.0),
+    "sampled": rd.control.PD(rd.control.hold(Q), 10.0, 1.0, period_s=0.01),
+    "states": rd.control.PID(rd.control.hold(Q), 10.0, 2.0, 1.0, period_s=0.01),
 }  # fmt: skip
 
 
@@ -52,7 +53,7 @@ def test_counts_are_those_of_the_programs_that_are_run(control: str) -> None:
     """Four evaluations and, where control is sampled, a tick; without a part, those of a setup made without it."""
     controller = CONTROLLERS[control]
     given = setup(FRICTION, SPRING, controller=controller)
-    found = rd.cost(given, **TINY)
+    found = rd.studies.cost(given, **TINY)
     without = {
         "viscous_friction": setup(SPRING, controller=controller),
         "spring": setup(FRICTION, controller=controller),
@@ -73,20 +74,20 @@ def test_viscous_friction_costs_what_is_counted_by_hand() -> None:
 
     2 products b v and 2 sums; 2 products and 1 sum of the power: 7, and at most 3 changes of sign.
     """
-    added = rd.cost(setup(FRICTION), **TINY).parts["viscous_friction"]
+    added = rd.studies.cost(setup(FRICTION), **TINY).parts["viscous_friction"]
     assert added % 4 == 0 and 7 <= added // 4 <= 10
 
 
 @pytest.mark.parametrize("control", CONTROLLERS)
 def test_what_is_off_costs_nothing_and_parts_add_up(control: str) -> None:
     """All on = rigid bodies + each part + what several share; a part never adds to a setup that is without it."""
-    given = setup(FRICTION, SPRING, *rd.joint_stops(-1.0, 1.0), controller=CONTROLLERS[control])
-    found = rd.cost(given, **TINY)
+    given = setup(FRICTION, SPRING, *rd.effects.joint_stops(-1.0, 1.0), controller=CONTROLLERS[control])
+    found = rd.studies.cost(given, **TINY)
     whole = found.of(step_cost.EVERYTHING)
     assert whole.second.instructions + sum(found.parts.values()) + found.shared == whole.first.instructions
     assert all(count > 0 for count in found.parts.values())
     assert abs(found.shared) <= sum(found.parts.values()) / 10
-    again = rd.cost(replace(given, plant=rd.Plant(ARM, [SPRING, *given.plant.effects[2:]])), **TINY)
+    again = rd.studies.cost(replace(given, plant=rd.Plant(ARM, [SPRING, *given.plant.effects[2:]])), **TINY)
     assert again.of(step_cost.EVERYTHING).first.instructions == found.of("viscous_friction").second.instructions
     assert "viscous_friction" not in again.parts
 
@@ -128,7 +129,7 @@ def test_machine_code_of_constants_has_no_inputs_and_the_numbers_of_its_robot() 
     for gravity in ((0.0, 0.0, -9.81), (0.0, 0.0, -3.7)):
         plant = rd.Plant(ARM.with_(gravity=gravity), [FRICTION])
         equation = StateEquation(plant, None)
-        made = compiled_with_constants(equation, rd.method("rk4"))
+        made = compiled_with_constants(equation, rd.integrate.method("rk4"))
         assert made.parameters.size == 0 < sum(each.size for each in parameters(ARM, plant.effects, None))
         y, out = np.array([*Q, *V, 0.0, 0.0]), np.empty((8, 1))
         made.in_python.rate(0.0, y, np.array([0.0, 1.0]), np.zeros((1, 1)), out)
@@ -137,15 +138,15 @@ def test_machine_code_of_constants_has_no_inputs_and_the_numbers_of_its_robot() 
 
 
 def test_what_cannot_be_done_is_said_with_the_reason() -> None:
-    coupled = rd.cost(rd.load("mimic_chain"), np.full(rd.load("mimic_chain").n, 0.3), **TINY)
+    coupled = rd.studies.cost(rd.load("mimic_chain"), np.full(rd.load("mimic_chain").n, 0.3), **TINY)
     assert any("joints are coupled" in each for each in coupled.left_out)
     assert any("right angles of the file: the file states none" in each for each in coupled.left_out)
 
-    class Odd(rd.Dissipative):
+    class Odd(rd.effects.Dissipative):
         def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:
             return -np.array([float(x) for x in v])
 
-    odd = rd.cost(setup(Odd()), **TINY)
+    odd = rd.studies.cost(setup(Odd()), **TINY)
     assert any("parts: effect odd cannot be compiled" in each for each in odd.left_out)
     assert odd.sentence == "no step was counted" and odd.of("forward dynamics")
     with pytest.raises(QueryError, match="no cost of 'wind'; known: Coriolis matrix"):
@@ -154,7 +155,7 @@ def test_what_cannot_be_done_is_said_with_the_reason() -> None:
 
 def test_long_programs_are_counted_and_not_timed(monkeypatch) -> None:
     monkeypatch.setattr("robot_dyn.studies.costs.query_cost._MOST_TIMED", 30)
-    found = rd.cost(setup(), budget_s=20.0, repeats=1)
+    found = rd.studies.cost(setup(), budget_s=20.0, repeats=1)
     row = found.of("forward dynamics")
     assert row.first.instructions > 30 and row.first.time_s is None
     why = f"time of forward dynamics, M, Cholesky: {row.first.instructions} instructions, more than 30, take long"
@@ -173,7 +174,7 @@ def test_the_page_has_the_counts_of_today(tmp_path) -> None:
 
 
 def test_a_budget_that_ends_says_what_was_not_timed() -> None:
-    found = rd.cost(setup(), **TINY)
+    found = rd.studies.cost(setup(), **TINY)
     assert all(each.time_ratio is None and each.first.repeats == 0 for each in found.alternatives)
     assert "time of everything, on: the budget of 1e-09 s ended" in found.left_out
 
@@ -218,7 +219,7 @@ def test_ratios_are_of_the_same_turn_and_a_difference_lost_in_them_is_not_told()
 
 
 def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
-    result = rd.cost(setup(FRICTION, controller=CONTROLLERS["sampled"]), budget_s=0.5, repeats=2)
+    result = rd.studies.cost(setup(FRICTION, controller=CONTROLLERS["sampled"]), budget_s=0.5, repeats=2)
     read = json.loads(json_text(result))
     kept = [
         ABComparison(
@@ -236,10 +237,10 @@ def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
     assert tuple(kept) == result.alternatives
     assert read["sentence"] == result.sentence and read["parts"] == result.parts
     assert kept[0].time_ratio is not None
-    with open(rd.save_result(result, tmp_path / "table.csv"), encoding="utf-8") as file:
+    with open(rd.studies.save_result(result, tmp_path / "table.csv"), encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["first_instructions"]) for row in rows] == [each.first.instructions for each in kept]
-    assert rd.save_result(result, tmp_path / "plot", theme="dark").read_bytes().startswith(b"\x89PNG")
+    assert rd.studies.save_result(result, tmp_path / "plot", theme="dark").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
@@ -252,4 +253,4 @@ def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
 )
 def test_mistakes_are_told(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(QueryError, match=message):
-        rd.cost(setup(), **wrong)
+        rd.studies.cost(setup(), **wrong)

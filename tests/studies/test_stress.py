@@ -14,10 +14,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.cli.studies import lines
 from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.certificate.worst_case_search import random_states
 from robot_dyn.studies.stress_test import confirm, runs, steps
 from robot_dyn.studies.stress_test.finding import JudgedRun
@@ -26,6 +24,7 @@ from robot_dyn.studies.stress_test.scenes import FAMILIES, scenes
 from robot_dyn.studies.stress_test.stress import stressed
 from robot_dyn.studies.stress_test.work import Work
 from robot_dyn.studies.stress_test.worst import BY_PD, FASTEST, pd_gains, worst, worst_configurations
+from robot_dyn.studies.time_budget import Budget
 from tests.cli.test_command_documents import promised
 from tests.command import refusal, run
 from tests.hostile.kinds import AXIS, LIMIT
@@ -39,8 +38,8 @@ FOREVER = 1e9  # [s]: what is found is not to depend on the load of the machine
 
 
 @cache
-def made(name: str) -> rd.Stress:
-    return rd.stress(rd.load(name), samples=300, runs=1, seed=2, budget_s=FOREVER)
+def made(name: str) -> rd.studies.Stress:
+    return rd.studies.stress(rd.load(name), samples=300, runs=1, seed=2, budget_s=FOREVER)
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -96,7 +95,7 @@ def test_a_limit_that_is_too_long_is_refuted(monkeypatch) -> None:
         return replace(advice, limits={name: 1.1 * x for name, x in advice.limits.items()})
 
     monkeypatch.setattr(steps, "advice_about", wrong)
-    result = rd.stress(rd.load("pendulum"), samples=200, runs=0, budget_s=FOREVER)
+    result = rd.studies.stress(rd.load("pendulum"), samples=200, runs=0, budget_s=FOREVER)
     refuted = {each.what for each in result.limits if each.confirmed is False}
     assert {"explicit_euler", "midpoint", "rk4", "order_8"} <= refuted
     assert not result.ok and len(result.failures) == len(refuted) and "is refuted" in result.failures[0]
@@ -152,16 +151,16 @@ def test_states_repeat_the_worst_that_was_found(name: str) -> None:
         elif each.what == FASTEST:  # the advisor's, to two digits, where gravity is balanced
             gains = (0.0, 0.0) if each.note != BY_PD else pd_of(result)
             effects = () if each.note == BY_PD else "urdf"
-            held = rd.PDGravity(robot, rd.hold(state["q"]), *gains)
+            held = rd.control.PDGravity(robot, rd.control.hold(state["q"]), *gains)
             setup = rd.Setup(rd.Plant(robot, effects), state["q"], controller=held, duration_s=1e-4)
             assert abs(rd.advise(setup).fastest.eigenvalue) == pytest.approx(each.minimal, rel=0.06)
         elif each.note.startswith("Pinocchio"):
-            again = rd.certify(robot, **state, samples=100, repeats=1).of(each.what.split()[-1], "Pinocchio")
+            again = rd.studies.certify(robot, **state, samples=100, repeats=1).of(each.what.split()[-1], "Pinocchio")
             rough = 0.1 if "inverse" in each.what else 1e-9  # on the root mean square of 100 states
             assert -np.log10(2.0**-53) - again.given == pytest.approx(each.minimal, rel=rough)
 
 
-def pd_of(result: rd.Stress) -> tuple[np.ndarray, np.ndarray]:
+def pd_of(result: rd.studies.Stress) -> tuple[np.ndarray, np.ndarray]:
     """Gains of the PD by which steps are judged."""
     law = next(each.setups[0].controller for each in result.limits if each.of == "step" and each.what == "rk4")
     return law.kp, law.kd
@@ -182,7 +181,7 @@ def test_setups_repeat_what_confirmed_a_limit(name: str) -> None:
 def test_a_joint_without_inertia_is_named_and_the_rest_is_told() -> None:
     with pytest.warns(rd.ModelWarning, match="has no mass"):
         robot = rd.load("massless_tip")
-    result = rd.stress(robot, samples=100, runs=1, budget_s=FOREVER)
+    result = rd.studies.stress(robot, samples=100, runs=1, budget_s=FOREVER)
     assert "runs: joint 'pointer_joint' carries no inertia" in result.left_out
     assert {each.of for each in result.limits} == {"speed", "payload"} and not result.runs
     assert {each.what for each in result.worst} == {"gravity torque / effort limit", "digits lost in inverse_dynamics"}
@@ -241,7 +240,7 @@ def test_what_there_is_no_time_for_is_named_and_nothing_else_is_missing(looks: i
     for of in ("gain", "speed", "payload"):
         assert (of in {each.of for each in result.limits}) != (of in late)
     assert f"{len(result.out_of_time)} not looked at for lack of time" in result.sentence
-    assert f"not looked at for lack of time: {result.out_of_time[0]}" in lines(result)
+    assert f"not looked at for lack of time: {result.out_of_time[0]}" in result.blocks()
 
 
 def test_a_budget_looks_at_the_clock_within_each_piece() -> None:
@@ -305,7 +304,7 @@ def test_friction_that_is_faster_than_all_else_is_what_the_push_is_along() -> No
 def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
     """Steps beyond their limit: the run leaves the equilibrium, and admits that."""
     robot = rd.load("pendulum")
-    law = rd.PDGravity(robot, rd.hold([0.4]), 133.0, 13.3)
+    law = rd.control.PDGravity(robot, rd.control.hold([0.4]), 133.0, 13.3)
     setup = rd.Setup(rd.Plant(robot), [0.4 + 1e-6], duration_s=2.0, controller=law, integrator="midpoint", step_s=0.11)
     pushed = confirm.run_from_near(setup, np.array([0.4]), Budget(), True)
     assert pushed.growth > 30 and not pushed.misleads  # it says so
@@ -316,7 +315,7 @@ def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
 
 def test_document_has_the_keys_that_are_promised_and_no_infinity(tmp_path, monkeypatch) -> None:
     whole = made("pendulum")
-    monkeypatch.setattr(rd, "stress", lambda *arguments, **options: whole)
+    monkeypatch.setattr(rd.studies, "stress", lambda *arguments, **options: whole)
     done = run("stress", "pendulum", "--json", "-o", tmp_path / "found")
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))
@@ -334,7 +333,7 @@ def test_document_has_the_keys_that_are_promised_and_no_infinity(tmp_path, monke
 def test_failures_are_told_loudly(monkeypatch) -> None:
     whole = made("pendulum")
     wrong = replace(whole, limits=tuple(replace(each, confirmed=False) for each in whole.limits[-1:]))
-    monkeypatch.setattr(rd, "stress", lambda *arguments, **options: wrong)
+    monkeypatch.setattr(rd.studies, "stress", lambda *arguments, **options: wrong)
     done = run("stress", "pendulum")
     assert done.returncode == 1 and "\nFAILURE: gain PD" in done.stdout
 

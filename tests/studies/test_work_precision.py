@@ -15,18 +15,18 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 import robot_dyn as rd
-from robot_dyn.cli import studies
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.explicit import ExplicitRungeKutta
 from robot_dyn.integrate.tableau import ButcherTableau
 from robot_dyn.queries.units import format_duration
 from robot_dyn.result import json_text
-from robot_dyn.studies.budget import Budget, Limit
+from robot_dyn.studies.time_budget import Budget, Limit
 from robot_dyn.studies.work_precision_diagram.measurement import Rung, Walk, measure
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, own, recorded, whole
 from robot_dyn.studies.work_precision_diagram.past_horizon import past_horizon
 from robot_dyn.studies.work_precision_diagram.peers import found
 from robot_dyn.studies.work_precision_diagram.reference_run import HorizonError, Reference, reference
+from robot_dyn.studies.work_precision_diagram.text import programs
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
 from tests.long import long
 
@@ -35,7 +35,7 @@ UNTIL_DONE = Limit(math.inf)
 
 def swing(duration_s: float = 0.3) -> rd.Setup:
     """A double pendulum with friction, interpreted: smooth, of two joints, at a general state."""
-    plant = rd.Plant(rd.load("planar_2r"), [rd.ViscousFriction([0.3, 0.2])])
+    plant = rd.Plant(rd.load("planar_2r"), [rd.effects.ViscousFriction([0.3, 0.2])])
     return rd.Setup(plant, [0.4, 0.9], [0.3, -0.5], duration_s, engine="interpreted")
 
 
@@ -64,8 +64,8 @@ def test_measured_orders_are_those_of_the_methods(smooth, name: str, first: int,
     half the step, so that a slope is off by log2(1.1 / 1.05) < 0.1; 0.25 leaves room for its factor.
     """
     setup, truth = smooth
-    found = ladder(own(setup, rd.method(name), "interpreted"), truth, first, last)
-    assert found.measured_order == pytest.approx(rd.method(name).order, abs=0.25)
+    found = ladder(own(setup, rd.integrate.method(name), "interpreted"), truth, first, last)
+    assert found.measured_order == pytest.approx(rd.integrate.method(name).order, abs=0.25)
 
 
 def test_a_wrong_coefficient_shows_in_the_measured_order(smooth) -> None:
@@ -113,7 +113,7 @@ def test_chaotic_motion_is_cut_where_references_part() -> None:
 
 def test_beyond_the_horizon_energy_and_the_way_back_judge() -> None:
     """Two joints there and back: a method of higher order comes back nearer; with friction nothing comes back."""
-    rubbed, methods = swing(2.0), {name: rd.method(name) for name in ("rk4", "order_8")}
+    rubbed, methods = swing(2.0), {name: rd.integrate.method(name) for name in ("rk4", "order_8")}
     setup = replace(rubbed, plant=rd.Plant(rubbed.plant.dynamics))
     made = [
         ToleranceLadder(
@@ -132,13 +132,13 @@ def test_beyond_the_horizon_energy_and_the_way_back_judge() -> None:
 
 def test_an_accuracy_of_the_setup_is_not_used() -> None:
     """It would choose the method, which differs from run to run here."""
-    (only,) = rd.work_precision(replace(swing(0.1), accuracy=1e-6), methods=["rk4"], repeats=1).ladders
+    (only,) = rd.studies.work_precision(replace(swing(0.1), accuracy=1e-6), methods=["rk4"], repeats=1).ladders
     assert only.points
 
 
 def test_a_motion_without_reference_is_refused() -> None:
     with pytest.raises(HorizonError, match=r"no run of 0\.3 s ends by DOP853 or Rosenbrock"):
-        rd.work_precision(replace(swing(), controller=lambda t, q, v: v * (np.nan if t > 0.1 else 1.0)))
+        rd.studies.work_precision(replace(swing(), controller=lambda t, q, v: v * (np.nan if t > 0.1 else 1.0)))
 
 
 def points(*errors: float, believed: bool = True, each_s: float = 1e-3) -> tuple[Point, ...]:
@@ -148,9 +148,9 @@ def points(*errors: float, believed: bool = True, each_s: float = 1e-3) -> tuple
     )
 
 
-def invented(*ladders: ToleranceLadder, floor: float = 1e-12) -> rd.WorkPrecision:
+def invented(*ladders: ToleranceLadder, floor: float = 1e-12) -> rd.studies.WorkPrecision:
     truth = Reference(np.zeros(2), np.zeros((2, 1)), floor, ("one", "other"), 1.0)
-    return rd.WorkPrecision("arm", (), "rad", 1.0, truth, ladders, (), {"processor": "P"}, 1.0, 1.0)
+    return rd.studies.WorkPrecision("arm", (), "rad", 1.0, truth, ladders, (), {"processor": "P"}, 1.0, 1.0)
 
 
 def of(
@@ -181,7 +181,7 @@ def test_errors_below_that_of_the_reference_are_not_believed(smooth) -> None:
     """DOP853 at 1e-13 ends nearer to the reference than the two runs of that are to each other: it takes no part."""
     setup, truth = smooth
     coarse = replace(truth, error=1e-6)
-    found = ladder(own(setup, rd.method("DOP853"), "interpreted"), coarse, 0, 12)
+    found = ladder(own(setup, rd.integrate.method("DOP853"), "interpreted"), coarse, 0, 12)
     assert [p.believed for p in found.points] == [p.error > 1e-6 for p in found.points]
     assert not found.points[-1].believed and found.points[0].believed
     assert all(p.error > 1e-6 for _, p in invented(found, floor=1e-6).front)
@@ -224,10 +224,12 @@ def test_events_keep_the_order_at_a_stop() -> None:
 
     Where they do not, it errs a hundred times as much, or more.
     """
-    plant = rd.Plant(rd.load("pendulum"), [rd.ViscousFriction(0.1), *rd.joint_stops(-1.0, 1.0, 1e3, 10.0)])
+    plant = rd.Plant(
+        rd.load("pendulum"), [rd.effects.ViscousFriction(0.1), *rd.effects.joint_stops(-1.0, 1.0, 1e3, 10.0)]
+    )
     setup, truth = reference(whole(rd.Setup(plant, [0.98], [2.0], 0.06, engine="interpreted")), Budget(1e3))
     with_events, without = (
-        ladder(own(setup, rd.method("rk4"), "interpreted", events), truth, 2, 5) for events in (True, False)
+        ladder(own(setup, rd.integrate.method("rk4"), "interpreted", events), truth, 2, 5) for events in (True, False)
     )
     assert with_events.measured_order == pytest.approx(4, abs=0.3)
     assert without.points[-1].error > 100 * with_events.points[-1].error
@@ -243,7 +245,7 @@ def test_mujoco_makes_the_same_error_by_the_same_method() -> None:
     peers, _ = found(setup)
     theirs = {each.method: each for each in peers}
     assert {"SciPy DOP853 + pin.aba", "MuJoCo RK4", "MuJoCo Euler", "MuJoCo implicitfast"} <= theirs.keys()
-    ours = ladder(own(setup, rd.method("rk4"), "compiled"), truth, 0, 2)
+    ours = ladder(own(setup, rd.integrate.method("rk4"), "compiled"), truth, 0, 2)
     same = ladder(theirs["MuJoCo RK4"], truth, 0, 2)
     for a, b in zip(ours.points, same.points, strict=True):
         assert b.error == pytest.approx(a.error, rel=1e-6) and b.evaluations == a.evaluations
@@ -265,30 +267,30 @@ def test_a_program_that_cannot_be_imported_is_left_out(monkeypatch) -> None:
 
 
 def test_json_and_csv_hold_the_runs(tmp_path) -> None:
-    result = rd.work_precision(swing(0.1), methods=["rk4", "DOP853"], repeats=1)
+    result = rd.studies.work_precision(swing(0.1), methods=["rk4", "DOP853"], repeats=1)
     read = json.loads(json_text(result))
     kept = [Point(**{key: x for key, x in row.items() if key in Point.__annotations__}) for row in read["rows"]]
     assert kept == [p for each in result.ladders for p in each.points]
     assert read["sentence"] == result.sentence and read["reference"]["error"] == result.reference.error
-    with open(rd.save_result(result, tmp_path / "runs.csv"), encoding="utf-8") as file:
+    with open(rd.studies.save_result(result, tmp_path / "runs.csv"), encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["error"]) for row in rows] == [p.error for p in kept]
     assert [int(row["evaluations"]) for row in rows] == [p.evaluations for p in kept]
     marked = [row["on_front"] for row in read["rows"]]
     assert [row["on_front"] == "True" for row in rows] == marked and any(marked)
-    assert rd.save_result(result, tmp_path / "plot").read_bytes().startswith(b"\x89PNG")
+    assert rd.studies.save_result(result, tmp_path / "plot").read_bytes().startswith(b"\x89PNG")
 
 
 def test_evaluations_are_counted_exactly() -> None:
     """RK4 takes four a step and steps end at the records: 25 of them, or two, four, … times as many."""
-    result = rd.work_precision(swing(0.1), methods=["rk4"], repeats=1)
+    result = rd.studies.work_precision(swing(0.1), methods=["rk4"], repeats=1)
     (only,) = result.ladders
     assert [(p.steps, p.evaluations) for p in only.points[:3]] == [(25, 100), (50, 200), (100, 400)]
 
 
 def test_a_budget_that_ends_says_what_was_left_out(smooth) -> None:
     setup, truth = smooth
-    (walk,), _ = measure([own(setup, rd.method("rk4"), "interpreted")], truth, Budget(1e-9), 1)
+    (walk,), _ = measure([own(setup, rd.integrate.method("rk4"), "interpreted")], truth, Budget(1e-9), 1)
     assert not walk.rungs and walk.ended == "the budget of 1e-09 s ended"
 
 
@@ -304,7 +306,7 @@ def test_a_budget_that_ends_says_what_was_left_out(smooth) -> None:
 )
 def test_wrong_options_are_refused(wrong: dict[str, object], message: str) -> None:
     with pytest.raises(QueryError, match=message):
-        rd.work_precision(swing(0.1), **wrong)
+        rd.studies.work_precision(swing(0.1), **wrong)
 
 
 def test_each_program_is_named_with_its_cheapest_method_or_with_what_ended_it() -> None:
@@ -316,9 +318,9 @@ def test_each_program_is_named_with_its_cheapest_method_or_with_what_ended_it() 
     own = ladder("DOP853", 1e-6, 1e-8, engine="compiled"), ladder("rk4", 1e-2, 1e-8, engine="compiled", each_s=1.0)
     other = ladder("Other RK4", 1e-4, 1e-8, each_s=0.1), ladder("Other Euler", 1.0, 0.5)
     more = ladder("Third RK", 2.0, 1.0), ladder("Fourth RK", 1e-8)
-    assert list(studies.programs(invented(*other, *own, *more), 1e-8)) == [
+    assert list(programs(invented(*other, *own, *more), 1e-8)) == [
         "  robot_dyn DOP853: 2 ms", "  Fourth RK: 1 ms, 0.5 times as long", "  Other RK4: 200 ms, 100 times as long",
         "  Third: reached by no run (late)", "  times of the loop alone, medians of runs that take turns",
     ]  # fmt: skip
-    lost = list(studies.programs(invented(ladder("DOP853", 2.0, 1.0, engine="compiled"), *other), 1e-8))
+    lost = list(programs(invented(ladder("DOP853", 2.0, 1.0, engine="compiled"), *other), 1e-8))
     assert lost[:2] == ["  robot_dyn: reached by no run (late)", "  Other RK4: 200 ms"]

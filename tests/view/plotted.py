@@ -16,9 +16,9 @@ def ur5():
     """UR5 under PD, in general position."""
     arm = rd.load("ur5")
     q = np.array([0.1, -1.2, 1.8, -2.2, -1.5, 0.3])
-    plan = rd.quintic(q, q + np.array([0.3, -0.2, 0.1, 0.4, -0.3, 0.2]), 0.2)
-    kp, kd = rd.gains_from(np.diag(arm.M(q)), 20.0)
-    controller = rd.PD(plan, kp, kd)
+    plan = rd.control.quintic(q, q + np.array([0.3, -0.2, 0.1, 0.4, -0.3, 0.2]), 0.2)
+    kp, kd = rd.control.gains_from(np.diag(arm.M(q)), 20.0)
+    controller = rd.control.PD(plan, kp, kd)
     return rd.simulate(
         rd.Plant(arm), q0=q, v0=0 * q, duration_s=0.3, controller=controller, integrator="rk4", step_s=0.005
     )
@@ -27,7 +27,7 @@ def ur5():
 @cache
 def cart_pole():
     """A joint that slides and one that turns, without a reference."""
-    plant = rd.Plant(rd.load("cart_pole"), [rd.ViscousFriction(0.1)])
+    plant = rd.Plant(rd.load("cart_pole"), [rd.effects.ViscousFriction(0.1)])
     return rd.simulate(plant, q0=[0.1, 0.4], v0=[0.2, -0.3], duration_s=0.2, integrator="rk4", step_s=0.01)
 
 

@@ -34,7 +34,7 @@ def test_the_live_page_shows_the_run_in_a_browser(browser, swing) -> None:
     """The scene comes over meshcat's socket; links stand where Pinocchio puts them, within single precision."""
     arm = rd.load("planar_2r")
     first, second = arm.joint_names
-    with rd.replay(swing) as server, opened(browser, server.url) as view:
+    with rd.replay(swing).serve() as server, opened(browser, server.url) as view:
         assert view.complaints == []
         view.ask(f"(replay.seek({np.float32(swing.t[-1])}), 0)")
         link = arm.description.element.xpath(f"joint[@name='{second}']/child/@link")[0]
@@ -47,7 +47,7 @@ def test_another_meshcat_program_can_draw_into_it(browser, swing) -> None:
     zmq = pytest.importorskip("zmq")
     import umsgpack
 
-    with rd.replay(swing) as server, opened(browser, server.url) as view:
+    with rd.replay(swing).serve() as server, opened(browser, server.url) as view:
         client = zmq.Context.instance().socket(zmq.REQ)
         client.connect(server.zmq_url)
         command = {"type": "set_property", "path": "/guest", "property": "visible", "value": False}
@@ -59,7 +59,7 @@ def test_another_meshcat_program_can_draw_into_it(browser, swing) -> None:
 
 def test_nobody_else_is_served(swing) -> None:
     """It listens on the loopback address, not on this machine's others, and ends when it is closed."""
-    with rd.replay(swing) as server:
+    with rd.replay(swing).serve() as server:
         port = urlparse(server.url).port
         assert urllib.request.urlopen(server.url, timeout=10).status == 200
         others = {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} | {"127.0.0.2"}
@@ -70,7 +70,7 @@ def test_nobody_else_is_served(swing) -> None:
 @pytest.mark.parametrize("path", ["static/", ""])
 def test_a_foreign_name_is_refused(swing, path: str) -> None:
     """A web site whose name was turned to this machine's address can read nothing: 403, for page and socket."""
-    with rd.replay(swing) as server:
+    with rd.replay(swing).serve() as server:
         request = urllib.request.Request(server.url.replace("static/", path), headers={"Host": "evil.example"})
         with pytest.raises(urllib.error.HTTPError, match="403"):
             urllib.request.urlopen(request, timeout=10)
@@ -82,7 +82,7 @@ def test_a_port_in_use_is_told_with_the_remedy(swing) -> None:
         taken.listen()
         port = taken.getsockname()[1]
         with pytest.raises(rd.RobotDynError, match=rf"port {port}: .*in use; choose another"):
-            rd.replay(swing, port=port)
+            rd.replay(swing).serve(port)
 
 
 def test_a_bridge_that_cannot_start_is_told_and_does_not_hang(swing, monkeypatch) -> None:
@@ -93,11 +93,11 @@ def test_a_bridge_that_cannot_start_is_told_and_does_not_hang(swing, monkeypatch
 
     monkeypatch.setattr(server, "Bridge", refuse)
     with pytest.raises(rd.RobotDynError, match=r"cannot start: no sockets left; write a file"):
-        rd.replay(swing)
+        rd.replay(swing).serve()
 
 
 def test_two_replays_stand_side_by_side(swing) -> None:
-    with rd.replay(swing) as one, rd.replay(swing) as two:
+    with rd.replay(swing).serve() as one, rd.replay(swing).serve() as two:
         assert one.url != two.url
         assert all(urllib.request.urlopen(each.url, timeout=10).status == 200 for each in (one, two))
 

@@ -76,7 +76,7 @@ def junk_over_the_socket(url: str) -> None:
 
 
 def test_every_request_is_answered_whatever_it_holds(swing) -> None:
-    with rd.replay(swing) as server, Client(server.zmq_url) as client:
+    with rd.replay(swing).serve() as server, Client(server.zmq_url) as client:
         for frames in JUNK:
             assert client.ask(*frames).startswith(b"error: "), frames
         assert client.ask(b"url").decode() == server.url
@@ -84,7 +84,7 @@ def test_every_request_is_answered_whatever_it_holds(swing) -> None:
 
 
 def test_who_waits_for_a_browser_holds_up_nobody(swing) -> None:
-    with rd.replay(swing) as server, Client(server.zmq_url) as one, Client(server.zmq_url) as two:
+    with rd.replay(swing).serve() as server, Client(server.zmq_url) as one, Client(server.zmq_url) as two:
         one.socket.send(b"wait")
         two.socket.send_multipart([b"capture_image"])
         with Client(server.zmq_url) as three:
@@ -93,7 +93,7 @@ def test_who_waits_for_a_browser_holds_up_nobody(swing) -> None:
 
 def test_a_picture_without_a_browser_is_refused_in_the_end(swing, monkeypatch) -> None:
     monkeypatch.setattr("robot_dyn.view.live.bridge._PATIENCE_S", 0.2)
-    with rd.replay(swing) as server, Client(server.zmq_url) as client:
+    with rd.replay(swing).serve() as server, Client(server.zmq_url) as client:
         assert client.ask(b"capture_image").startswith(b"error: no browser sent a picture within 0.2 s; open http")
         assert client.ask(b"url").decode() == server.url
 
@@ -102,7 +102,7 @@ def test_a_picture_is_what_the_browser_shows_and_the_next_request_is_answered(br
     """Once with the frames of meshcat's client, once with the name alone; beside it a browser that sends junk."""
     from PIL import Image
 
-    with rd.replay(swing) as server, opened(browser, server.url) as view, Client(server.zmq_url) as client:
+    with rd.replay(swing).serve() as server, opened(browser, server.url) as view, Client(server.zmq_url) as client:
         assert client.ask(b"wait") == b"ok"
         junk_over_the_socket(server.url)
         for frames in ([b"capture_image", b"", umsgpack.packb({"type": "capture_image"})], [b"capture_image"]):
@@ -120,7 +120,7 @@ def test_a_picture_is_what_the_browser_shows_and_the_next_request_is_answered(br
 
 
 def test_the_root_leads_to_the_page_and_nothing_else_is_there(swing) -> None:
-    with rd.replay(swing) as server:
+    with rd.replay(swing).serve() as server:
         root = server.url.removesuffix("static/")
         with urllib.request.urlopen(root, timeout=10) as page:
             assert (page.status, page.url) == (200, server.url)
@@ -181,7 +181,7 @@ def inserted(view) -> list[bool]:
 @pytest.mark.parametrize("live", [False, True])
 def test_only_the_pages_own_scripts_and_styles_run(browser, swing, tmp_path, live: bool) -> None:
     """The content policy names them by hash; the panel of meshcat keeps its look: its folders stand at the right."""
-    with rd.replay(swing) as server:
+    with rd.replay(swing).serve() as server:
         where = server.url if live else rd.save_replay(swing, tmp_path / "run.html")
         with opened(browser, where) as view:
             assert view.complaints == []

@@ -21,7 +21,7 @@ RAIL = arms()["rail"]  # 1 kg on a vertical rail
 @pytest.fixture(scope="module")
 def fall() -> rd.Trajectory:
     """Thrown up at 2 m/s from 0 against friction 12 N, held at the top, and pulled down by 4 t to a stop at −0.1."""
-    plant = rd.Plant(RAIL, [rd.DryFriction(12.0), rd.RigidStops(-0.1, np.inf)])
+    plant = rd.Plant(RAIL, [rd.effects.DryFriction(12.0), rd.effects.RigidStops(-0.1, np.inf)])
     pull = lambda t, q, v: np.array([-4.0 * t])  # noqa: E731
     return rd.simulate(plant, [0.0], [2.0], duration_s=3.0, controller=pull, estimate_error=False,
                        record_period_s=0.0371)  # fmt: skip

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_dyn.view.geometry import meshes
+from robot_dyn.shapes import meshes
 from tests.drawings import box, boxes, collada_points, drawn, mesh_visual, stl, urdf
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
@@ -231,7 +231,7 @@ def test_gltf_reads_no_buffer_that_is_not_beside_or_below_it(uri: str, tmp_path:
 
 
 def test_gltf_may_not_open_more_than_the_limit_in_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from robot_dyn.view.geometry import mesh_files
+    from robot_dyn.shapes import mesh_files
 
     description = gltf("a.bin")
     description["buffers"] += [{"byteLength": 96, "uri": f"{i}.bin"} for i in range(5)]
@@ -326,7 +326,7 @@ def test_package_is_found_by_the_name_in_its_package_xml(place: str, tmp_path: P
 
 
 def test_package_dirs_are_searched_below_and_come_first(tmp_path: Path) -> None:
-    from robot_dyn.view.geometry.addresses import find_file
+    from robot_dyn.shapes.addresses import find_file
 
     for place in ("first/repository/x", "above/y"):
         stl(named(tmp_path / place, "arm") / "a.stl")

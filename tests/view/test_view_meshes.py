@@ -12,10 +12,11 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.description import description, solids
 from robot_dyn.model.robot import Robot
+from robot_dyn.shapes.mesh_files import MAX_BYTES
 from robot_dyn.view.geometry.inertia_boxes import inertia_boxes
-from robot_dyn.view.geometry.mesh_files import MAX_BYTES
 from robot_dyn.view.geometry.visuals import drawing
 from tests.drawings import box, boxes, drawn, mesh_visual, stl, urdf
+from tests.hostile.kinds import ARM, MOMENTS
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
 
@@ -239,8 +240,27 @@ def test_moments_that_no_body_has_are_noted_and_drawn_thin(tmp_path: Path) -> No
     text = urdf("").replace(b'izz="0.01"', b'izz="0.9"')
     here = drawn(text, tmp_path, inertia=True)
     assert any("inertia box of link 'arm'" in note and "triangle inequality" in note for note in here.notes)
-    assert np.ptp(here.pieces[-1].mesh.vertices, axis=0).min() > 0
-    assert here.pieces[-1].rgba[3] < 1
+    assert np.ptp(here.boxes[-1].mesh.vertices, axis=0).min() > 0
+    assert here.boxes[-1].rgba[3] < 1
+
+
+def test_an_inertia_far_beyond_the_robot_is_drawn_in_red_at_most_as_long_as_its_longest_link(tmp_path: Path) -> None:
+    """In kg mm² in place of kg m²: a box of hundreds of metres would hide the arm."""
+    sound = drawn(ARM.encode(), tmp_path, inertia=True)
+    here = drawn(
+        ARM.replace(MOMENTS, MOMENTS.replace("0.02", "2e4").replace("0.01", "1e4")).encode(), tmp_path, inertia=True
+    )
+    (note,) = [note for note in here.notes if "inertia box" in note]
+    assert "link 'upper'" in note and "in red" in note
+    (upper,) = [each for each in here.boxes if each.link == "upper"]
+    assert np.ptp(upper.mesh.vertices, axis=0).max() == pytest.approx(0.7)
+    assert upper.rgba[0] > upper.rgba[2] and all(each.rgba[0] < each.rgba[2] for each in sound.boxes)
+
+
+def test_a_link_that_no_joint_connects_is_not_drawn(tmp_path: Path) -> None:
+    box = '<{0} name="{1}"><visual><geometry><box size="1 1 1"/></geometry></visual></{0}>'
+    text = ARM.replace('<link name="base"/>', box.format("link", "base") + box.format("link", "table"))
+    assert {each.link for each in drawn(text.encode(), tmp_path).pieces} == {"base"}
 
 
 @pytest.mark.parametrize(("mass", "moment", "edge"), [("1e-320", "0.03", 1e6), ("2", "1e-300", 0.01)])

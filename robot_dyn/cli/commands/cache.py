@@ -8,8 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
+from robot_dyn.answer import Table
 from robot_dyn.cli.app import Json, app
-from robot_dyn.cli.terminal import say, say_json, table
+from robot_dyn.cli.terminal import say, say_json
 
 
 @app.command()
@@ -43,7 +44,7 @@ def _lines(answer: dict[str, Any]) -> Iterator[Any]:
         rows = []
         for each in answer["kernels"]:
             used = datetime.fromtimestamp(each.used).strftime("%Y-%m-%d %H:%M")
-            rows.append([each.key[:12], each.about, f"{each.size / 1024:.0f}", used])
-        yield table(("kernel", "about", "KiB", "last used"), rows, words=("kernel", "about", "last used"))
+            rows.append((each.key[:12], each.about, f"{each.size / 1024:.0f}", used))
+        yield Table(("kernel", "about", "KiB", "last used"), tuple(rows), right=("KiB",))
     count = len(answer["kernels"])
     yield f"{count} kernel{'' if count == 1 else 's'}, {answer['bytes'] / 2**20:.1f} MiB in {answer['folder']}"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,13 +10,14 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Force, Json, PackageDir, app, progress
+from robot_dyn.cli.app import Force, Json, PackageDir, Xacro, app, progress
 from robot_dyn.cli.terminal import say, say_json, to_stderr
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.files import Kind, save
 
 if TYPE_CHECKING:
     from robot_dyn.studies.doctor.check import Checkup
+    from robot_dyn.studies.doctor.finding import Finding
 
 _URDF = Kind("a URDF", ".urdf", b"<?xml")
 
@@ -35,6 +35,14 @@ def check(
     fix: Annotated[
         bool, typer.Option("--fix", help="Write NAME.fixed.urdf here, with every change in a comment.")
     ] = False,
+    mass: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LINK=KG", help="With --fix: mass of a link without inertia, which its shape gives."),
+    ] = None,
+    total_mass: Annotated[
+        float | None,
+        typer.Option(metavar="KG", help="With --fix: mass of the robot, shared by links without inertia, from shapes."),
+    ] = None,
     density: Annotated[
         float | None,
         typer.Option(metavar="KG/M³", help="With --fix: inertias of this density for links without any, from shapes."),
@@ -42,21 +50,35 @@ def check(
     units: Annotated[
         bool, typer.Option("--units", help="With --fix: convert what seems to be in another unit, such as kg mm².")
     ] = False,
+    every: Annotated[bool, typer.Option("--all", help="Print each finding, not one line for each kind.")] = False,
     force: Force = False,
     package_dir: PackageDir = None,
+    xacro: Xacro = None,
     as_json: Json = False,
 ) -> None:
-    """Check URDF files: inertias, units, limits, names, shapes; exit code 1 if there are errors in one."""
+    """Check URDF files: inertias, units, limits, names, shapes; exit code 1 if errors are left."""
     from robot_dyn.result import plain
+    from robot_dyn.studies.doctor.finding import Severity
 
-    for option, given in (("--density", density is not None), ("--units", units)):
-        if given and not fix:
+    estimated = {"--mass": mass or None, "--total-mass": total_mass, "--density": density}
+    for option, value in (estimated | {"--units": units or None}).items():
+        if value is not None and not fix:
             raise QueryError(f"{option} is for --fix, which writes the changes; add it, or leave {option} out")
     targets = {file: _target(file, force) for file in files} if fix else {}
     if len({*targets.values()}) < len(targets):
         raise QueryError("--fix: two of the files would be written under one name; repair them one by one")
+    masses = arguments.assignments("--mass", mass, "link") if mass else None
+    expansion = None if xacro is None else arguments.expansion(xacro)
     checkups = [
-        rd.check(file, package_dirs=package_dir or (), density=density, units=units)
+        rd.check(
+            file,
+            package_dirs=package_dir or (),
+            mass=masses,
+            total_mass=total_mass,
+            density=density,
+            units=units,
+            xacro=expansion,
+        )
         for file in progress(files, "checking")
     ]
     written = {}
@@ -68,31 +90,35 @@ def check(
     if as_json:
         say_json({"files": [{"file": file, "written": to} | plain(each) for file, each, to in checked]})
     else:
-        say(*(line for each in checked for line in _lines(*each)))
+        say(*(line for each in checked for line in _lines(*each, every)))
     if fix and not as_json:
         for file in files:
             if file not in written:
                 to_stderr(f"{file}: nothing that can be repaired")
-    if not all(each.ok for each in checkups):
+    remaining = (finding for file, each, _ in checked for finding in (each.left if file in written else each.findings))
+    if any(finding.severity is Severity.ERROR for finding in remaining):
         raise typer.Exit(1)
 
 
 def _target(file: str, force: bool) -> Path:
-    stem = Path(file).name.removesuffix(".urdf")
+    stem = Path(file).name.removesuffix(".xacro").removesuffix(".urdf")
     return arguments.output(f"{stem}.fixed.urdf", _URDF, RepairError, [file] if Path(file).is_file() else [], force)
 
 
-def _lines(file: str, checkup: Checkup, written: str | None) -> Iterator[str]:
+def _lines(file: str, checkup: Checkup, written: str | None, every: bool) -> Iterator[str]:
     """A file, its findings, and what was written."""
-    from robot_dyn.studies.doctor.finding import Severity
+    from robot_dyn.studies.doctor.report import counted, grouped, sentence
 
-    counts = Counter(each.severity for each in checkup.findings)
-    said = [f"{counts[each]} {each.value}{'s' * (counts[each] > 1)}" for each in Severity if counts[each]]
-    yield f"{file}: {', '.join(said) or 'nothing found'}{'' if checkup.loads else '; it does not load'}"
-    for each in checkup.findings:
-        line = f" (line {each.line})" if each.line else ""
-        by = "[--fix --units]" if each.supposed else "[--fix]"
-        fixed = f" {by}" if each.changes and (each.supposed or written is None) else ""
-        yield f"  {each.severity.value}: {each.where}{line}: {each.what}; {each.remedy}{fixed}"
+    yield checkup.sentence.replace(checkup.source, file, 1)
+    for group in grouped(checkup.findings):
+        for each in ((finding,) for finding in group) if every else (group,):
+            yield f"  {sentence(tuple(each))}{_repairable(each, written)}"
     if written:
-        yield f"  written to {written}"
+        mended = [each for each in checkup.findings if not any(each is still for still in checkup.left)]
+        yield f"  written to {written}: repaired {counted(mended)}; left {counted(checkup.left) or 'nothing'}"
+
+
+def _repairable(findings: Iterable[Finding], written: str | None) -> str:
+    """The option that repairs these findings, or some of them; "" if they are repaired, or cannot be."""
+    supposed = {each.supposed for each in findings if each.changes and (each.supposed or written is None)}
+    return "" if not supposed else " [--fix --units]" if supposed == {True} else " [--fix]"

@@ -46,10 +46,10 @@ def accuracy(
     as_json: Json = False,
 ) -> None:
     """Show what each digit of a motion costs in time, by method and program. Ctrl-C ends it and keeps its runs."""
-    paths = outputs(rd.WorkPrecision, output, csv, [what] if os.path.isfile(what) else [], force)
+    paths = outputs(rd.studies.WorkPrecision, output, csv, [what] if os.path.isfile(what) else [], force)
     setup = _setup(what, q, v, duration, lock, package_dir)
-    with bar(budget) as spent:
-        result = rd.work_precision(
+    with bar(budget, "starting") as spent:
+        result = rd.studies.work_precision(
             setup, methods=method, peers=peers, budget_s=budget, repeats=repeats, on_progress=spent
         )
     give(result, paths, as_json, dark)
@@ -67,10 +67,10 @@ def cost(
     as_json: Json = False,
 ) -> None:
     """Count and time effects, control and terms of a scene, on and off, and algorithms beside each other."""
-    paths = outputs(rd.Cost, output, csv, [scene], force)
+    paths = outputs(rd.studies.Cost, output, csv, [scene], force)
     setup = rd.read_scene(scene)
-    with bar(budget) as spent:
-        result = rd.cost(setup, budget_s=budget, repeats=repeats, on_progress=spent)
+    with bar(budget, "starting") as spent:
+        result = rd.studies.cost(setup, budget_s=budget, repeats=repeats, on_progress=spent)
     give(result, paths, as_json, dark)
 
 
@@ -93,20 +93,22 @@ def certify(
     as_json: Json = False,
 ) -> None:
     """Count the digits of M, C, N, inverse and forward dynamics that are true, by program and numbers, beside times."""
-    paths = outputs(rd.Certificate, output, csv, [robot] if os.path.isfile(robot) else [], force)
+    paths = outputs(rd.studies.Certificate, output, csv, [robot] if os.path.isfile(robot) else [], force)
     arm = arguments.load(robot, lock, package_dir)
     given = {"q": q, "v": v, "a": a, "tau": tau}
     state = {key: arguments.vector(f"--{key}", x, arm.joint_names) for key, x in given.items() if x is not None}
-    with bar(1.0) as done:
-        result = rd.certify(arm, **state, samples=samples, seed=seed, repeats=repeats, on_progress=done)
+    with bar(1.0, "starting") as done:
+        result = rd.studies.certify(arm, **state, samples=samples, seed=seed, repeats=repeats, on_progress=done)
     give(result, paths, as_json, dark)
 
 
 @app.command()
 def advise(scene: Scene, as_json: Json = False) -> None:
     """Say whether step and control period are short enough, and what error to expect; exit code 1 if they are not."""
-    advice = rd.advise(rd.read_scene(scene))
-    say_json(advice) if as_json else say(*advice.text.split("\n"))
+    setup = rd.read_scene(scene)
+    with bar(what="looking at the loop"):
+        advice = rd.advise(setup)
+    say_json(advice) if as_json else say(advice)
     if not advice.stable:
         raise typer.Exit(1)
 

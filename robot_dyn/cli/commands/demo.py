@@ -32,8 +32,8 @@ def demo(
     from robot_dyn.scene.scene import SCENE, SceneError
     from robot_dyn.scene.starters import starter
     from robot_dyn.simulation.results.run_file import RUN, RunFileError
+    from robot_dyn.view.page import PAGE, ReplayError
     from robot_dyn.view.plots.plots import PICTURES, PlotError
-    from robot_dyn.view.replay import PAGE, ReplayError
 
     folder = Path(output)
     try:
@@ -45,15 +45,19 @@ def demo(
     files = {end: arguments.output(folder / f"panda.{end}", kind, error, (), force) for end, kind, error in kinds}
     save(files["toml"], lambda stream: stream.write(starter("panda_computed_torque").encode()), SceneError)
     panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
-    say(*report.demo_tables(panda), "", "The same arm under computed torque, its model 20 % too heavy", "")
+    with bar(what="comparing"):
+        tables = list(report.demo_tables(panda))
+    say(*tables, "", "The same arm under computed torque, its model 20 % too heavy", "")
     scene = rd.read_scene(files["toml"])
-    run = rd.simulate(scene)
+    with bar(scene.duration_s, at_the_end="estimating the error") as advance:
+        run = rd.simulate(scene, on_progress=advance)
     if run.outcome.ending == "stopped":
         say(*run.summary.split("\n"))
         raise typer.Exit(130)
-    rd.save_run(run, files["npz"])
-    rd.save_replay(run, files["html"])
-    rd.save_plot(run, files["png"])
+    with bar(what="drawing"):
+        rd.save_run(run, files["npz"])
+        rd.save_replay(run, files["html"])
+        rd.save_plot(run, files["png"])
     say(*run.summary.split("\n"))
     say(
         "",
@@ -68,17 +72,19 @@ def demo(
 
 def _price(swing: rd.Setup) -> Iterator[str]:
     """What digits of a free swing cost, here and now."""
-    from robot_dyn.cli import studies
+    from robot_dyn.studies.work_precision_diagram.text import programs
 
     yield ""
     yield f"What 1e-8 rad takes here: {swing.duration_s:g} s of the same arm, swinging freely"
     try:
-        with bar(_BUDGET_S) as spent:
-            result = rd.work_precision(swing, methods=[_METHOD], budget_s=_BUDGET_S, repeats=5, on_progress=spent)
+        with bar(_BUDGET_S, "starting") as spent:
+            result = rd.studies.work_precision(
+                swing, methods=[_METHOD], budget_s=_BUDGET_S, repeats=5, on_progress=spent
+            )
     except RobotDynError as error:
         yield f"left out: {error}"
         return
-    yield from studies.programs(result, _ERROR)
+    yield from programs(result, _ERROR)
     if result.interrupted:
         raise typer.Exit(130)
     yield "  all methods: robot-dyn accuracy; each effect and algorithm: robot-dyn cost"

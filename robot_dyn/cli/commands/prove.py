@@ -23,8 +23,8 @@ def prove(
 ) -> None:
     """Prove where the arm of a scene will be: balls that hold q and v; exit code 1 if not up to the end."""
     setup = rd.read_scene(scene)
-    with bar(setup.duration_s if until is None else until) as advance:
-        proof = rd.prove(setup, until, bits, budget_s=budget, on_progress=advance)
-    say_json(proof) if as_json else say(*proof.summary.split("\n"))
+    with bar(setup.duration_s if until is None else until, "proving") as advance:
+        proof = rd.studies.prove(setup, until, bits, budget_s=budget, on_progress=advance)
+    say_json(proof) if as_json else say(proof)
     if not proof.proven:
         raise typer.Exit(1)

@@ -39,10 +39,11 @@ def info(
 
     loaded = arguments.load(robot, lock, package_dir, xacro, quiet=True)  # the findings are shown below
     implementations = {"compiled": report.formulations(loaded)} if compiled else {}
+    answer = rd.info(loaded)
     if as_json:
-        say_json(report.info(loaded) | implementations)
+        say_json(answer, **implementations)
         return
-    say(*report.info_tables(loaded))
+    say(answer)
     if compiled:
         say(*report.formulation_table(implementations["compiled"]))
 
@@ -70,6 +71,13 @@ def query(
         ),
     ] = None,
     effects: Annotated[str | None, typer.Option(help='"urdf" adds the friction that the file states.')] = None,
+    payload: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LINK=MASS@X,Y,Z",
+            help="Add a body to a link, in kg and m, as tool0=5kg@0,0,0.1; may be repeated.",
+        ),
+    ] = None,
     lock: Lock = None,
     package_dir: PackageDir = None,
     xacro: Xacro = None,
@@ -79,28 +87,31 @@ def query(
 
     Of a scene: at its start, under the actuation of its control; what dry friction and rigid stops hold is listed.
     """
-    from robot_dyn.cli import state_report
+    from robot_dyn.effects.plant_state import plant_state
+    from robot_dyn.effects.why import why_at
 
     if a is not None and tau is not None:
         raise QueryError("give --a or --tau, not both: one follows from the other")
     setup = arguments.scene(
-        what, {"--effects": effects, "--lock": lock, "--package-dir": package_dir, "--xacro": xacro}
+        what,
+        {"--effects": effects, "--payload": payload, "--lock": lock, "--package-dir": package_dir, "--xacro": xacro},
     )
-    plant = (
-        rd.Plant(arguments.load(what, lock, package_dir, xacro), effects or ())
-        if setup is None
-        else setup.plant.at(0.0)
-    )
+    if setup is None:
+        robot = arguments.load(what, lock, package_dir, xacro)
+        robot = robot.with_(payload=[arguments.payload(each) for each in payload]) if payload else robot
+        plant = rd.Plant(robot, effects or ())
+    else:
+        plant = setup.plant.at(0.0)
     names = plant.dynamics.joint_names
     at = setup.q0 if setup is not None and q is None else arguments.vector("--q", q, names)
     speed = setup.v0 if setup is not None and v is None else arguments.vector("--v", v, names)
     torque = None if tau is None else arguments.vector("--tau", tau, names)
     if setup is not None and a is None and tau is None:
         torque = _actuation(setup, at, speed)
-    answer = state_report.query(plant, at, speed, arguments.vector("--a", a, names), torque)
-    if why is not None:
-        answer |= state_report.why(plant, answer, why)
-    say_json(answer) if as_json else say(*state_report.query_tables(answer))
+    acceleration = arguments.vector("--a", a, names) if torque is None else None
+    state = plant_state(plant, at, speed, acceleration, torque)
+    cause = {} if why is None else {"why": why_at(state, why)}
+    say_json(state, **cause) if as_json else say(state, *(part for each in cause.values() for part in ("", each)))
 
 
 def _actuation(setup: rd.Setup, q: np.ndarray, v: np.ndarray) -> np.ndarray:

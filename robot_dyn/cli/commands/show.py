@@ -10,7 +10,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Dark, Force, Lock, Name, PackageDir, app
+from robot_dyn.cli.app import Dark, Force, Lock, Name, PackageDir, app, bar
 from robot_dyn.cli.arguments import output as checked_output
 from robot_dyn.cli.terminal import say
 from robot_dyn.errors import QueryError
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from robot_dyn.view.live.server import Server
 
 Html = Annotated[str | None, typer.Option(metavar="OUT.html", help="Write one file that needs no server, and end.")]
+Video = Annotated[
+    str | None,
+    typer.Option(metavar="OUT.mp4", help="Write an .mp4 or .gif, drawn by an installed Chrome, Chromium or Edge."),
+]
 Inertia = Annotated[bool, typer.Option("--inertia", help="Draw each link's equivalent inertia box.")]
 Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Where to listen; a free one by default.")]
 Browse = Annotated[bool, typer.Option("--open", help="Open the page in your browser.")]
@@ -44,9 +48,11 @@ def show_(
     at = arguments.vector("--q", q, loaded.joint_names)
     options = {"inertia": inertia, "package_dirs": package_dir or ()}
     if page is not None:
-        _written(rd.save_show(loaded, page, at, **options), browse)
+        with bar(what="writing the page"):
+            file = rd.show(loaded, at, **options).save(page)
+        _written(file, browse)
     else:
-        _serve(rd.show(loaded, at, port=port, **options), "robot", browse)
+        _serve(rd.show(loaded, at, **options).serve(port), "robot", browse)
 
 
 @app.command()
@@ -55,6 +61,12 @@ def replay(
         list[str], typer.Argument(metavar="RUN.npz...", help="Run files; those after the first are drawn transparent.")
     ],
     html: Html = None,
+    video: Video = None,
+    fps: Annotated[
+        int | None, typer.Option(help="Frames a second of the video: frame k shows t = k / fps; 60, or 25 of a .gif.")
+    ] = None,
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of the video.")] = "1280x720",
+    dark: Dark = False,
     frame: Annotated[
         str | None, typer.Option(metavar="LINK", help="Link whose path is drawn; the tip by default.")
     ] = None,
@@ -64,14 +76,23 @@ def replay(
     force: Force = False,
     package_dir: PackageDir = None,
 ) -> None:
-    """Replay runs in the browser, live on this machine until Ctrl-C, or as one HTML file."""
+    """Replay runs in the browser, live on this machine until Ctrl-C, or as one HTML file or a video."""
     page = _page(html, port, runs, force)
+    film = _film(video, html, port, runs, force, size)
     trajectories = [rd.load_run(path) for path in runs]
     options = {"frame": frame, "inertia": inertia, "package_dirs": package_dir or ()}
-    if page is not None:
-        _written(rd.save_replay(trajectories[0], page, *trajectories[1:], **options), browse)
+    if film is not None:
+        path, pixels = film
+        with bar(1.0, what="starting the browser", at_the_end="writing") as advance:
+            shown = rd.replay(*trajectories, **options)
+            file = shown.save_video(path, fps=fps, size=pixels, dark=dark, on_progress=advance)
+        _written(file, browse)
+    elif page is not None:
+        with bar(what="writing the page"):
+            file = rd.save_replay(trajectories[0], page, *trajectories[1:], **options)
+        _written(file, browse)
     else:
-        _serve(rd.replay(*trajectories, port=port, **options), "run", browse)
+        _serve(rd.replay(*trajectories, **options).serve(port), "run", browse)
 
 
 @app.command()
@@ -83,31 +104,52 @@ def plot(
     only: Annotated[
         list[str] | None,
         typer.Option(
-            "--show",
-            metavar="NAME",
-            help="joints, torques, energy, tracking, phase or error_growth; may be repeated; by default all.",
+            "--only",
+            metavar="PART",
+            help="overview, joints, torques, energy, tracking, phase or error_growth; may be repeated; by default the"
+            " overview.",
         ),
     ] = None,
     joint: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Show this joint; may be repeated.")] = None,
+    width_mm: Annotated[float, typer.Option("--width-mm", help="Width in mm; text keeps its size.")] = 180.0,
+    paper: Annotated[bool, typer.Option("--paper", help="For a paper: thin lines, no title, legible in grey.")] = False,
     dark: Dark = False,
     force: Force = False,
 ) -> None:
-    """Draw a run: joints, torques against limits, energy ledger, tracking error, phase portrait, error."""
+    """Draw a run on one page, or parts of it: joints, torques against limits, energy, tracking, phase, error."""
     from robot_dyn.view.plots.plots import PICTURES, PlotError
 
     path = checked_output(output or Path(run).with_suffix(".png"), PICTURES, PlotError, [run], force)
-    theme = "dark" if dark else "light"
-    file = rd.save_plot(rd.load_run(run), path, *(only or ()), only=joint or None, theme=theme)
+    look = {"theme": "dark" if dark else "light", "style": "paper" if paper else "screen", "width_mm": width_mm}
+    with bar(what="drawing"):
+        file = rd.save_plot(rd.load_run(run), path, only=only or (), joints=joint or None, **look)
     say(f"written: {file}")
 
 
 def _page(html: str | None, port: int | None, inputs: list[str], force: bool) -> Path | None:
     """The file to write, checked; None if the page is served."""
-    from robot_dyn.view.replay import PAGE, ReplayError
+    from robot_dyn.view.page import PAGE, ReplayError
 
     if html is not None and port is not None:
         raise QueryError("give --html or --port, not both: a file needs no server")
     return None if html is None else checked_output(html, PAGE, ReplayError, inputs, force)
+
+
+def _film(
+    video: str | None, html: str | None, port: int | None, inputs: list[str], force: bool, size: str
+) -> tuple[Path, tuple[int, int]] | None:
+    """The video to write, checked, and its size in pixels; None if there is none."""
+    from robot_dyn.errors import VideoError
+    from robot_dyn.view.video.video import KINDS
+
+    if video is None:
+        return None
+    if html is not None or port is not None:
+        raise QueryError("give --video, --html or --port, not several")
+    width, cross, height = size.partition("x")
+    if not (cross and width.isascii() and width.isdecimal() and height.isascii() and height.isdecimal()):
+        raise QueryError(f"--size must be WIDTHxHEIGHT in pixels, such as 1280x720, got {size!r}")
+    return checked_output(video, KINDS, VideoError, inputs, force), (int(width), int(height))
 
 
 def _serve(server: Server, what: str, browse: bool) -> None:

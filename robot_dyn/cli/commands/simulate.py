@@ -1,13 +1,15 @@
-"""Commands on scenes: simulate, explain, scene."""
+"""Commands on scenes: simulate, explain, sweepable, scene."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import robot_dyn as rd
+from robot_dyn.answer import Table
 from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import Force, Json, Scene, app, bar
 from robot_dyn.cli.terminal import put, say, say_json, to_stderr
@@ -29,8 +31,8 @@ def simulate(
 ) -> None:
     """Run a scene; exit code 1 if it diverges. Ctrl-C ends the run and keeps its samples."""
     from robot_dyn.cli import report
+    from robot_dyn.simulation.export.export import TABLE
     from robot_dyn.simulation.results.run_file import RUN, RunFileError
-    from robot_dyn.simulation.table import TABLE, export_csv
 
     setup = rd.read_scene(scene)
     if accuracy is not None:
@@ -38,10 +40,10 @@ def simulate(
     inputs = [scene, setup.plant.dynamics.description.source]  # pyright: ignore[reportAttributeAccessIssue]
     file = output and arguments.output(output, RUN, RunFileError, inputs, force)
     table = csv and arguments.output(csv, TABLE, RunFileError, [*inputs, *([file] if file else [])], force)
-    with bar(setup.duration_s) as advance:
+    with bar(setup.duration_s, at_the_end="estimating the error") as advance:
         run = rd.simulate(setup, on_progress=advance)
     try:  # the files first: a terminal or pipe may be gone
-        written = [path for path in (file and rd.save_run(run, file), table and export_csv(run, table)) if path]
+        written = [path for path in (file and rd.save_run(run, file), table and rd.export(run, table)) if path]
     finally:
         say_json(report.run(run)) if as_json else say(*run.summary.split("\n"))
     for path in written:
@@ -51,12 +53,17 @@ def simulate(
 
 
 @app.command()
-def explain(scene: Scene) -> None:
+def explain(scene: Scene, as_json: Json = False) -> None:
     """Say what a scene integrates: each term, what is not simulated, and where every number came from."""
-    from robot_dyn.scene.explain import explain as lines
-    from robot_dyn.scene.scene import read_both
+    answer = rd.explain(Path(scene))
+    say_json(answer) if as_json else say(answer)
 
-    say(*lines(*read_both(scene)))
+
+@app.command()
+def sweepable(scene: Scene, as_json: Json = False) -> None:
+    """List the parameters of a scene that `rd.rollouts` can sweep, with values and units."""
+    answer = rd.sweepable(rd.read_scene(scene))
+    say_json(answer) if as_json else say(answer)
 
 
 @app.command()
@@ -68,7 +75,10 @@ def scene(
         ),
     ] = None,
 ) -> None:
-    """Print a scene file to start from."""
-    from robot_dyn.scene.starters import starter, starters
+    """Print a scene file to start from, as `robot-dyn scene pendulum > pendulum.toml`."""
+    from robot_dyn.scene.starters import opening, starter, starters
 
-    put(starter(name)) if name else say(*starters())
+    if name:
+        put(starter(name))
+    else:
+        say(Table(("scene", "what it is"), tuple((each, opening(each)) for each in starters()), wrap=True))

@@ -42,8 +42,8 @@ def stress(
     inputs = [robot] if os.path.isfile(robot) else []
     paths = [arguments.output(output, JSON, ResultError, inputs, force)] if output else []
     arm = arguments.load(robot, lock, package_dir, xacro)
-    with bar(budget) as spent:
-        result = rd.stress(arm, samples=samples, runs=runs, seed=seed, budget_s=budget, on_progress=spent)
+    with bar(budget, "starting") as spent:
+        result = rd.studies.stress(arm, samples=samples, runs=runs, seed=seed, budget_s=budget, on_progress=spent)
     give(result, paths, as_json)
     if not result.ok:
         raise typer.Exit(1)

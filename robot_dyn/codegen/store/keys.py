@@ -22,13 +22,13 @@ from pathlib import Path
 _ROOT = Path(__file__).parents[2]
 _CODEGEN = _ROOT / "codegen"
 # Rooms above the simulation, which nothing that is traced imports: the layers in pyproject.toml ensure it.
-_ABOVE = {"cli", "scene", "studies", "view"}
+_ABOVE = {"cli", "scene", "studies", "sweeps", "view"}
 
 
 def digest(texts: list[str], *, processor: bool = True) -> str:
     """The key of what these texts, versions and the processor determine; sources are among the texts."""
     versions = [f"{name} {version_of(name)}" for name in ("robot-dyn", "llvmlite", "casadi", "numpy")]
-    return digest_of_texts([*texts, *versions, platform.python_version(), *(_processor() if processor else ())])
+    return digest_of_texts([*texts, *versions, platform.python_version(), *(processor_of_code() if processor else ())])
 
 
 def digest_of_texts(texts: Iterable[str]) -> str:
@@ -37,7 +37,8 @@ def digest_of_texts(texts: Iterable[str]) -> str:
     return hashlib.sha256(joined.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _processor() -> tuple[str, str]:
+def processor_of_code() -> tuple[str, str]:
+    """Name and features of the processor that machine code is made for."""
     import llvmlite.binding as llvm
 
     return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()

@@ -14,7 +14,7 @@ import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.parameters import CONTROLLER, Part
-from robot_dyn.codegen.trace.symbolic import Symbols, TraceError, column, every_branch
+from robot_dyn.codegen.trace.symbolic import Symbol, Symbols, TraceError, column, every_branch
 from robot_dyn.coefficients import with_values
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial, polynomial
@@ -22,10 +22,15 @@ from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Active, Bound, Conservative, Drive, Effect, Stateful
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.set_valued import Mode, SetValued
-from robot_dyn.errors import because
+from robot_dyn.errors import QueryError, because
 
 _INTERPRETED = "ask the plant itself, or simulate it"
 REMEDY = "write it in robot_dyn.arithmetic and NumPy's operators, or take engine='interpreted'"
+_ARM_INSIDE = "an arm inside a function cannot be traced; take engine='interpreted'"
+_ARM_INSIDE_A_LAW = (
+    "an arm inside a function cannot be traced: make it an attribute of a rd.control.Stateless controller, or take"
+    " engine='interpreted'"
+)
 
 
 def symbolic_plant(plant: Plant, bodies: Any, values: Mapping[Part, Mapping[str, Array]] | None = None) -> Plant:
@@ -57,7 +62,7 @@ def symbolic_controller(
         if isinstance(reference, PiecewisePolynomial) and type(reference).at is not PiecewisePolynomial.at:
             raise TraceError(
                 f"reference {type(reference).__name__} cannot be compiled: its at(t) is not that of its polynomials;"
-                " give an rd.PiecewisePolynomial, or take engine='interpreted'"
+                " give an rd.control.PiecewisePolynomial, or take engine='interpreted'"
             )
         polynomials = {attribute: next(remaining) for attribute in reference.polynomials}
         given = polynomials | dict(values.get(("reference", name), {}))
@@ -70,14 +75,19 @@ def wide(x: Any, n: int) -> np.ndarray:
     return np.broadcast_to(np.asarray(x, dtype=object), (n,)).view(Symbols)
 
 
-def whichever_way(name: str, function: Callable[[], Any]) -> Any:
-    """The result of a part for every outcome of its comparisons; TraceError names the part."""
+def whichever_way(name: str, function: Callable[[], Any], of_arm_inside: str = _ARM_INSIDE) -> Any:
+    """The result of a part for every outcome of its comparisons; TraceError names the part.
+
+    `of_arm_inside` is the remedy where the part asks an arm that it does not declare.
+    """
     try:
         result = every_branch(function).view(Symbols)
         column(result)  # reports what is not a number
         return result
     except Exception as error:  # anything that user-defined code raises on symbols
-        raise TraceError(f"{name} cannot be compiled ({because(error)}): {REMEDY}") from error
+        held = isinstance(error, QueryError) and Symbol.__name__ in str(error)  # an arm that was asked with symbols
+        remedy = of_arm_inside if held else REMEDY
+        raise TraceError(f"{name} cannot be compiled ({because(error)}): {remedy}") from error
 
 
 @final
@@ -232,4 +242,4 @@ class TracedController(Controller):
 
     def traced(self, function: Callable[[], Any], length: int) -> Array:
         """Symbols (length,) of a result."""
-        return whichever_way(f"controller {self.original.name}", lambda: wide(function(), length))
+        return whichever_way(f"controller {self.original.name}", lambda: wide(function(), length), _ARM_INSIDE_A_LAW)

@@ -26,7 +26,12 @@ SIGNAL = "signal"  # within a unit, the unit of the signal: rad, rad/s or N m, d
 class Block(Value, ABC):
     """A discrete-time block of a loop, y = output(x, s), s⁺ = next(x, s).
 
-    Its methods are pure functions, called at ticks with
+    To write one, define
+
+        def output(self, x, s, period_s): ...          # y, (n,), in the unit of x
+        def next_state(self, x, s, period_s): ...      # s⁺, (state_size(n),)
+
+    and `state_size`; the last two are not needed without states. The methods are pure functions, called at ticks with
 
         x: signal, (n,), in [rad], [rad/s] or [N m], or [m], [m/s] or [N], depending on line and joint
         s: states of the block, (state_size(n),)

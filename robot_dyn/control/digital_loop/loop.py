@@ -27,7 +27,8 @@ from robot_dyn.errors import ControlError, shown
 from robot_dyn.threshold import smooth
 from robot_dyn.validate import integer
 
-LINES = ("position", "velocity", "actuation")
+SIGNALS = {"position": "rad", "velocity": "rad/s", "actuation": "N m"}  # of each line, the unit of what goes through it
+LINES = tuple(SIGNALS)
 
 
 @final
@@ -98,6 +99,10 @@ class Loop(Controller):
     def n(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Number of joints it drives."""
         return self.controller.n
+
+    @property
+    def term(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self.controller.term
 
     @property
     def parts(self) -> tuple[Nested, ...]:
@@ -208,5 +213,5 @@ def _blocks(line: str, given: Any) -> tuple[Block, ...]:
     """The blocks of a line, given as several or as one."""
     blocks = (given,) if isinstance(given, Block) else given
     if not isinstance(blocks, tuple | list) or not all(isinstance(each, Block) for each in blocks):
-        raise ControlError(f"{line} must be blocks, such as [rd.Quantisation(1e-4)], got {shown(given)}")
+        raise ControlError(f"{line} must be blocks, such as [rd.control.Quantisation(1e-4)], got {shown(given)}")
     return tuple(blocks)

@@ -67,6 +67,10 @@ class Multirate(Controller):
         return self.fast.n
 
     @property
+    def term(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"{self.fast.term} + u_slow"
+
+    @property
     def parts(self) -> tuple[Nested, ...]:
         return nested(self, "fast", "fast.") + nested(self, "slow", "slow.")
 

@@ -17,3 +17,8 @@ def starter(name: str) -> str:
     if name not in starters():
         raise SceneError(f"no scene {name!r}; {nearest(name, starters())}")
     return (files(__name__) / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def opening(name: str) -> str:
+    """Its first line, which says what it is."""
+    return starter(name).partition("\n")[0].lstrip("# ")

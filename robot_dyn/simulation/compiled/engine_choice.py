@@ -7,6 +7,7 @@ Machine code that this process already has, or the store, is used in any case.
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from math import inf
 from typing import TYPE_CHECKING, Any
 
@@ -71,11 +72,23 @@ def _checked(setup: Setup, equation: StateEquation, found: CompiledStateEquation
     """The machine code that exists, or new code, after its self-check."""
     from robot_dyn.simulation.compiled.self_check import check
 
-    if found is not None:
-        check(found, setup)
-        return found
+    if found is None:
+        return checked(setup, lambda: compiled_for(setup, equation))
+    check(found, setup)
+    return found
+
+
+def checked(setup: Setup, build: Callable[[], CompiledStateEquation]) -> CompiledStateEquation:
+    """The machine code that `build` returns, after its self-check, which compiles it; says so if that takes long.
+
+    Raises:
+        TraceError: If a part cannot be compiled; names it.
+        MachineError: If the machine code does not agree with the interpreted engine.
+    """
+    from robot_dyn.simulation.compiled.self_check import check
+
     with announced("compiling the equations of this run, once for its structure"):
-        compiled = compiled_for(setup, equation)
+        compiled = build()
         check(compiled, setup)
     return compiled
 

@@ -46,7 +46,7 @@ def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterato
             text = f"{quantity} of {names[i]} from {at_start:.4g} to {begins:.4g} {units[i][row]} at {t:.4g} s"
             yield Remark(
                 Kind.JUMPS, names[i], quantity, t, 0.0, t, begins, at_start, text,
-                "let it begin where and as fast as the joint does; rd.via_points(times_s, points) begins at rest",
+                "let it begin where and as fast as the joint does; rd.control.via_points(…) starts at rest",
             ), gaps[:, i]  # fmt: skip
 
 

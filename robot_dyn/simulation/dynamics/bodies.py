@@ -1,6 +1,6 @@
 """What moves, as the convex problems of events take it: mass matrix, and all torques but the reactions.
 
-    bodies = (M, load, u_m):   load = u + Σ τ − C v − ∂V/∂q,   u_m = u − b θ̇ of each motor in a rigid backlash
+    bodies = (M, load, u_m):   load = τ + Σ τ_effect − C v − ∂V/∂q,   u_m = u − b θ̇ of each motor in a rigid backlash
 
 [As of `effects.rigid_backlash`]
 """

@@ -76,8 +76,8 @@ def _missing(part: Any) -> str:
         return "declares no thresholds: define thresholds(self, n), which returns () if it is smooth everywhere"
     if isinstance(part, Controller) and not _defines(kind, "thresholds", Controller):
         return (
-            "declares no thresholds: give a class, such as an rd.Stateless, with thresholds(self), which returns () if"
-            " it is smooth everywhere"
+            "declares no thresholds: give a class, such as rd.control.Stateless, with thresholds(self), which returns"
+            " () if it is smooth everywhere"
         )
     if isinstance(part, Block) and not _defines(kind, "rounds", Block):
         return "does not declare whether its output jumps: define rounds, True or False"

@@ -14,8 +14,9 @@ from typing import final
 import numpy as np
 
 from robot_dyn.arithmetic import Array
+from robot_dyn.effects.effect import numbered
 from robot_dyn.integrate.differences import by_state, rowwise
-from robot_dyn.simulation.dynamics.state_equation import CONTROL, StateEquation, numbered
+from robot_dyn.simulation.dynamics.state_equation import CONTROL, StateEquation
 
 BODIES = "the motion of the bodies"
 
@@ -45,7 +46,8 @@ class Fastest:
             return "nothing acts back on the motion"
         how = "decays" if self.decays else "changes"
         by = self.source if self.source == BODIES else repr(self.source)
-        return f"the fastest motion {how} with {abs(self.eigenvalue):.1e} per second, of joint {self.joint!r}, by {by}"
+        rate = float(f"{abs(self.eigenvalue):.2g}")
+        return f"the fastest motion {how} with {rate:g} per second, of joint {self.joint!r}, by {by}"
 
 
 def jacobian(equation: StateEquation, t: float, y: Array, held: Array | None) -> Array:

@@ -5,13 +5,18 @@ A = [[0, 1], [∂a/∂q, ∂a/∂v]],   B = [[0], [M⁻¹]]
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple, final
+
 import numpy as np
 
+from robot_dyn.answer import Answer, Block, Table
 from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError
 from robot_dyn.integrate.differences import of_fourth_order
 from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.queries.units import without_rounding
 from robot_dyn.validate import one_state
 
 _STEPS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of Richardson's extrapolated central difference: error O(h⁴) and u/h
@@ -20,9 +25,34 @@ _NO_DERIVATIVE = "the plant has no derivative at this state, such as at an effor
 _AGREE = 1e-6  # of the largest slope: two steps that differ by more do not show a derivative
 
 
-def linearise(
-    plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = None, *, t: float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
+class _Matrices(NamedTuple):
+    A: np.ndarray
+    B: np.ndarray
+
+
+@final
+class Linearisation(Answer, _Matrices):
+    """A and B about one state, a pair that shows its eigenvalues.
+
+    Attributes:
+        A: Of (δq, δv), shape (2n, 2n).
+        B: Of δu, shape (2n, n).
+    """
+
+    __slots__ = ()
+
+    def blocks(self) -> Iterator[Block]:
+        n = self.B.shape[1]
+        yield f"d/dt (δq, δv) = A (δq, δv) + B δu: A ({2 * n}, {2 * n}), B ({2 * n}, {n})"
+        found = [x for x in np.linalg.eigvals(self.A).tolist() if complex(x).imag >= 0]
+        rows = sorted((complex(x) for x in found), key=lambda x: (-x.real, x.imag))
+        headings = ("growth, real part [1/s]", "± imaginary part [rad/s]")
+        yield "eigenvalues of A:"
+        shown = without_rounding([(x.real, x.imag) for x in rows])
+        yield Table(headings, tuple(map(tuple, shown.tolist())), 4)
+
+
+def linearise(plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = None, *, t: float = 0.0) -> Linearisation:
     """A and B about one state.
 
     Args:
@@ -34,7 +64,7 @@ def linearise(
         t: Time, in [s].
 
     Returns:
-        A, shape (2n, 2n), and B, shape (2n, n).
+        A, shape (2n, 2n), and B, shape (2n, n); shown as the eigenvalues of A.
 
     Raises:
         QueryError: If an argument is wrong, or the acceleration has no derivative at this state.
@@ -67,4 +97,4 @@ def linearise(
             raise QueryError(_NO_DERIVATIVE)
     A = np.zeros((2 * n, 2 * n))
     A[:n, n:], A[n:] = np.eye(n), slopes[:, : 2 * n]
-    return A, np.vstack([np.zeros((n, n)), slopes[:, 2 * n :]])
+    return Linearisation(A, np.vstack([np.zeros((n, n)), slopes[:, 2 * n :]]))

@@ -1,6 +1,6 @@
 """A step of Moreau and Jean of a state equation, as its method asks for it: the problem, its solution, what is behind.
 
-    M(q_m) v⁺ = M v + h (u + Σ τ − C v − N) + r,   r of what holds joints:  −r ∈ h f ∂|v⁺| + N(v⁺)
+    M(q_m) v⁺ = M v + h (τ − C v − N) + r,   r of what holds joints:  −r ∈ h f ∂|v⁺| + N(v⁺)
 
 at q_m = q + h/2 v. The work of each force is that of its impulse at the mean velocity (v + v⁺)/2, so that the ledger
 tells what stops and friction took. In floats, or in symbols for machine code. [As of `integrate.time_stepping`]

@@ -1,6 +1,6 @@
 """The state equation: the motion of a plant as a first-order system y' = f(t, y), with y = (q, v or p, z, W).
 
-    q' = v,   v' = M⁻¹ (u + Σ τ − C v − N)   or   p' = u + Σ τ + Cᵀ v − N with p = M v,
+    q' = v,   v' = M⁻¹ (τ − C v − N)   or   p' = τ + Cᵀ v − N with p = M v,
     z' = rate of the states of the controller, then of the effects; then J' = λ, the reactions of what holds joints,
     W_k' = τ_kᵀ v: the work of the control and of each effect without a potential
 
@@ -11,14 +11,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import count
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
 from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
-from robot_dyn.effects.effect import Bound, Conservative, Stateful
+from robot_dyn.effects.effect import Bound, Conservative, Stateful, numbered
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.plant import Plant, carrying, in_mode
 from robot_dyn.effects.set_valued import Mode
@@ -286,12 +285,3 @@ class StateEquation(Caching):
         equation = self.equation_of_motion
         own = z[self.state_size :]
         return self._powers(v, u, equation.torques(t, q, v, z=own), own, 0 * v)
-
-
-def numbered(*names: str) -> tuple[str, ...]:
-    """Names, each of them once: a second part of a name gets a number, "spring" and "spring 2"."""
-    made: list[str] = []
-    for name in names:
-        others = (f"{name} {k}" for k in count(2))
-        made.append(name if name not in made else next(each for each in others if each not in {*made, *names}))
-    return tuple(made)

@@ -183,7 +183,7 @@ def _achieved(chosen: _Try, requested: float, spent: int) -> Trajectory:
 
 def _refusal(best: _Try, requested: float, rtol: float) -> str:
     """Return why the best run misses the requested error, with tolerances down to `rtol`, and the remedy."""
-    why = "" if best.trial.error is None else best.trial.error.note
+    why = "" if best.trial.error is None else best.trial.error.note.partition("; take ")[0]  # its remedy is of one run
     if not why:
         method = best.trial.statistics.method
         least = f"{method}'s least tolerance" if rtol <= 1.01 * LEAST_RTOL else "the tolerance"

@@ -1,8 +1,4 @@
-"""Where switching functions change sign within a step: plain functions of arrays, for the loop of one run.
-
-Where `detection` cannot exclude it, that a coordinate of y does not pass a level is proven by the coefficients of the
-dense output in Bernstein's form; other functions are looked at eight times in the step. [Shampine, Thompson 2000]
-"""
+"""Switching functions of a run: their values within a step, and their sides; plain functions of arrays."""
 
 from __future__ import annotations
 
@@ -11,15 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.integrate.bernstein import NONE, coefficients, first_below, rate_coefficients, value
+from robot_dyn.integrate.bernstein import rate_coefficients, value
 from robot_dyn.integrate.primitives import between, evaluate
 from robot_dyn.simulation.dynamics.loop_state import Functions, Rules, Runs
 from robot_dyn.simulation.events.detection import coordinate_nears, enclosure, enclosure_of_position, function_nears
 
+LOOKS = 11  # at a switching function that is no coordinate, in each step, see `first_event`
 ROUNDING = 64 * np.finfo(float).eps  # of the coefficients of a polynomial
-_LOOKS = 8  # at a switching function that is no coordinate, in each step
-_HALVINGS = 50
-_NEAR = 1e-4  # of a step: for the slope of a switching function that is no coordinate
+NEAR = 1e-4  # of a step: for the slope of a switching function that is no coordinate
 
 
 class Switches(NamedTuple):
@@ -41,6 +36,7 @@ class Switches(NamedTuple):
         before, change: Those at the start of a step, and by how much they changed in the step before, (F,).
         exact, slack: Rounding of each coordinate near its level, and by how much it passes it before that counts, (E,).
         b, stack: Room for `bernstein`.
+        looks: Room for the values of the functions within a step, times their sides, (G, LOOKS).
     """
 
     rows: Array
@@ -60,6 +56,7 @@ class Switches(NamedTuple):
     slack: Array
     b: Array
     stack: Array
+    looks: Array
 
 
 def approaches(y: Array, after: Array, h: float, before: Array, last: Array, rules: Rules, switches: Switches) -> bool:
@@ -105,51 +102,6 @@ def nears(t: float, y: Array, p: Array, run_parameters: Array, switches: Switche
     return found
 
 
-def first_event(
-    f: Functions, t: float, h: float, y: Array, p: Array, runs: Runs, F: Array, switches: Switches
-) -> tuple[int, float]:
-    """The switching function that changes sign first within a step, and θ; −1 without any."""
-    event, first, b, run_parameters = -1, NONE, switches.b, runs.run_parameters
-    for e in range(len(switches.exact)):
-        if not switches.active[e]:
-            continue
-        row, side, d = switches.rows[e], switches.sides[e], len(b) - switches.rates[e]
-        if switches.rates[e]:
-            rate_coefficients(F, row, h, b)
-            for j in range(d):
-                b[j] -= switches.levels[e]
-        else:
-            coefficients(y[row, 0] - switches.levels[e], F, row, b)
-            if y[row, 0] == switches.levels[e]:
-                b[0] = 0.0
-        for j in range(d):
-            b[j] *= side
-        theta = first_below(b[:d], switches.slack[e], switches.stack)
-        if theta < first:
-            event, first = e, theta
-    before, x = 0.0, runs.last
-    for i in range(1, _LOOKS + 1 if has_functions(switches) else 0):
-        theta = i / _LOOKS
-        values(f, t, h, theta, y, p, run_parameters, F, x, switches)
-        for g in range(len(switches.exact), len(switches.rows)):
-            if passed(switches, g) and before < first:
-                low, high = before, theta
-                for _ in range(_HALVINGS):
-                    middle = (low + high) / 2
-                    values(f, t, h, middle, y, p, run_parameters, F, x, switches)
-                    if passed(switches, g):
-                        high = middle
-                    else:
-                        low = middle
-                if high < first:
-                    event, first = g, high
-                values(f, t, h, theta, y, p, run_parameters, F, x, switches)
-        if event >= 0 and first <= theta:
-            break
-        before = theta
-    return event, first
-
-
 def has_functions(switches: Switches) -> bool:
     """Whether there are switching functions that are no coordinates."""
     return len(switches.rows) > len(switches.exact)
@@ -158,11 +110,6 @@ def has_functions(switches: Switches) -> bool:
 def gap(switches: Switches, g: int) -> float:
     """The latest value of a switching function that is no coordinate, less its level."""
     return switches.then[switches.rows[g], 0] - switches.levels[g]
-
-
-def passed(switches: Switches, g: int) -> bool:
-    """Whether it is on the other side."""
-    return switches.sides[g] * gap(switches, g) < 0.0
 
 
 def values(
@@ -207,17 +154,17 @@ def correction(
     if event < len(switches.exact) and switches.rates[event]:  # its slope likewise
         row, b, theta = switches.rows[event], switches.b, h / whole
         rate_coefficients(work.F, row, whole, b)
-        slope = (value(b[:-1], theta + _NEAR) - value(b[:-1], theta - _NEAR)) / (2 * _NEAR * whole)
+        slope = (value(b[:-1], theta + NEAR) - value(b[:-1], theta - NEAR)) / (2 * NEAR * whole)
         left = work.last[row, 0] - switches.levels[event]
     elif event < len(switches.exact):
         row = switches.rows[event]
         left, slope = runs.after[row, 0] - switches.levels[event], work.last[row, 0]
     else:  # its slope from the dense output of the whole step
         theta = h / whole
-        values(f, t, whole, theta + _NEAR, y, p, runs.run_parameters, work.F, runs.last, switches)
+        values(f, t, whole, theta + NEAR, y, p, runs.run_parameters, work.F, runs.last, switches)
         slope = gap(switches, event)
-        values(f, t, whole, theta - _NEAR, y, p, runs.run_parameters, work.F, runs.last, switches)
-        slope = (slope - gap(switches, event)) / (2 * _NEAR * whole)
+        values(f, t, whole, theta - NEAR, y, p, runs.run_parameters, work.F, runs.last, switches)
+        slope = (slope - gap(switches, event)) / (2 * NEAR * whole)
         evaluate(switches.functions, t + h, runs.after, p, runs.run_parameters, switches.then)
         left = gap(switches, event)
     return -left / slope if slope != 0.0 else 0.0

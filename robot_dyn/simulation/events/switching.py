@@ -13,7 +13,7 @@ from robot_dyn.effects.plant import Plant, in_mode
 from robot_dyn.errors import EffectError
 from robot_dyn.integrate.bernstein import room
 from robot_dyn.simulation.dynamics.state_equation import CONTROLLER, StateEquation
-from robot_dyn.simulation.events.crossings import ROUNDING, Switches
+from robot_dyn.simulation.events.crossings import LOOKS, ROUNDING, Switches
 from robot_dyn.simulation.events.mode_change import guards
 from robot_dyn.simulation.events.modes import Modes
 from robot_dyn.simulation.events.occurrence import Occurrence
@@ -109,6 +109,7 @@ class Switching:
         switches = Switches(
             rows, levels, sides, rates, active, E, K, zeroed, functions, G, np.zeros((len(values), 1)), values,
             np.zeros(len(values)), exact, slack, np.zeros(degree + 1), room(degree),
+            np.zeros((len(rows) - E - K, LOOKS)),
         )  # fmt: skip
         if self.modes is not None:
             guards(self.modes.holding, y[:, None].copy(), switches)

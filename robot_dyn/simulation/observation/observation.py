@@ -152,7 +152,7 @@ class Visit:
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Observed(Value):
     """What was observed of B runs of n joints from their start to their end.
 
@@ -174,6 +174,9 @@ class Observed(Value):
 
     def __post_init__(self) -> None:
         read_only(self)
+
+    def __repr__(self) -> str:
+        return f"<Observed: {len(self.extremes)} runs, {len(self.levels)} levels>"
 
     def __getitem__(self, runs: slice) -> Observed:
         """Of some of the runs."""

@@ -2,6 +2,7 @@
 
 - trajectory: `Trajectory`, its statistics and requested accuracy; summary: its text.
 - samples: what follows from states: acceleration, actuation, power, energy, tracking error; ledger: energy and work.
+- causes: the actuation of each joint by inertia, Coriolis, gravity and effect.
 - error_estimate: the estimated error and its verdict.
 - acting: what acts: names, wrenches on links, stops that joints bear on.
 - provenance: texts from which the robot of a run is built again.

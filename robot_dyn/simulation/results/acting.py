@@ -31,6 +31,8 @@ def _edits(robot: Robot) -> Iterator[str]:
     edits = robot.edits
     if any(edits.gravity):
         yield f"gravity {np.linalg.norm(edits.gravity):.4g} m/s²"
+    if estimated := len(robot.estimated):
+        yield f"inertia of {estimated} link{'s' * (estimated > 1)} estimated from shapes"
     yield from (f"payload {each.mass:g} kg on {each.frame}" for each in edits.payloads)
     if edits.mass_scale != 1:
         yield f"mass_scale {edits.mass_scale:g}"

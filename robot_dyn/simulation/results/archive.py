@@ -51,8 +51,8 @@ class Header:
         return f"{self.dtype.name} {self.shape}"
 
 
-def write(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write arrays with their digest, compressed.
+def write(stream: BinaryIO, arrays: Mapping[str, np.ndarray], compressed: bool = True) -> None:
+    """Write arrays with their digest, compressed unless told otherwise.
 
     Raises:
         ArchiveError: If a name cannot be that of a member.
@@ -62,7 +62,7 @@ def write(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
             raise ArchiveError(f"{shorten(name)!r} cannot be a name in a file; use a shorter one, without NUL")
     contents = {name: np.ascontiguousarray(array).reshape(np.shape(array)) for name, array in arrays.items()}
     contents[DIGEST] = np.array(_digest(contents))
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as file:
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED) as file:
         for name, array in contents.items():
             with file.open(f"{name}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, array, version=(1, 0), allow_pickle=False)

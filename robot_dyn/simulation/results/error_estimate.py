@@ -20,7 +20,7 @@ class Verdict(StrEnum):
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ErrorEstimate(Value):
     """Estimated error of positions, the largest over the joints, in [rad] or [m].
 
@@ -51,6 +51,9 @@ class ErrorEstimate(Value):
             figure += f" up to t = {self.resolved_until:g} s"
         reason = f": {self.reason}" if self.reason else ""
         return f"{figure} ({self.verdict}{reason})" + (f"; after that none: {self.note}" if self.note else "")
+
+    def __repr__(self) -> str:
+        return f"<ErrorEstimate: {self}>"
 
     @property
     def final(self) -> float:

@@ -18,7 +18,7 @@ _ROUNDING = 1e-12  # of the energies, whose differences are the residual
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Ledger(Value):
     """Energy at the samples of a run, in [J]; arrays of shape (m,).
 
@@ -40,6 +40,12 @@ class Ledger(Value):
 
     def __post_init__(self) -> None:
         read_only(self)
+
+    def __repr__(self) -> str:
+        if not self.known:
+            return "<Ledger: not recorded>"
+        worst = f"largest residual {largest(np.abs(self.residual)):.2e} J of {self.exchanged:.3g} J exchanged"
+        return f"<Ledger: {worst}; work of {', '.join(self.work) or 'nothing'}>"
 
     @property
     @np.errstate(all="ignore")
@@ -73,9 +79,17 @@ class Ledger(Value):
     @property
     def rounded(self) -> bool:
         """Whether the residual is rounding: at most 1e-12 of the energies and the work that are added up."""
+        return bool(largest(np.abs(self.residual)) <= self._rounding)
+
+    @property
+    def exchanges(self) -> bool:
+        """Whether energy was exchanged, beyond rounding of the energies."""
+        return self.exchanged > self._rounding
+
+    @property
+    def _rounding(self) -> float:
         parts = (self.kinetic, self.potential, *self.work.values())
-        size = sum(largest(np.abs(part)) for part in parts if not np.isnan(part).all())
-        return bool(largest(np.abs(self.residual)) <= _ROUNDING * size)
+        return _ROUNDING * sum(largest(np.abs(part)) for part in parts if not np.isnan(part).all())
 
     @property
     def closure(self) -> float:

@@ -20,6 +20,7 @@ from robot_dyn.description.description import check
 from robot_dyn.description.edits import Payload
 from robot_dyn.errors import DescriptionError, QueryError
 from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.setup.settings import settings_of
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.results.trajectory import Trajectory
@@ -44,13 +45,20 @@ def edits_of_machine_code(setup: Setup) -> dict[str, str]:
     return {"right_angles": edited_angles} if edited_angles else {}
 
 
+def settings_text(setup: Setup) -> dict[str, str]:
+    """The settings of a run, as a text of it."""
+    return {"settings": json.dumps(settings_of(setup), ensure_ascii=False)}
+
+
 def packed(about: dict[str, str], folder: Path) -> dict[str, str]:
-    """The texts of a run as a file in `folder` stores them."""
+    """The texts of a run as a file in `folder` stores them: without the name of the file that it was read from."""
+    about = {name: text for name, text in about.items() if name != "file"}
     return about | {"source": portable(about["source"], folder)} if "source" in about else about
 
 
-def unpacked(about: dict[str, str], folder: Path) -> dict[str, str]:
-    """The texts of a run whose file is in `folder`."""
+def unpacked(about: dict[str, str], file: Path) -> dict[str, str]:
+    """The texts of a run of a file, with the name of that file."""
+    about, folder = about | {"file": file.name}, file.parent
     if "source" not in about:
         return about
     path = Path(about["source"])

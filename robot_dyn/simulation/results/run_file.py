@@ -89,7 +89,7 @@ class Format(Generic[Run]):
                     held = f"{archive.size / 2**30:.3g} GiB, more than {max_bytes / 2**30:.3g} GiB"
                     raise RunFileError(f"{path}: holds {held}; if you trust it, raise max_bytes of the load")
                 run = self._built(archive.arrays(), about)
-                return replace(run, about=unpacked(run.about, Path(path).parent))
+                return replace(run, about=unpacked(run.about, Path(path)))
             except (ArchiveError, SerialError) as error:
                 raise RunFileError(f"{path}: is not a complete run file: {error}; simulate again") from None
 
@@ -170,7 +170,7 @@ def _check(run: Trajectory) -> None:
     if run.error is not None and not are_times(run.error.t):
         raise ArchiveError("the times of member 'error/t' are not those of a run, or do not grow")
     if run.power.keys() != run.ledger.work.keys():
-        raise ArchiveError("members 'power/…' and 'ledger/work/…' have different names")
+        raise ArchiveError("members of 'power' and of the ledger's 'work' have different names")
     if run.desired is not None and run.deviation is not None and run.deviation.shape != run.desired.shape:
         raise ArchiveError("members 'desired' and 'deviation' differ in shape")
     if run.desired is None and run.deviation is not None and run.deviation.shape[1] != 3:

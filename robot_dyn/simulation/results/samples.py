@@ -1,6 +1,6 @@
 """What follows from the states of a run: acceleration, actuation, power, energy and tracking error of each sample.
 
-    a = M⁻¹ (u + Σ τ − C v − N),   P_k = τ_kᵀ v,   E = K + Σ potentials
+    a = M⁻¹ (τ − C v − N),   P_k = τ_kᵀ v,   E = K + Σ potentials
 
 The tracking error is √(mean over samples and joints of (q − q_d)²).
 """
@@ -66,8 +66,19 @@ def _acceleration(
         return np.full_like(q, np.nan)
 
 
-def deviation_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Desired positions (m, n), and how far the joints (…, m, n), or the frame (…, m, 3), are from the reference.
+class Tracking(NamedTuple):
+    """Desired positions and velocities of the joints, (m, n); how far the joints, or the frame, are from the reference.
+
+    None where there is no such reference; `deviation` is (…, m, n) or (…, m, 3).
+    """
+
+    desired: np.ndarray | None = None
+    desired_velocity: np.ndarray | None = None
+    deviation: np.ndarray | None = None
+
+
+def tracking_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> Tracking:
+    """What a controller is to follow, and how far from it the motion is.
 
     Args:
         setup: Of the controller.
@@ -76,17 +87,28 @@ def deviation_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray
     """
     controller = setup.controller
     if controller is None:
-        return None, None
+        return Tracking()
     reference = controller.desired
     if isinstance(reference, PiecewisePolynomial):
-        desired = reference.at(t)[0]
-        return desired, q - desired
+        desired, velocity, _ = reference.at(t)
+        return Tracking(desired, velocity, q - desired)
     if isinstance(reference, CartesianReference) and controller.task_frame is not None:
-        return None, setup.plant.dynamics.placement(q, controller.task_frame)[..., :3, 3] - reference.at(t)[0]
-    return None, None
+        p = setup.plant.dynamics.placement(q, controller.task_frame)[..., :3, 3]
+        return Tracking(deviation=p - reference.at(t)[0])
+    return Tracking()
 
 
 def root_mean_square(deviation: np.ndarray) -> float:
     """Of all entries."""
     scale = np.ldexp(1.0, np.frexp(np.abs(deviation).max(initial=0.0))[1] - 1)  # that squares do not overflow
     return float(scale * np.sqrt(np.mean((deviation / scale) ** 2)))
+
+
+def root_mean_squares(x: np.ndarray) -> np.ndarray:
+    """Over the samples of runs (B, m, n) that are not nan, (B, n); nan where a run has none."""
+    known = ~np.isnan(x)
+    sizes = np.abs(x).max(axis=1, where=known, initial=0.0, keepdims=True)
+    scale = np.ldexp(1.0, np.frexp(sizes)[1] - 1)
+    with np.errstate(invalid="ignore"):  # 0 / 0 where nothing is known
+        mean = np.square(x / scale).sum(axis=1, where=known) / known.sum(axis=1)
+    return scale[:, 0] * np.sqrt(mean)

@@ -26,7 +26,8 @@ def summary(run: Trajectory) -> str:
     """A few lines: outcome, what acted, ledger, error, tracking, cost."""
     s, ledger, unit = run.statistics, run.ledger, units("q", joint_types(run))
     opening = f"{run.outcome.ending} at t = {run.outcome.t:g} s, {len(run.t)} samples"
-    residual = f"residual {largest(np.abs(ledger.residual)):.2e} J, {ledger.closure:.1e} of the energy exchanged"
+    part = f"{ledger.closure:.1e} of the energy exchanged" if ledger.exchanges else "no energy exchanged"
+    residual = f"residual {largest(np.abs(ledger.residual)):.2e} J, {part}"
     lines = [
         opening + _after(run.outcome.advice),
         *([] if run.acting is None else [f"effects: {', '.join(run.acting) or 'none'}"]),

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import inf
 from types import NoneType
-from typing import Annotated, Any, Protocol, final, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, final, runtime_checkable
 
 import numpy as np
 
 from robot_dyn.errors import QueryError, shown
+from robot_dyn.simulation.columns import attributes, by_heading, data_frame, data_set
 from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
@@ -18,6 +19,9 @@ from robot_dyn.simulation.results.samples import root_mean_square
 from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.values import Derived, Layout, read_only
 
+if TYPE_CHECKING:
+    from robot_dyn.effects.causes import Causes
+
 # Residuals, as parts of the energy exchanged. Over 150 random scenes they were at most 10 times the estimated error of
 # q, as a part of the motion; one that is far larger contradicts the estimate.
 _CONTRADICTS, _ROUNDING = 100.0, 1e-12
@@ -25,7 +29,7 @@ _CONTRADICTS, _ROUNDING = 100.0, 1e-12
 
 @runtime_checkable
 class Theorem(Protocol):
-    """What is proven of a motion, as `rd.Proof`."""
+    """What is proven of a motion, as `rd.studies.Proof`."""
 
     joint_names: tuple[str, ...]
 
@@ -132,7 +136,8 @@ class Trajectory(Derived):
         outcome: How it ended.
         statistics: What it took.
         error: Its estimated error; None without an estimate.
-        about: Texts that make it whole: URDF, its path, edits, scene, versions; the controlled frame, if any.
+        about: Texts that make it whole: URDF, its path, edits, settings, scene, versions; the controlled frame and the
+            file that it was read from, if any.
         wrenches: External wrench by link, rows (t, force, torque), (k, 7), in base axes at its frame, in SI units:
             at the samples and at both sides of each switch.
         at_stop: Whether each joint is at or beyond a stop, (m, n); None without stops.
@@ -144,6 +149,9 @@ class Trajectory(Derived):
         events: Where effects switched, and requested ones, in the order of time.
         effect_states: z of each effect with states, by name, (m, z); empty if they were not recorded.
         accuracy: The requested accuracy and its cost; None if none was requested.
+        effect_torques: What each effect exerted on the joints by name, (m, n), in [N m] or [N], so that
+            M a + C v + ∂V/∂q = u + their sum; None if they were not recorded.
+        desired_velocity: Velocities of a joint reference, or None.
     """
 
     joint_names: tuple[str, ...]
@@ -169,6 +177,10 @@ class Trajectory(Derived):
     events: tuple[Occurrence, ...] = field(default_factory=tuple)
     effect_states: dict[str, Annotated[np.ndarray, Layout(("m", None))]] = field(default_factory=dict)
     accuracy: Accuracy | None = field(default_factory=NoneType)
+    effect_torques: dict[str, Annotated[np.ndarray, Layout(("m", "n"), absent=True)]] | None = field(
+        default_factory=NoneType
+    )
+    desired_velocity: Annotated[np.ndarray, Layout(("m", "n"))] | None = field(default_factory=NoneType)
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -187,18 +199,49 @@ class Trajectory(Derived):
         """Decimal digits of q that a theorem confirms: −log₁₀ of the largest possible error, in [rad] or [m].
 
         Args:
-            proof: Of the same motion, as `rd.prove` returns it; samples after its end are left out.
+            proof: Of the same motion, as `rd.studies.prove` returns it; samples after its end are left out.
 
         Raises:
             QueryError: If it is of other joints, or its motion starts elsewhere.
         """
         if not isinstance(proof, Theorem):
-            raise QueryError(f"proof: give one, as rd.prove(setup), got {shown(proof)}")
+            raise QueryError(f"proof: give one, as rd.studies.prove(setup), got {shown(proof)}")
         if proof.joint_names != self.joint_names:
             raise QueryError(f"proof is of the joints {', '.join(proof.joint_names)}; give one of this motion")
         if self.t[0] == 0 and not proof.contains(0.0, self.q[0], self.v[0]):
             raise QueryError("the motion of the proof starts elsewhere; give one of this motion")
         return proof.digits_of(self.t, self.q)
+
+    def table(self) -> dict[str, np.ndarray]:
+        """The samples as columns (m,), by quantity, joint and unit: `run.table()["q elbow_joint [rad]"]`."""
+        from robot_dyn.simulation.results.table import columns
+
+        return by_heading(columns(self))
+
+    def to_pandas(self) -> Any:
+        """Return `table` as a `pandas.DataFrame`; MissingExtraError without pandas."""
+        from robot_dyn.simulation.results.table import columns
+
+        return data_frame(columns(self), attributes(self))
+
+    def to_xarray(self) -> Any:
+        """Return `table` as an `xarray.Dataset` over t and joint, units as attributes; MissingExtraError without it."""
+        from robot_dyn.simulation.results.table import columns
+
+        return data_set(columns(self), self.joint_names, attributes(self))
+
+    def causes(self) -> Causes:
+        """The actuation of each joint at the samples by cause: inertia, Coriolis, gravity, and each effect by its name.
+
+        The causes add up to u, to rounding. Where several effects hold a joint at rest, dry friction takes what it can
+        and stops the rest. The cause of a drive is what its motor takes for itself, less the torque of its spring.
+
+        Raises:
+            QueryError: If the run carries no robot, or does not hold what its effects exerted.
+        """
+        from robot_dyn.simulation.results.causes import causes_of
+
+        return causes_of(self)
 
     def __repr__(self) -> str:
         return f"<Trajectory: {self.summary}>"

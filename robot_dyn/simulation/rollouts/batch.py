@@ -58,8 +58,11 @@ class Batch:
     def some(self, runs: np.ndarray) -> Batch:
         """The runs of these numbers."""
         sweep = {name: x[runs] for name, x in self.sweep.items()}
-        numbers = runs if self.numbers is None else self.numbers[runs]
-        return Batch(self.setup, self.q0[runs], self.v0[runs], sweep, self.recorded, numbers)
+        return Batch(self.setup, self.q0[runs], self.v0[runs], sweep, self.recorded, self.number_of(runs))
+
+    def number_of(self, runs: np.ndarray) -> np.ndarray:
+        """Of runs at these places of the batch, the numbers of which their noise is."""
+        return runs if self.numbers is None else self.numbers[runs]
 
     def parts(self, run: int) -> tuple[Plant, Controller | None]:
         """Plant and controller of a run."""
@@ -103,7 +106,7 @@ class Batch:
             work=None if work is None else dict(zip(sources, np.moveaxis(work, -1, 0), strict=True)),
             **ends._asdict(), statistics=statistics, sources=sources,
             about=origin(self.setup.plant.dynamics) | self.setup.about, params=dict(self.sweep), setup=setup,
-            q0=self.q0, v0=self.v0, observed=observed,
+            q0=self.q0, v0=self.v0, observed=observed, numbers=self.numbers,
         )  # fmt: skip
 
 

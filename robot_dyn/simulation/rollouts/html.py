@@ -9,7 +9,7 @@ from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.rollouts.result import Rollouts
 
-_MOST_JOINTS, _MOST_RUNS = 4, 2000
+_MOST_JOINTS, _MOST_RUNS = 8, 2000
 _QUANTILES = {"least": 0.0, "median": 0.5, "largest": 1.0}
 
 
@@ -23,4 +23,7 @@ def rollouts_html(runs: Rollouts) -> str:
         with np.errstate(all="ignore"):
             at = [np.nanquantile(some[:, :, i], level, axis=0) for level in _QUANTILES.values()]
         plots.append(plot(f"{name} [{unit('q', kind)}]", runs.t, dict(zip(_QUANTILES, at, strict=True))))
-    return page("Rollouts", text(runs.summary), legend(_QUANTILES), side_by_side(plots))
+    parts = [text(runs.summary), legend(_QUANTILES), side_by_side(plots)]
+    if more := len(runs.joint_names) - len(plots):
+        parts.append(text(f"curves of the first {len(plots)} joints; {more} more are not drawn"))
+    return page("Rollouts", *parts)

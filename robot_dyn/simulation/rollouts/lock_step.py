@@ -149,7 +149,7 @@ class Tiles:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
         equation, index = self.compiled.equation, self._numbers(tile)
         run_parameters = self.compiled.run_parameters({name: x[index] for name, x in self.batch.sweep.items()})
-        return runs_of(equation, self.y[index].T, run_parameters, self.out_extras.shape[1], index)
+        return runs_of(equation, self.y[index].T, run_parameters, self.out_extras.shape[1], self.batch.number_of(index))
 
     def _numbers(self, tile: int) -> np.ndarray:
         """The numbers of the runs in a tile."""

@@ -11,8 +11,7 @@ import numpy as np
 from robot_dyn.coefficients import with_values
 from robot_dyn.simulation.compiled.build import with_numbers
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
-from robot_dyn.simulation.compiled.engine_choice import compiled_for
-from robot_dyn.simulation.compiled.self_check import check
+from robot_dyn.simulation.compiled.engine_choice import checked, compiled_for
 from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.observation.guard_levels import GuardLevels
@@ -61,8 +60,9 @@ class OneByOne:
         self.compiled = self.setup.engine != "interpreted"
         self.compiled_equation: CompiledStateEquation | None = None
         if self.compiled:
-            self.compiled_equation = compiled_for(self.setup, self.setup.equation, tuple(batch.sweep))
-            check(self.compiled_equation, self.setup)
+            self.compiled_equation = checked(
+                self.setup, lambda: compiled_for(self.setup, self.setup.equation, tuple(batch.sweep))
+            )
         self.records: list[Single | None] = [None] * len(batch)
         self.stop = np.zeros(1, np.int64)
 

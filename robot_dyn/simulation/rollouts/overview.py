@@ -16,7 +16,7 @@ from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Kind, Remark
 from robot_dyn.simulation.results.provenance import joint_types
-from robot_dyn.simulation.results.samples import deviation_of, root_mean_square
+from robot_dyn.simulation.results.samples import root_mean_square, tracking_of
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.values import Layout, Value, read_only
 
@@ -189,7 +189,7 @@ def tracking_errors(runs: Rollouts) -> np.ndarray | None:
         return None
     known = np.isfinite(runs.q.sum(axis=2))
     q = np.where(known[..., None], runs.q, 0.0)
-    _, deviation = deviation_of(runs.setup, runs.t, q)
+    deviation = tracking_of(runs.setup, runs.t, q).deviation
     if deviation is None:
         return None
     return np.array([root_mean_square(x[of]) if of.any() else np.nan for x, of in zip(deviation, known, strict=True)])

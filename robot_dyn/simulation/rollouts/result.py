@@ -11,6 +11,7 @@ from typing import Annotated, Any, final, overload
 import numpy as np
 
 from robot_dyn.errors import QueryError, escaped
+from robot_dyn.simulation.columns import attributes, by_heading, data_frame, data_set
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.observation.remarks import lines as lines_of
@@ -56,8 +57,8 @@ class Rollouts(Value):
         observed: Extremes, limits passed and chatter of each run, over all steps except for u of continuous control
             (see `remarks`); None in files of older versions.
         saved: Overview stored with runs read from a file; None otherwise.
-        numbers: For a slice, the number of each run in the original batch, which determines its noise, (B,); None
-            for a full batch, and for runs read from a file.
+        numbers: Number of each run, which determines its noise, (B,): those that were given, or of a slice those in
+            the original batch; None for a batch numbered from 0 on, and for runs read from a file.
     """
 
     joint_names: tuple[str, ...]
@@ -183,6 +184,29 @@ class Rollouts(Value):
         in the file by the largest fraction; the run with the largest tracking error; or 0.
         """
         return self.overview.worst
+
+    def table(self) -> dict[str, np.ndarray]:
+        """A row for each run, as columns (B,) by quantity, joint and unit: `runs.table()["rms v elbow_joint [rad/s]"]`.
+
+        What was swept, the start, the end, the tracking error, the remarks; the rms of v and u over the samples up to
+        the end, as far as they were recorded (`record=("q", "v", "u")` for u), and extremes of q, v and u
+        over the steps, which need no record (see `observed`).
+        """
+        from robot_dyn.simulation.rollouts.table import columns
+
+        return by_heading(columns(self))
+
+    def to_pandas(self) -> Any:
+        """Return `table` as a `pandas.DataFrame`; MissingExtraError without pandas."""
+        from robot_dyn.simulation.rollouts.table import columns
+
+        return data_frame(columns(self), attributes(self))
+
+    def to_xarray(self) -> Any:
+        """Return `table` and all samples as an `xarray.Dataset` over run, t and joint; MissingExtraError without it."""
+        from robot_dyn.simulation.rollouts.table import columns, samples
+
+        return data_set(columns(self), self.joint_names, attributes(self), samples(self))
 
     def __repr__(self) -> str:
         return f"<Rollouts: {self.summary}>"

@@ -1,6 +1,6 @@
 """Rollouts: one setup from many starts, or with many values of its parameters, side by side in machine code.
 
-    q' = v,   v' = M⁻¹ (u + Σ τ − C v − N)   for 64 runs side by side, on all threads
+    q' = v,   v' = M⁻¹ (τ − C v − N)   for 64 runs side by side, on all threads
 
 Each run is a lane of a tile, and no lane depends on another: one that diverges leaves the rest as they are.
 """
@@ -10,14 +10,16 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any, Unpack, cast
 
 import numpy as np
 
-from robot_dyn.codegen.parameters import CONTROLLER, link_parameters, names_of, parameters, with_parameters
+from robot_dyn.codegen.parameters import CONTROLLER, names_of, parameters, sweepable_parameters, with_parameters
 from robot_dyn.codegen.threads import thread_count
 from robot_dyn.coefficients import rebuilt
 from robot_dyn.description.edits import Edits
+from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.errors import QueryError, nearest, shown
@@ -25,7 +27,7 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.build import compiled_equation
-from robot_dyn.simulation.compiled.self_check import check
+from robot_dyn.simulation.compiled.engine_choice import checked
 from robot_dyn.simulation.results.acting import frame_of
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
 from robot_dyn.simulation.rollouts.batch import Batch
@@ -40,6 +42,7 @@ from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_BYTES
 from robot_dyn.validate import choice, instance, integer, joint_values, numbers, truth
 
+LARGEST_NUMBER = 2**53  # of a run
 RECORDS = ("q", "v", "u", "energy", "work")
 _WITHOUT_EFFECT = {
     "estimate_error": "simulate one of the runs for that",
@@ -56,6 +59,7 @@ def rollouts(
     params: Mapping[str, Any] | None = None,
     record: Iterable[str] = ("q", "v"),
     cuts: bool = True,
+    numbers: Any = None,
     threads: int | None = None,
     most_bytes: int = MOST_BYTES,
     on_progress: Callable[[float], object] | None = None,
@@ -85,6 +89,8 @@ def rollouts(
             those of `simulate`.
         cuts: False for runs in lock step whose steps do not end at thresholds, which the summary then names: faster,
             and wrong by as much as a step that passes one.
+        numbers: Numbers of the runs, of which their noise is, (B,); 0 to B − 1 unless given. The bits of a run depend
+            on its number, start and parameters, not on the runs beside it.
         threads: Number of threads; None for all processors.
         most_bytes: Refuse to record more than this.
         on_progress: Called with the time that the runs have reached, the mean in [s], some ten times a second; with
@@ -117,13 +123,52 @@ def rollouts(
         )
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
-    recorded, threads = _recorded(record), thread_count(threads)
-    q, v, sweep = _starts(setup, q0, v0, params or {})
+    batch = batch_of(setup, q0, v0, params or {}, record, numbers)
+    passed = None if _why_one_by_one(setup) else thresholds(setup, batch.sweep, len(batch))
+    runs = run_batch(batch, passed, truth("cuts", cuts), thread_count(threads), most_bytes, on_progress)
+    return replace(runs, advice=causes(replace(runs, setup=setup)))
+
+
+def batch_of(
+    setup: Setup, q0: Any, v0: Any, params: Mapping[str, Any], record: Iterable[str], numbers: Any = None
+) -> Batch:
+    """The runs of a setup; arguments and errors as of `rollouts`."""
+    recorded = _recorded(record)
+    q, v, sweep = _starts(setup, q0, v0, params)
+    return Batch(setup, q, v, sweep, recorded, None if numbers is None else _numbers(numbers, len(q)))
+
+
+def _numbers(given: Any, count: int) -> np.ndarray:
+    """Numbers of runs, (B,)."""
+    array = numbers("numbers", given, ("B",), least=0)
+    if array.shape != (count,) or (array != np.floor(array)).any() or array.max() > LARGEST_NUMBER:
+        raise QueryError(f"numbers: give a whole number of each of the {count} runs, 0 to {LARGEST_NUMBER:g}")
+    return array.astype(np.int64)
+
+
+def manners(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
+    """The runs of a batch in groups of which each is run in one manner whatever runs are beside it, with thresholds.
+
+    A batch in which some run has a threshold detects what passes it; its runs without any go apart from it, as they go
+    in a batch of such runs alone.
+    """
+    runs = np.arange(len(batch))
+    passed = None if _why_one_by_one(batch.setup) else thresholds(batch.setup, batch.sweep, len(batch))
+    if passed is None or passed.some.all():
+        return [(runs, passed)]
+    with_some = runs[passed.some]
+    return [(with_some, passed.of(with_some)), (runs[~passed.some], None)]
+
+
+def run_batch(
+    batch: Batch, passed: Thresholds | None, cuts: bool, threads: int, most_bytes: int,
+    on_progress: Callable[[float], object] | None = None,
+) -> Rollouts:  # fmt: skip
+    """The runs of a batch with thresholds `passed`, as of `rollouts`, but for the causes of their divergence."""
+    setup = batch.setup
     why = _why_one_by_one(setup)
-    if not truth("cuts", cuts) and why:
+    if not cuts and why:
         raise QueryError(f"cuts=False: {why}, and so the runs go one after the other; leave it out")
-    batch = Batch(setup, q, v, sweep, recorded)
-    passed = None if why else thresholds(setup, sweep, len(q))
     cut = passed is not None or setup.finds_events  # samples are then interpolated within steps, which lock step cannot
     if why or (cuts and cut and not setup.samples_on_steps):
         runs = one_by_one(batch, most_bytes, threads, on_progress)
@@ -131,8 +176,7 @@ def rollouts(
         runs = _side_by_side(batch, passed if cuts else None, most_bytes).run(threads, on_progress)
         if passed is not None and not cuts:
             runs = replace(runs, uncut=passed.names)
-    about = frame_of(setup) | edits_of_machine_code(setup) | runs.about
-    return replace(runs, about=about, advice=causes(replace(runs, setup=setup)))
+    return replace(runs, about=frame_of(setup) | edits_of_machine_code(setup) | runs.about)
 
 
 def _why_one_by_one(setup: Setup) -> str:
@@ -156,12 +200,11 @@ def _side_by_side(batch: Batch, passed: Thresholds | None, most: int) -> Tiles:
     from_code = ("u", "v", "energy") if equation.canonical else ("u", "energy")
     extras = tuple(name for name in from_code if name in recorded)
     method = cast(Integrator, setup.integrator)
-    compiled = compiled_equation(
-        equation, method, lanes=LANES, extras=extras, swept=tuple(batch.sweep), jacobian=method.needs_jacobian,
-        detects=passed is not None, nonsmooth=setup.integrator.nonsmooth,
+    build = partial(
+        compiled_equation, equation, method, lanes=LANES, extras=extras, swept=tuple(batch.sweep),
+        jacobian=method.needs_jacobian, detects=passed is not None, nonsmooth=setup.integrator.nonsmooth,
     )  # fmt: skip
-    check(compiled, setup)
-    return Tiles(batch, compiled, extras, most, passed)
+    return Tiles(batch, checked(setup, build), extras, most, passed)
 
 
 def _recorded(record: Any) -> tuple[str, ...]:
@@ -227,8 +270,8 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
             raise QueryError(
                 f"params: no {name!r}: the arm carries no payload; add one, as robot.with_(payload={payload})"
             )
-        names = dict.fromkeys((*(each.name for each in swept), *link_parameters(plant.dynamics)))
-        raise QueryError(f"params: no {name!r}; {nearest(name, names)}")
+        known = sweepable_parameters(plant.dynamics, plant.effects, setup.controller)
+        raise QueryError(f"params: no {name!r}; {nearest(name, dict.fromkeys(each.name for each in known))}")
     n, declared = mine[0].size, mine[0].declared
     shapes = (("B",), ("B", 1), ("B", n)) if declared.of_joints or n == 1 else (("B", *mine[0].value.shape),)
     array = numbers(
@@ -240,9 +283,11 @@ def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
         for inertia in rows.reshape(-1, 3, 3):
             Edits().with_((), inertias={part.key.partition(" ")[2]: inertia})  # refuses what no body has
     for part in {each.part for each in mine if each.part[0] == "effect"}:
+        effect = plant.effects[part[1]]
+        if type(effect).__post_init__ is Effect.__post_init__:
+            continue  # it asks no more of its coefficients than was asked above
         for row in np.unique(rows, axis=0):
-            value = row.reshape(mine[0].value.shape)
-            replace(plant.effects[part[1]], **{mine[0].key: value})  # refuses what has no meaning
+            replace(effect, **{mine[0].key: row.reshape(mine[0].value.shape)})  # refuses what has no meaning
     for part in (each for each in mine if each.part == CONTROLLER and "." in each.key):
         for row in np.unique(rows, axis=0):
             rebuilt(setup.controller, {part.key: row.reshape(part.value.shape)})

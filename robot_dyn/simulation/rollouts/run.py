@@ -1,6 +1,6 @@
 """One run of a batch as a trajectory: the recorded quantities, and those computed from them and the setup.
 
-a = M⁻¹ (u + Σ τ − C v − N),   P_k = τ_kᵀ v;   nan where neither the record nor the setup determines a value
+a = M⁻¹ (τ − C v − N),   P_k = τ_kᵀ v;   nan where neither the record nor the setup determines a value
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from robot_dyn.errors import QueryError
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.acting import acting, at_stop, wrenches
 from robot_dyn.simulation.results.ledger import Ledger
-from robot_dyn.simulation.results.samples import columns, deviation_of
+from robot_dyn.simulation.results.provenance import settings_text
+from robot_dyn.simulation.results.samples import Tracking, columns, tracking_of
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.batch import parts_of_run
 from robot_dyn.simulation.rollouts.overview import remarks_of
@@ -46,18 +47,19 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
     work = {name: np.full(len(t), np.nan) for name in runs.sources}
     if runs.work is not None:
         work = {name: x[run, known] for name, x in runs.work.items()}
-    desired, deviation, loads, stops, acts = None, None, {}, None, None
+    tracking, loads, stops, acts, settings = Tracking(), {}, None, None, {}
     if setup is not None:
-        desired, deviation = deviation_of(setup, t, q)
+        tracking, settings = tracking_of(setup, t, q), settings_text(setup)
         loads, stops, acts = wrenches(setup.plant, t, q), at_stop(setup.plant, q), acting(setup)
     counts = {"steps": int(runs.steps[run]), "evaluations": int(runs.evaluations[run])}
-    about = runs.about | {"run": f"{run} of {len(runs)}"}
+    about = runs.about | settings | {"run": f"{run} of {len(runs)}"}
     return Trajectory(
         joint_names=runs.joint_names, t=t, q=q, v=v, a=a, u=u, power=dict(zip(runs.sources, power.T, strict=True)),
-        ledger=Ledger(energy[:, 0], energy[:, 1], work), desired=desired, deviation=deviation,
+        ledger=Ledger(energy[:, 0], energy[:, 1], work), desired=tracking.desired, deviation=tracking.deviation,
         outcome=runs.outcome(run), statistics=replace(runs.statistics, **counts), about=about, wrenches=loads,
         at_stop=stops, acting=acts, remarks=remarks_of(runs, run, setup, t, q),
         extremes=None if runs.observed is None else runs.observed.extremes[run],
+        desired_velocity=tracking.desired_velocity,
     )  # fmt: skip
 
 

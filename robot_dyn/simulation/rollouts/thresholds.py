@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.codegen.parameters import CONTROLLER, Part, joined, parameters, rows, split
 from robot_dyn.coefficients import with_values
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import LockStep, lock_step
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_CUT
+from robot_dyn.threshold import smooth
 
 
 @final
@@ -37,6 +40,15 @@ class Thresholds:
     functions: int
     others: np.ndarray
     names: tuple[str, ...]
+
+    @property
+    def some(self) -> np.ndarray:
+        """Whether each run has a threshold, (B,)."""
+        return np.isfinite(self.levels).any(axis=0) | self.others
+
+    def of(self, runs: np.ndarray) -> Thresholds:
+        """The thresholds of some of the runs."""
+        return replace(self, levels=self.levels[:, runs], others=self.others[runs])
 
     def lanes(self, runs: np.ndarray, rows: int, positions: int) -> LockStep:
         """The switching functions of some of the runs at their start: of rates of so many rows, and `positions`."""
@@ -93,6 +105,7 @@ def _of_runs(
     plant, controller = equation.plant, equation.controller
     known = parameters(plant.dynamics, plant.effects, controller, sweep)
     parts = {each.part for each in known if each.name in sweep and each.part[0] in ("effect", *CONTROLLER)}
+    parts = {part for part in parts if not _always_smooth(controller if part == CONTROLLER else plant.effects[part[1]])}
     known = [each for each in known if each.part in parts]
     of = {part: controller if part == CONTROLLER else plant.effects[part[1]] for part in parts}
     values, places = joined(known), {each.name: rows(known, each.name) for each in known if each.name in sweep}
@@ -112,3 +125,8 @@ def _of_runs(
         state = StateEquation(Plant(plant.dynamics, effects), swept.get(CONTROLLER, controller), equation.canonical)
         found.append((Switching(state), np.array(runs if parts else range(count))))
     return found
+
+
+def _always_smooth(part: Any) -> bool:
+    """Whether a part has no threshold, whatever its coefficients are."""
+    return type(part).thresholds in (smooth, Effect.thresholds, Controller.thresholds)

@@ -24,12 +24,12 @@ from robot_dyn.simulation.events.crossings import (
     Switches,
     approaches,
     correction,
-    first_event,
     nears,
     remember,
     settle_sides,
 )
 from robot_dyn.simulation.events.detection import FASTEST
+from robot_dyn.simulation.events.first_event import first_event
 from robot_dyn.simulation.events.holding import Holding
 from robot_dyn.simulation.events.sides import Sides, goes_on
 from robot_dyn.simulation.run.recording import Records, log_step, sample, share, show

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from inspect import signature
 from typing import Any, final
 
@@ -18,7 +18,8 @@ _DIRECTIONS = (-1, 0, 1)
 class Event:
     """A user-defined event: g(t, q, v) = 0.
 
-    A step of integration ends there. Between the ends of steps g is looked at eight times on the dense output.
+    A step of integration ends there. Within a step g is evaluated at its eighths on the dense output, and its least
+    value near 0 is searched, so that g may pass 0 twice between two of them; two minima there may be missed.
 
     Attributes:
         function: g, a function of (t, q, v) that returns a number.
@@ -30,7 +31,7 @@ class Event:
         QueryError: If the function does not take three arguments, or an option is not allowed.
     """
 
-    function: Callable[[Any, Any, Any], Any]
+    function: Callable[[Any, Any, Any], Any] = field(repr=False)
     direction: int = 0
     terminal: bool = False
     name: str = ""

@@ -5,19 +5,18 @@ Names and defaults stand once, in `Setup`; `inspect.signature` and `help` of bot
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from copy import copy
-from dataclasses import fields, replace
-from inspect import Parameter, signature
-from typing import Any, TypedDict, TypeVar
+from dataclasses import MISSING, fields, replace
+from inspect import signature
+from typing import Any, TypedDict
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, nearest
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.signatures import takes
 from robot_dyn.simulation.setup.setup import Setup, no_step
-
-Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class Options(TypedDict, total=False):
@@ -35,15 +34,10 @@ class Options(TypedDict, total=False):
     accuracy: Any
 
 
-def takes_options(function: Function) -> Function:
-    """A decorator: the signature shows each option with its default, in place of `**options`."""
-    known = signature(function)
-    (rest,) = (each for each in known.parameters.values() if each.kind is Parameter.VAR_KEYWORD)
-    given = [each for each in known.parameters.values() if each is not rest]
-    of_setup = signature(Setup).parameters
-    options = [of_setup[name].replace(kind=Parameter.KEYWORD_ONLY) for name in Options.__annotations__]
-    function.__signature__ = known.replace(parameters=[*given, *options])  # pyright: ignore[reportFunctionMemberAccess]
-    return function
+_BUILT = {each.name: each.default_factory() for each in fields(Setup) if each.default_factory is not MISSING}
+_STATED = {name: signature(Setup).parameters[name] for name in Options.__annotations__}
+takes_options = takes([x.replace(default=_BUILT.get(name, x.default)) for name, x in _STATED.items()])
+"""A decorator: the signature shows each option with its default, in place of `**options`."""
 
 
 def starts(q0: Any, v0: Any) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from robot_dyn.simulation.dynamics.declarations import is_value, undeclared
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.checks import check_model, check_parts, least_accuracy
 from robot_dyn.simulation.setup.event import Event
+from robot_dyn.simulation.setup.explanation import explanation_of
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
 from robot_dyn.simulation.setup.size import MOST_CUT, check_segments
 from robot_dyn.validate import choice, duration, instance, integer, one_state, truth
@@ -42,8 +43,8 @@ class Setup(Value, Caching):
         duration_s: In [s].
         controller: What drives it: a `Controller`; a function (t, q, v) → torque (n,), which becomes one; or None.
         integrator: The method, by its name as in a scene or itself: "auto", "DOP853" and "Rosenbrock", or an `Adaptive`
-            with other tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of `rd.method` have a
-            fixed one.
+            with other tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of
+            `rd.integrate.method` have a fixed one.
         step_s: Fixed step, 1 ms unless given; shortened where samples, ticks, switches and the end require it. It is
             not to be given for a method that chooses its steps.
         record_period_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
@@ -111,6 +112,12 @@ class Setup(Value, Caching):
             raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {self.integrator}")
         if not self.estimate_error:
             raise QueryError("accuracy: is held to the error estimate; leave out estimate_error=False")
+
+    def __repr__(self) -> str:
+        return f"<Setup: {explanation_of(self)}>"
+
+    def _repr_html_(self) -> str:
+        return explanation_of(self)._repr_html_()
 
     def __getstate__(self) -> Any:
         state, frozen = super().__getstate__()
@@ -209,7 +216,7 @@ def no_step(name: str) -> str:
     """What is wrong with a step for a method that chooses its own."""
     return (
         f"step_s has no effect on {name}, which chooses its steps: leave it out, name a method of fixed step, such as"
-        " integrator='rk4', or give rd.Adaptive(max_step_s=…)"
+        " integrator='rk4', or give rd.integrate.Adaptive(max_step_s=…)"
     )
 
 
@@ -227,7 +234,10 @@ def _controller(given: Any, n: int) -> Controller | None:
     if callable(given) and not isinstance(given, Controller) and not isinstance(given, type):
         controller = ControlLaw(given, n)
     instance(
-        "controller", controller, Controller | None, "give one, such as rd.PD(…), a function of (t, q, v), or None"
+        "controller",
+        controller,
+        Controller | None,
+        "give one, such as rd.control.PD(…), a function of (t, q, v), or None",
     )
     if controller is not None:
         duration("period_s of the controller", controller.period_s, zero=True)

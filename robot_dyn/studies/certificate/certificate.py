@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 from math import log10, nan
 from typing import Any, ClassVar, final
 
+from robot_dyn.answer import Block
 from robot_dyn.errors import QueryError
 from robot_dyn.queries.units import format_duration
-from robot_dyn.result import Result, reported
+from robot_dyn.result import reported
+from robot_dyn.studies.certificate.text import DECIMALS, certificate_tables
+from robot_dyn.studies.result import Result
 from robot_dyn.validate import choice
-
-DECIMALS = "decimals of the file as float64"  # name of the implementation that computes exactly with these decimals
 
 
 @final
@@ -71,7 +72,7 @@ class Condition:
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Certificate(Result):
     """True digits of a robot's dynamics.
 
@@ -100,9 +101,12 @@ class Certificate(Result):
     condition: Condition
     bits: int
     left_out: tuple[str, ...]
-    environment: dict[str, str] = field(repr=False)
+    environment: dict[str, str]
     seed: int
     interrupted: bool = False
+
+    def tables(self) -> Iterator[Block]:
+        return certificate_tables(self)
 
     def of(self, quantity: str, implementation: str) -> Held:
         """The digits of one quantity by one implementation.

@@ -13,7 +13,7 @@ import numpy as np
 
 from robot_dyn.errors import RobotDynError
 from robot_dyn.result import reported
-from robot_dyn.studies.budget import Budget
+from robot_dyn.studies.time_budget import Budget
 
 _QUARTILES = (25, 50, 75)
 

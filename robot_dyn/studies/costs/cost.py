@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar, final
 
+from robot_dyn.answer import Block
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import format_duration
-from robot_dyn.result import Result, reported
+from robot_dyn.result import reported
 from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.costs import step_cost
 from robot_dyn.studies.costs.ab_comparison import ABComparison, Pair, Version, in_turns
 from robot_dyn.studies.costs.query_cost import QueryCost
+from robot_dyn.studies.costs.text import cost_tables
 from robot_dyn.studies.environment import environment
+from robot_dyn.studies.result import Result
+from robot_dyn.studies.time_budget import Budget
 from robot_dyn.validate import choice, function, integer, number
 
 _MOST_REPEATS = 1000
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Cost(Result):
     """The cost of the parts of a setup, and of algorithms for its equations.
 
@@ -49,10 +52,13 @@ class Cost(Result):
     acting: tuple[str, ...]
     alternatives: tuple[ABComparison, ...]
     left_out: tuple[str, ...]
-    environment: dict[str, str] = field(repr=False)
+    environment: dict[str, str]
     budget_s: float
     spent_s: float
     interrupted: bool = False
+
+    def tables(self) -> Iterator[Block]:
+        return cost_tables(self)
 
     def of(self, what: str) -> ABComparison:
         """The two versions of what differs, such as "gravity" or "forward dynamics".

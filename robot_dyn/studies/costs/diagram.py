@@ -31,7 +31,7 @@ def draw(result: Cost, theme: str = "light") -> Figure:
     height = _HEIGHT + _ROW * max(len(parts), len(others))
     figure, colours = sheet(_WIDTH, height, result, _caption(result), theme)
     grid = figure.add_gridspec(
-        1, 2, left=0.125, right=0.975, top=1 - 1.3 / height, bottom=0.55 / height, wspace=0.55, width_ratios=(1, 1.15)
+        1, 2, left=0.125, right=0.975, top=1 - 1.3 / height, bottom=0.55 / height, wspace=0.72, width_ratios=(1, 1.1)
     )
     if parts:
         _draw_parts(figure.add_subplot(grid[0]), parts, colours)
@@ -70,7 +70,7 @@ def _draw_parts(axes: Any, parts: list[tuple[str, int, float | None]], colours: 
         said = f" {count} ({100 * count / whole:.1f} %){time}".replace("-", "−")
         axes.text(max(count, 0), place, said, va="center", fontsize=8, **ink(colours))
     _named(axes, [name for name, _, _ in parts], colours)
-    axes.set_xlim(min(0, *(count for _, count, _ in parts)), 1.45 * max(count for _, count, _ in parts) or 1)
+    axes.set_xlim(min(0, *(count for _, count, _ in parts)), 1.7 * max(count for _, count, _ in parts) or 1)
 
 
 def _draw_ratios(axes: Any, others: list[ABComparison], colours: Colours) -> None:

@@ -1,7 +1,9 @@
 """The doctor of URDF files: what is wrong or doubtful in one, and what can be repaired.
 
-check                             the whole check
+check, report                     the whole check; findings as text
 document, finding                 the file; findings and changes
-spelling, literals, limits, names findings in the text
-masses, shapes, estimate          findings in the numbers, alone and against the shapes of links
+spelling, literals, names         findings in the text
+limits, axes, proportions         findings in its joints and lengths
+masses, gravity_load              findings in the numbers of the robot
+shapes, estimate                  the same against the shapes of links
 """

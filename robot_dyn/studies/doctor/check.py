@@ -2,34 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
+from robot_dyn.answer import Answer, Block
 from robot_dyn.description import catalog, description
 from robot_dyn.description.packages import searched
 from robot_dyn.errors import DescriptionError
 from robot_dyn.model.robot import Robot
 from robot_dyn.result import UNREPORTED, reported
-from robot_dyn.studies.doctor import limits, literals, masses, names, shapes, spelling
+from robot_dyn.shapes.masses import Masses
+from robot_dyn.studies.doctor import (
+    axes,
+    gravity_load,
+    limits,
+    literals,
+    masses,
+    names,
+    proportions,
+    report,
+    shapes,
+    spelling,
+)  # fmt: skip
 from robot_dyn.studies.doctor.document import Document
-from robot_dyn.studies.doctor.estimate import estimates
+from robot_dyn.studies.doctor.estimate import missing_inertials
 from robot_dyn.studies.doctor.finding import Finding, Severity
 from robot_dyn.validate import truth
 
 _OF_TEXT = (
     spelling.misspelt, literals.decimal_commas, literals.line_breaks, literals.angles_in_degrees,
-    literals.near_right_angles, limits.limits, names.names, names.leftovers,
+    literals.near_right_angles, proportions.far_origins, axes.missing_axes, limits.limits, names.names, names.leftovers,
 )  # fmt: skip
 _ORDER = [*Severity]
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Checkup:
+@dataclass(frozen=True, eq=False, repr=False)
+class Checkup(Answer):
     """What a check found.
 
     Attributes:
@@ -38,55 +51,89 @@ class Checkup:
         findings: The gravest first.
         repaired: The file with all changes of the findings, each in a comment before its element; None if it is not
             XML, or nothing can be changed.
+        left: The findings that the repaired file still has; all of them if there is none.
+        examined: Whether masses, inertias and shapes were checked, which takes a file, or a repaired one, that is read.
     """
 
     source: str
     loads: bool
     findings: tuple[Finding, ...]
     repaired: bytes | None = field(metadata=UNREPORTED)
+    left: tuple[Finding, ...] = field(metadata=UNREPORTED)
+    examined: bool = field(default=False, metadata=UNREPORTED)
 
     @reported
     def ok(self) -> bool:
         """Whether there is no error among the findings."""
         return not any(each.severity is Severity.ERROR for each in self.findings)
 
+    @property
+    def sentence(self) -> str:
+        """How many findings of each severity there are, and whether the file is read."""
+        unread = "" if self.loads else "; it does not load"
+        unread += "" if self.examined else "; masses, inertias and shapes were not checked"
+        return f"{catalog.abbreviated(self.source)}: {report.counted(self.findings) or 'nothing found'}{unread}"
+
+    def blocks(self) -> Iterator[Block]:
+        """The sentence, and a line for each kind of finding; `findings` has all of them."""
+        yield self.sentence
+        yield from (f"  {report.sentence(each)}" for each in report.grouped(self.findings))
+
+    def _repr_html_(self) -> str:
+        from robot_dyn.display import page, table
+
+        rows = ((x.severity.value, x.where, x.line, x.what, x.remedy) for x in self.findings)
+        return page(self.sentence, table(("", "where", "line", "what", "remedy"), rows) if self.findings else "")
+
 
 def check(
-    name_or_path: str | Path, *, package_dirs: Iterable[str | Path] = (), density: float | None = None,
-    units: bool = False,
+    name_or_path: str | Path, *, package_dirs: Iterable[str | Path] = (), mass: Mapping[str, float] | None = None,
+    total_mass: float | None = None, density: float | None = None, units: bool = False,
+    xacro: Mapping[str, str | float | bool] | None = None,
 ) -> Checkup:  # fmt: skip
     """Check a URDF file: its numbers, names, limits and units, and its inertias against the shapes of its links.
 
     Args:
         name_or_path: As of `load`.
         package_dirs: Folders in which packages of meshes are searched first.
-        density: In [kg/m³]: links with a shape and no inertial get the inertia of that shape among the repairs.
+        mass: Masses by link, in [kg]: links with a shape and no inertial get one among the repairs, as in `load`.
+        total_mass: Of the robot, in [kg]: likewise; what the known masses leave is shared by volume.
+        density: In [kg/m³]: likewise, in place of total_mass.
         units: Whether masses, inertias and shapes in units that are suspected are converted among the repairs. Numbers
             that nobody measured look like these as well.
+        xacro: Expand the file by xacro first, as `load` does; findings are those of the expanded text, without lines.
 
     Raises:
         CatalogError: If there is no such file, or an entry of `package_dirs` is not a folder.
-        DescriptionError: If it cannot be opened; a file that is refused is a finding.
-        QueryError: If density is not positive.
+        DescriptionError: If it cannot be opened, or expanded; a file that is refused is a finding. If masses are given
+            and the shape of a link without inertial cannot be read.
+        QueryError: If a mass, the total or the density is not allowed, as in `load`.
     """
     package_dirs = searched(package_dirs)
-    path = catalog.find(name_or_path, package_dirs)
+    path, units = catalog.find(name_or_path, package_dirs), truth("units", units)
+    nothing = mass is None and total_mass is None and density is None
+    known = None if nothing else Masses({} if mass is None else mass, total_mass, density)
+    if xacro is not None:
+        from robot_dyn.description.sources.xacro import expand
+
+        text, warned = expand(path, xacro, package_dirs)
+        return _without_lines(checked(text, str(path), package_dirs, known, units), map(_assumed, warned))
     try:
         description.refuse_xacro(path)
     except DescriptionError as error:
-        return Checkup(str(path), False, (_of_refusal(str(path), str(error)),), None)
-    return checked(description.content(path), str(path), package_dirs, density, truth("units", units))
+        return _refused(str(path), error)
+    return checked(description.content(path), str(path), package_dirs, known, units)
 
 
 def checked(
-    text: bytes, source: str, package_dirs: tuple[Path, ...] = (), density: float | None = None, units: bool = False
+    text: bytes, source: str, package_dirs: tuple[Path, ...] = (), known: Masses | None = None, units: bool = False
 ) -> Checkup:
     """Check the text of a file."""
     refusal = _refusal(text, source)
     try:
         document = written = Document(text, source)
     except DescriptionError as error:
-        return Checkup(source, False, (_of_refusal(source, str(error)),), None)
+        return _refused(source, error)
     found = [_assumed(each) for each in document.assumed]
     found += [finding for find in _OF_TEXT for finding in find(document)]
     explained = any(each.severity is Severity.ERROR for each in found)
@@ -100,17 +147,47 @@ def checked(
     robot = None if still is not None else _loaded(document, found)
     if robot is not None:
         found += [_assumed(each) for each in robot.description.findings if not _reported(each, found)]
-        found += masses.masses(robot)
         of, unread = shapes.shapes(robot, package_dirs)
         found += [_of_mesh(each) for each in unread]
-        later = [*shapes.misfits(document, robot, of), *shapes.outside(robot, of), *estimates(document, of, density)]
+        estimated = [*missing_inertials(document, robot.description, of, known, package_dirs)]
+        found += estimated
+        if made := [each for each in estimated if each.changes]:
+            repairs += made
+            document = _rewritten(document, made)
+            robot = Robot(description.check(document.text, source))
+        found += masses.masses(document, robot)
+        later = [*shapes.misfits(document, robot, of), *shapes.outside(document, robot, of)]
         found += later
+        found += masses.beyond_reach(document, robot, found)
+        found += gravity_load.weak_joints(document, robot, found)
         if made := [each for each in later if each.changes and (units or not each.supposed)]:
             repairs += made
             document = _rewritten(document, made)
-    found.sort(key=lambda each: _ORDER.index(each.severity))
     loads = refusal is None and not any(each.kind == "refused" for each in found)
-    return Checkup(source, loads, tuple(found), document.text if repairs or declared else None)
+    return Checkup(
+        source, loads, _gravest_first(found), document.text if repairs or declared else None,
+        _gravest_first(each for each in found if not any(each is mended for mended in repairs)), robot is not None,
+    )  # fmt: skip
+
+
+def _gravest_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    return tuple(sorted(findings, key=lambda each: _ORDER.index(each.severity)))
+
+
+def _refused(source: str, error: DescriptionError) -> Checkup:
+    """Of a text that is not read at all."""
+    found = (_of_refusal(source, str(error)),)
+    return Checkup(source, False, found, None, found)
+
+
+def _without_lines(checkup: Checkup, more: Iterable[Finding]) -> Checkup:
+    """The checkup of an expanded text, whose lines are not those of the file, with the warnings of the expansion."""
+    more = tuple(more)
+    found, left = (
+        _gravest_first((*(replace(each, line=None) for each in findings), *more))
+        for findings in (checkup.findings, checkup.left)
+    )
+    return replace(checkup, findings=found, left=left)
 
 
 def _refusal(text: bytes, source: str) -> DescriptionError | None:
@@ -167,9 +244,7 @@ def _rewritten(document: Document, findings: Iterable[Finding]) -> Document:
             comment.tail = _indent(change.element)
             change.apply()
             change.element.addprevious(comment)
-    tree = document.root.getroottree()
-    text = etree.tostring(tree, xml_declaration=True, encoding="UTF-8")
-    return Document(text + b"\n" if not text.endswith(b"\n") else text, document.source)
+    return document.mended()
 
 
 def _plain(text: str) -> str:

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from copy import copy
 from typing import Any, final
 
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
 from robot_dyn.description.markup import parse
+from robot_dyn.description.urdf import other_format
 from robot_dyn.errors import DescriptionError
 from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+
+_NOT_IN_M = ("limit", "dynamics", "calibration", "safety_controller")
 
 
 def parsed(text: str | None) -> float:
@@ -35,7 +41,7 @@ class Document:
         self.text, self.source = text, source
         self.root, self.assumed = parse(text, source, comments=True)
         if self.root.tag != "robot":
-            raise DescriptionError(f"{source}: begins with <{self.root.tag}>, not <robot>; give a URDF file")
+            raise DescriptionError(f"{source}: line {self.root.sourceline}: {other_format(self.root.tag)}")
 
     def elements(self) -> Iterator[Any]:
         """All elements of links and joints, and these themselves, without comments."""
@@ -47,6 +53,13 @@ class Document:
         """A link or joint by its name, or None."""
         found = (each for each in self.root.iterfind(kind) if (each.get("name") or "").strip() == name)
         return next(found, None)
+
+    def mended(self) -> Document:
+        """The document with the text of its elements as they are now; these keep the lines of the file."""
+        text = etree.tostring(self.root.getroottree(), xml_declaration=True, encoding="UTF-8")
+        new = copy(self)
+        new.text = text + b"\n" if not text.endswith(b"\n") else text
+        return new
 
     def line(self, where: str, what: str) -> int | None:
         """Return the line of the link or joint, or of the element in it or in its inertial, that a refusal names."""
@@ -62,6 +75,14 @@ class Document:
     ) -> Finding:
         """Return a finding at an element: with its link or joint, and its line."""
         return Finding(severity, kind, self.where(element), what, remedy, element.sourceline, changes)
+
+    @staticmethod
+    def moves_mass(element: Any) -> bool:
+        """Whether an element has a part in M: that of an inertial, or of a joint, limits and friction excepted."""
+        while (above := element.getparent()) is not None and above.tag not in ("link", "joint", "robot"):
+            element = above
+        inertial = above is not None and above.tag == "link" and element.tag == "inertial"
+        return inertial or (above is not None and above.tag == "joint" and element.tag not in _NOT_IN_M)
 
     @staticmethod
     def where(element: Any) -> str:

@@ -1,41 +1,61 @@
-"""Inertials that a file does not state, estimated from the shapes of links at a density."""
+"""Inertials that a file does not state, and those that were estimated; with masses they are estimated from shapes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
-
+from robot_dyn.description.description import Description
+from robot_dyn.shapes.estimate import Estimate, estimates, shapes_of_lacking
+from robot_dyn.shapes.masses import Masses
 from robot_dyn.studies.doctor.document import Document
 from robot_dyn.studies.doctor.finding import Change, Finding, Severity
-from robot_dyn.validate import number
 
 if TYPE_CHECKING:
     from robot_dyn.studies.doctor.shapes import Shape
 
-_MOMENTS = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 
+def missing_inertials(
+    document: Document,
+    description: Description,
+    of: Mapping[str, Shape],
+    masses: Masses | None,
+    package_dirs: tuple[Path, ...],
+) -> Iterator[Finding]:
+    """Links without an inertial that have a shape: with masses each gets one; and those whose inertial is marked.
 
-def estimates(document: Document, of: Mapping[str, Shape], density: float | None) -> Iterator[Finding]:
-    """Links with a shape of some volume and without an inertial; each gets one if a density is given, in [kg/m³]."""
-    if density is not None:
-        density = number("density", density, above=0)
+    Raises:
+        QueryError: As `robot_dyn.shapes.estimate.with_estimates`; DescriptionError likewise.
+    """
+    found = dict[str, Estimate]()
+    if masses is not None:
+        shapes = shapes_of_lacking(description, package_dirs)
+        found = {each.link: each for each in estimates(description, shapes, masses)[0]}
     for name, shape in of.items():
-        link, unit = document.named("link", name), shape.unit
-        if link.find("inertial") is not None or unit is None:
-            continue
-        changes = ()
-        if density is not None:
-            inertial = etree.SubElement(link, "inertial")
-            etree.SubElement(inertial, "origin", xyz=" ".join(map(repr, unit.com.tolist())), rpy="0 0 0")
-            etree.SubElement(inertial, "mass", value="0")
-            moments = {key: repr(float(density * unit.inertia[at])) for key, at in _MOMENTS.items()}
-            etree.SubElement(inertial, "inertia", moments)
-            changes = (Change(inertial.find("mass"), "value", repr(float(density * unit.mass))),)
-        yield Finding(
-            Severity.NOTE, "inertial_missing", f"link {name!r}",
-            f"has a shape of {1e3 * unit.mass:.3g} litres and no <inertial>: it has no mass"
-            + (f"; estimated at {density:g} kg/m³" if density is not None else ""),
-            "add one, or have it estimated: --fix --density", link.sourceline, changes,
+        if name not in found and shape.unit is not None and document.named("link", name).find("inertial") is None:
+            yield _finding(
+                document, name, "inertial_missing",
+                f"has a shape of {1e3 * shape.unit.mass:.3g} litres and no <inertial>: it has no mass",
+                "add one, or have it estimated: --fix with --mass, --total-mass or --density",
+            )  # fmt: skip
+    for name, each in found.items():
+        what = "a mass and no moments of inertia" if each.moments_only else "a shape and no mass"
+        inertial = each.write(document.named("link", name))
+        del inertial.attrib["estimated"]  # which the change writes
+        yield _finding(
+            document, name, "inertial_missing", f"has {what}; estimated, not measured: {each.basis}",
+            "replace it by measured values where you have them", (Change(inertial, "estimated", each.basis),),
         )  # fmt: skip
+    for name, basis in description.estimated.items():
+        yield _finding(
+            document, name, "inertial_estimated", f"its inertial is estimated, not measured: {basis}",
+            "replace it by measured values where you have them",
+        )  # fmt: skip
+
+
+def _finding(
+    document: Document, link: str, kind: str, what: str, remedy: str, changes: tuple[Change, ...] = ()
+) -> Finding:
+    line = document.named("link", link).sourceline
+    return Finding(Severity.NOTE, kind, f"link {link!r}", what, remedy, line, changes)

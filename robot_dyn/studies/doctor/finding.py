@@ -13,8 +13,8 @@ from robot_dyn.result import UNREPORTED
 class Severity(Enum):
     """How grave a finding is.
 
-    ERROR: the file is refused, or its numbers cannot be those of the robot. WARNING: they are hardly meant. NOTE: other
-    programs read it in another way, or something is not stated.
+    ERROR: the file is refused, or M is wrong by a factor. WARNING: its numbers are hardly meant. NOTE: other programs
+    read it in another way, or something is not stated.
     """
 
     ERROR = "error"
@@ -46,6 +46,8 @@ class Change:
         text = f'{self.key} of <{tag}> was "{shorten(before)}"'  # while the old value is still there
         if not self.key:
             text = f"<{tag}> is now <{self.value}>"
+        elif self.key not in self.element.attrib and not self.renames:
+            text = f"{self.key} of <{tag}> is added"
         elif self.renames:
             text = f"{self.renames} of <{tag}> is now called {self.key}"
         object.__setattr__(self, "text", text)
@@ -63,7 +65,7 @@ class Change:
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Finding:
     """What is wrong, or doubtful.
 
@@ -87,5 +89,13 @@ class Finding:
     changes: tuple[Change, ...] = ()
     supposed: bool = False
 
+    @property
+    def place(self) -> str:
+        """Link, joint or file, with its line where it is known."""
+        return f"{self.where} (line {self.line})" if self.line else self.where
+
     def __str__(self) -> str:
-        return f"{self.where}: {self.what}; {self.remedy}"
+        return f"{self.place}: {self.what}; {self.remedy}"
+
+    def __repr__(self) -> str:
+        return f"<Finding, {self.severity.value}: {self}>"

@@ -31,18 +31,20 @@ def _of_joint(document: Document, joint: Any) -> Iterator[Finding]:
     stated = {key: x for key in ("lower", "upper", *_UNITS) if isfinite(x := parsed(limit.get(key)))}
     if missing := [key for key in _UNITS if limit.get(key) is None]:
         yield document.finding(
-            Severity.NOTE, "limit_missing", joint, f"its <limit> has no {' and no '.join(missing)}",
+            Severity.WARNING if "effort" in missing else Severity.NOTE, "limit_missing", joint,
+            f"its <limit> has no {' and no '.join(missing)}",
             "add it: URDF requires both, and other programs refuse the file",
         )  # fmt: skip
     for key, unit in _UNITS.items():
         if stated.get(key) == 0:
             yield document.finding(
-                Severity.WARNING, "limit_zero", joint, f"its {key} limit is 0, which allows no {key} at all",
+                Severity.WARNING, "limit_zero", joint,
+                f'its {key} limit is "{limit.get(key).strip()}", which allows no {key} at all',
                 f"write the limit in {unit}",
             )  # fmt: skip
         elif stated.get(key, 0.0) < 0:
             yield document.finding(
-                Severity.WARNING, "limit_negative", joint, f"its {key} limit is {limit.get(key)}",
+                Severity.WARNING, "limit_negative", joint, f'its {key} limit is "{limit.get(key)}"',
                 "write it without the sign", (Change(limit, key, limit.get(key).strip().lstrip("-")),),
             )  # fmt: skip
     if joint.get("type") == "continuous" or not {"lower", "upper"} & stated.keys():
@@ -51,11 +53,13 @@ def _of_joint(document: Document, joint: Any) -> Iterator[Finding]:
     if lower > upper:
         exchanged = Change(limit, "lower", limit.get("upper", "0")), Change(limit, "upper", limit.get("lower", "0"))
         yield document.finding(
-            Severity.WARNING, "limits_crossed", joint, f"its lower limit {lower:g} is above its upper one {upper:g}",
+            Severity.WARNING, "limits_crossed", joint,
+            f'its lower limit "{limit.get("lower", "0")}" is above its upper one "{limit.get("upper", "0")}"',
             "exchange them", exchanged,
         )  # fmt: skip
     elif lower == upper:
         yield document.finding(
-            Severity.WARNING, "limits_equal", joint, f"its limits are both {lower:g}, so that it cannot move",
+            Severity.WARNING, "limits_equal", joint,
+            f'its limits are both "{limit.get("lower", "0")}", so that it cannot move',
             "correct them, or make the joint fixed",
         )  # fmt: skip

@@ -20,6 +20,10 @@ _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _BREAK = re.compile(rb"<\s*([A-Za-z_]+)((?:[^<>\"']|\"[^\"<]*\"|'[^'<]*')*)>")
 _QUOTED = re.compile(rb"([A-Za-z_]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _TURN = 2 * pi
+_DRAWN = ("box", "cylinder", "sphere", "mesh")
+_ROUNDED = 0.011  # [degrees], of an angle that was computed from radians of four digits
+_TURNS = 4 * _TURN  # [rad]: a limit beyond is in degrees; some joints turn several times
+_FEW = 20.0  # [rad]: whole limits below, such as ±10, are of joints without stops
 _LEAST_DECIMALS = 2
 _WHOLE = 15.0  # [degrees]: angles in degrees are most often multiples of this
 
@@ -37,8 +41,9 @@ def decimal_commas(document: Document) -> Iterator[Finding]:
     for element, key, words in numbers(document):
         if words and any(_COMMA.fullmatch(word) for word in words):
             text = " ".join(word.replace(",", ".") if _COMMA.fullmatch(word) else word for word in words)
+            drawn = element.tag in _DRAWN or element.getparent().tag in ("visual", "collision")
             yield document.finding(
-                Severity.ERROR, "decimal_comma", element,
+                Severity.WARNING if drawn else Severity.ERROR, "decimal_comma", element,
                 f'{key} of <{element.tag}> is "{" ".join(words)}", with decimal commas',
                 "write a point; many programs read the digits before the comma alone, or drop the element",
                 (Change(element, key, text),),
@@ -75,12 +80,14 @@ def near_right_angles(document: Document) -> Iterator[Finding]:
             continue
         full = [_right_angle(word) or word for word in words]
         if full != words:
-            off = max(abs(float(a) - float(b)) for a, b in zip(full, words, strict=True) if a != b)
+            rounded = [(a, b) for a, b in zip(full, words, strict=True) if a != b]
+            off = max(abs(float(a) - float(b)) for a, b in rounded)
+            meant = " and ".join(dict.fromkeys(_named(float(a)) for a, _ in rounded))
             drawn = element.getparent().tag in ("visual", "collision")
             severity = Severity.WARNING if off > 1e-6 and not drawn else Severity.NOTE
             yield document.finding(
                 severity, "near_right_angle", element,
-                f'rpy "{" ".join(words)}" is off a right angle by {off:.1e} rad', "write π/2 to 16 digits",
+                f'rpy "{" ".join(words)}" is off {meant} by {off:.1e} rad', f"write {meant} to 16 digits",
                 (Change(element, key, " ".join(full)),),
             )  # fmt: skip
 
@@ -97,6 +104,13 @@ def _right_angle(word: str) -> str | None:
     return repr(nearest)
 
 
+def _named(angle: float) -> str:
+    """A multiple of π/2 by its name, such as "−π/2", "π" or "3π/2"."""
+    k = round(angle / (pi / 2))
+    whole, of = (k // 2, "π") if k % 2 == 0 else (k, "π/2")
+    return f"{'−' if k < 0 else ''}{'' if abs(whole) == 1 else abs(whole)}{of}"
+
+
 def angles_in_degrees(document: Document) -> Iterator[Finding]:
     """Angles of more than a turn that are whole degrees."""
     for element, key, words in numbers(document):
@@ -104,13 +118,14 @@ def angles_in_degrees(document: Document) -> Iterator[Finding]:
         values = [x for word in words if isfinite(x := parsed(word))]
         if not angles or len(values) != len(words) or not any(_TURN * 1.01 < abs(x) <= 720 for x in values):
             continue
-        whole = all(x % (_WHOLE if key == "rpy" else 1.0) == 0 for x in values)
-        if key != "rpy" and not whole:  # some joints turn several times
+        unit = _WHOLE if key == "rpy" else 1.0
+        whole = all(abs(x - unit * round(x / unit)) <= _ROUNDED for x in values)
+        if key != "rpy" and max(map(abs, values)) <= (_FEW if whole else _TURNS):
             continue
         meant = " ".join(repr(x * pi / 180) for x in values)
         yield document.finding(
             Severity.WARNING, "degrees", element,
-            f'{key} "{" ".join(words)}" is more than a turn ({degrees(max(map(abs, values))):.0f}°)'
-            + (": degrees are suspected" if whole else ""),
+            f'{key} "{" ".join(words)}" is more than a turn ({degrees(max(values, key=abs)):.0f}°)'
+            + (": degrees are suspected" if whole or key != "rpy" else ""),
             "write radians", (Change(element, key, meant),) if whole else (),
         )  # fmt: skip

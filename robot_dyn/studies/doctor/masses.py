@@ -6,7 +6,8 @@ I₁ ≥ 0,   I₁ + I₂ ≥ I₃,   for each link and for the links that joint
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from robot_dyn.description.inertia import implausibility
 from robot_dyn.description.structure import Structure, structure
 from robot_dyn.model import findings as doctor
 from robot_dyn.model.robot import Robot
+from robot_dyn.studies.doctor.document import Document
 from robot_dyn.studies.doctor.finding import Finding, Severity
 
 _QUOTED = r"""(?:'[^']*'|"[^"]*")"""  # a name, which may hold colons and semicolons
@@ -22,7 +24,6 @@ _NOTHING = 1e-9  # of the largest moment
 _RATIO = 1e4  # of the masses of two bodies of an arm: of a base of 100 kg to a finger of 10 g
 _KINDS = (
     (Severity.ERROR, "inertia_impossible", doctor.impossible_inertias),
-    (Severity.ERROR, "mass_missing", doctor.massless_bodies),
     (Severity.WARNING, "inertia_without_mass", doctor.moments_without_mass),
     (Severity.WARNING, "mass_tiny", doctor.tiny_masses),
     (Severity.WARNING, "length_long", doctor.long_lengths),
@@ -32,17 +33,32 @@ _KINDS = (
 )
 
 
-def masses(robot: Robot) -> Iterator[Finding]:
+def masses(document: Document, robot: Robot) -> Iterator[Finding]:
     """What is wrong with the masses and inertias of a robot that loads."""
     stated = structure(robot.description, robot.edits)
+    for found in (*_in_words(robot, stated), *_massless(document, robot, stated)):
+        yield replace(found, line=document.line(found.where, ""))
+    yield from _rods_and_points(document, stated)
+    yield from _merged(document, robot, stated)
+    yield from _proportions(document, stated)
+
+
+def beyond_reach(document: Document, robot: Robot, found: Iterable[Finding]) -> Iterator[Finding]:
+    """Inertias out of proportion to the robot, unless the shape of the link has shown them already."""
+    shown = {each.where for each in found if each.kind == "inertia_shape"}
+    for text in doctor.inertias_beyond_reach(structure(robot.description, robot.edits)):
+        each = _of_words(Severity.ERROR, "inertia_far", text)
+        if each.where not in shown:
+            yield replace(each, line=document.line(each.where, ""))
+
+
+def _in_words(robot: Robot, stated: Structure) -> Iterator[Finding]:
+    """The findings that `load` has as well."""
     for text in doctor.no_inertia_about_axis(stated, robot.joint_without_inertia):
         yield _of_words(Severity.ERROR, "inertia_missing", text)
     for severity, kind, find in _KINDS:
         for text in find(stated):
             yield _of_words(severity, kind, text)
-    yield from _rods_and_points(stated)
-    yield from _merged(robot, stated)
-    yield from _proportions(robot, stated)
 
 
 def _of_words(severity: Severity, kind: str, text: str) -> Finding:
@@ -53,31 +69,42 @@ def _of_words(severity: Severity, kind: str, text: str) -> Finding:
     return Finding(severity, kind, "robot", what, remedy)
 
 
-def _rods_and_points(stated: Structure) -> Iterator[Finding]:
+def _massless(document: Document, robot: Robot, stated: Structure) -> Iterator[Finding]:
+    """Bodies without mass: an error if they are drawn, or M is singular; between the axes of a wrist they are meant."""
+    for text in doctor.massless_bodies(stated):
+        found = _of_words(Severity.WARNING, "mass_missing", text)
+        links = next((links for links in stated.bodies.values() if found.where == f"link {links[0]!r}"), ())
+        drawn = any(document.named("link", name).find(f"{tag}/geometry") is not None
+                    for name in links for tag in ("visual", "collision"))  # fmt: skip
+        singular = robot.joint_without_inertia is not None
+        yield replace(found, severity=Severity.ERROR) if drawn or singular or not links else found
+
+
+def _rods_and_points(document: Document, stated: Structure) -> Iterator[Finding]:
     """Links that move with mass and a principal moment of 0, which other programs refuse."""
     for name, link in stated.links.items():
         least, _, most = np.linalg.eigvalsh(link.inertia)
         if link.mass > 0 and abs(least) <= _NOTHING * most and name not in stated.base:
-            yield Finding(
-                Severity.NOTE, "inertia_zero", f"link {name!r}",
+            yield document.finding(
+                Severity.NOTE, "inertia_zero", document.named("link", name),
                 f"its least principal moment is 0, as of a rod or a point of {link.mass:g} kg; MuJoCo refuses that",
                 "give it the moments of a body with some width",
             )  # fmt: skip
 
 
-def _merged(robot: Robot, stated: Structure) -> Iterator[Finding]:
+def _merged(document: Document, robot: Robot, stated: Structure) -> Iterator[Finding]:
     """Merged bodies with impossible inertia, although that of each link may be possible."""
     for joint, body in zip(robot.model.names[1:], list(robot.model.inertias)[1:], strict=True):
         links = next((links for name, links in stated.bodies.items() if joint.endswith(name)), ())
         if len(links) > 1 and body.mass > 0 and (why := implausibility(body.mass, body.lever, body.inertia)):
             named = ", ".join(map(repr, links[:4]))
-            yield Finding(
-                Severity.ERROR, "inertia_impossible", f"link {links[0]!r}",
+            yield document.finding(
+                Severity.ERROR, "inertia_impossible", document.named("link", links[0]),
                 f"merged with what is fixed to it ({named}), {why}", "correct the inertias of these links",
             )  # fmt: skip
 
 
-def _proportions(robot: Robot, stated: Structure) -> Iterator[Finding]:
+def _proportions(document: Document, stated: Structure) -> Iterator[Finding]:
     """The lightest and the heaviest body that move, if their masses are out of all proportion."""
     of = {
         stated.joints[joint].child: sum(stated.links[name].mass for name in links)
@@ -90,8 +117,8 @@ def _proportions(robot: Robot, stated: Structure) -> Iterator[Finding]:
     if most > _RATIO * least:
         typical = float(np.exp(np.median(np.log(list(of.values())))))
         odd = light if typical / least > most / typical else heavy
-        yield Finding(
-            Severity.WARNING, "mass_ratio", f"link {odd!r}",
+        yield document.finding(
+            Severity.WARNING, "mass_ratio", document.named("link", odd),
             f"the masses of bodies that move reach from {least:.3g} kg ({light!r}) to {most:.3g} kg ({heavy!r})",
             "check its mass and the unit of it",
         )  # fmt: skip

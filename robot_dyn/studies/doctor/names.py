@@ -45,10 +45,12 @@ def names(document: Document) -> Iterator[Finding]:
 
 def leftovers(document: Document) -> Iterator[Finding]:
     """Expressions of xacro that nobody expanded."""
-    for element in document.root.iter():
+    for element in sorted(document.root.iter(), key=lambda each: not document.moves_mass(each)):
         if isinstance(element.tag, str) and (found := _EXPRESSION.search(" ".join(map(str, element.attrib.values())))):
+            grave = document.moves_mass(element) or element.tag in ("link", "joint", "limit", "dynamics")
             yield document.finding(
-                Severity.ERROR, "xacro", element, f"holds {found[0]}, which is still to be computed",
+                Severity.ERROR if grave else Severity.WARNING, "xacro", element,
+                f"holds {found[0]}, which is still to be computed",
                 "expand the file: xacro robot.xacro > robot.urdf, or robot-dyn … --xacro ''",
             )  # fmt: skip
             return

@@ -69,4 +69,7 @@ def _finding(document: Document, element: Any, what: str, near: list[str], key: 
         return document.finding(Severity.NOTE, kind, element, found, "remove it, or write what URDF calls it")
     change = Change(element, near[0], "", key) if key else Change(element, "", near[0])
     meant = near[0] if key else f"<{near[0]}>"
-    return document.finding(Severity.ERROR, kind, element, found, f"{meant} is meant; correct it", (change,))
+    grave = near[0] == "inertial" or (near[0] not in ("limit", "dynamics") and document.moves_mass(element))
+    return document.finding(
+        Severity.ERROR if grave else Severity.WARNING, kind, element, found, f"{meant} is meant; correct it", (change,)
+    )

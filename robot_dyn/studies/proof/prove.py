@@ -85,7 +85,8 @@ def prove(
     except NotProvenError as error:
         why = str(error)
     meant = assumed(about, setup, q0 is not None, v0 is not None, widths)
-    return Proof(about.robot.name, about.robot.joint_names, until_s, nodes[-1].t, why, bits, meant, tuple(nodes))
+    arm = about.robot
+    return Proof(arm.name, arm.joint_names, arm.joint_types, until_s, nodes[-1].t, why, bits, meant, tuple(nodes))
 
 
 def _nodes(about: Motion, state: State, until_s: float, bits: int) -> Iterator[Node]:

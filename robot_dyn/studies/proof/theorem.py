@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf, log10, nextafter
 from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.answer import Answer, Block, Table
 from robot_dyn.arithmetic import Array, Ball
-from robot_dyn.errors import QueryError, escaped
+from robot_dyn.errors import QueryError
+from robot_dyn.queries.units import units
 from robot_dyn.result import UNREPORTED, reported
 from robot_dyn.studies.proof.hypotheses import numbers_of
 from robot_dyn.studies.proof.node import Node, Packed, on_the_way, unpacked
@@ -25,13 +28,14 @@ TRUSTED = (
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Proof(Value):
-    """A theorem about the flow, of the numbers that a file and a setup state; `rd.prove` makes it.
+@dataclass(frozen=True, eq=False, repr=False)
+class Proof(Answer, Value):
+    """A theorem about the flow, of the numbers that a file and a setup state; `rd.studies.prove` makes it.
 
     Attributes:
         robot: Name of the arm.
         joint_names: Of the n joints.
+        joint_types: Their types, such as "revolute".
         requested_s: Time up to which it was requested, in [s].
         until_s: Time up to which it is proven.
         why_not: Why it is not proven beyond; empty if it is proven up to there.
@@ -42,6 +46,7 @@ class Proof(Value):
 
     robot: str
     joint_names: tuple[str, ...] = field(metadata=UNREPORTED)
+    joint_types: tuple[str, ...] = field(metadata=UNREPORTED)
     requested_s: float
     until_s: float
     why_not: str
@@ -164,17 +169,31 @@ class Proof(Value):
         """What the theorem rests on."""
         return TRUSTED
 
+    def blocks(self) -> Iterator[Block]:
+        yield f"{self.robot}: " + self._claim
+        heading = ("joint", *(f"{name} [{units(name, self.joint_types)}]" for name in "qv"))
+        yield Table(heading, tuple(zip(self.joint_names, self.q, self.v, strict=True)), right=heading[1:])
+        if self.why_not:
+            yield f"Not proven beyond t = {self.until_s!r} s, because {self.why_not}."
+        yield "Which numbers are meant:"
+        yield from (f"  {each}" for each in self.assumed)
+        yield f"Trusted: {'; '.join(self.trusted)}."
+        yield f"{self.steps} steps, balls of {self.bits} bits"
+
+    @property
+    def drawing(self) -> str:
+        from robot_dyn.display import plot
+
+        t, radius = self.radii
+        if self.steps < 2:
+            return ""
+        with np.errstate(divide="ignore"):  # the start may be a point
+            return plot("log₁₀ of the largest radius of q", t, {"radius": np.log10(radius)})
+
     @property
     def summary(self) -> str:
         """The theorem as text."""
-        lines = [f"{self.robot}: " + self._claim]
-        rows = zip(self.joint_names, self.q, self.v, strict=True)
-        lines += [f"  {name}: q = {q}, v = {v}" for name, q, v in rows]
-        if self.why_not:
-            lines.append(f"Not proven beyond t = {self.until_s!r} s, because {self.why_not}.")
-        lines += ["Which numbers are meant:", *(f"  {each}" for each in self.assumed)]
-        lines += [f"Trusted: {'; '.join(self.trusted)}.", f"{self.steps} steps, balls of {self.bits} bits"]
-        return "\n".join(map(escaped, lines))
+        return repr(self)
 
     @property
     def _claim(self) -> str:

@@ -6,4 +6,5 @@ worst, lost_digits       worst configurations; digits lost at the worst states
 steps, gains, loads      limits of step, gain, speed and payload
 confirm                  runs on both sides of a limit
 scenes, runs             random scenes, and their runs judged
+text                     what it says
 """

@@ -23,13 +23,13 @@ from robot_dyn.queries.quantity import CORIOLIS_TORQUE, N
 from robot_dyn.simulation.observation.remarks import Kind
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
-from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.certificate.implementation import evaluate
 from robot_dyn.studies.certificate.worst_case_search import Batch
 from robot_dyn.studies.stress_test.confirm import BEYOND, WITHIN
 from robot_dyn.studies.stress_test.finding import Limit
 from robot_dyn.studies.stress_test.work import Work
 from robot_dyn.studies.stress_test.worst import Gains, State, listed, worst
+from robot_dyn.studies.time_budget import Budget
 
 _LOOKS = 50  # states at which the tip is looked for
 _HOLD_S = 0.05  # of a run that holds a payload

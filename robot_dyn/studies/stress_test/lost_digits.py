@@ -13,7 +13,6 @@ import numpy as np
 from robot_dyn.lagrange.digits import digits_of
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, Quantity
-from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.certificate.certificate import Held
 from robot_dyn.studies.certificate.digit_count import DigitCount
 from robot_dyn.studies.certificate.implementation import Implementation, implementations
@@ -21,6 +20,7 @@ from robot_dyn.studies.certificate.worst_case_search import Batch
 from robot_dyn.studies.stress_test.finding import WorstCase
 from robot_dyn.studies.stress_test.work import Work
 from robot_dyn.studies.stress_test.worst import KEPT, listed, shrunk_state
+from robot_dyn.studies.time_budget import Budget
 
 _OF_FLOAT64 = -log10(2.0**-53)
 _ROUNDS, _MOST_TRIES = 3, 60

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from math import isfinite
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf, isfinite
 from typing import final
 
-from robot_dyn.result import Result, reported
+from robot_dyn.answer import Block
+from robot_dyn.result import reported
+from robot_dyn.studies.result import Result
 from robot_dyn.studies.stress_test.finding import JudgedRun, Limit, WorstCase
+from robot_dyn.studies.stress_test.text import stress_tables
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Stress(Result):
     """The worst cases of an arm, what breaks first, and what of that the library fails to report.
 
@@ -36,11 +40,21 @@ class Stress(Result):
     runs: tuple[JudgedRun, ...]
     left_out: tuple[str, ...]
     out_of_time: tuple[str, ...]
-    environment: dict[str, str] = field(repr=False)
+    environment: dict[str, str]
     samples: int
     seed: int
     spent_s: float
     interrupted: bool = False
+
+    @property
+    def drawing(self) -> str:
+        from robot_dyn.display import levels
+
+        steps = {f"{each.what} {each.joint}": each.value for each in self.limits if each.of == "step"}
+        return levels("largest step that is stable [s]", steps, inf)
+
+    def tables(self) -> Iterator[Block]:
+        return stress_tables(self)
 
     @reported
     def failures(self) -> tuple[str, ...]:

@@ -26,10 +26,10 @@ from robot_dyn.simulation.dynamics.stability import step_map
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.studies.advice import Advice, advice_about, at_rest
-from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.stress_test.confirm import BEYOND, WITHIN, pushed, run_from_near
 from robot_dyn.studies.stress_test.finding import Limit
 from robot_dyn.studies.stress_test.work import Work
+from robot_dyn.studies.time_budget import Budget
 
 _TIMES = 400.0  # of the run, 1/|λ| of the fastest motion
 _STEPS = 10  # of a method whose stages are iterated

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.model.robot import Robot
-from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.certificate.worst_case_search import random_states
 from robot_dyn.studies.environment import environment
 from robot_dyn.studies.stress_test.finding import JudgedRun, Limit, WorstCase
@@ -21,6 +20,7 @@ from robot_dyn.studies.stress_test.runs import judged_runs
 from robot_dyn.studies.stress_test.steps import held, step_limits
 from robot_dyn.studies.stress_test.work import Work
 from robot_dyn.studies.stress_test.worst import BY_PD, HELD, pd_gains, worst_configurations
+from robot_dyn.studies.time_budget import Budget
 from robot_dyn.validate import function, instance, integer, number
 
 _LEAST_SAMPLES, _MOST_SAMPLES, _MOST_RUNS = 100, 10**6, 10**5

@@ -10,7 +10,7 @@ from statistics import median
 from typing import final
 
 from robot_dyn.errors import RobotDynError
-from robot_dyn.studies.budget import Budget, Limit, OvertimeError
+from robot_dyn.studies.time_budget import Budget, Limit, OvertimeError
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run
 from robot_dyn.studies.work_precision_diagram.reference_run import Reference
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import (

@@ -26,7 +26,7 @@ from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_CUT
-from robot_dyn.studies.budget import Limit
+from robot_dyn.studies.time_budget import Limit
 
 RECORDS = 25  # approximate number of times at which errors are evaluated
 _MOST_RECORDS = 400  # limit where records must fall on switching times

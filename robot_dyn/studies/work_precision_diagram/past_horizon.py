@@ -23,7 +23,7 @@ from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
-from robot_dyn.studies.budget import Budget, Limit, OvertimeError
+from robot_dyn.studies.time_budget import Budget, Limit, OvertimeError
 from robot_dyn.studies.work_precision_diagram.method_under_test import ATOL, recorded
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
 

@@ -16,7 +16,7 @@ from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.methods import method
 from robot_dyn.result import UNREPORTED, reported
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.budget import Budget, Limit, OvertimeError
+from robot_dyn.studies.time_budget import Budget, Limit, OvertimeError
 from robot_dyn.studies.work_precision_diagram.method_under_test import Run, common, recorded, step_ladder, timed, warmed
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import COMPILED, INTERPRETED
 from robot_dyn.values import Value, read_only

@@ -5,30 +5,33 @@ error = max over joints and records of |q − q_ref|
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import floor, isfinite, log10
 from typing import Any, ClassVar, final
 
+from robot_dyn.answer import Block
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.methods import METHODS, as_method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import format_duration, units
-from robot_dyn.result import Result, reported
+from robot_dyn.result import reported
 from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.budget import Budget
 from robot_dyn.studies.environment import environment
+from robot_dyn.studies.result import Result
+from robot_dyn.studies.time_budget import Budget
 from robot_dyn.studies.work_precision_diagram.measurement import measure
 from robot_dyn.studies.work_precision_diagram.method_under_test import own, recorded, whole
 from robot_dyn.studies.work_precision_diagram.past_horizon import PastHorizon, past_horizon
 from robot_dyn.studies.work_precision_diagram.peers import found
 from robot_dyn.studies.work_precision_diagram.reference_run import Reference, reference
+from robot_dyn.studies.work_precision_diagram.text import work_precision_tables
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import (
     COMPILED,
     INTERPRETED,
@@ -46,7 +49,7 @@ _ALWAYS_NAMED = ("rk4", "rk4 (without events)", "explicit_euler")
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class WorkPrecision(Result):
     """Error against work of the methods for one motion.
 
@@ -76,11 +79,14 @@ class WorkPrecision(Result):
     reference: Reference
     ladders: tuple[ToleranceLadder, ...]
     left_out: tuple[str, ...]
-    environment: dict[str, str] = field(repr=False)
+    environment: dict[str, str]
     budget_s: float
     spent_s: float
     interrupted: bool = False
     past_horizon: tuple[PastHorizon, ...] = ()
+
+    def tables(self) -> Iterator[Block]:
+        return work_precision_tables(self)
 
     @property
     def front(self) -> tuple[tuple[ToleranceLadder, Point], ...]:
@@ -133,6 +139,8 @@ class WorkPrecision(Result):
         digits = integer("digits", digits, most=_MOST_DIGITS)
         prices = self.digits(10.0**-digits)
         measure = [each for each in prices if not each[1].extrapolated]
+        if not self.ladders:
+            return "no method was measured: see what was left out"
         if not measure:
             return f"{digits} digits of q were reached by no run"
         chosen, programs = [], set[str]()
@@ -177,7 +185,7 @@ def work_precision(
         v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
         duration_s: In [s]; that of the setup, or 1, unless given. Chaotic motion is cut earlier.
         controller: As of a setup.
-        methods: Names of `rd.method`, or methods; all of these unless given.
+        methods: Names of `rd.integrate.method`, or methods; all of these unless given.
         peers: Whether other programs that are installed and can do the motion run too.
         budget_s: Time to spend, compiling not counted, in [s].
         repeats: How often a run is timed at most, while the budget lasts.

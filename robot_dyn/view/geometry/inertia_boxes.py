@@ -14,10 +14,11 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
 from robot_dyn.description.inertia import implausibility
+from robot_dyn.description.structure import structure
 from robot_dyn.model.robot import Robot
+from robot_dyn.shapes.triangles import Mesh
 from robot_dyn.spatial import homogeneous
 from robot_dyn.view.geometry.shapes import box, ellipsoid
-from robot_dyn.view.geometry.triangles import Mesh
 
 _THIN = 1e-3  # of the longest edge: what an edge of length 0 is drawn with
 _SMALL = 0.01  # [m], edge drawn for a mass in one point
@@ -25,11 +26,13 @@ _POINT, _LARGEST = 1e-6, 1e6  # [m]: an edge below is that of a point; none is d
 
 
 def inertia_boxes(robot: Robot) -> Iterator[tuple[str, ndarray, Mesh, str | None]]:
-    """For each body that moves and has mass: its link, pose there (4, 4), uniform box, and what is bent to draw it.
+    """For each body that moves and has mass: its link, pose there (4, 4), uniform box, and why it is doubtful.
 
     The bodies are those of the dynamics: with payloads, and with all links fixed to them. Moments that no body has
-    would need an edge of negative square; that edge is drawn thin.
+    would need an edge of negative square; that edge is drawn thin. A box far beyond the robot is drawn as long as the
+    robot's longest link.
     """
+    stated = structure(robot.description, robot.edits)
     for frame in robot.model.frames:
         joint = frame.parentJoint
         if frame.type != pin.FrameType.BODY or not joint or not frame.placement.isIdentity(0):
@@ -37,8 +40,13 @@ def inertia_boxes(robot: Robot) -> Iterator[tuple[str, ndarray, Mesh, str | None
         body = robot.model.inertias[joint]
         if body.mass > 0:
             edges, axes = _lengths(body.mass, body.inertia, 6.0)
-            bent = implausibility(body.mass, body.lever, body.inertia)
-            yield frame.name, homogeneous(axes, np.array(body.lever)), box(*edges), bent
+            doubt = implausibility(body.mass, body.lever, body.inertia)
+            if doubt:
+                doubt = f"{doubt}; drawn thin"
+            elif radius := stated.radius_beyond_reach(body.mass, body.inertia):
+                doubt = f"its inertia is that of a mass {radius:.3g} m and more away; drawn smaller"
+                edges = edges * (stated.longest_link / edges.max())
+            yield frame.name, homogeneous(axes, np.array(body.lever)), box(*edges), doubt
 
 
 def off_centre(mesh: Mesh, pose: ndarray, com: ndarray) -> float:

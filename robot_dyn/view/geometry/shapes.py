@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from robot_dyn.view.geometry.triangles import Mesh, welded
+from robot_dyn.shapes.triangles import Mesh, welded
 
 _SEGMENTS = 48  # of a circle
 
@@ -74,8 +74,4 @@ def sphere(radius: float) -> Mesh:
     return ellipsoid(radius, radius, radius)
 
 
-PRIMITIVES: dict[str, tuple[Callable[..., Mesh], dict[str, int]]] = {  # of URDF: its attributes, numbers in each
-    "box": (box, {"size": 3}),
-    "cylinder": (cylinder, {"radius": 1, "length": 1}),
-    "sphere": (sphere, {"radius": 1}),
-}
+PRIMITIVES: dict[str, Callable[..., Mesh]] = {"box": box, "cylinder": cylinder, "sphere": sphere}  # of URDF

@@ -7,7 +7,6 @@ collision shape of the link, otherwise the ellipsoid of its inertia.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -17,21 +16,21 @@ import numpy as np
 from numpy import ndarray
 
 from robot_dyn.description.markup import parse
-from robot_dyn.errors import shorten
+from robot_dyn.model.findings import estimated_links
 from robot_dyn.model.robot import Robot
-from robot_dyn.spatial import homogeneous, rotation_rpy
-from robot_dyn.view.geometry import mesh_files, meshes
-from robot_dyn.view.geometry.addresses import find_file, shown
+from robot_dyn.shapes import elements, mesh_files, meshes
+from robot_dyn.shapes.addresses import find_file, shown
+from robot_dyn.shapes.mesh_files import MeshError
+from robot_dyn.shapes.meshes import WHITE, Part, Rgba
+from robot_dyn.shapes.triangles import Mesh
+from robot_dyn.spatial import homogeneous
 from robot_dyn.view.geometry.inertia_boxes import inertia_boxes, inertia_ellipsoid, off_centre
-from robot_dyn.view.geometry.mesh_files import MeshError
-from robot_dyn.view.geometry.meshes import WHITE, Part, Rgba
 from robot_dyn.view.geometry.shapes import PRIMITIVES
-from robot_dyn.view.geometry.triangles import Mesh
 
 GREY: Rgba = (0.7, 0.7, 0.7, 1.0)  # of what has no material; rviz takes red
 _STAND_IN: Rgba = (0.9, 0.6, 0.3, 1.0)  # of what is drawn in place of a visual
 _INERTIA: Rgba = (0.2, 0.4, 1.0, 0.35)
-_SMALLEST, _LARGEST = 1e-9, 1e6  # [m], of a length; the latter of a position, too
+_DOUBTFUL: Rgba = (1.0, 0.15, 0.1, 0.5)
 _Y_UP_REMARKS = {  # of files that are read the other way than usual
     meshes.COLLADA: "its Collada meshes with <up_axis> Y_UP are turned to z up, as in Gazebo: raw, as in rviz, they"
     " stand away from the masses of their links",
@@ -69,11 +68,13 @@ class Drawing:
         pieces: What is drawn.
         notes: What could not be drawn as described.
         remarks: What else a reader should know.
+        boxes: The uniform box with the mass and moments of each body that moves, payloads included.
     """
 
     pieces: tuple[Piece, ...]
     notes: tuple[str, ...]
     remarks: tuple[str, ...] = ()
+    boxes: tuple[Piece, ...] = ()
 
 
 def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: bool = False) -> Drawing:
@@ -82,19 +83,20 @@ def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: b
     Args:
         robot: The robot; its edits do not change its look.
         package_dirs: Searched first; then folders above the file, ROS_PACKAGE_PATH, the installed example-robot-data.
-        inertia: Also draw the uniform box with the mass and moments of each body that moves, payloads included.
+        inertia: Whether its boxes of inertia are shown: a note then says which of them are not as described.
 
     Returns:
         Pieces and notes; a mesh that is missing or damaged is noted and replaced, not raised.
     """
     artist = _Artist(robot, package_dirs)
     pieces = artist.upright(artist.robot_pieces)
-    if inertia:
-        for link, pose, mesh, bent in inertia_boxes(robot):
-            pieces.append(Piece(link, pose, mesh, _INERTIA))
-            if bent:
-                artist.notes.append(f"inertia box of link {link!r}: {bent}; drawn thin; correct its <inertia>")
-    return Drawing(tuple(pieces), tuple(dict.fromkeys(artist.notes)), tuple(artist.remarks))
+    boxes = []
+    for link, pose, mesh, doubt in inertia_boxes(robot):
+        boxes.append(Piece(link, pose, mesh, _DOUBTFUL if doubt else _INERTIA))
+        if doubt and inertia:
+            artist.notes.append(f"inertia box of link {link!r}: {doubt}, in red; correct its <inertia>")
+    estimated = [f"{robot.name}: {each}" for each in estimated_links(robot.description)]
+    return Drawing(tuple(pieces), tuple(dict.fromkeys(artist.notes)), (*artist.remarks, *estimated), tuple(boxes))
 
 
 def solids(
@@ -118,7 +120,7 @@ class _Artist:
         self._turned = frozenset({meshes.GLTF})  # the formats of which files with y up are turned to z up
         self._y_up: list[tuple[str, str, ndarray, Mesh]] = []  # of these files: format, link, pose and mesh
         self._read = cache(meshes.read)  # so that pieces of one file share their meshes
-        self._primitive = cache(lambda tag, lengths: PRIMITIVES[tag][0](*lengths))
+        self._primitive = cache(lambda tag, lengths: PRIMITIVES[tag](*lengths))
         self._texture = cache(lambda path: meshes.png(mesh_files.bounded(path)))
         # As in urdfdom: a name means its first definition, those of the top level before those of the links.
         self._materials: dict[str, Any] = {}
@@ -127,13 +129,18 @@ class _Artist:
                 self._materials.setdefault(name, material)
 
     def robot_pieces(self) -> list[Piece]:
-        links = [((link.get("name") or "").strip(), link) for link in self.element.iterfind("link")]
+        links = self.links()
         if self.element.find("link/visual") is not None:
             return [piece for name, link in links for piece in self.visuals(name, link)]
         pieces = [piece for name, link in links for piece in self.stand_in(name, link)[0]]
         what = "its collision shapes and inertia ellipsoids are drawn; add <visual> elements to see more"
         self.remarks.append(f"{self.name}: no link has a <visual>; {what}")
         return pieces
+
+    def links(self) -> list[tuple[str, Any]]:
+        """The links of the robot by name; those that no joint connects to it are not of it."""
+        named = [((link.get("name") or "").strip(), link) for link in self.element.iterfind("link")]
+        return [(name, link) for name, link in named if name in self.checked]
 
     def upright(self, draw: Callable[[], T]) -> T:
         """What is drawn; drawn again if files with y up, turned or not, stand nearer to masses the other way."""
@@ -158,8 +165,7 @@ class _Artist:
     def link_solids(self) -> dict[str, tuple[Piece, ...]]:
         """The collision shapes of each link, or its visuals where it has none that can be read."""
         found: dict[str, tuple[Piece, ...]] = {}
-        for link in self.element.iterfind("link"):
-            name = (link.get("name") or "").strip()
+        for name, link in self.links():
             for kind in ("collision", "visual"):
                 if not found.get(name):
                     pieces, failed = self.shapes(name, link, kind)
@@ -208,10 +214,7 @@ class _Artist:
     def shape(self, name: str, element: Any, where: str, color: Rgba | None = None) -> list[Piece]:
         """The pieces of a <visual> or <collision>."""
         pose, (stated, texture) = self.pose(element, where), self.material(element, where)
-        geometry = element.find("geometry")
-        if geometry is None or not len(geometry):
-            raise MeshError("<geometry> is empty; name a box, cylinder, sphere or mesh")
-        parts = self.parts(geometry[0])
+        parts = self.parts(elements.shape(element))
         self._y_up += [(part.y_up, name, pose, part.mesh) for part in parts if part.y_up]
         # As in rviz: a material of the mesh file wins over that of the URDF. [robot_link.cpp]
         return [
@@ -224,16 +227,11 @@ class _Artist:
     def parts(self, shape: Any) -> tuple[Part, ...]:
         if shape.tag == "mesh":
             return self.mesh(shape)
-        if shape.tag not in PRIMITIVES:
-            raise MeshError(f"<{shorten(shape.tag)}> is not a shape of URDF; give a box, cylinder, sphere or mesh")
-        lengths = tuple(x for key, count in PRIMITIVES[shape.tag][1].items() for x in _numbers(shape, key, count))
-        if min(lengths) < _SMALLEST:
-            raise MeshError(f"<{shape.tag}> has a length that is not positive, or below {_SMALLEST:g} m; correct it")
-        return (Part(self._primitive(shape.tag, lengths)),)
+        return (Part(self._primitive(shape.tag, elements.lengths(shape))),)
 
     def mesh(self, element: Any) -> tuple[Part, ...]:
         address = element.get("filename")
-        path, scale = self.file(address), _numbers(element, "scale", 3, "1 1 1")
+        path, scale = self.file(address), elements.numbers(element, "scale", 3, "1 1 1")
         try:
             parts, complaints = self._read(path, scale, self._turned)
         except MeshError as error:
@@ -243,12 +241,10 @@ class _Artist:
 
     def pose(self, element: Any, where: str) -> ndarray:
         try:
-            for origin in element.iterfind("origin"):
-                rpy, xyz = (np.array(_numbers(origin, key, 3, "0 0 0")) for key in ("rpy", "xyz"))
-                return homogeneous(rotation_rpy(rpy), xyz)
+            return elements.pose(element)
         except MeshError as error:
             self.notes.append(f"{where}: {error}; drawn at the origin of the link")
-        return np.eye(4)
+            return np.eye(4)
 
     def material(self, element: Any, where: str) -> tuple[Rgba | None, bytes | None]:
         """Colour and texture that a visual names, or None."""
@@ -262,18 +258,9 @@ class _Artist:
             if address:
                 return WHITE, self._texture(self.file(address))
             if color is not None:
-                r, g, b, a = (min(max(x, 0.0), 1.0) for x in _numbers(color, "rgba", 4))
+                r, g, b, a = (min(max(x, 0.0), 1.0) for x in elements.numbers(color, "rgba", 4))
                 return (r, g, b, a), None
         except MeshError as error:
             what = f"texture {shown(address)}" if address else "material"
             self.notes.append(f"{where}: {what}: {error}; drawn without it")
         return None, None
-
-
-def _numbers(element: Any, key: str, count: int, default: str = "") -> tuple[float, ...]:
-    text, values = element.get(key, default), ()
-    with suppress(ValueError):
-        values = tuple(map(float, text.split()))
-    if len(values) != count or not np.all(np.abs(values) <= _LARGEST):
-        raise MeshError(f"<{element.tag}> {key} must be {count} finite numbers, got {shorten(text)!r}; correct it")
-    return values

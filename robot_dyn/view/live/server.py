@@ -119,7 +119,7 @@ class Server:
         self._thread.start()
         self._ready.wait()
         if self._failure is not None:
-            raise ServerError(f"the live replay cannot start: {self._failure}; write a file with save_replay instead")
+            raise ServerError(f"the live replay cannot start: {self._failure}; write a file with .save(path) instead")
 
     async def _serve(self, page: str, commands: list[Command], listening: socket) -> None:
         self._loop, self._closed = asyncio.get_running_loop(), asyncio.Event()

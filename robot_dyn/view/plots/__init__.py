@@ -1,1 +1,8 @@
-"""Figures of a run: plots.py says what is drawn against what, figure.py draws it."""
+"""Figures of runs and batches.
+
+plots.py    `plot` and `save_plot`
+parts.py    what a figure of a run shows, by name; batch.py that of rollouts
+sheet.py    the layout on a page, in mm
+figure.py   axes with curves, limits and scales; themes and styles
+shown.py    a figure that a notebook shows
+"""

@@ -12,7 +12,7 @@ import numpy as np
 from robot_dyn.codegen.program import Kind, Program
 from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.studies.budget import Limit
+from robot_dyn.studies.time_budget import Limit
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run
 from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import COMPILED

@@ -10,7 +10,7 @@ import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.model.robot import Robot
-from robot_dyn.studies.budget import Limit
+from robot_dyn.studies.time_budget import Limit
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run, step_ladder
 from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError, bare_urdf
 

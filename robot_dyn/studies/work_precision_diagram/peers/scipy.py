@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.studies.budget import Limit
+from robot_dyn.studies.time_budget import Limit
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run, tolerances
 from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError
 

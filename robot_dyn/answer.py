@@ -1,0 +1,126 @@
+"""Answers: values that are shown as the same lines and tables in a terminal and in a notebook, and stored as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import groupby
+from math import isfinite
+from typing import final
+
+from robot_dyn.errors import escaped
+
+
+@final
+@dataclass(frozen=True)
+class Table:
+    """A table of texts and numbers.
+
+    Attributes:
+        heading: Of the columns.
+        rows: Cells, texts or numbers.
+        digits: Of numbers.
+        right: Headings of columns whose texts stand at the right, as numbers do.
+        wrap: Whether a narrow terminal breaks its texts rather than its rows.
+    """
+
+    heading: tuple[str, ...]
+    rows: tuple[tuple[str | float, ...], ...]
+    digits: int = 6
+    right: tuple[str, ...] = ()
+    wrap: bool = False
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Headings of the columns that hold texts; the others hold numbers."""
+        columns = zip(self.heading, zip(*self.rows, strict=True), strict=True) if self.rows else ()
+        texts = (name for name, cells in columns if any(isinstance(cell, str) for cell in cells))
+        return tuple(name for name in texts if name not in self.right)
+
+    @property
+    def cells(self) -> list[list[str]]:
+        """The rows as texts of one line each."""
+        return [
+            [escaped(x) if isinstance(x, str) else number_or_dash(x, self.digits) for x in row] for row in self.rows
+        ]
+
+    @property
+    def widths(self) -> list[int]:
+        """Letters of the longest cell of each column, headings included."""
+        return [max(map(len, column)) for column in zip(self.heading, *self.cells, strict=True)]
+
+    def within(self, width: int) -> Iterator[Table]:
+        """The table in parts of so many letters a line, as far as the first column, which each part has, leaves room.
+
+        A table whose texts may be broken stays whole.
+        """
+        first, *others = self.widths
+        parts: list[list[int]] = [[]]
+        for k, each in enumerate(others, 1):
+            if parts[-1] and not self.wrap and first + sum(2 + self.widths[j] for j in parts[-1]) + 2 + each > width:
+                parts.append([])
+            parts[-1].append(k)
+        for part in parts:
+            rows = tuple(tuple(row[k] for k in (0, *part)) for row in self.rows)
+            yield replace(self, heading=tuple(self.heading[k] for k in (0, *part)), rows=rows)
+
+    @property
+    def lines(self) -> Iterator[str]:
+        """The table as lines of aligned columns."""
+        words, widths = self.words, self.widths
+        for row in [list(self.heading), *self.cells]:
+            columns = zip(self.heading, row, widths, strict=True)
+            yield "  ".join(x.ljust(w) if name in words else x.rjust(w) for name, x, w in columns).rstrip()
+
+
+def number_or_dash(x: float, digits: int = 6) -> str:
+    """A number as text, a dash if it is infinite or not a number."""
+    return f"{x:.{digits}g}" if isfinite(x) else "—"
+
+
+Block = str | Table
+
+
+class Answer:
+    """A dataclass whose `repr` is its lines and tables, as the command line prints them; in a notebook it is HTML."""
+
+    @property
+    def title(self) -> str:
+        """Its heading in a notebook; the first line unless given."""
+        return ""
+
+    @property
+    def drawing(self) -> str:
+        """A drawing, as SVG; empty if there is none."""
+        return ""
+
+    def blocks(self) -> Iterable[Block]:
+        """Texts of one line each, and tables."""
+        raise NotImplementedError
+
+    def to_json(self) -> str:
+        """The JSON document of docs/json.md."""
+        from robot_dyn.result import json_text  # late: the command line writes lines without NumPy
+
+        return json_text(self)
+
+    def __repr__(self) -> str:
+        return "\n".join(line for each in self.blocks() for line in _lines(each))
+
+    def _repr_html_(self) -> str:
+        from robot_dyn import display
+
+        parts, (first, *rest) = [], self.blocks()
+        rest = [first, *rest] if self.title else rest
+        for of_text, blocks in groupby(rest, lambda each: isinstance(each, str)):
+            if of_text:
+                parts.append(display.text("\n".join(line for each in blocks for line in _lines(each)).strip("\n")))
+            else:
+                parts += [
+                    display.table(each.heading, each.rows, each.right) for each in blocks if isinstance(each, Table)
+                ]
+        return display.page(self.title or "".join(_lines(first)), *parts, self.drawing)
+
+
+def _lines(block: Block) -> Iterable[str]:
+    return (escaped(block),) if isinstance(block, str) else block.lines

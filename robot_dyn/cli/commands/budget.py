@@ -1,0 +1,145 @@
+"""The command that says whether motors suffice for a motion: budget."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import robot_dyn as rd
+from robot_dyn.cli import arguments, completion
+from robot_dyn.cli.app import Csv, Dark, Force, Json, Lock, PackageDir, Plot, Xacro, app, bar
+from robot_dyn.cli.outcome import give, outputs
+from robot_dyn.errors import QueryError
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.results.trajectory import Trajectory
+    from robot_dyn.studies.motor_budget.result import MotorBudget
+
+_RUNS = ".toml", ".npz"
+
+
+@app.command()
+def budget(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="ROBOT|SCENE.toml|RUN.npz",
+            help="A robot, with a plan; a scene, which is simulated; or a run file.",
+            autocompletion=completion.robots,
+        ),
+    ],
+    plan: Annotated[
+        str | None,
+        typer.Argument(metavar="[PLAN.csv]", help="Way points or samples: a column t in s, and one for each joint."),
+    ] = None,
+    payload: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LINK=MASS@X,Y,Z", help="What it carries, in kg and m, as tool0=5kg@0,0,0.1; may be repeated."
+        ),
+    ] = None,
+    effects: Annotated[str | None, typer.Option(help='"urdf" adds the friction that the file states.')] = None,
+    limits: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MOTORS.csv",
+            help="Motors: joint, peak, continuous, speed, gear_ratio, …, with units; else the robot's file.",
+        ),
+    ] = None,
+    max_payload: Annotated[
+        str | None,
+        typer.Option("--max-payload", metavar="LINK@X,Y,Z", help="Find the largest payload there that still fits."),
+    ] = None,
+    fastest: Annotated[
+        bool,
+        typer.Option(
+            "--fastest", help="Move along the same path as fast as the limits allow; -o and --csv are then of it."
+        ),
+    ] = False,
+    share: Annotated[
+        float | None, typer.Option(help="With --fastest: of the peak torques that it may take, up to 1.")
+    ] = None,
+    unit: Annotated[str | None, typer.Option(help="rad or deg, of angles in the plan whose heading says none.")] = None,
+    period: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="Time between rows of a plan without times.")
+    ] = None,
+    time: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="Heading of the times in the plan, unless it is t or time.")
+    ] = None,
+    joint: Annotated[
+        list[str] | None,
+        typer.Option(metavar="JOINT=COLUMN", help="Heading of a joint in the plan, for each; others are left out."),
+    ] = None,
+    output: Plot = None,
+    csv: Csv = None,
+    dark: Dark = False,
+    force: Force = False,
+    lock: Lock = None,
+    package_dir: PackageDir = None,
+    xacro: Xacro = None,
+    as_json: Json = False,
+) -> None:
+    """Compare what a motion asks of each motor with its limits, by cause; exit code 1 if a motor is too small.
+
+    With --fastest it is 1 if one is too small for the given motion or for the fastest one.
+    Torque and speed peaks, rms torque, power, energy, and the torque at which dry friction breaks away.
+    """
+    from robot_dyn.studies.motor_budget.result import MotorBudget
+
+    paths = outputs(MotorBudget, output, csv, [each for each in (what, plan, limits) if each], force)
+    if share is not None and not fastest:
+        raise QueryError("--share is of the fastest motion: add --fastest, or leave it out")
+    if time is not None and period is not None:
+        raise QueryError("--time and --period both give the times: leave one of them out")
+    motors = None if limits is None else rd.plan.read_motors(limits)
+    of_robots = {
+        "PLAN.csv": plan, "--payload": payload, "--effects": effects, "--max-payload": max_payload,
+        "--fastest": fastest, "--unit": unit, "--period": period, "--time": time, "--joint": joint,
+        "--lock": lock, "--package-dir": package_dir,
+        "--xacro": xacro,
+    }  # fmt: skip
+    if what.lower().endswith(_RUNS):
+        if given := [name for name, value in of_robots.items() if value]:
+            raise QueryError(f"{given[0]}: is for a robot with a plan; a scene or a run has its own, so leave it out")
+        found = rd.budget(_run(what), motors=motors)
+    else:
+        if plan is None:
+            raise QueryError(f"{what}: give its motion as well, a CSV file with a column t [s] and one for each joint")
+        robot = arguments.load(what, lock, package_dir, xacro)
+        times = time if period is None else period
+        motion = rd.plan.from_samples(robot, plan, time=times, joints=_columns(joint), unit=unit)
+        bodies = [arguments.payload(each) for each in payload or ()] or None
+        with bar(what="asking for the torque"):
+            found = rd.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)
+    more = _more(found, max_payload, fastest, 1.0 if share is None else share)
+    judged = [found, more["fastest"].budget] if fastest else [found]
+    give(found, paths, as_json, dark, judged[-1], **more)
+    if not all(each.fits for each in judged):
+        raise typer.Exit(1)
+
+
+def _columns(texts: list[str] | None) -> dict[str, str] | None:
+    """Headings by joint."""
+    return dict(arguments.pair("--joint", each, "JOINT=COLUMN") for each in texts) if texts else None
+
+
+def _run(path: str) -> Trajectory:
+    """The run of a file, or of a scene."""
+    if path.lower().endswith(".npz"):
+        return rd.load_run(path)
+    setup = rd.read_scene(path)
+    with bar(setup.duration_s) as advance:
+        return rd.simulate(setup, on_progress=advance)
+
+
+def _more(found: MotorBudget, max_payload: str | None, fastest: bool, share: float) -> dict[str, Any]:
+    """What follows from a budget, by key."""
+    more: dict[str, Any] = {}
+    if max_payload is not None:
+        with bar(what="looking for the largest payload"):
+            more["max_payload"] = found.max_payload(*arguments.link_and_place("--max-payload", max_payload))
+    if fastest:
+        with bar(what="looking for the fastest motion"):
+            more["fastest"] = found.fastest(share)
+    return more

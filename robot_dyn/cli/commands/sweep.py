@@ -1,0 +1,124 @@
+"""The command that runs a scene many times into a folder, and what is asked of the folder: sweep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from robot_dyn.cli.app import Json, app, bar
+from robot_dyn.cli.terminal import say, say_json, to_stderr
+from robot_dyn.errors import SweepError, nearest
+
+if TYPE_CHECKING:
+    from robot_dyn.sweeps.plan.sweep import Sweep
+    from robot_dyn.sweeps.result import SweepResult
+
+ACTIONS = ("run", "status", "verify", "report", "export")
+
+
+@app.command()
+def sweep(
+    what: Annotated[
+        str, typer.Argument(metavar="SCENE.toml|ACTION", help=f"A scene to sweep; or {', '.join(ACTIONS)} of a FOLDER.")
+    ],
+    folder: Annotated[str | None, typer.Argument(metavar="FOLDER", help="Of a sweep, for an action.")] = None,
+    output: Annotated[
+        str | None,
+        typer.Option("-o", "--output", metavar="PATH", help="Folder to fill; or the file of report, export."),
+    ] = None,
+    runs: Annotated[int | None, typer.Option(help="Number of runs.")] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=DISTRIBUTION", help="What varies, as 'kp=uniform(low=50, high=100)'; repeated."),
+    ] = None,
+    figure: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=FIGURE", help="What is kept of each run, as 'peak=peak(\"u\")'; repeated."),
+    ] = None,
+    design: Annotated[str | None, typer.Option(help="random, sobol, halton, latin, saltelli or grid.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Of the design.")] = None,
+    threads: Annotated[int | None, typer.Option(help="Of this process; all processors unless given.")] = None,
+    cluster: Annotated[
+        str | None, typer.Option(help="Workers of Dask in place of threads: local:2, or tls://host:8786.")
+    ] = None,
+    share: Annotated[str | None, typer.Option(metavar="3/16", help="The part of one job of an array.")] = None,
+    chunk: Annotated[int | None, typer.Option(help="Runs of a file; about 2 s of work unless given.")] = None,
+    probability: Annotated[
+        list[str] | None,
+        typer.Option(metavar="EVENT", help="Say how likely it is, as 'failed | error > 0.1'; repeated."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run a scene many times, with what varies, into a folder; again, it is resumed.
+
+    Ctrl-C drops the chunks under way, and the folder keeps the others. `sweep run FOLDER` resumes it, `status` says
+    what is left, `verify` reads all files, `report` writes a page, `export` a table as .csv or .parquet.
+    """
+    from robot_dyn import sweeps as sw
+
+    options: dict[str, Any] = {"threads": threads, "cluster": cluster, "share": share}
+    if what.lower().endswith(".toml"):
+        if folder is not None or output is None:
+            raise SweepError("give the folder to fill with -o FOLDER")
+        stated = _stated(what, {"runs": runs, "design": design, "seed": seed}, vary or [], figure or [])
+        result = _run(stated, output, options | {"chunk": chunk})
+    else:
+        if what not in ACTIONS:
+            raise SweepError(
+                f"{what!r} is neither a scene, which ends with .toml, nor an action; {nearest(what, ACTIONS)}"
+            )
+        if folder is None:
+            raise SweepError(f"{what}: of which folder? robot-dyn sweep {what} FOLDER")
+        result = sw.read(folder)
+        if what == "run":
+            result = _run(result.sweep, folder, options)
+        elif what == "verify":
+            to_stderr(f"all rows: SHA-256 {result.verify()}")
+            for name, count in result.processors.items():
+                to_stderr(f"{count} chunks by {name}")
+        elif what in ("report", "export"):
+            path = Path(output or f"{folder.rstrip('/')}.{'html' if what == 'report' else 'csv'}")
+            written = result.save_report(path) if what == "report" else result.export(path)
+            to_stderr(f"written: {written}")
+    answers = [result.probability(event) for event in probability or ()] if not result.status["missing"] else []
+    if as_json:
+        say_json(result, probabilities=dict(zip(probability or (), answers, strict=False)))
+    else:
+        say(result, *answers)
+    if result.status["missing"] and what != "status" and share is None:
+        raise typer.Exit(130)
+
+
+def _stated(scene: str, given: dict[str, Any], vary: list[str], figure: list[str]) -> Sweep:
+    """The sweep of a scene and of options, which take the place of what its table states."""
+    from robot_dyn import sweeps as sw
+    from robot_dyn.sweeps.plan.texts import assignment, distribution_of, figure_of
+
+    varies = [assignment("--vary", each) for each in vary]
+    figures = [assignment("--figure", each) for each in figure]
+    changes = {name: value for name, value in given.items() if value is not None}
+    return sw.from_scene(
+        scene,
+        vary={name: distribution_of(text) for name, text in varies},
+        figures={name: figure_of(name, text, imports=True) for name, text in figures},
+        **changes,
+    )
+
+
+def _run(stated: Sweep, folder: str, options: dict[str, Any]) -> SweepResult:
+    """Fill the folder, with a bar of the time left."""
+    from robot_dyn import sweeps as sw
+
+    to_stderr(f"{stated.runs} runs, {stated.bytes_expected / 2**20:.3g} MiB on disk")
+    began, first = perf_counter(), [-1]
+    with bar(stated.runs, "preparing") as advance:
+
+        def on_progress(done: int, runs: int) -> None:
+            first[0] = done if first[0] < 0 else first[0]
+            rate = (done - first[0]) / max(perf_counter() - began, 1e-9)
+            advance(done, f"{done} of {runs} runs, {rate:.0f} a second")
+
+        return sw.run(stated, folder, on_progress=on_progress, **options)

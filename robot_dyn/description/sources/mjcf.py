@@ -1,0 +1,283 @@
+"""MJCF, the format of MuJoCo: compiled by MuJoCo itself, and written as a URDF of hinges and slides.
+
+A body with joints 1 … k of anchors p_i and axes a_i, in its own axes, stands in its parent at
+
+    T_body · Π_i Tr(p_i) exp(â_i (q_i − q0_i)) Tr(−p_i)        a hinge; a slide is Tr(a_i (q_i − q0_i))
+
+so several joints of a body become links without mass between them. Defaults and `inertiafromgeom` are those of the
+compiler. Damping, dry friction, ranges and limits of actuators stand in the URDF as in any other, armature and gravity
+are edits; contacts, actuators, sensors, springs and shapes are left out. [MuJoCo documentation, Computation]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.description.couplings import Mimic, resolve
+from robot_dyn.description.description import content
+from robot_dyn.description.edits import Changes
+from robot_dyn.description.sources.mjcf_actuators import Actuators
+from robot_dyn.description.urdf import UNBOUNDED
+from robot_dyn.errors import DescriptionError, shorten, shown
+from robot_dyn.extras import needs
+from robot_dyn.spatial import rotation, rpy_of
+
+SUFFIXES = (".xml", ".mjcf")
+_START = 2**16  # bytes, in which a file says what it is
+LEAVABLE = ("tendon", "equality", "free", "ball")
+_EQUALITIES = ("connect", "weld", "joint", "tendon", "flex", "flexvert", "flexstrain", "distance")
+
+
+@final
+@dataclass(frozen=True)
+class Mjcf:
+    """What a file of MJCF says.
+
+    Attributes:
+        urdf: As a URDF.
+        armature: By joint, in [kg m²] or [kg]; that of a follower at the joint that it follows.
+        gravity: Acceleration of free fall, in [m/s²].
+        findings: What was left out.
+    """
+
+    urdf: bytes
+    armature: dict[str, float]
+    gravity: tuple[float, ...]
+    findings: tuple[str, ...]
+
+    def edits(self, joint_names: Iterable[str]) -> Changes:
+        """The edits of a robot with these joints."""
+        armature = {name: value for name, value in self.armature.items() if name in joint_names and value}
+        return Changes(armature=armature, gravity=self.gravity)
+
+
+def is_mjcf(path: Path) -> bool:
+    """Whether a file is MJCF, by its suffix and its root."""
+    return path.suffix.lower() in SUFFIXES and b"<mujoco" in content(path)[:_START]
+
+
+def leavable(without: Iterable[str]) -> frozenset[str]:
+    """What is to be left out, checked.
+
+    Raises:
+        DescriptionError: If it is not several of `LEAVABLE`.
+    """
+    if not isinstance(without, set | frozenset | tuple | list) or not all(each in LEAVABLE for each in without):
+        raise DescriptionError(f"without must be some of {', '.join(LEAVABLE)}, as a set, got {shown(without)}")
+    return frozenset(without)
+
+
+def read(path: Path, without: frozenset[str] = frozenset()) -> Mjcf:
+    """A file of MJCF as a URDF and edits.
+
+    Raises:
+        MissingExtraError: If MuJoCo is not installed.
+        DescriptionError: If MuJoCo refuses the file, or it has tendons, equalities other than of two joints and degree
+            1, or free or ball joints, that `without` does not name.
+    """
+    mujoco: Any = needs("mujoco", extra="mjcf")
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except Exception as error:  # ValueError of the compiler, and those of its readers of meshes
+        raise DescriptionError(f"{path}: MuJoCo refuses it: {shorten(' '.join(str(error).split()), 300)}") from None
+    return _Reader(mujoco, model, str(path), without).read()
+
+
+@dataclass
+class _Reader:
+    """Writes the URDF of one compiled model."""
+
+    mujoco: Any
+    model: Any
+    source: str
+    without: frozenset[str]
+    findings: list[str] = field(default_factory=list)
+    mimics: dict[str, Mimic] = field(default_factory=dict)
+
+    def read(self) -> Mjcf:
+        self.refuse_tendons()
+        self.equalities()
+        self.note_the_rest()
+        out = etree.Element("robot", name=self.name_of_model())
+        etree.SubElement(out, "link", name=self.body(0))
+        for body in range(1, self.model.nbody):
+            self.write_body(out, body)
+        gravity = tuple(map(float, self.model.opt.gravity))
+        return Mjcf(etree.tostring(out), self.at_joints("armature", 2), gravity, tuple(self.findings))
+
+    def leave(self, what: str, where: str, why: str) -> None:
+        """A finding if this is to be left out; otherwise a refusal."""
+        if what not in self.without:
+            raise DescriptionError(f"{self.source}: {where}: {why}; remove it, or leave it out: without={{{what!r}}}")
+        self.findings.append(f"{where}: {why}; left out")
+
+    def name(self, kind: Any, prefix: str, index: int) -> str:
+        return (self.mujoco.mj_id2name(self.model, kind, index) or "").strip() or f"{prefix}_{index}"
+
+    def new(self, name: str) -> str:
+        """A name of what MuJoCo does not name, that no body or joint has."""
+        taken = {*map(self.body, range(self.model.nbody)), *map(self.joint, range(self.model.njnt))}
+        while name in taken:
+            name += "_"
+        return name
+
+    def name_of_model(self) -> str:
+        names = bytes(self.model.names)
+        return names[: names.index(b"\0")].decode(errors="replace").strip() or "mjcf"
+
+    def body(self, index: int) -> str:
+        return self.name(self.mujoco.mjtObj.mjOBJ_BODY, "body", index)
+
+    def joint(self, index: int) -> str:
+        return self.name(self.mujoco.mjtObj.mjOBJ_JOINT, "joint", index)
+
+    def moves(self, joint: int) -> bool:
+        return self.kind(joint) in ("hinge", "slide")
+
+    def kind(self, joint: int) -> str:
+        return self.mujoco.mjtJoint(int(self.model.jnt_type[joint])).name.removeprefix("mjJNT_").lower()
+
+    def dof(self, what: str, joint: int) -> float:
+        """Armature, damping or dry friction of a joint, with those of its actuators."""
+        of_joint = float(getattr(self.model, f"dof_{what}")[self.model.jnt_dofadr[joint]])
+        return of_joint + self.actuators.added(what, joint)
+
+    @property
+    def actuators(self) -> Actuators:
+        return Actuators(self.mujoco, self.model)
+
+    def reference(self, joint: int) -> float:
+        return float(self.model.qpos0[self.model.jnt_qposadr[joint]])
+
+    def at_joints(self, what: str, power: int) -> dict[str, float]:
+        """Values by joint, those of followers times |ratio|ᵖ at the joint that they follow: by virtual work."""
+        total: dict[str, float] = {}
+        for j in filter(self.moves, range(self.model.njnt)):
+            source, ratio, _ = resolve(self.joint(j), self.mimics, FLOAT64)
+            total[source] = total.get(source, 0.0) + abs(float(ratio)) ** power * self.dof(what, j)
+        return total
+
+    def refuse_tendons(self) -> None:
+        for index in range(self.model.ntendon):
+            name = self.name(self.mujoco.mjtObj.mjOBJ_TENDON, "tendon", index)
+            self.leave("tendon", f"tendon {name!r}", "tendons are not taken")
+
+    def equalities(self) -> None:
+        """Two joints in proportion become a mimic joint; any other equality is refused, or left out."""
+        model, joints = self.model, self.mujoco.mjtObj.mjOBJ_JOINT
+        for index in range(model.neq):
+            kind, (one, other) = int(model.eq_type[index]), (int(model.eq_obj1id[index]), int(model.eq_obj2id[index]))
+            name = self.name(self.mujoco.mjtObj.mjOBJ_EQUALITY, "equality", index)
+            a0, a1, *higher = model.eq_data[index][:5].tolist()
+            if not model.eq_active0[index]:
+                self.findings.append(f"equality {name!r}: is not active; left out")
+            elif kind == int(self.mujoco.mjtEq.mjEQ_JOINT) and other >= 0 and a1 and not any(higher):
+                if self.name(joints, "joint", one) in self.mimics:
+                    self.leave("equality", f"equality {name!r}", f"joint {self.joint(one)!r} follows another already")
+                    continue
+                offset = a0 + self.reference(one) - a1 * self.reference(other)
+                self.mimics[self.joint(one)] = Mimic(self.joint(other), repr(a1), repr(offset))
+            else:
+                what = _EQUALITIES[kind] if kind < len(_EQUALITIES) else f"type {kind}"
+                self.leave("equality", f"equality {name!r}", f"an equality of {what} that is not q₁ = a₀ + a₁ q₂")
+
+    def note_the_rest(self) -> None:
+        """What acts in MuJoCo and is not of a robot: effects state it."""
+        model = self.model
+        springs = [self.joint(j) for j in range(model.njnt) if model.jnt_stiffness[j].any()]
+        if springs:
+            listed = shorten(", ".join(springs), 200)
+            self.findings.append(f"joints {listed}: have springs, which are left out; add them as effects")
+        if getattr(model, "dof_dampingpoly", np.zeros(1)).any():  # of MuJoCo 4
+            self.findings.append("damping that is not linear is left out; add it as an effect")
+        for what in filter(self.actuators.not_at_joints, ("armature", "damping")):
+            self.findings.append(f"{what} of actuators that do not act at a joint is left out")
+        if model.opt.density or model.opt.viscosity:
+            self.findings.append(
+                "forces of the medium, of its density and viscosity, are left out; add them as effects"
+            )
+        if model.body_gravcomp.any():
+            self.findings.append("gravity compensation of bodies is left out; add it by a controller")
+
+    def write_body(self, out: Any, body: int) -> None:
+        """The joints of a body, and its link, whose frame is that of the body in MuJoCo."""
+        model, name = self.model, self.body(body)
+        R, p, parent = self.rotation(model.body_quat[body]), model.body_pos[body], self.body(model.body_parentid[body])
+        first = int(model.body_jntadr[body])
+        for j in range(first, first + int(model.body_jntnum[body])):
+            if not self.moves(j):
+                why = f"is a {self.kind(j)} joint; its body {name!r} would be fixed"
+                self.leave(self.kind(j), f"joint {self.joint(j)!r}", why)
+                continue
+            anchor, axis, q0 = model.jnt_pos[j], model.jnt_axis[j], self.reference(j)
+            hinge = self.kind(j) == "hinge"
+            p = p + R @ anchor if hinge else p - R @ axis * q0
+            R = R @ rotation(axis, np.float64(-q0)) if hinge else R
+            child = self.new(f"{name}_{self.joint(j)}")
+            etree.SubElement(out, "link", name=child)
+            self.write_joint(out, j, (R, p), parent, child, hinge)
+            R, p, parent = np.eye(3), -anchor if hinge else np.zeros(3), child
+        link = etree.SubElement(out, "link", name=name)
+        joint = etree.SubElement(out, "joint", name=self.new(f"{name}_frame"), type="fixed")
+        self.ends(joint, (R, p), parent, name)
+        if model.body_mass[body] > 0:
+            self.inertial(link, body)
+
+    def write_joint(self, out: Any, j: int, pose: tuple[Any, Any], parent: str, child: str, hinge: bool) -> None:
+        model, name, limited = self.model, self.joint(j), bool(self.model.jnt_limited[j])
+        kind = ("revolute" if limited else "continuous") if hinge else "prismatic"
+        joint = etree.SubElement(out, "joint", name=name, type=kind)
+        self.ends(joint, pose, parent, child)
+        etree.SubElement(joint, "axis", xyz=_words(model.jnt_axis[j]))
+        limit = etree.SubElement(joint, "limit", effort=self.effort(j), velocity=UNBOUNDED)
+        lower, upper = map(float, model.jnt_range[j]) if limited else (-float(UNBOUNDED), float(UNBOUNDED))
+        if kind != "continuous":
+            limit.set("lower", repr(lower))
+            limit.set("upper", repr(upper))
+        if name in self.mimics:
+            mimic = self.mimics[name]
+            etree.SubElement(joint, "mimic", joint=mimic.source, multiplier=mimic.multiplier, offset=mimic.offset)
+            return
+        damping, friction = (self.at_joints(*each)[name] for each in (("damping", 2), ("frictionloss", 1)))
+        etree.SubElement(joint, "dynamics", damping=repr(damping), friction=repr(friction))
+
+    def effort(self, j: int) -> str:
+        """The largest force of the actuators of a joint, if it is limited and the same in both directions."""
+        limits = self.actuators.range(j)
+        if limits is not None and limits[0] != -limits[1]:
+            self.findings.append(
+                f"joint {self.joint(j)!r}: its actuators exert {limits[0]:g} to {limits[1]:g}, not the same in both"
+                " directions; no effort limit is taken"
+            )
+            limits = None
+        return UNBOUNDED if limits is None else repr(limits[1])
+
+    def rotation(self, quaternion: Any) -> np.ndarray:
+        R = np.zeros(9)
+        self.mujoco.mju_quat2Mat(R, quaternion)
+        return R.reshape(3, 3)
+
+    def ends(self, joint: Any, pose: tuple[Any, Any], parent: str, child: str) -> None:
+        R, p = pose
+        etree.SubElement(joint, "origin", xyz=_words(p), rpy=_words(rpy_of(R)))
+        etree.SubElement(joint, "parent", link=parent)
+        etree.SubElement(joint, "child", link=child)
+
+    def inertial(self, link: Any, body: int) -> None:
+        model, R = self.model, self.rotation(self.model.body_iquat[body])
+        inertia, element = R * model.body_inertia[body] @ R.T, etree.SubElement(link, "inertial")
+        etree.SubElement(element, "origin", xyz=_words(model.body_ipos[body]), rpy="0 0 0")
+        etree.SubElement(element, "mass", value=repr(float(model.body_mass[body])))
+        keys = {f"i{a}{b}": (i, k) for i, a in enumerate("xyz") for k, b in enumerate("xyz") if k >= i}
+        etree.SubElement(element, "inertia", {key: repr(float(inertia[at])) for key, at in keys.items()})
+
+
+def _words(values: Any) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,107 @@
+"""Robots of the package robot_descriptions, by names such as robot_descriptions:ur10e_description.
+
+The package keeps its files in a cache, ~/.cache/robot_descriptions, and downloads what is not there as soon as a
+description is imported. Here it is imported only if its files are there, or on request.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, final
+
+from robot_dyn.errors import CatalogError, nearest, shorten
+from robot_dyn.extras import needs
+
+PREFIX = "robot_descriptions:"
+
+
+@final
+@dataclass(frozen=True)
+class Described:
+    """A description on disk.
+
+    Attributes:
+        path: Its URDF or xacro file.
+        package_dirs: Where its packages are.
+        arguments: Of its xacro file; None for a URDF.
+    """
+
+    path: Path
+    package_dirs: tuple[Path, ...]
+    arguments: Mapping[str, Any] | None
+
+    def expansion(self, given: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
+        """Arguments of xacro: its own, unless others are given; None for a URDF if none are given."""
+        return given if self.arguments is None else {**self.arguments, **(given or {})}
+
+
+def find(name: str, download: bool) -> Described:
+    """The files of a name.
+
+    Raises:
+        MissingExtraError: If the package is not installed.
+        CatalogError: If it has no such description, or one of MJCF alone; if it is not on disk and not to be
+            downloaded; if the download fails.
+    """
+    description = name.removeprefix(PREFIX)
+    known = needs("robot_descriptions", extra="robots").DESCRIPTIONS
+    if description not in known:
+        raise CatalogError(f"robot_descriptions has no {shorten(description)!r}; {nearest(description, known)}")
+    if not download and not _on_disk(description):
+        raise CatalogError(
+            f"{name}: is not on disk; run python -m robot_descriptions pull {description}, or load it with"
+            " download=True"
+        )
+    try:
+        module: Any = import_module(f"robot_descriptions.{description}")
+    except Exception as error:  # of git, of the network, of the package
+        raise CatalogError(f"{name}: cannot be downloaded ({shorten(error, 200)}); try again") from None
+    path = getattr(module, "URDF_PATH", None) or getattr(module, "XACRO_PATH", None)
+    if path is None:
+        raise CatalogError(f"{name}: is MJCF, not URDF; take the description of a URDF")
+    folders = dict.fromkeys(Path(each) for each in (module.PACKAGE_PATH, module.REPOSITORY_PATH))
+    around = dict.fromkeys((*folders, *(folder.parent for folder in folders)))
+    arguments = getattr(module, "XACRO_ARGS", {}) if getattr(module, "URDF_PATH", None) is None else None
+    return Described(Path(path), tuple(around), arguments)
+
+
+def _on_disk(description: str) -> bool:
+    """Whether the commit that the package names is checked out in its cache, so that no import downloads anything."""
+    git = needs("git", extra="robots")
+    known = needs("robot_descriptions._repositories", extra="robots").REPOSITORIES
+    commit = os.environ.get("ROBOT_DESCRIPTION_COMMIT")
+    cache = Path(os.environ.get("ROBOT_DESCRIPTIONS_CACHE", "~/.cache/robot_descriptions")).expanduser()
+    for repository in map(known.get, _repositories(description)):
+        if repository is None:
+            return False
+        inside = (
+            repository.cache_path if commit is None else f"{repository.cache_path}-{commit}/{repository.cache_path}"
+        )
+        try:
+            clone = git.Repo(cache / inside)
+            if clone.git.rev_parse(f"{commit or repository.commit}^{{commit}}") != clone.head.commit.hexsha:
+                return False
+        except (git.GitCommandError, git.InvalidGitRepositoryError, git.NoSuchPathError, ValueError):
+            return False
+    return True
+
+
+def _repositories(description: str) -> list[str]:
+    """The repositories that a description asks for, by the source of its module: importing it would download them."""
+    spec = find_spec(f"robot_descriptions.{description}")
+    if spec is None or spec.origin is None:
+        return [""]  # of another version of the package: not known to be on disk
+    calls = (each for each in ast.walk(ast.parse(Path(spec.origin).read_text("utf-8"))) if isinstance(each, ast.Call))
+    named = [
+        call.args[0].value
+        for call in calls
+        if isinstance(call.func, ast.Name) and "clone_to_cache" in call.func.id and call.args
+        if isinstance(call.args[0], ast.Constant)
+    ]
+    return [str(each) for each in named] or [""]

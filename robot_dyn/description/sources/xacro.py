@@ -1,0 +1,135 @@
+"""Expansion of xacro macros, by the reference implementation, the package xacro.
+
+xacro evaluates expressions of the file as Python, with a filter that stops mistakes and not an attacker: **a xacro file
+is a program**. It is expanded only on request, in a separate process with limits of time and memory,
+since xacro keeps its state in its module and writes to stderr. The result is read as any other file.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from robot_dyn.description import catalog
+from robot_dyn.errors import DescriptionError, RobotDynError, nearest, shorten, shown
+
+SECONDS = 60  # of an expansion
+MEMORY = 2 << 30  # bytes
+
+_CHILD = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from robot_dyn.description.sources.xacro import answer
+answer()
+"""
+
+
+def expand(path: Path, arguments: Mapping[str, Any], package_dirs: Iterable[str | Path]) -> tuple[bytes, list[str]]:
+    """The URDF that a xacro file expands to, and the warnings of xacro.
+
+    Args:
+        path: The file.
+        arguments: Values of its `<xacro:arg>` elements by name: texts, numbers or booleans.
+        package_dirs: Where `$(find package)` searches first, see `packages`.
+
+    Raises:
+        DescriptionError: If xacro is not installed, refuses the file, takes too long, or knows no such argument.
+    """
+    if find_spec("xacro") is None:
+        raise DescriptionError(f"{path}: to expand it, the package xacro is needed; pip install robot-dyn[xacro]")
+    if not isinstance(arguments, Mapping):
+        raise DescriptionError(f"xacro must be a mapping of names to values, such as {{}}, got {shown(arguments)}")
+    order = {
+        "path": str(path),
+        "arguments": {str(name): _text(str(name), value) for name, value in arguments.items()},
+        "package_dirs": [str(Path(folder).expanduser().absolute()) for folder in package_dirs],
+    }
+    command = [sys.executable, "-P", "-c", _CHILD, json.dumps(sys.path)]  # -P: no module of the working directory
+    try:
+        child = subprocess.run(
+            command, input=json.dumps(order), capture_output=True, encoding="utf-8", errors="replace", timeout=SECONDS
+        )
+    except subprocess.TimeoutExpired:
+        raise DescriptionError(f"{path}: its macros take more than {SECONDS} s; simplify them") from None
+    warnings = [line.removeprefix("warning: ") for line in child.stderr.splitlines() if line.startswith("warning: ")]
+    try:
+        result = json.loads(child.stdout)
+    except ValueError:
+        last = shorten((child.stderr.splitlines() or ["no memory or no time left"])[-1], 200)
+        raise DescriptionError(f"{path}: the expansion ended without a result ({last}); simplify its macros") from None
+    if "error" in result:
+        raise DescriptionError(f"{path}: xacro refuses it: {shorten(result['error'], 400)}; correct the file")
+    for name in result["unknown"]:
+        raise DescriptionError(f"{path}: xacro has no argument {name!r} in it; {nearest(name, result['known'])}")
+    return result["text"].encode(), [f"xacro: {shorten(line, 200)}" for line in dict.fromkeys(warnings)]
+
+
+def _text(name: str, value: Any) -> str:
+    """A value as xacro reads it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str | int | float | Path):
+        return str(value)
+    raise DescriptionError(f"xacro: {name!r} must be a text, a number or a boolean, got {shown(value)}")
+
+
+class _Arguments(dict[str, str]):
+    """Arguments that note which names the file declares or uses."""
+
+    def __init__(self, given: Mapping[str, str]) -> None:
+        super().__init__(given)
+        self.used: set[str] = set()
+
+    def __contains__(self, name: object) -> bool:
+        self.used.add(str(name))
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> str:
+        self.used.add(name)
+        return super().__getitem__(name)
+
+
+def answer() -> None:
+    """The work of the child: an order on stdin, the URDF or an error on stdout."""
+    order = json.load(sys.stdin)
+    with suppress(ImportError, OSError, ValueError):  # no such limits on this system
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+    path, arguments = Path(order["path"]), _Arguments(order["arguments"])
+    _serve_packages(path, order["package_dirs"])
+    import xacro  # pyright: ignore[reportMissingImports]
+
+    try:
+        document: Any = xacro.process_file(str(path), mappings=arguments)
+        text = document.toxml()
+    except Exception as error:  # xacro and the expressions of the file raise anything
+        file = (xacro.filestack or [path])[-1]
+        print(json.dumps({"error": f"{_why(error)} (in {file})"}))
+        return
+    unknown = sorted(set(order["arguments"]) - arguments.used)
+    print(json.dumps({"text": text, "unknown": unknown, "known": sorted(arguments.used - set(unknown))}))
+
+
+def _why(error: BaseException) -> str:
+    """What xacro says; what `_serve_packages` says, where that is the cause."""
+    cause = error
+    while isinstance(cause := getattr(cause, "exc", None), BaseException):
+        if isinstance(cause, RobotDynError):
+            return str(cause)
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _serve_packages(path: Path, package_dirs: list[str]) -> None:
+    """Answer xacro where it asks ROS 2 for the folder of a package."""
+    module = ModuleType("ament_index_python.packages")
+    module.get_package_share_directory = lambda name: str(catalog.package(name, path, package_dirs))  # pyright: ignore[reportAttributeAccessIssue]
+    sys.modules |= {"ament_index_python": ModuleType("ament_index_python"), module.__name__: module}

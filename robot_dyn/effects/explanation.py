@@ -1,0 +1,177 @@
+"""The equation of motion of a plant in words: its terms, what acts, and the coefficients as they act."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, final
+
+from robot_dyn.answer import Answer, Block
+from robot_dyn.description.catalog import abbreviated
+from robot_dyn.queries.units import coefficient_texts
+
+if TYPE_CHECKING:
+    from robot_dyn.effects.effect import Effect
+    from robot_dyn.effects.plant import Plant
+
+EDITED = {
+    "gravity": "∂V/∂q in N, with V = −Σ m gᵀ p",
+    "lock": "a joint held at a value, its link part of the link before",
+    "payload": "a rigid body on a link, in M, C and N",
+    "armature": "added to the diagonal of M",
+    "mass_scale": "factor on mass and inertia of all links, payloads excepted",
+    "mass": "of a link, in place of that of the file",
+    "inertia": "of a link, in place of that of the file",
+}
+"""What each edit of a robot does, in a line."""
+
+
+@final
+@dataclass(frozen=True)
+class Number:
+    """A number of a scene, its key, and its source: "scene", "default" or "the robot's file"."""
+
+    key: str
+    value: str
+    source: str
+
+
+@final
+@dataclass(frozen=True)
+class Term:
+    """What acts: an edit of the robot or an effect.
+
+    Attributes:
+        kind: Its name in scenes.
+        term: Its equation in a line; empty for a user-defined effect that states none.
+        numbers: Of a scene, as they are written there.
+        coefficients: As they act, with units.
+    """
+
+    kind: str
+    term: str
+    numbers: tuple[Number, ...] = ()
+    coefficients: tuple[str, ...] = ()
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Explanation(Answer):
+    """What a plant, a setup or a scene integrates.
+
+    Attributes:
+        robot: Its name.
+        joints: Names of the joints.
+        equation: Lines of the equation of motion.
+        effects: What acts.
+        absent: Kinds that do not act.
+        absent_of_control: What a digital loop can have and that of the controller has not.
+        control: Lines on controller and reference.
+        method: Lines on method and start.
+        machine_code: Lines on instructions.
+        source: Path of the robot's file; empty if there is none.
+    """
+
+    robot: str
+    joints: tuple[str, ...]
+    equation: tuple[str, ...]
+    effects: tuple[Term, ...]
+    absent: tuple[str, ...] = ()
+    absent_of_control: tuple[str, ...] = ()
+    control: tuple[str, ...] = ()
+    method: tuple[str, ...] = ()
+    machine_code: tuple[str, ...] = ()
+    source: str = ""
+
+    def blocks(self) -> Iterator[Block]:
+        n = len(self.joints)
+        yield f"{self.robot}: {n} joint{'s' if n > 1 else ''}, {', '.join(self.joints)}"
+        yield ""
+        yield from (f"    {line}" for line in self.equation)
+        yield ""
+        yield "effects:" if self.effects else "effects: none"
+        for each in self.effects:
+            yield f"  {each.kind}: {each.term}" if each.term else f"  {each.kind}"
+            yield from (f"    {x.key} = {x.value}  ({x.source})" for x in each.numbers)
+            if each.coefficients:
+                yield f"    as it acts: {'; '.join(each.coefficients)}"
+        if self.absent:
+            yield ""
+            yield "not simulated, since nothing names it:"
+            yield f"  {', '.join(self.absent)}"
+        if self.absent_of_control:
+            yield f"  of the control: {', '.join(self.absent_of_control)}"
+        for lines in (self.control, self.method, self.machine_code):
+            yield from ("", *lines) if lines else ()
+        if self.source:
+            yield ""
+            yield f"the file of the robot: {abbreviated(self.source)}"
+
+
+def explanation(plant: Plant) -> Explanation:
+    """The equation of motion of a plant, with what acts."""
+    dynamics: Any = plant.dynamics
+    robot = getattr(dynamics, "robot", dynamics)
+    edits = tuple(edit_terms(robot.edits)) if hasattr(robot, "edits") else ()
+    weight = ["∂V/∂q"] if not hasattr(robot, "edits") or any(robot.edits.gravity) else []
+    forces = dict.fromkeys(force.name for force in plant.forces)
+    bounds = dict.fromkeys(part.name for part in plant.effects if hasattr(part, "actuation"))
+    return Explanation(
+        getattr(robot, "name", type(dynamics).__name__),
+        dynamics.joint_names,
+        (
+            "M(q) a + C(q, v) v + N = τ",
+            f"N = {_sum([*weight, *(f'− τ_{name}' for name in forces)])}",
+            " after ".join(["τ = u", *([", ".join(bounds)] if bounds else [])]),
+        ),
+        (*edits, *(_term(parts, dynamics) for parts in _by_effect(plant.effects))),
+        source=robot.description.source if hasattr(robot, "description") else "",
+    )
+
+
+def _sum(terms: list[str]) -> str:
+    """Terms of N; the sign of the first one stands before it."""
+    return " ".join(terms).replace("− ", "−", 1) if terms and terms[0][0] == "−" else " ".join(terms) or "0"
+
+
+def _by_effect(effects: Iterable[Effect]) -> Iterator[list[Effect]]:
+    """The parts of each effect: neighbours of one name and different classes."""
+    parts: list[Effect] = []
+    for each in effects:
+        if parts and (each.name != parts[0].name or type(each) in map(type, parts)):
+            yield parts
+            parts = []
+        parts.append(each)
+    if parts:
+        yield parts
+
+
+def _term(parts: list[Effect], dynamics: Any) -> Term:
+    return Term(parts[0].name, term_of(parts), coefficients=as_they_act(parts, dynamics))
+
+
+def term_of(parts: Iterable[Any]) -> str:
+    """The sum of the terms of the parts of an effect, or of their classes."""
+    first, *rest = (each.term for each in parts)
+    return " ".join((first, *(f"− {term[1:]}" if term[:1] == "−" else f"+ {term}" for term in rest)))
+
+
+def as_they_act(parts: Iterable[Any], dynamics: Any, signal: str = "signal") -> tuple[str, ...]:
+    """Coefficients of the parts of an effect or a controller, with units; `signal` as of `coefficient_texts`."""
+    types = getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * dynamics.n)
+    texts = {name: text for each in parts for name, text in coefficient_texts(each, types, signal).items()}
+    return tuple(texts.values())
+
+
+def edit_terms(edits: Any) -> Iterator[Term]:
+    """What was changed of a robot, gravity included."""
+    texts = {
+        "gravity": [f"g = ({', '.join(f'{x:g}' for x in edits.gravity)}) m/s²"] if any(edits.gravity) else [],
+        "lock": [f"{joint} = {x:g}" for joint, x in edits.lock],
+        "payload": [f"{x.mass:g} kg on {x.frame} at ({', '.join(f'{c:g}' for c in x.com)}) m" for x in edits.payloads],
+        "armature": [f"{joint} {x:g}" for joint, x in edits.armature if x],
+        "mass_scale": [f"{edits.mass_scale:g}"] if edits.mass_scale != 1 else [],
+        "mass": [f"{link} {x:g} kg" for link, x in edits.masses],
+        "inertia": [link for link, _ in edits.inertias],
+    }
+    yield from (Term(kind, EDITED[kind], coefficients=tuple(each)) for kind, each in texts.items() if each)

@@ -1,0 +1,124 @@
+"""A plant at one state: M, C, N, the torque of each effect, and the joints that are held."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.answer import Answer, Block, Table
+from robot_dyn.effects.effect import numbered
+from robot_dyn.effects.hold import Hold
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import QueryError
+from robot_dyn.model.gravity import gravity_acts, no_torque
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.quantity import PLANT, C, M
+from robot_dyn.queries.units import numbers_row, units, without_rounding
+from robot_dyn.result import UNREPORTED
+from robot_dyn.validate import instance, number, one_state
+from robot_dyn.values import Value, read_only
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class PlantState(Answer, Value):
+    """A plant of a robot at one state, M a + C v + N = τ.
+
+    Attributes:
+        robot: Name of the robot.
+        gravity: Acceleration of free fall in base axes, in [m/s²].
+        gravity_acts: Whether it has a torque on a joint at some position.
+        joints: Names of the n joints.
+        types: Their types, such as "revolute".
+        q, v, a, tau: The state, (n,), in SI units.
+        M, C: (n, n).
+        N: Gravity and effects, as what must be overcome, (n,).
+        effects: Torque of each effect on the joints, (n,), by name.
+        held: The joints that dry friction and rigid stops hold, where a follows from tau.
+        plant: The plant, with the payloads that it carries at that time.
+        of_tau: Whether a follows from tau.
+    """
+
+    robot: str
+    gravity: tuple[float, float, float]
+    gravity_acts: bool
+    joints: tuple[str, ...]
+    types: tuple[str, ...]
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    tau: np.ndarray
+    M: np.ndarray
+    C: np.ndarray
+    N: np.ndarray
+    effects: dict[str, np.ndarray]
+    held: tuple[Hold, ...]
+    plant: Plant = field(metadata=UNREPORTED)
+    of_tau: bool = field(metadata=UNREPORTED)
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+    @property
+    def title(self) -> str:
+        return f"{self.robot}, M a + C v + N = τ"
+
+    def blocks(self) -> Iterator[Block]:
+        for name in ("q", "v", "a", "tau"):
+            yield f"{name:4}{numbers_row(getattr(self, name))}  [{units(name, self.types)}]"
+        force = units("tau", self.types)
+        of_M = {"N m": "kg m²", "N": "kg"}.get(force, "kg m², kg m, kg")
+        of_C = {"N m": "N m s/rad", "N": "N s/m"}.get(force, "rows times v: N m, N")
+        meanings = (("M", "mass matrix", of_M), ("C", "Coriolis matrix", of_C), ("N", "gravity and effects", force))
+        for name, meaning, of_entries in meanings:
+            yield ""
+            yield f"{name}, {meaning} [{of_entries}]:"
+            rows = getattr(self, name).reshape(len(self.joints), -1)
+            one_unit = name == "N" or force in ("N m", "N")
+            rows = without_rounding(rows) if one_unit else rows  # M stays symmetric; elsewhere row by row
+            yield from (f"  {numbers_row(row)}  {joint}" for row, joint in zip(rows, self.joints, strict=True))
+        if not self.gravity_acts:
+            yield ""
+            yield f"{no_torque(self.gravity)} without effects"
+        if self.held:
+            yield ""
+            yield f"held at rest [{force}]:"
+            headings = ("joint", "from", "load", "slides below", "slides above", "margin")
+            loads = (without_rounding((x.load, x.least, x.most, x.margin)) for x in self.held)
+            yield Table(
+                headings, tuple((x.joint, ", ".join(x.by), *load) for x, load in zip(self.held, loads, strict=True))
+            )
+
+
+def plant_state(plant: Any, q: Any, v: Any, a: Any = None, tau: Any = None, t: float = 0.0) -> PlantState:
+    """A plant, or a robot, at a state: tau from a, or a, and what is held, from tau.
+
+    Raises:
+        QueryError: If there is no robot in the plant, neither or both of a and tau are given, or one has another shape
+            than (n,) or is not finite.
+    """
+    plant = plant if isinstance(plant, Plant) else Plant(plant)
+    plant = plant.at(t := number("t", t))
+    robot = instance("plant", plant.dynamics, Robot, "give that of a robot, such as rd.Plant(rd.load('ur5'))")
+    if (a is None) == (tau is None):
+        raise QueryError("give one of a and tau: the other follows from it")
+    q, v = (one_state(name, x, robot.joint_names) for name, x in (("q", q), ("v", v)))
+    held: tuple[Hold, ...] = ()
+    of_tau = tau is not None
+    if of_tau:
+        tau = plant.actuation(one_state("tau", tau, robot.joint_names))
+        a, held = plant.forward_dynamics(t, q, v, tau), plant.held(t, q, v, tau)
+    else:
+        a = one_state("a", a, robot.joint_names)
+        tau = plant.inverse_dynamics(t, q, v, a)
+    torques = plant.equation_of_motion.torques(t, q, v, q.shape)
+    state = {"q": q, "v": v, "a": a, "tau": tau}
+    terms = {each.name: each.ask(plant, state | {"t": t}) for each in (M, C, PLANT["N"])}
+    effects = dict(zip(numbered(*(force.name for force in plant.forces)), torques, strict=True))
+    return PlantState(
+        robot.name, robot.edits.gravity, gravity_acts(robot), robot.joint_names, robot.joint_types, **state, **terms,
+        effects=effects, held=held, plant=plant, of_tau=of_tau,
+    )  # fmt: skip

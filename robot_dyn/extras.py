@@ -1,0 +1,28 @@
+"""Packages that only some answers need: imported when asked for, named with the line that installs them."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from robot_dyn.errors import MissingExtraError
+
+
+def needs(module: str, *, extra: str) -> ModuleType:
+    """A module of an optional dependency, imported now.
+
+    Args:
+        module: Its name, such as "ruckig".
+        extra: The extra of robot-dyn that installs it, such as "plan".
+
+    Raises:
+        MissingExtraError: If it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.partition(".")[0] != module.partition(".")[0]:
+            raise  # it is there, and lacks a package of its own
+        raise MissingExtraError(
+            f"{module.partition('.')[0]} is not installed: pip install 'robot-dyn[{extra}]'"
+        ) from None

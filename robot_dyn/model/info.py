@@ -1,0 +1,159 @@
+"""What is known of a robot: its joints, couplings, mass, edits and findings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from robot_dyn.answer import Answer, Block, Table
+from robot_dyn.description.catalog import abbreviated
+from robot_dyn.description.edits import Edits, Payload
+from robot_dyn.model.gravity import gravity_acts, no_torque
+
+if TYPE_CHECKING:
+    from robot_dyn.model.robot import Robot
+
+_HEADINGS = "joint", "kind", "lower", "upper", "effort", "velocity", "damping", "dry friction", "armature"
+
+
+@final
+@dataclass(frozen=True)
+class Joint:
+    """A joint: limits in [rad] or [m], [N m] or [N] and per second; what is not stated is infinite or 0."""
+
+    name: str
+    kind: str
+    lower: float
+    upper: float
+    effort_limit: float
+    velocity_limit: float
+    damping: float
+    friction: float
+    armature: float
+
+
+@final
+@dataclass(frozen=True)
+class Coupling:
+    """A joint that follows another one: q = multiplier · q_source + offset."""
+
+    joint: str
+    source: str
+    multiplier: float
+    offset: float
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Info(Answer):
+    """What `info` tells of a robot.
+
+    Attributes:
+        robot: Name in its file.
+        source: Path of the file.
+        n: Degrees of freedom.
+        total_mass: Of all links, in [kg].
+        gravity: Acceleration of free fall in base axes, in [m/s²].
+        gravity_acts: Whether it has a torque on a joint at some position.
+        joints: In the order of q.
+        couplings: Joints that follow another one, as the file states them.
+        locked: Value of each joint that is held, in [rad] or [m].
+        payloads: Bodies that were added.
+        estimated: What inertias that nobody measured were made from, by link.
+        links: Names of the frames.
+        findings: What is doubtful in its description, each with its remedy.
+    """
+
+    robot: str
+    source: str
+    n: int
+    total_mass: float
+    gravity: tuple[float, float, float]
+    gravity_acts: bool
+    joints: tuple[Joint, ...]
+    couplings: tuple[Coupling, ...]
+    locked: dict[str, float]
+    payloads: tuple[Payload, ...]
+    estimated: dict[str, str]
+    links: tuple[str, ...]
+    findings: tuple[str, ...]
+
+    def blocks(self) -> Iterator[Block]:
+        yield _heading(self.robot, self.n, self.total_mass, self.gravity)
+        yield abbreviated(self.source)
+        if not self.gravity_acts:
+            yield no_torque(self.gravity)
+        yield Table(_HEADINGS, tuple(tuple(vars(joint).values()) for joint in self.joints), digits=4)
+        yield "units: rad and N m for a joint that turns, m and N for one that slides; — is not stated"
+        for each in self.couplings:
+            yield f"coupled: {each.joint} = {each.multiplier:g} · {each.source} + {each.offset:g}"
+        yield from _edits(self.locked, self.payloads)
+        yield from (f"estimated: {link}: {basis}" for link, basis in self.estimated.items())
+        yield from (f"finding: {finding}" for finding in self.findings)
+
+
+def info(robot: Robot) -> Info:
+    """What is known of a robot: joints with limits and stated friction, couplings, mass, edits and findings.
+
+    Its `repr` is the table that `robot-dyn info` prints, `to_json()` the document of `robot-dyn info --json`.
+
+    Args:
+        robot: Of `rd.load`, with its edits.
+
+    Raises:
+        QueryError: If it is no robot.
+    """
+    from robot_dyn.model.robot import Robot
+    from robot_dyn.validate import instance
+
+    instance("robot", robot, Robot, "give one, such as rd.load('ur5')")
+    columns = [getattr(robot, each) for each in list(Joint.__dataclass_fields__)[2:]]
+    rows = zip(robot.joint_names, robot.joint_types, *(np.asarray(x).tolist() for x in columns), strict=True)
+    return Info(
+        robot.name, robot.description.source, robot.n, robot.total_mass, robot.edits.gravity, gravity_acts(robot),
+        tuple(Joint(*row) for row in rows), tuple(_couplings(robot)), dict(robot.edits.lock), robot.edits.payloads,
+        dict(robot.estimated), robot.frame_names, robot.findings,
+    )  # fmt: skip
+
+
+def info_html(robot: Robot) -> str:
+    """The same as HTML, for a robot in a notebook."""
+    return info(robot)._repr_html_()
+
+
+def robot_line(self: Robot) -> str:
+    """`Robot.__repr__`: one line, as it stands within the `repr` of controllers and other values."""
+    edits = self.edits
+    heading = _heading(self.name, self.n, self.total_mass, edits.gravity)
+    return f"<Robot: {'; '.join((heading, *_edits(dict(edits.lock), edits.payloads), *_other_edits(edits)))}>"
+
+
+def _heading(name: str, n: int, total_mass: float, gravity: tuple[float, float, float]) -> str:
+    g = ", ".join(f"{x:g}" for x in gravity)
+    return f"{name}: {n} joint{'s' * (n != 1)}, {total_mass:.4g} kg, gravity ({g}) m/s²"
+
+
+def _edits(locked: Mapping[str, float], payloads: Iterable[Payload]) -> Iterator[str]:
+    yield from (f"locked: {name} = {value:g}" for name, value in locked.items())
+    yield from (f"payload: {each.mass:g} kg on {each.frame}" for each in payloads)
+
+
+def _other_edits(edits: Edits) -> Iterator[str]:
+    if edits.mass_scale != 1:
+        yield f"mass_scale: {edits.mass_scale:g}"
+    for name, changed in (("armature", edits.armature), ("mass", edits.masses), ("inertia", edits.inertias)):
+        if changed:
+            yield f"{name} changed: {', '.join(key for key, _ in changed)}"
+
+
+def _couplings(robot: Robot) -> Iterator[Coupling]:
+    """As the file states them."""
+    moving = robot.model.names[1:]
+    for joint in robot.description.element.iterfind("joint[mimic]"):
+        mimic: Any = joint.find("mimic")
+        if joint.get("name") in moving:
+            name: Any = joint.get("name")
+            yield Coupling(name, mimic.get("joint"), float(mimic.get("multiplier")), float(mimic.get("offset")))

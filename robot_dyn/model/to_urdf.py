@@ -1,0 +1,170 @@
+"""A robot as a URDF with its edits applied, which other programs read.
+
+Locked joints, and those that follow them, are fixed at T · exp(ξ̂ q); payloads are links of their own; masses and
+inertias are those of the edits. Other literals stay as the file has them; rotations of locked joints pass through roll,
+pitch and yaw. Shapes and materials are those of the file; its other elements, such as transmissions, are left out.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from copy import deepcopy
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.description.couplings import resolve
+from robot_dyn.description.edits import STANDARD_GRAVITY, Payload
+from robot_dyn.description.markup import parse
+from robot_dyn.description.structure import stated_mimics
+from robot_dyn.description.urdf import UNBOUNDED
+from robot_dyn.errors import DescriptionError, ModelWarning
+from robot_dyn.files import Kind, save, target
+from robot_dyn.model.pinocchio_model import state_edits
+from robot_dyn.spatial import rotation, rotation_rpy, rpy_of
+
+if TYPE_CHECKING:
+    from robot_dyn.model.robot import Robot
+
+_URDF = Kind("a URDF", ".urdf", b"<?xml")
+_DRAWN = ("visual", "collision")
+_UNIT_SLACK = 1e-15  # of an axis: its rounding
+
+
+def to_urdf(self: Robot, path: str | Path) -> Path:
+    """Write the robot with its edits as a URDF; an older one of that name is replaced.
+
+    Locks become fixed joints and payloads links; meshes keep their addresses, relative ones are those from the new
+    place.
+
+    Args:
+        self: The robot.
+        path: Ends with .urdf, which is added if it has no suffix; not the file that the robot was read from.
+
+    Returns:
+        The path.
+
+    Raises:
+        DescriptionError: If the file cannot be written there.
+
+    Warns:
+        ModelWarning: If there is armature, or a gravity that is not the standard one: URDF has no place for them.
+    """
+    source = Path(self.description.source)
+    path = target(path, _URDF, DescriptionError, [source] if source.is_file() else [])
+    text = urdf_text(self, path.parent)
+    save(path, lambda stream: stream.write(text), DescriptionError)
+    if lacking := _not_stated(self):
+        warnings.warn(f"{self.name}: {'; '.join(lacking)}", ModelWarning, stacklevel=2)
+    return path
+
+
+def urdf_text(robot: Robot, folder: Path) -> bytes:
+    """The bytes of that file, with relative addresses of meshes as from `folder`."""
+    out, edits = robot.description.element, robot.edits
+    state_edits(out, edits)
+    for inertial in out.iterfind("link/inertial") if edits.mass_scale != 1.0 else ():
+        for element in (inertial.find("mass"), inertial.find("inertia")):
+            for key, text in element.items():
+                element.set(key, repr(edits.mass_scale * float(text)))
+    _fix_locked(out, dict(edits.lock))
+    for joint in out.iterfind("joint"):
+        _restate(joint)
+    _draw(out, robot, folder)
+    for payload in edits.payloads:
+        _add_payload(out, payload)
+    for each in _not_stated(robot):
+        out.insert(0, etree.Comment(f" {each.replace('--', '- -')} "))
+    etree.indent(out)
+    return etree.tostring(out, xml_declaration=True, encoding="UTF-8") + b"\n"
+
+
+def _not_stated(robot: Robot) -> list[str]:
+    """What a URDF cannot state of the edits."""
+    armature = {name: value for name, value in robot.edits.armature if value}
+    told = [f"armature is not in the URDF, which has no place for it: {armature}"] if armature else []
+    if robot.edits.gravity != STANDARD_GRAVITY:
+        told.append(f"gravity is not in the URDF, which has no place for it: {robot.edits.gravity} m/s²")
+    return told
+
+
+def _fix_locked(out: Any, values: dict[str, float]) -> None:
+    """Joints that are held, and those that follow them, as fixed ones; chains of followers as single steps."""
+    mimics = stated_mimics(out)
+    for joint in out.iterfind("joint"):
+        name, mimic = joint.get("name"), joint.find("mimic")
+        source, ratio, offset = resolve(name, mimics, FLOAT64)
+        if source in values and joint.get("type") != "fixed":
+            _hold(joint, ratio * values[source] + offset)
+        elif mimic is not None and mimic.get("joint") != source:
+            for key, value in (("joint", source), ("multiplier", repr(float(ratio))), ("offset", repr(float(offset)))):
+                mimic.set(key, value)
+
+
+def _hold(joint: Any, value: float) -> None:
+    origin, axis = joint.find("origin"), _numbers(joint.find("axis").get("xyz"))
+    axis, R, p = axis / np.linalg.norm(axis), rotation_rpy(_numbers(origin.get("rpy"))), _numbers(origin.get("xyz"))
+    if joint.get("type") == "prismatic":
+        origin.set("xyz", _words(p + R @ axis * value))
+    else:
+        origin.set("rpy", _words(rpy_of(R @ rotation(axis, np.float64(value)))))
+    joint.set("type", "fixed")
+    for tag in ("axis", "limit", "dynamics", "mimic"):
+        if (element := joint.find(tag)) is not None:
+            joint.remove(element)
+
+
+def _restate(joint: Any) -> None:
+    """Axes of length 1, as some programs need them, and limits left out that the file does not state."""
+    limit, axis = joint.find("limit"), joint.find("axis")
+    if axis is not None and abs((length := np.linalg.norm(_numbers(axis.get("xyz")))) - 1) > _UNIT_SLACK:
+        axis.set("xyz", _words(_numbers(axis.get("xyz")) / length))
+    if limit is None or joint.get("type") != "continuous":
+        return
+    for key in ("lower", "upper"):
+        del limit.attrib[key]
+    if {limit.get("effort"), limit.get("velocity")} == {UNBOUNDED}:
+        joint.remove(limit)
+
+
+def _draw(out: Any, robot: Robot, folder: Path) -> None:
+    """Add the shapes of links, and materials, of the text that was read."""
+    read, _ = parse(robot.description.text, robot.description.source)
+    shapes = {(link.get("name") or "").strip(): link for link in read.iterfind("link")}
+    for link in out.iterfind("link"):
+        if (drawn := shapes.get(link.get("name"))) is not None:
+            link.extend(deepcopy(each) for each in drawn if each.tag in _DRAWN)
+    for material in reversed(read.findall("material")):
+        out.insert(0, deepcopy(material))
+    source = Path(robot.description.source)
+    for element in out.iter("mesh", "texture") if source.is_file() else ():
+        address = element.get("filename") or ""
+        if address and "://" not in address and not Path(address).is_absolute():
+            element.set("filename", Path(os.path.relpath(source.absolute().parent / address, folder)).as_posix())
+
+
+def _add_payload(out: Any, payload: Payload) -> None:
+    """A link of its own, fixed to the frame that carries it."""
+    taken = {each.get("name") for each in out.iter("link", "joint")}
+    name = next(each for k in range(len(taken) + 1) if (each := f"payload_{k}") not in taken)
+    inertial = etree.SubElement(etree.SubElement(out, "link", name=name), "inertial")
+    etree.SubElement(inertial, "origin", xyz=_words(payload.com), rpy="0 0 0")
+    etree.SubElement(inertial, "mass", value=repr(payload.mass))
+    moments = {f"i{a}{b}": (i, j) for i, a in enumerate("xyz") for j, b in enumerate("xyz") if j >= i}
+    etree.SubElement(inertial, "inertia", {key: repr(float(payload.inertia[i][j])) for key, (i, j) in moments.items()})
+    joint = etree.SubElement(out, "joint", name=f"{name}_joint", type="fixed")
+    etree.SubElement(joint, "origin", xyz="0 0 0", rpy="0 0 0")
+    etree.SubElement(joint, "parent", link=payload.frame)
+    etree.SubElement(joint, "child", link=name)
+
+
+def _numbers(text: str) -> np.ndarray:
+    return np.array(text.split(), dtype=float)
+
+
+def _words(values: Any) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,200 @@
+"""A path as fast as its limits allow, with what the plant asks for in full."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.control.reference import PiecewisePolynomial, hold
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import PlanError
+from robot_dyn.plan.geometric_path import geometric_path, in_time, turning_points
+from robot_dyn.plan.limits import Limits, limits_of
+from robot_dyn.plan.motors import Motors
+from robot_dyn.plan.path_plan import BINDS, Judgement, PathPlan, bindings, elsewhere, judged, judged_times, phases
+from robot_dyn.plan.plan import Plan
+from robot_dyn.plan.plannable import check_effects, check_limited, check_positions, why_not
+from robot_dyn.plan.time_scaling import Effects, Speed, cells, fastest, imposed
+from robot_dyn.validate import number
+
+_CELLS, _MOST_CELLS = 200, 8000  # of the grid, besides breaks of the path
+_ROUNDS = 40
+_TIGHTER = 3  # times that limits are tightened where the judgement finds more than they allow
+_ERROR = 1e-4  # of linearised torque, as a share of its limit
+_REST = 1e-20  # of the greatest ṡ²: about which effects are linearised at rest, so that friction has a sign
+_SAME = 1e-9  # of the path: joints that reverse nearer to each other, or to a break, do so at one place
+_SHORTEST = 1e-5  # of the duration: shorter pieces are not halved
+_ABOVE, _REFUSED = 1.0005, 1.001  # share of a limit that is refined, and that is refused
+_AT_LIMITS, _ENOUGH = 0.985, 0.98  # share of time at a limit that is looked for, and below which there is a finding
+_INSIDE = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # where cells are judged for the next round
+_EXPECTED = 1.0, 0.2, 5.0, 0.04, 25.0  # factors on the expected duration: toppra's solver needs its scale
+
+
+def path(
+    plant: Any,
+    points: Any,
+    *,
+    share: float = 1.0,
+    effort: Any = None,
+    velocity: Any = None,
+    acceleration: Any = None,
+    motors: Motors | None = None,
+) -> PathPlan:
+    """The fastest motion along a path, from rest to rest, within limits of torque, velocity and acceleration.
+
+        minimise T over s(t):  |τ(q, q̇, q̈)| ≤ share · τ_max,  |q̇| ≤ v_max,  |q̈| ≤ a_max  on q = q(s(t))
+
+    τ is the plant's inverse dynamics, with all of its effects. The motion is a polynomial in each of some hundred
+    pieces, in which s̈ is constant: its acceleration and torque jump between pieces, as those of time-optimal motions
+    do. It is judged at 10 000 times. What follows it in a run needs torque for its feedback: take share=0.95.
+
+    Args:
+        plant: A plant or an arm.
+        points: Way points, (m, n), in [rad] or [m], which a natural cubic spline joins; or a
+            `rd.control.PiecewisePolynomial`, of which the path alone counts.
+        share: Of the effort limits that the motion may take, up to 1.
+        effort: Effort limits, one number, by joint name or (n,), in [N m] or [N]; those of the motors or, without
+            them, of the robot's file unless given.
+        velocity: Velocity limits, likewise, in [rad/s] or [m/s].
+        acceleration: Acceleration limits, likewise, in [rad/s²] or [m/s²]; none unless given.
+        motors: Of `rd.plan.read_motors`: peak torques and speeds.
+
+    Raises:
+        PlanError: If points or limits are not allowed, the path leaves the joint limits, an effect depends on time or
+            has states, or no motion is within the limits; it names the joint or the effect.
+        MissingExtraError: Without toppra.
+
+    Source: Bobrow, Dubowsky, Gibson, Time-Optimal Control of Robotic Manipulators Along Specified Paths, 1985; Pham,
+    Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis, 2018.
+    """
+    plant = plant if isinstance(plant, Plant) else Plant(plant)
+    share = number("share", share, error=PlanError, above=0.0)
+    if share > 1:
+        raise PlanError(f"share must be at most 1, got {share:g}")
+    limits = limits_of(plant, motors, effort, velocity, acceleration)
+    limits = Limits(limits.effort * share, limits.velocity, limits.acceleration)
+    geometry = geometric_path(points, plant.dynamics.joint_names)
+    check_effects(plant)
+    check_positions(plant, geometry)
+    check_limited(plant, limits, geometry)
+    names = plant.dynamics.joint_names
+    motion, found = _within(plant, limits, geometry)
+    largest, at_limits = float(found.most.max()), float((found.most >= BINDS).mean())
+    moves = geometry.coefficients[:, 1:].any(axis=(0, 1))
+    free = [name for i, name in enumerate(names) if moves[i] and np.isinf(limits.effort[i])]
+    findings = [f"joint {name!r} moves without an effort limit; give effort={{{name!r}: …}}" for name in free]
+    if at_limits < _ENOUGH:
+        findings.append(f"no limit binds for {1 - at_limits:.1%} of the time: a faster motion may exist")
+    robot: Any = plant.dynamics
+    kinds = getattr(robot, "joint_types", ("revolute",) * robot.n)
+    by_kind = {"velocity": limits.velocity, "acceleration": limits.acceleration, "torque": limits.effort}
+    method = "path at its limits" + ("" if share == 1 else f", with torques up to {share:.4g} of theirs")
+    return PathPlan(
+        Plan(getattr(robot, "name", "arm"), names, kinds, motion, method, by_kind, tuple(findings)),
+        share,
+        largest,
+        at_limits,
+        elsewhere(found, motion.breaks),
+        tuple(bindings(found, limits, names)),
+        tuple(phases(found, names)),
+        {name: found.shares[0][:, i] for i, name in enumerate(names) if np.isfinite(limits.effort[i])},
+    )
+
+
+def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[PiecewisePolynomial, Judgement]:
+    """The fastest motion that the judgement finds within limits, and its judgement."""
+    allowed, largest, error = 1.0, inf, inf
+    for _ in range(_TIGHTER):
+        motion, error = _fastest_motion(plant, _scaled(limits, allowed), path)
+        found = judged(plant, limits, motion, judged_times(motion.end))
+        largest = float(found.most.max())
+        if largest <= _REFUSED and error <= _ERROR:
+            return motion, found
+        allowed /= max(1.0, largest)
+    raise PlanError(
+        f"no motion was found within the limits: the best one takes {largest:.5f} of them, and the torque of its"
+        f" effects is known to {error:.2g} of the limits; take a smoother path or smoother effects"
+    )
+
+
+def _scaled(limits: Limits, factor: float) -> Limits:
+    return Limits(limits.effort * factor, limits.velocity * factor, limits.acceleration * factor)
+
+
+def _fastest_motion(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[PiecewisePolynomial, float]:
+    """The motion, and the error of its linearised effects, as a share of the effort limits."""
+    fixed = _apart(path.breaks, turning_points(path)) if plant.forces else path.breaks
+    cosine = (1 - np.cos(np.linspace(0, np.pi, _CELLS + 1))) / 2
+    grid = _merged(fixed, path.start + (path.end - path.start) * cosine)
+    duration = cells(plant, limits, path, grid, None).expected_duration
+    last = Speed(path.breaks[[0, -1]], np.full(2, ((path.end - path.start) / duration) ** 2))
+    motion, error = hold(path.at(path.start)[0]), inf
+    for turn in range(_ROUNDS):
+        last, error = _solved(plant, limits, path, grid, last, duration)
+        motion = in_time(path, last.s, last.x)
+        duration = motion.end
+        if turn == 0:  # pieces of about the same duration
+            grid = _merged(fixed, _places(last, motion.breaks, np.linspace(0, duration, _CELLS + 1)))
+            continue
+        bad, settled = _unsettled(plant, limits, motion)
+        if error < _ERROR and (settled or not bad.any() or len(grid) > _MOST_CELLS):
+            break
+        grid = np.sort(np.concatenate([grid, (grid[:-1] + grid[1:])[bad] / 2]))
+    return motion, error
+
+
+def _solved(
+    plant: Plant, limits: Limits, path: PiecewisePolynomial, grid: np.ndarray, last: Speed, duration: float
+) -> tuple[Speed, float]:
+    """The fastest speed on a grid, with effects linearised about the last one, or about slower ones if none exists.
+
+    Also the error of what was linearised, as a share of the effort limits.
+    """
+    places = imposed(grid).ravel()
+    known = np.maximum(last.at(places), _REST * last.x.max())
+    for slower in 4.0 ** np.arange(6 if plant.forces else 1):
+        effects = Effects.about(plant, path, places, known / slower) if plant.forces else None
+        made = cells(plant, limits, path, grid, effects)
+        for factor in _EXPECTED:
+            if (x := fastest(made, factor * duration)) is not None:
+                speed = Speed(grid, x)
+                if effects is None:
+                    return speed, 0.0
+                return speed, float(np.abs(effects.error(plant, path, speed.at(places)) / limits.effort).max())
+    raise PlanError(why_not(plant, limits, path))
+
+
+def _unsettled(plant: Plant, limits: Limits, motion: PiecewisePolynomial) -> tuple[np.ndarray, bool]:
+    """The pieces to be halved, (k,), and whether none need be: enough of the motion is at a limit, and none above."""
+    h = np.diff(motion.breaks)
+    most = judged(plant, limits, motion, (motion.breaks[:-1, None] + h[:, None] * _INSIDE).ravel()).most
+    most = most.reshape(len(h), -1)
+    at_limits = (h[:, None] * (most >= BINDS)).mean(axis=-1).sum() / h.sum()
+    above = most.max(axis=-1) > _ABOVE
+    bad = (above | (most.min(axis=-1) < BINDS)) & (h > _SHORTEST * motion.end)
+    return bad, bool(at_limits >= _AT_LIMITS and not above.any())
+
+
+def _apart(breaks: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """The breaks, and the points that differ from them and from each other by more than rounding."""
+    least = _SAME * (breaks[-1] - breaks[0])
+    points = points[np.diff(points, prepend=-inf) > least]
+    near = np.abs(points[:, None] - breaks).min(axis=-1, initial=inf)
+    return np.union1d(breaks, points[near > least])
+
+
+def _merged(fixed: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """A grid with all the fixed points, and the free ones that are not close to them."""
+    near = np.abs(free[:, None] - fixed).min(axis=-1)
+    cell = np.gradient(free)
+    return np.unique(np.concatenate([fixed, free[near > 0.3 * cell]]))
+
+
+def _places(speed: Speed, breaks: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """S at times t."""
+    piece = np.clip(np.searchsorted(breaks, t, side="right") - 1, 0, len(breaks) - 2)
+    u = (np.diff(speed.x) / (2 * np.diff(speed.s)))[piece]
+    h = t - breaks[piece]
+    return speed.s[piece] + np.sqrt(speed.x[piece]) * h + u / 2 * h**2

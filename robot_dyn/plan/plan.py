@@ -1,0 +1,76 @@
+"""A planned motion: what a controller follows, with the limits that it was made for and what is doubtful in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+
+from robot_dyn.answer import Answer, Block, Table
+from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.plan.extremes import extremes
+from robot_dyn.queries.units import of_joint
+from robot_dyn.result import reported
+from robot_dyn.values import Value, read_only
+
+_ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
+_PER = {"velocity": "[/s]", "acceleration": "[/s²]", "jerk": "[/s³]"}
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Answer, Value):
+    """A motion of the joints of an arm; `plan.reference` is what controllers follow.
+
+    Attributes:
+        arm: Name of the arm.
+        joint_names: Names of the n joints, in the order of q.
+        joint_types: Their types, such as "revolute".
+        reference: The motion q(t).
+        method: How it was made, in a line.
+        limits: Greatest absolute values, (n,) each, inf where there is none, by "velocity", "acceleration", "jerk" or
+            "torque": those that it was made for, or compared with.
+        findings: What is doubtful, in words, each with its remedy.
+    """
+
+    arm: str
+    joint_names: tuple[str, ...]
+    joint_types: tuple[str, ...]
+    reference: PiecewisePolynomial
+    method: str
+    limits: Mapping[str, np.ndarray]
+    findings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+    @reported
+    def duration(self) -> float:
+        """Time from the first to the last break, in [s]."""
+        return self.reference.end - self.reference.start
+
+    @cached_property
+    def peaks(self) -> dict[str, np.ndarray]:
+        """Largest absolute velocity, acceleration and jerk of each joint, (n,) each, exact but for rounding."""
+        return {name: extremes(self.reference, order).largest for name, order in _ORDERS.items()}
+
+    def blocks(self) -> Iterator[Block]:
+        yield f"{self.arm}: {self.method}"
+        after = f" from {self.reference.start:g} s" if self.reference.start else ""
+        yield f"{self.duration:.6g} s{after}, {len(self.reference.coefficients)} polynomials"
+        start, end = self.reference.at(np.array([self.reference.start, self.reference.end]))[0]
+        shown = [name for name in _ORDERS if name in self.limits or name != "jerk"]
+        columns = [self._cells(name) for name in shown]
+        units = [of_joint("rad", kind) for kind in self.joint_types]
+        heading = "joint", "unit", "from", "to", *(f"{name} {_PER[name]}, of its limit" for name in shown)
+        yield Table(heading, tuple(zip(self.joint_names, units, start, end, *columns, strict=True)), right=heading[4:])
+        yield from (f"finding: {each}" for each in self.findings)
+
+    def _cells(self, name: str) -> list[str]:
+        """The largest value of each joint, with its limit where there is one."""
+        limits = self.limits.get(name, np.full(len(self.joint_names), np.inf))
+        pairs = zip(self.peaks[name], limits, strict=True)
+        return [f"{x:.4g} of {limit:.4g}" if limit < np.inf else f"{x:.4g}" for x, limit in pairs]

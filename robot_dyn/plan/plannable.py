@@ -1,0 +1,93 @@
+"""What a path at its limits can be planned for: effects of position and velocity, and limits that suffice."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.effects.actuator import EffortLimit
+from robot_dyn.effects.carried_payload import CarriedPayload
+from robot_dyn.effects.effect import Bound, Force, Stateful
+from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.rigid_stops import RigidStops
+from robot_dyn.errors import PlanError
+from robot_dyn.plan.extremes import extremes
+from robot_dyn.plan.limits import Limits
+
+_TIMES = 0.1234, 7.891  # at which torques must be the same
+_ROUNDING = 1e-9
+
+
+def check_effects(plant: Plant) -> None:
+    """Refuse what depends on time, has states, or changes the torque of the motors."""
+    rng, n = np.random.default_rng(0), plant.dynamics.n
+    q, v = rng.uniform(-1, 1, (2, 8, n))
+    for effect in plant.effects:
+        why = ""
+        if isinstance(effect, Stateful):
+            why = "has states"
+        elif isinstance(effect, CarriedPayload):
+            why = "comes and goes: give the arm with the payload, arm.with_(payload=…)"
+        elif any(0 < each < np.inf for each in effect.switches) or (
+            isinstance(effect, Force)
+            and not np.array_equal(*(Plant(plant.dynamics, [effect]).torque(t, q, v) for t in _TIMES))
+        ):
+            why = "depends on the time"
+        elif isinstance(effect, Bound) and not isinstance(effect, EffortLimit):
+            why = "changes the torque of the motors"
+        if why:
+            raise PlanError(f"effect {effect.name!r} {why}; a path at its limits is planned without such effects")
+
+
+def check_positions(plant: Plant, path: PiecewisePolynomial) -> None:
+    """Refuse a path that leaves the joint limits or passes rigid stops."""
+    robot: Any = plant.dynamics
+    found = extremes(path)
+    stops = [(each.lower, each.upper) for each in plant.effects if isinstance(each, RigidStops)]
+    for lower, upper in ((getattr(robot, "lower", -np.inf), getattr(robot, "upper", np.inf)), *stops):
+        lower, upper = np.broadcast_to(lower, robot.n), np.broadcast_to(upper, robot.n)
+        beyond = np.maximum(lower - found.least, found.greatest - upper)
+        i = int(np.argmax(beyond))
+        if beyond[i] > _ROUNDING:
+            far = found.least[i] if found.least[i] < lower[i] else found.greatest[i]
+            raise PlanError(
+                f"the path takes joint {robot.joint_names[i]!r} to {far:.6g}, beyond its limits {lower[i]:.6g} …"
+                f" {upper[i]:.6g}; move the points, or give more of them where the spline swings out"
+            )
+
+
+def check_limited(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> None:
+    """Refuse a path along which nothing limits the acceleration."""
+    slope = path.at(_along(path))[1]
+    no_limit = np.isinf(limits.effort) & np.isinf(limits.acceleration)
+    alone = (np.abs(slope[:, ~no_limit]).max(axis=-1, initial=0.0) == 0) & np.isinf(limits.effort).all()
+    if alone.any():
+        i = int(np.argmax(np.abs(slope[np.argmax(alone)])))
+        raise PlanError(
+            f"nothing limits the acceleration of joint {plant.dynamics.joint_names[i]!r}: no effort limit is known;"
+            " give effort=, acceleration= or motors="
+        )
+
+
+def why_not(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> str:
+    """The joint that needs most to rest on the path, as the reason that no motion exists."""
+    s = _along(path)
+    q, slope, _ = path.at(s)
+    slowly = 1e-9 * slope  # for the friction that acts when it moves
+    load = plant.inverse_dynamics(0.0, q, slowly, 0 * q) / limits.effort
+    k, i = np.unravel_index(np.argmax(np.abs(load)), load.shape)
+    name, limit = plant.dynamics.joint_names[i], float(limits.effort[i])
+    needs_it = (
+        f"joint {name!r} needs {load[k, i] * limit:.6g} of {limit:.6g} N m (or N) to move slowly at s = {s[k]:.6g}"
+    )
+    if abs(load[k, i]) > 1:
+        return f"no motion along the path is within the limits: {needs_it}"
+    return f"no motion along the path was found; at rest {needs_it}, which is most of all joints"
+
+
+def _along(path: PiecewisePolynomial) -> np.ndarray:
+    """Places along a path, one of them in each piece at least."""
+    inside = np.array([0.05, 0.25, 0.5, 0.75, 0.95]) if len(path.coefficients) > 50 else np.linspace(0.01, 0.99, 50)
+    return (path.breaks[:-1, None] + np.diff(path.breaks)[:, None] * inside).ravel()

@@ -1,0 +1,175 @@
+"""What is doubtful in samples: units that are not stated, gaps, jumps, whole turns, limits passed, ends that move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.errors import PlanError
+from robot_dyn.model.robot import Robot
+from robot_dyn.plan.extremes import extremes
+from robot_dyn.plan.samples.columns import Columns
+from robot_dyn.queries.units import of_joint
+
+_GAP = 5  # times the median time between samples
+_DEGREE = np.pi / 180
+_FAR = 1.5  # times the limit: beyond, positions may be in degrees
+_TURNS = 4 * np.pi  # the same for joints without limits, [rad]
+_MANY = 0.1  # of the samples: so many faster than their limit may be in degrees
+_SLOW, _SPEED = 0.01, np.pi  # of the velocity limit, or of so much without one: slower, times may be in [ms]
+_TURN = 0.1  # [rad], and twice the steps beside it: what a joint moves in a step that is a whole turn off
+_WHOLE = 1e-6  # from whole numbers
+_MOVES = 1e-6  # [rad] or [m]
+_LATE_S, _LATE = 1000.0, 10  # a later start, by so many durations, is that of a clock
+_ROUNDING = 1e-9  # of a limit that a sample may pass
+DENSE = 16  # samples from which ends at rest, and an error, can be judged
+
+
+def refuse_other_units(arm: Robot, table: Columns) -> None:
+    """Raise PlanError if angles look like degrees, or times like [ms], and their columns state no unit."""
+    t = table.t
+    if len(t) < 2:
+        return
+    _refuse_degrees(arm, table)
+    if not table.of_time and _slow(arm, table) and np.abs(t - np.round(t)).max() <= _WHOLE:
+        raise PlanError(
+            f"times look like ms, µs or ns: whole numbers, {np.median(np.diff(t)):.6g} apart, and no joint reaches 1 %"
+            " of its speed; state the unit in the heading, as 't [ms]', or 't [s]' if they are not"
+        )
+
+
+def findings(arm: Robot, table: Columns, reference: PiecewisePolynomial, ends: str) -> Iterator[str]:
+    """What is doubtful, in words, each with its remedy."""
+    yield from _of_times(arm, table, reference)
+    speed = np.diff(table.q, axis=0) / np.diff(table.t)[:, None]
+    within, velocity = extremes(reference), extremes(reference, 1)
+    for i in range(arm.n):
+        name, unit = arm.joint_names[i], of_joint("rad", arm.joint_types[i])
+        if not table.given[i]:
+            yield f"{name} has no samples and rests at {table.q[0, i]:g} {unit}; give a column if it moves"
+            continue
+        jumps = list(_jumps(arm, table, i, speed[:, i]))
+        outside = list(_outside(arm, table, i))
+        yield from jumps + outside
+        if not jumps and velocity.largest[i] > (1 + _ROUNDING) * _limit(arm)[i]:
+            at = velocity.at_greatest[i] if velocity.greatest[i] > -velocity.least[i] else velocity.at_least[i]
+            yield (
+                f"{name} moves at {velocity.largest[i]:.4g} {unit}/s at {at:.6g} s, between samples that are no faster"
+                f" than its limit, {arm.velocity_limit[i]:.4g}; lengthen the times, or give more samples"
+            )
+        if not jumps and not outside:
+            yield from _between(arm, i, within.least[i], within.at_least[i], within.greatest[i], within.at_greatest[i])
+    if ends == "rest" and len(table.t) >= DENSE:
+        yield from _moving_ends(arm, speed)
+
+
+def _limit(arm: Robot) -> np.ndarray:
+    """Velocity limits, (n,): 0 in a file is none."""
+    return np.where(arm.velocity_limit > 0, arm.velocity_limit, np.inf)
+
+
+def _turns(arm: Robot, table: Columns) -> np.ndarray:
+    """Steps of about a whole turn between small ones, as of angles kept between −π and π, (m − 1, n)."""
+    steps = np.abs(np.diff(table.q, axis=0))
+    beside = np.pad(steps, ((1, 1), (0, 0)))
+    beside = np.maximum(beside[:-2], beside[2:])
+    alone = beside < np.pi / 2
+    near = np.minimum(_limit(arm) * np.diff(table.t)[:, None], np.minimum(_TURN + 2 * beside, np.pi / 4))
+    revolute = np.array([kind != "prismatic" for kind in arm.joint_types])
+    return revolute & alone & (np.abs(steps - 2 * np.pi) <= near)
+
+
+def _refuse_degrees(arm: Robot, table: Columns) -> None:
+    """PlanError if angles without a stated unit are beyond the limits, and within them as degrees."""
+    unknown = ~table.stated & table.given
+    if not unknown.any():
+        return
+    most = np.maximum(np.abs(arm.lower), np.abs(arm.upper))
+    far = np.abs(table.q).max(axis=0)
+    speed, turns = np.abs(np.diff(table.q, axis=0)) / np.diff(table.t)[:, None], _turns(arm, table)
+    fast = ((speed > _limit(arm)) & ~turns).mean(axis=0) > _MANY
+    beyond = (far > np.where(np.isfinite(most), _FAR * most, _TURNS)) & ~turns.any(axis=0)
+    fits = (far * _DEGREE <= np.where(np.isfinite(most), most, np.inf)) | ~unknown
+    for i in np.flatnonzero((beyond | fast) & unknown)[:1]:
+        if fits.all():
+            what = f"{arm.joint_names[i]} is at up to {far[i]:.4g}, moving at up to {speed[:, i].max():.4g} a second"
+            raise PlanError(
+                f"angles look like degrees: {what}; give unit='deg', or unit='rad' if they are"
+                " not; --unit on the command line"
+            )
+
+
+def _slow(arm: Robot, table: Columns) -> bool:
+    """Whether some joint moves, and none reaches a hundredth of its speed."""
+    speed = np.abs(np.diff(table.q, axis=0) / np.diff(table.t)[:, None]).max(axis=0)
+    limit = np.where(np.isfinite(_limit(arm)), _limit(arm), _SPEED)
+    return bool((np.ptp(table.q, axis=0) > _MOVES).any() and (speed < _SLOW * limit).all())
+
+
+def _of_times(arm: Robot, table: Columns, reference: PiecewisePolynomial) -> Iterator[str]:
+    t, dt = table.t, np.diff(table.t)
+    middle, longest = float(np.median(dt)), int(dt.argmax())
+    if gaps := int((dt > _GAP * middle).sum()):
+        yield (
+            f"{gaps} gap{'s' * (gaps > 1)} in time, the longest of {dt[longest]:.4g} s from {t[longest]:.6g} s, where"
+            f" samples are {middle:.4g} s apart: the spline is a guess there; fill it in"
+        )
+    if not table.of_time and (len(t) >= DENSE or middle > 1) and _slow(arm, table):
+        yield (
+            f"no joint reaches 1 % of its speed in {t[-1] - t[0]:.6g} s, samples are {middle:.4g} s apart: are the"
+            f" times in ms? state the unit in the heading, as 't [ms]' or 't [s]'"
+        )
+    start, duration = reference.start, reference.end - reference.start
+    if start < 0 or start > max(_LATE_S, _LATE * duration):
+        yield f"the first sample is at {start:.10g} s, and runs begin at 0 s; start_s=0 begins there"
+
+
+def _jumps(arm: Robot, table: Columns, i: int, speed: np.ndarray) -> Iterator[str]:
+    """Steps of a joint that are too fast: whole turns, and others."""
+    name, unit, dt = arm.joint_names[i], of_joint("rad", arm.joint_types[i]), np.diff(table.t)
+    turns = _turns(arm, table)[:, i]
+    for steps, what, remedy in (
+        (turns, "jumps by a whole turn", "unwrap the angles, as numpy.unwrap does"),
+        ((np.abs(speed) > _limit(arm)[i]) & ~turns, "jumps", "correct the sample, or lengthen the times"),
+    ):
+        if count := int(steps.sum()):
+            k = int(np.where(steps, np.abs(speed), 0).argmax())
+            yield (
+                f"{name} {what}: from {table.q[k, i]:.5g} to {table.q[k + 1, i]:.5g} {unit} in {dt[k]:.4g} s at"
+                f" {table.t[k]:.6g} s, {abs(speed[k]):.4g} {unit}/s of {_limit(arm)[i]:.4g} allowed, in {count}"
+                f" step{'s' * (count > 1)}; {remedy}"
+            )
+
+
+def _outside(arm: Robot, table: Columns, i: int) -> Iterator[str]:
+    """The sample that is furthest outside the position limits."""
+    q = table.q[:, i]
+    outside = np.maximum(arm.lower[i] - q, q - arm.upper[i])
+    if outside.max() > _ROUNDING:
+        k = int(outside.argmax())
+        at = f"{arm.joint_names[i]} is at {q[k]:.5g} {of_joint('rad', arm.joint_types[i])} at {table.t[k]:.6g} s"
+        yield f"{at}, outside its limits {arm.lower[i]:.5g} to {arm.upper[i]:.5g}; check unit and joint"
+
+
+def _between(arm: Robot, i: int, least: float, at_least: float, greatest: float, at_greatest: float) -> Iterator[str]:
+    """Where the spline is outside the position limits, between samples that are within them."""
+    for q, t, outside in (
+        (least, at_least, arm.lower[i] - least),
+        (greatest, at_greatest, greatest - arm.upper[i]),
+    ):
+        if outside > _ROUNDING:
+            at = f"{arm.joint_names[i]} is at {q:.5g} {of_joint('rad', arm.joint_types[i])} at {t:.6g} s"
+            limits = f"{arm.lower[i]:.5g} to {arm.upper[i]:.5g}"
+            yield f"{at}, between samples within its limits {limits}; give more samples there"
+
+
+def _moving_ends(arm: Robot, speed: np.ndarray) -> Iterator[str]:
+    for where, k in (("start", 0), ("end", -1)):
+        i = int(np.abs(speed[k]).argmax())
+        if abs(speed[k, i]) > 0.05 * np.abs(speed[:, i]).max():
+            yield (
+                f"{arm.joint_names[i]} moves at {abs(speed[k, i]):.3g} {of_joint('rad/s', arm.joint_types[i])} at"
+                f" the {where}, where the motion is at rest; ends='measured' moves as the samples do"
+            )

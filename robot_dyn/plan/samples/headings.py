@@ -1,0 +1,44 @@
+"""Headings of columns: a name, and a unit in brackets or parentheses, as "elbow_joint [deg]" or "t (ms)"."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from robot_dyn.errors import PlanError, shown
+
+_HEADING = re.compile(r"\s*(.*?)\s*(?:\[([^]]*)\]|\(([^)]*)\))?\s*")
+UNITS = {
+    "time": {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6, "ns": 1e-9},
+    "angle": {"rad": 1.0, "deg": np.pi / 180, "°": np.pi / 180},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
+}
+
+
+def name_of(heading: str) -> str:
+    """The heading without its unit."""
+    match = _HEADING.fullmatch(heading)
+    return match[1] if match else heading
+
+
+def unit_of(heading: str) -> str | None:
+    """The unit that a heading states."""
+    match = _HEADING.fullmatch(heading)
+    return ((match[2] or match[3] or "").strip() or None) if match else None
+
+
+def size(heading: str, kind: str, unit: str | None = None) -> tuple[float, bool]:
+    """The unit of a column in SI units, and whether it is stated, in the heading or by `unit` for angles.
+
+    Raises:
+        PlanError: If the unit is unknown, or the heading states another one than `unit`.
+    """
+    stated, known = unit_of(heading), UNITS[kind]
+    if stated is None:
+        return (known[unit], True) if kind == "angle" and unit else (1.0, kind == "length")
+    if stated not in known:
+        raise PlanError(f"column {shown(heading)}: the unit must be one of {', '.join(known)}")
+    if kind == "angle" and unit and known[unit] != known[stated]:
+        raise PlanError(f"column {shown(heading)} states another unit than unit={unit!r}; leave unit, --unit, out")
+    return known[stated], True

@@ -1,0 +1,89 @@
+"""Samples as a motion to follow: the spline of degree 5 through them, and what is doubtful in them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.control.samples import Samples, spline
+from robot_dyn.errors import PlanError
+from robot_dyn.model.robot import Robot
+from robot_dyn.plan.plan import Plan
+from robot_dyn.plan.samples.columns import columns
+from robot_dyn.plan.samples.findings import DENSE, findings, refuse_other_units
+from robot_dyn.queries.units import of_joint
+from robot_dyn.validate import choice, instance, number
+
+
+def from_samples(
+    arm: Robot,
+    source: Any,
+    *,
+    time: Any = None,
+    joints: Any = None,
+    unit: str | None = None,
+    ends: str = "rest",
+    q0: Any = None,
+    start_s: float | None = None,
+    topic: str | None = None,
+) -> Plan:
+    """The motion through samples of joint positions: a spline of degree 5, with four continuous derivatives.
+
+    It passes through every sample: noise is not smoothed. How far it may be off between them is said by the spline
+    through every second sample, which misses the others by so much. What is doubtful is found and said: gaps in time,
+    steps faster than the velocity limits, whole turns, positions beyond the limits, ends that are not at rest.
+
+    Args:
+        arm: The robot.
+        source: Path of a CSV file, a data frame, columns by heading in a dict, or an array (m, n) in the order of q.
+            Headings are names of joints, with or without a unit, as "elbow_joint [deg]", or those of
+            `rd.export`, as "q elbow_joint [rad]". Or path of an MCAP log (.mcap) with ROS 2 messages
+            sensor_msgs/msg/JointState, whose names are those of joints; needs the extra "data".
+        time: Heading of the times, with or without its unit, or the times, (m,), in [s], or the time between samples;
+            by default the column "t", "time" or "timestamp", with a unit of s, ms, µs or ns. Of a log
+            "header" or "log", counted from its first message: when its joints were measured, or it was logged; by
+            default the first if headers have times.
+        joints: Heading, with or without its unit, or name in a log, by joint, where they are not the names: then other
+            columns are left out.
+        unit: "rad" or "deg" of angles whose heading states none; "rad" by default, unless they look like degrees.
+        ends: "rest", with neither velocity nor acceleration at both ends; or "measured", as the samples have it: with
+            the velocities and accelerations of a run's table where it has them, else not-a-knot.
+        q0: Where joints without a column rest, (n,), in [rad] or [m]; by default each needs one.
+        start_s: Time of the first sample, in [s]; as given by default.
+        topic: Of a log; by default its only one of joint states, or "/joint_states".
+
+    Raises:
+        PlanError: If a column is missing or unknown, times do not increase, or angles look like degrees, or times like
+            ms, and no unit is given.
+        MissingExtraError: Of a log, without mcap and mcap-ros2-support.
+    """
+    instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=PlanError)
+    choice("ends", ends, ("rest", "measured"), error=PlanError)
+    table = columns(arm, source, time, joints, unit, q0, topic)
+    t, q = table.t, table.q
+    refuse_other_units(arm, table)
+    if start_s is not None:
+        t = t - t[0] + number("start_s", start_s, error=PlanError)
+    at_rest = ends == "rest"
+    reference = PiecewisePolynomial(*spline(t, q, at_rest=True)) if at_rest else Samples(t, q, **table.more)
+    method = "; ".join([_method(arm, t, q, ends), *([table.note] if table.note else [])])
+    return Plan(
+        *(arm.name, arm.joint_names, arm.joint_types, reference, method),
+        *({"velocity": arm.velocity_limit}, tuple(findings(arm, table, reference, ends))),
+    )
+
+
+def _method(arm: Robot, t: np.ndarray, q: np.ndarray, ends: str) -> str:
+    """How the motion was made, and how far every other sample is from the spline through the rest."""
+    text = f"through {len(t)} samples, ends {'at rest' if ends == 'rest' else 'as measured'}"
+    if len(t) < DENSE:
+        return text
+    through = PiecewisePolynomial(*spline(t[::2], q[::2]))
+    left_out = t[1::2][t[1::2] <= t[::2][-1]]
+    off = np.abs(through.at(left_out)[0] - q[1::2][: len(left_out)])
+    k, i = np.unravel_index(off.argmax(), off.shape)
+    unit = of_joint("rad", arm.joint_types[i])
+    most = f"{off[k, i]:.2g} {unit} ({arm.joint_names[i]})"
+    return f"{text}; a spline through every second sample misses the others by at most {most}"

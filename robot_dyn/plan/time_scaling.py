@@ -1,0 +1,174 @@
+"""The fastest speed along a path under limits: toppra on cells of a grid, repeated for what depends on speed.
+
+    τ(s) = a(s) s̈ + b(s) ṡ² + c(s) + h(s, ṡ),    h ≈ h₀ + (∂h/∂x)₀ (x − x₀),  x = ṡ²
+
+a, b, c are of the rigid bodies; h is the torque of effects, linearised in x about the last solution x₀(s). Viscous
+friction taken as a part of b would be scaled by ṡ² in place of ṡ. In a cell s̈ is constant, and the limits are imposed
+just after its start, in its middle and just before its end. [Pham, Pham, A New Approach to Time-Optimal Path
+Parameterization Based on Reachability Analysis, 2018]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.effects.plant import Plant
+from robot_dyn.extras import needs
+from robot_dyn.plan.limits import Limits
+
+IMPOSED = np.array([1e-6, 0.5, 1 - 1e-6])  # where in a cell; not at its ends, where the sign of a velocity may change
+_SLOW = 1e-3  # of the greatest ṡ²
+_BEND = 1e-4  # step of the difference quotient ∂h/∂x, in x
+
+needs_plan = partial(needs, extra="plan")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Speed:
+    """ṡ² = x at the points s of a grid, each (m + 1,), and linear between them: s̈ is constant there."""
+
+    s: np.ndarray
+    x: np.ndarray
+
+    def at(self, places: np.ndarray) -> np.ndarray:
+        """ṡ² at places within the grid."""
+        return np.interp(places, self.s, self.x)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """What limits the motion in the cells of a grid, at some places of each: |A s̈ + B x + C| ≤ 1, with x at its start.
+
+    Attributes:
+        s: The grid, (m + 1,).
+        rows: A, B, C, each (m, r).
+    """
+
+    s: np.ndarray
+    rows: tuple[np.ndarray, np.ndarray, np.ndarray]
+
+    @property
+    def expected_duration(self) -> float:
+        """That of a motion with the mean acceleration and speed that the limits allow, in [s]: an order of size."""
+        (A, B, _), length = self.rows, self.s[-1] - self.s[0]
+        per_acceleration, per_squared_speed = (np.median(np.abs(each).max(axis=-1)) for each in (A, B))
+        return float(2 * np.sqrt(length * per_acceleration) + length * np.sqrt(per_squared_speed))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Effects:
+    """The torque of effects along a path, h ≈ h₀ + slope (x − x₀) at places s, all of shape (m,) or (m, n)."""
+
+    s: np.ndarray
+    x0: np.ndarray
+    h0: np.ndarray
+    slope: np.ndarray
+
+    @classmethod
+    def about(cls, plant: Plant, path: PiecewisePolynomial, s: np.ndarray, x0: np.ndarray) -> Effects:
+        """Linearised in x = ṡ² about x0, which is positive; near rest, where ∂h/∂x of friction is large, h₀ alone."""
+        h = partial(effects_load, plant, path, s)
+        slope = (h(x0 * (1 + _BEND)) - h(x0 * (1 - _BEND))) / (2 * _BEND * x0)[:, None]
+        slope[x0 < _SLOW * x0.max()] = 0.0
+        return cls(s, x0, h(x0), slope)
+
+    def error(self, plant: Plant, path: PiecewisePolynomial, x: np.ndarray) -> np.ndarray:
+        """What the linearised torque lacks at speeds x, (m, n)."""
+        return effects_load(plant, path, self.s, x) - self.h0 - self.slope * (x - self.x0)[:, None]
+
+
+def effects_load(plant: Plant, path: PiecewisePolynomial, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """The load h of the effects, −Σ τ_effect, at places s with ṡ² = x, each (m,): (m, n)."""
+    q, slope, _ = path.at(s)
+    return -plant.torque(0.0, q, slope * np.sqrt(x)[:, None])
+
+
+def imposed(grid: np.ndarray) -> np.ndarray:
+    """The places in the cells of a grid at which limits are imposed, (m, 3)."""
+    return grid[:-1, None] + np.diff(grid)[:, None] * IMPOSED
+
+
+def cells(plant: Plant, limits: Limits, path: PiecewisePolynomial, grid: np.ndarray, effects: Effects | None) -> Cells:
+    """The limits in the cells of a grid, with effects at its imposed places."""
+    n, ahead = path.n, (np.diff(grid)[:, None] * IMPOSED).reshape(-1, 1)
+    q, slope, bend = path.at(imposed(grid).ravel())
+    rigid, zero = plant.dynamics.inverse_dynamics, np.zeros_like(q)
+    still = rigid(q, zero, zero)
+    A, B, C = rigid(q, zero, slope) - still, rigid(q, slope, bend) - still, still
+    if effects is not None:
+        B, C = B + effects.slope, C + effects.h0 - effects.slope * effects.x0[:, None]
+    fast = (slope**2 / limits.velocity**2).max(axis=-1, keepdims=True)
+    torque = (A / limits.effort, B / limits.effort, C / limits.effort)
+    acceleration = (slope / limits.acceleration, bend / limits.acceleration, zero)
+    velocity = (0 * fast, fast, 0 * fast)
+    A, B, C = (np.concatenate(each, axis=-1) for each in zip(torque, acceleration, velocity, strict=True))
+    A = A + 2 * ahead * B  # x in the cell is that at its start, and 2 s̈ times the way from there
+    shape = len(grid) - 1, len(IMPOSED) * (2 * n + 1)
+    return Cells(grid, (A.reshape(shape), B.reshape(shape), C.reshape(shape)))
+
+
+def fastest(grid: Cells, duration: float) -> np.ndarray | None:
+    """The greatest ṡ² at the points of the grid, (m + 1,), from rest to rest; None if there is no such motion.
+
+    Args:
+        grid: The limits.
+        duration: About what is expected, in [s]: the mean ṡ is made about 1, since toppra rounds ṡ² to 1e-8.
+    """
+    algorithm, constraint = needs_plan("toppra.algorithm"), _constraint(grid, duration)
+    unit = duration / (grid.s[-1] - grid.s[0])
+    scaled = (grid.s - grid.s[0]) * unit
+    solver = algorithm.TOPPRA([constraint], _Interval(scaled), gridpoints=scaled, solver_wrapper="seidel")
+    _, speed, _ = solver.compute_parameterization(0.0, 0.0)
+    if speed is None or not np.isfinite(speed).all():
+        return None
+    x = (speed / unit) ** 2
+    x[[0, -1]] = 0.0
+    return x if (x[1:-1] > 0).all() else None
+
+
+@final
+@dataclass(frozen=True)
+class _Interval:
+    """What toppra asks of a path whose limits are computed already."""
+
+    grid: np.ndarray
+    dof: int = 1
+    waypoints: Any = None
+
+    @property
+    def path_interval(self) -> np.ndarray:
+        return self.grid[[0, -1]]
+
+
+def _constraint(grid: Cells, duration: float) -> Any:
+    linear = needs_plan("toppra.constraint").LinearConstraint
+    unit = duration / (grid.s[-1] - grid.s[0])
+    A, B, C = (np.concatenate([each, each[-1:]]) for each in grid.rows)  # toppra asks for a last row, and ignores it
+    used = np.any(A, axis=0) | np.any(B, axis=0) | np.any(C, axis=0)  # those without a limit are 0
+    A, B, C = (each[:, used] for each in (A / unit, B / unit**2, C))
+    both = np.concatenate([np.eye(A.shape[1]), -np.eye(A.shape[1])])
+
+    class Limited(linear):
+        """The rows of the cells in toppra's form, F (A s̈ + B x + C) ≤ g."""
+
+        identical = True
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.identical = True
+
+        def compute_constraint_params(self, path: Any, gridpoints: Any, *_: Any) -> tuple[Any, ...]:
+            return A, B, C, both, np.ones(len(both)), None, None
+
+        def get_dof(self) -> int:
+            return 1
+
+    return Limited()

@@ -1,0 +1,41 @@
+"""The table `[sweep]` of a scene: what varies in many runs of it, and what is kept of each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import Field
+
+from robot_dyn.scene.schema import Part
+
+if TYPE_CHECKING:
+    from robot_dyn.scene.scene import Scene
+
+
+class SweepTable(Part):
+    """What varies in many runs of the scene, and what is kept of each: `robot-dyn sweep scene.toml -o FOLDER`.
+
+    Values of `vary` and `figures` are texts, which are parsed and not run: distributions `uniform(low=0, high=3)`,
+    `normal(mean=1, sd=0.1)`, `lognormal(median=1, sigma_of_log=0.2)`, `triangular(low=0, mode=1, high=3)`,
+    `choice([50, 100])`, of lists of numbers for arrays; figures `rms_error()`, `peak('u')`, `final('q', 'joint')`.
+    """
+
+    runs: Annotated[int, Field(gt=0, strict=True)]
+    """How many."""
+    vary: dict[str, str]
+    """Distributions by the names of `robot-dyn sweepable`, and of `q0` and `v0`."""
+    figures: dict[str, str] = Field(default={})
+    """What is kept of each run, by name."""
+    design: str = "random"
+    """One of "random", "sobol", "halton", "latin", "saltelli", "grid"."""
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    """Of the design."""
+
+
+def sweep_table(path: str | Path) -> dict[str, Any] | None:
+    """The table `[sweep]` of a scene file as values by key; None without one. SceneError as of `read_scene`."""
+    from robot_dyn.scene.scene import read_both
+
+    scene: Scene = read_both(path)[0]
+    return None if scene.sweep is None else scene.sweep.model_dump(exclude_unset=True)

@@ -1,0 +1,54 @@
+"""Numbers of the <visual> and <collision> elements of a URDF, which the hardened read leaves out."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from robot_dyn.errors import shorten
+from robot_dyn.shapes.mesh_files import MeshError
+from robot_dyn.spatial import homogeneous, rotation_rpy
+
+SMALLEST, LARGEST = 1e-9, 1e6  # [m], of a length; the latter of a position, too
+LENGTHS = {"box": {"size": 3}, "cylinder": {"radius": 1, "length": 1}, "sphere": {"radius": 1}}  # numbers in each
+
+
+def numbers(element: Any, key: str, count: int, default: str = "") -> tuple[float, ...]:
+    """The numbers of an attribute; raises MeshError if they are not `count` finite ones."""
+    text, values = element.get(key, default), ()
+    with suppress(ValueError):
+        values = tuple(map(float, text.split()))
+    if len(values) != count or not np.all(np.abs(values) <= LARGEST):
+        raise MeshError(f"<{element.tag}> {key} must be {count} finite numbers, got {shorten(text)!r}; correct it")
+    return values
+
+
+def pose(element: Any) -> ndarray:
+    """The placement (4, 4) of a shape in its link, of the first <origin>; MeshError if it is not six numbers."""
+    origin = element.find("origin")
+    if origin is None:
+        return np.eye(4)
+    rpy, xyz = (np.array(numbers(origin, key, 3, "0 0 0")) for key in ("rpy", "xyz"))
+    return homogeneous(rotation_rpy(rpy), xyz)
+
+
+def shape(element: Any) -> Any:
+    """The box, cylinder, sphere or mesh of a <visual> or <collision>; MeshError if it has none."""
+    geometry = element.find("geometry")
+    if geometry is None or not len(geometry):
+        raise MeshError("<geometry> is empty; name a box, cylinder, sphere or mesh")
+    found = geometry[0]
+    if found.tag != "mesh" and found.tag not in LENGTHS:
+        raise MeshError(f"<{shorten(found.tag)}> is not a shape of URDF; give a box, cylinder, sphere or mesh")
+    return found
+
+
+def lengths(primitive: Any) -> tuple[float, ...]:
+    """The lengths of a box, cylinder or sphere, in [m]; MeshError if one is not positive."""
+    found = tuple(x for key, count in LENGTHS[primitive.tag].items() for x in numbers(primitive, key, count))
+    if min(found) < SMALLEST:
+        raise MeshError(f"<{primitive.tag}> has a length that is not positive, or below {SMALLEST:g} m; correct it")
+    return found

@@ -1,0 +1,156 @@
+"""Inertials that a file does not state, estimated from the shapes of links and from masses.
+
+A link without mass and moments gets both, and its centre of mass; one with a mass and without moments gets these alone.
+Its body is the solid of its shape, and below 200 kg/m³ of its convex hull a shell. What the file states is not changed,
+and what is estimated is marked: <inertial estimated="…">, which every later read finds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, final
+
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+from robot_dyn.description.description import Description, check
+from robot_dyn.description.edits import Edits
+from robot_dyn.description.inertia import MassProperties
+from robot_dyn.description.markup import parse
+from robot_dyn.description.structure import StatedLink, Structure, structure
+from robot_dyn.errors import DescriptionError, QueryError
+from robot_dyn.shapes.link_shapes import LinkShape, link_shapes
+from robot_dyn.shapes.masses import Masses
+
+_HOLLOW = 200.0  # [kg/m³] of the hull, below which a link is a thin housing; see docs/decisions/estimated-inertias.md
+_MOMENTS = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The estimated inertial of one link.
+
+    Attributes:
+        link: Its name.
+        body: Its mass properties in the frame of the link.
+        basis: What they were made from.
+        moments_only: Whether mass and centre of mass are those of the file.
+    """
+
+    link: str
+    body: MassProperties
+    basis: str
+    moments_only: bool = False
+
+    def write(self, link: Any) -> Any:
+        """Write the estimate into the <link> of a document, and return its <inertial>."""
+        inertial = link.find("inertial") if self.moments_only else None
+        if inertial is None:
+            for each in link.findall("inertial"):
+                link.remove(each)
+            inertial = etree.SubElement(link, "inertial")
+            etree.SubElement(inertial, "origin", xyz=" ".join(map(repr, self.body.com.tolist())), rpy="0 0 0")
+            etree.SubElement(inertial, "mass", value=repr(self.body.mass))
+        for origin in inertial.findall("origin"):
+            origin.set("rpy", "0 0 0")  # the moments are along the axes of the link
+        for each in inertial.findall("inertia"):
+            inertial.remove(each)
+        etree.SubElement(inertial, "inertia", {key: repr(float(self.body.inertia[at])) for key, at in _MOMENTS.items()})
+        inertial.set("estimated", self.basis)
+        return inertial
+
+
+def with_estimates(description: Description, masses: Masses, package_dirs: Iterable[str | Path] = ()) -> Description:
+    """The description with the estimates of all links that lack mass or moments and have a shape.
+
+    Args:
+        description: The file; its meshes are opened.
+        masses: Those that it does not state.
+        package_dirs: Folders in which packages of meshes are searched first.
+
+    Returns:
+        The description with each estimate in its text, marked, after a comment.
+
+    Raises:
+        QueryError: If a mass is of an unknown link, or of one that has a mass; if the total is used up; if a body that
+            moves is left without mass.
+        DescriptionError: If the shape of such a link cannot be read.
+    """
+    found, left_out = estimates(description, shapes_of_lacking(description, package_dirs), masses)
+    return replace(marked(description, found), findings=tuple(dict.fromkeys((*description.findings, *left_out))))
+
+
+def shapes_of_lacking(description: Description, package_dirs: Iterable[str | Path] = ()) -> dict[str, LinkShape]:
+    """Shapes of the links without mass or without moments; DescriptionError if one that is stated cannot be read."""
+    links = structure(description, Edits()).links
+    lacking = [name for name, link in links.items() if not any(link.moments)]
+    shapes, failed = link_shapes(description, lacking, tuple(package_dirs))
+    for name, why in failed.items():
+        raise DescriptionError(f"{description.source}: link {name!r}: its inertia cannot be estimated: {why}")
+    return shapes
+
+
+def estimates(
+    description: Description, shapes: Mapping[str, LinkShape], masses: Masses
+) -> tuple[tuple[Estimate, ...], tuple[str, ...]]:
+    """The estimates of links with these shapes, and what is said of those that get none; QueryError as above."""
+    stated = structure(description, Edits())
+    measured = {name: link.mass for name, link in stated.links.items() if link.mass}
+    masses.check_links(stated.links, measured)
+    for name in masses.of:
+        if name not in shapes:
+            raise QueryError(f"mass: link {name!r} has no <collision> or <visual> to estimate moments from; add one")
+    without = {name: shape for name, shape in shapes.items() if name not in measured}
+    known = masses.shared(without, sum(measured.values()))
+    found = [_new(name, shapes[name], *known[name]) for name in known]
+    found += [_moments(name, stated.links[name], shapes[name]) for name in shapes if name in measured]
+    _refuse_massless(stated, {each.link for each in found}, without)
+    return tuple(found), tuple(_left_out(without, known))
+
+
+def marked(description: Description, found: Iterable[Estimate]) -> Description:
+    """The description with these estimates in its text, each marked, after a comment."""
+    root, _ = parse(description.text, description.source, comments=True)
+    links = {(link.get("name") or "").strip(): link for link in root.iterfind("link")}
+    for each in found:
+        inertial = each.write(links[each.link])
+        inertial.addprevious(etree.Comment(f" estimated, not measured: {each.basis} "))
+    text = etree.tostring(root.getroottree(), xml_declaration=True, encoding="UTF-8")
+    return check(text, description.source)
+
+
+def _new(name: str, shape: LinkShape, mass: float, origin: str) -> Estimate:
+    hollow = mass < _HOLLOW * shape.hull.mass
+    body = shape.shell if hollow else shape.solid
+    shell = f" as a shell, at less than {_HOLLOW:g} kg/m³" if hollow else ""
+    return Estimate(name, _of_mass(mass, body), f"{shape.origin}{shell}; mass {origin}")
+
+
+def _moments(name: str, link: StatedLink, shape: LinkShape) -> Estimate:
+    """The moments of a link whose file states its mass."""
+    at = _new(name, shape, link.mass, "of the file")
+    return Estimate(name, at.body, f"moments alone, of {at.basis}", moments_only=True)
+
+
+def _of_mass(mass: float, body: MassProperties) -> MassProperties:
+    return MassProperties(mass, body.com, mass / body.mass * body.inertia)
+
+
+def _left_out(without: Mapping[str, LinkShape], known: Mapping[str, Any]) -> Iterator[str]:
+    for name in without:
+        if name not in known:
+            yield f"link {name!r}: has a shape and no <inertial>, and no mass was given for it; it has none"
+
+
+def _refuse_massless(stated: Structure, found: set[str], without: Mapping[str, LinkShape]) -> None:
+    """Refuse masses that leave a moving body without any, though one of its links has a shape."""
+    for joint, links in stated.bodies.items():
+        if any(stated.links[name].mass for name in links) or found.intersection(links):
+            continue
+        if shaped := [name for name in links if name in without]:
+            raise QueryError(
+                f"mass: link {shaped[0]!r} moves with joint {joint!r} and has no mass; add it, or give total_mass or"
+                " density"
+            )

@@ -1,0 +1,155 @@
+"""The shape of a link as bodies of density 1: of its <collision> elements, else of its <visual> ones.
+
+A box, cylinder or sphere is exact; a closed mesh is the solid within; an open one its convex hull. Elements add up,
+also where they overlap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from robot_dyn.description.description import Description
+from robot_dyn.description.inertia import MassProperties, combined
+from robot_dyn.description.markup import parse
+from robot_dyn.shapes import elements, meshes, primitives, surface
+from robot_dyn.shapes.addresses import find_file, shown
+from robot_dyn.shapes.mesh_files import MeshError
+
+_OVERLAP = 1.001  # of the volume of the hull, which no solid exceeds: float32 corners
+
+
+class _Bodies(NamedTuple):
+    """What one element gives, None without a volume; and whether the solid is not a hull in its place."""
+
+    solid: MassProperties | None
+    hull: MassProperties | None
+    shell: MassProperties | None
+    closed: bool
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LinkShape:
+    """The shape of a link, in its frame.
+
+    Attributes:
+        solid: Primitives and closed meshes as they are, open meshes by their convex hulls; at 1 kg/m³.
+        hull: The convex hulls; at 1 kg/m³.
+        shell: The surfaces; at 1 kg/m².
+        origin: What it was made from, such as "open collision mesh, by its convex hull".
+    """
+
+    solid: MassProperties
+    hull: MassProperties
+    shell: MassProperties
+    origin: str
+
+
+def link_shapes(
+    description: Description, links: Iterable[str], package_dirs: tuple[str | Path, ...] = ()
+) -> tuple[dict[str, LinkShape], dict[str, str]]:
+    """The shapes of links of a robot, and why others have none although the file states one.
+
+    Args:
+        description: Its file; meshes are searched as in `rd.show`.
+        links: Names.
+        package_dirs: Searched first.
+
+    Returns:
+        Shape by link, without links for which none is stated, or one without volume; and reason by link.
+    """
+    root, _ = parse(description.text, description.source)
+    stated = {(link.get("name") or "").strip(): link for link in root.iterfind("link")}
+    reader = _Reader(Path(description.source), package_dirs)
+    found, failed = dict[str, LinkShape](), dict[str, str]()
+    for name in links:
+        reasons = []
+        for kind in ("collision", "visual"):
+            of_kind = [*stated[name].iterfind(kind)] if name in stated else []
+            try:
+                if of_kind and (shape := reader.shape(kind, of_kind)) is not None:
+                    found[name] = shape
+                    break
+            except MeshError as error:
+                reasons.append(f"<{kind}>: {error}")
+        if name not in found and reasons:
+            failed[name] = reasons[0]
+    return found, failed
+
+
+class _Reader:
+    """Reads the shapes of one file, each mesh once."""
+
+    def __init__(self, source: Path, package_dirs: tuple[str | Path, ...]) -> None:
+        self.file = partial(find_file, source=source, package_dirs=package_dirs)
+        self._mesh = cache(_of_mesh)
+
+    def shape(self, kind: str, stated: list[Any]) -> LinkShape | None:
+        """The bodies of all elements of a kind together, None without volume; MeshError if one cannot be read."""
+        read = [self.bodies(each) for each in stated]
+        solid, hull, shell = (
+            [body for bodies in read if (body := getattr(bodies, key)) is not None]
+            for key in ("solid", "hull", "shell")
+        )
+        if not hull:
+            return None
+        return LinkShape(combined(solid), combined(hull), combined(shell), _origin(kind, stated, read))
+
+    def bodies(self, element: Any) -> _Bodies:
+        """The bodies of one element, in the frame of the link."""
+        shape, placement = elements.shape(element), elements.pose(element)
+        R, p = placement[:3, :3], placement[:3, 3]
+        found = self.mesh(shape) if shape.tag == "mesh" else _of_primitive(shape)
+        solid, hull, shell = (None if each is None else each.moved(R, p) for each in found[:3])
+        return _Bodies(solid, hull, shell, found.closed)
+
+    def mesh(self, element: Any) -> _Bodies:
+        address = element.get("filename")
+        try:
+            return self._mesh(self.file(address), elements.numbers(element, "scale", 3, "1 1 1"))
+        except MeshError as error:
+            raise MeshError(f"mesh {shown(address)}: {error}") from None
+
+
+def _of_mesh(path: Path, scale: tuple[float, ...]) -> _Bodies:
+    """The bodies of a mesh file, all of its materials together."""
+    parts, _ = meshes.read(path, scale)
+    vertices = np.vstack([part.mesh.vertices for part in parts])
+    faces = np.vstack(list(_renumbered(parts)))
+    hull, solid = surface.hull(vertices), surface.solid(vertices, faces)
+    if hull is None or (solid is not None and solid.mass > _OVERLAP * hull.mass):
+        solid = None  # parts that overlap, counted twice
+    shell = None if hull is None else surface.shell(vertices, faces)
+    return _Bodies(solid or hull, hull, shell, solid is not None)
+
+
+def _renumbered(parts: Iterable[meshes.Part]) -> Iterator[np.ndarray]:
+    """The triangles of several meshes, for their corners one after the other."""
+    before = 0
+    for part in parts:
+        yield part.mesh.faces.astype(int) + before
+        before += len(part.mesh.vertices)
+
+
+def _of_primitive(shape: Any) -> _Bodies:
+    lengths = elements.lengths(shape)
+    solid = primitives.solid(shape.tag, lengths)
+    return _Bodies(solid, solid, primitives.shell(shape.tag, lengths), True)
+
+
+def _origin(kind: str, stated: list[Any], read: list[_Bodies]) -> str:
+    """What a shape was made from, in words."""
+    tags = [elements.shape(each).tag for each in stated]
+    of_mesh = [each.closed for tag, each in zip(tags, read, strict=True) if tag == "mesh"]
+    words = [f"{kind} {tag}" for tag in dict.fromkeys(tags) if tag != "mesh"]
+    if closed := sum(of_mesh):
+        words.append(f"closed {kind} mesh" + "es" * (closed > 1))
+    if number := len(of_mesh) - sum(of_mesh):
+        words.append(f"open {kind} mesh" + ("es, by their convex hulls" if number > 1 else ", by its convex hull"))
+    return " and ".join(words)

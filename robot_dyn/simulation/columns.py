@@ -1,0 +1,122 @@
+"""Columns of a table: what each is of, its unit and its numbers; as a dictionary, a DataFrame and a Dataset.
+
+A heading is quantity, what it is of, and unit, as "q elbow_joint [rad]"; in a Dataset a quantity is over rows and
+joints.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from robot_dyn.errors import QueryError, shorten
+from robot_dyn.extras import needs
+
+if TYPE_CHECKING:
+    from robot_dyn.simulation.results.trajectory import Trajectory
+    from robot_dyn.simulation.rollouts.result import Rollouts
+
+EXTRA = "data"
+LONG_NAMES: Mapping[str, str] = {
+    "t": "time",
+    "q": "position",
+    "v": "velocity",
+    "a": "acceleration",
+    "u": "actuation within its bounds",
+    "desired": "desired position",
+    "deviation": "deviation from the desired motion",
+    "energy": "kinetic and potential energy",
+    "residual": "energy that nothing accounts for",
+}
+_DIMENSIONS = {"power": "source", "work": "source", "deviation": "axis"}  # where a quantity is not of the joints
+
+Variable = tuple[tuple[str, ...], np.ndarray, dict[str, str]]  # dimensions, numbers and attributes
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Column:
+    """A column of a table.
+
+    Attributes:
+        quantity: Such as "q".
+        values: Of each row.
+        unit: Empty if there is none.
+        of: Joint, effect or number of what it is a quantity; empty if there is but one.
+    """
+
+    quantity: str
+    values: np.ndarray
+    unit: str = ""
+    of: str = ""
+
+    @property
+    def heading(self) -> str:
+        """Such as "q elbow_joint [rad]"."""
+        return f"{self.quantity}{' ' * bool(self.of)}{self.of}" + f" [{self.unit}]" * bool(self.unit)
+
+
+def by_heading(columns: Iterable[Column]) -> dict[str, np.ndarray]:
+    """The columns as a dictionary.
+
+    Raises:
+        QueryError: If two have one heading, so that one of them would be lost.
+    """
+    columns = list(columns)
+    table = {each.heading: each.values for each in columns}
+    for each in columns:
+        if table[each.heading] is not each.values:
+            raise QueryError(f"two columns would be named {shorten(each.heading)!r}; give effects other names")
+    return table
+
+
+def data_frame(columns: Iterable[Column], attributes: Mapping[str, str]) -> Any:
+    """A `pandas.DataFrame` of the columns, with `attributes` as its `attrs`."""
+    frame = needs("pandas", extra=EXTRA).DataFrame(by_heading(columns))
+    frame.attrs |= attributes
+    return frame
+
+
+def data_set(
+    columns: Iterable[Column],
+    joint_names: tuple[str, ...],
+    attributes: Mapping[str, str],
+    more: Mapping[str, Variable] | None = None,
+) -> Any:
+    """An `xarray.Dataset`: a quantity of each joint is one variable over rows and joints.
+
+    Args:
+        columns: The first names the rows, and is their coordinate.
+        joint_names: Of the coordinate `joint`.
+        attributes: Of the whole.
+        more: Variables beside the columns.
+    """
+    columns = list(columns)
+    by_heading(columns)  # refuses what is named twice
+    row, coordinates, variables = columns[0].quantity, {"joint": list(joint_names)}, dict(more or {})
+    for quantity, each in groupby(columns, lambda column: column.quantity):
+        group = list(each)
+        of, name = tuple(column.of for column in group), re.sub(r"[\s/]", "_", quantity)
+        if name in variables:
+            raise QueryError(f"two variables would be named {shorten(name)!r}; give effects other names")
+        units = " or ".join(dict.fromkeys(column.unit for column in group if column.unit))
+        about = {key: text for key, text in (("units", units), ("long_name", LONG_NAMES.get(quantity, ""))) if text}
+        if of == ("",):
+            variables[name] = (row,), group[0].values, about
+            continue
+        over = "joint" if of == joint_names else _DIMENSIONS.get(quantity, f"{name}_number")
+        coordinates.setdefault(over, list(of))
+        variables[name] = (row, over), np.stack([column.values for column in group], axis=1), about
+    coordinates |= {name: variables.pop(name) for name in (row, "t") if name in variables}
+    return needs("xarray", extra=EXTRA).Dataset(variables, coordinates, dict(attributes))
+
+
+def attributes(run: Trajectory | Rollouts) -> dict[str, str]:
+    """What a table says of its run as a whole: robot, joints, method, versions. No path of this machine is in it."""
+    about = {name: run.about[name] for name in ("robot", "versions") if name in run.about}
+    return {"title": "run of robot_dyn", "method": run.statistics.method} | about

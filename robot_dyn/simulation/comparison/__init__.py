@@ -1,0 +1,1 @@
+"""Two runs beside each other: how far they are apart, when they part, and which settings differ."""

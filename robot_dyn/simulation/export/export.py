@@ -1,0 +1,79 @@
+"""A run, or the runs of a batch, as a file that other programs read; its suffix says in which format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, final
+
+from robot_dyn.errors import shown
+from robot_dyn.extras import needs
+from robot_dyn.files import Kind, file_path, save, target
+from robot_dyn.simulation.columns import EXTRA, Column
+from robot_dyn.simulation.export import csv_table, mcap_log, netcdf, parquet
+from robot_dyn.simulation.results.run_file import RunFileError
+from robot_dyn.simulation.results.table import columns as of_run
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.rollouts.table import columns as of_runs
+
+
+@final
+@dataclass(frozen=True)
+class Format:
+    """A format: its kind of file, what writes it, and the packages that this needs."""
+
+    kind: Kind
+    write: Callable[[Any, list[Column], BinaryIO], object]
+    packages: tuple[str, ...] = ()
+
+
+TABLE = Kind("a table of a run", ".csv", b"t [s]")
+_OF_BOTH = (
+    Format(Kind("a Parquet file", ".parquet", b"PAR1"), parquet.write, ("pyarrow",)),
+    Format(Kind("a netCDF file", ".nc", b"CDF\x02"), netcdf.write, ("xarray",)),
+)
+_LOG = Format(Kind("an MCAP log", ".mcap", b"\x89MCAP0\r\n"), mcap_log.write, ("mcap", "mcap_ros2.writer"))
+_OF_RUN = (Format(TABLE, csv_table.write), *_OF_BOTH, _LOG)
+_OF_RUNS = (Format(Kind("a table of runs", ".csv", b"run,"), csv_table.write), *_OF_BOTH)
+
+
+def kinds(run: Trajectory | Rollouts) -> tuple[Kind, ...]:
+    """The kinds of file that a run, or a batch, can be exported to."""
+    return tuple(each.kind for each in _formats(run).values())
+
+
+def export(run: Trajectory | Rollouts, path: str | Path) -> Path:
+    """Write a run, or a batch, to a file for other programs, whole or not at all; its suffix says in which format.
+
+    | suffix | what it holds | needs |
+    |---|---|---|
+    | .csv | `run.table()`: a row for each sample, or for each run of a batch; float() returns the numbers | |
+    | .parquet | the same columns, with quantity, joint and unit of each as metadata | robot-dyn[data] |
+    | .nc | `run.to_xarray()` as netCDF-3, with units as attributes | robot-dyn[data] |
+    | .mcap | of one run, as messages of ROS 2: q, v, u and its causes; desired q; power, energy | robot-dyn[data] |
+
+    Numbers are written to the bit, times of an MCAP log to 1 ns. Another file of the same format under that name is
+    replaced; a file of another kind is not. The suffix .csv is added if the path has none.
+
+    Raises:
+        RunFileError: If it cannot be written.
+        MissingExtraError: If the format needs a package that is not installed.
+    """
+    if not isinstance(run, Trajectory | Rollouts):
+        raise RunFileError(f"export takes a Trajectory of rd.simulate, or Rollouts, got {shown(run)}")
+    path = file_path(path, RunFileError)
+    if isinstance(run, Rollouts) and path.suffix.lower() == _LOG.kind.suffix:
+        raise RunFileError(f"{path}: a log is of one run, and these are {len(run)}; give one of them, such as runs[0]")
+    path = target(path, kinds(run), RunFileError)
+    form = _formats(run)[path.suffix.lower()]
+    for package in form.packages:
+        needs(package, extra=EXTRA)
+    columns = list(of_runs(run) if isinstance(run, Rollouts) else of_run(run))
+    return save(path, lambda stream: form.write(run, columns, stream), RunFileError)
+
+
+def _formats(run: Trajectory | Rollouts) -> Mapping[str, Format]:
+    """By suffix."""
+    return {each.kind.suffix: each for each in (_OF_RUNS if isinstance(run, Rollouts) else _OF_RUN)}

@@ -1,0 +1,122 @@
+"""A run as an MCAP log of ROS 2 messages in CDR, by mcap and mcap-ros2-support.
+
+| topic | type | what it holds |
+|---|---|---|
+| /joint_states | sensor_msgs/msg/JointState | q, v and u as position, velocity and effort |
+| /desired/joint_states | sensor_msgs/msg/JointState | desired positions |
+| /causes/NAME | sensor_msgs/msg/JointState | effort: the part of u that inertia, gravity, an effect … asks for |
+| /deviation/x, y, z | std_msgs/msg/Float64 | of a frame from its reference, in [m] |
+| /power/NAME, /energy, /residual | std_msgs/msg/Float64 | of the control and each effect, in [W]; in [J] |
+
+Time 0 of the run is time 0 of the log, to 1 ns. A message is of all joints or of one number, and is written in the
+order of time. Units are in the metadata record "robot_dyn". The causes add up to u; runs that do not hold what their
+effects exerted have none, which the record says.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from robot_dyn.errors import QueryError
+from robot_dyn.extras import needs
+from robot_dyn.simulation.columns import EXTRA, Column, attributes
+from robot_dyn.simulation.results.run_file import RunFileError
+from robot_dyn.simulation.results.trajectory import Trajectory
+
+_JOINT_STATE = """std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+_NS = 10**9
+_LONGEST_S = 2.0**31  # seconds of a stamp are an int32
+_NUMBERS = ("deviation", "power", "energy", "residual")
+_STATE, _NUMBER = "sensor_msgs/msg/JointState", "std_msgs/msg/Float64"
+_DEFINITIONS = {_STATE: _JOINT_STATE, _NUMBER: "float64 data\n"}
+
+Topic = tuple[str, str, Iterator[Any]]  # its name, its type, and its messages
+
+
+def write(run: Trajectory, columns: Iterable[Column], stream: BinaryIO) -> None:
+    """Write a message of each topic at each sample."""
+    if not (run.t < _LONGEST_S).all():
+        raise RunFileError(f"the run ends at t = {run.t[-1]:.3g} s; stamps of ROS 2 end at {_LONGEST_S:.3g} s")
+    columns = list(columns)
+    stamps = [round(t * _NS) for t in run.t.tolist()]
+    causes, missing = _causes(run)
+    topics = [
+        *_of_joints(run, stamps, causes),
+        *_of_numbers([each for each in columns if each.quantity in _NUMBERS]),
+    ]
+    with needs("mcap_ros2.writer", extra=EXTRA).Writer(stream) as log:
+        types = {name: log.register_msgdef(name, text) for name, text in _DEFINITIONS.items()}
+        log.add_metadata("robot_dyn", attributes(run) | _units(columns) | missing)
+        for k, ns in enumerate(stamps):
+            for name, kind, messages in topics:
+                log.write_message(name, types[kind], next(messages), ns, ns, k)
+
+
+def _causes(run: Trajectory) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """The torque of the joints by cause, (m, n) each; and, without them, why."""
+    try:
+        return run.causes().torques, {}
+    except QueryError as error:
+        return {}, {"causes": f"none: {error}"}
+
+
+def _of_joints(run: Trajectory, stamps: Sequence[int], causes: dict[str, np.ndarray]) -> Iterator[Topic]:
+    none = np.empty((len(run.t), 0))  # fields that say nothing are empty, as sensor_msgs/JointState.msg has it
+    yield "/joint_states", _STATE, _states(run, stamps, run.q, run.v, run.u)
+    if run.desired is not None:
+        yield "/desired/joint_states", _STATE, _states(run, stamps, run.desired, none, none)
+    for name, torque in zip(_names([f"/causes/{_word(each)}" for each in causes]), causes.values(), strict=True):
+        yield name, _STATE, _states(run, stamps, none, none, torque)
+
+
+def _states(run: Trajectory, stamps: Sequence[int], *values: np.ndarray) -> Iterator[Any]:
+    """Messages of position, velocity and effort, each (m, n) or (m, 0)."""
+    names = list(run.joint_names)
+    for ns, position, velocity, effort in zip(stamps, *values, strict=True):
+        seconds, rest = divmod(ns, _NS)
+        yield {
+            "header": {"stamp": {"sec": seconds, "nanosec": rest}, "frame_id": ""},
+            "name": names,
+            "position": position.tolist(),
+            "velocity": velocity.tolist(),
+            "effort": effort.tolist(),
+        }
+
+
+def _of_numbers(columns: Sequence[Column]) -> Iterator[Topic]:
+    """A topic for each column."""
+    names = _names([f"/{each.quantity}" + f"/{_word(each.of)}" * bool(each.of) for each in columns])
+    for name, each in zip(names, columns, strict=True):
+        yield name, _NUMBER, ({"data": x} for x in each.values.tolist())
+
+
+def _word(name: str) -> str:
+    """A name as ROS allows it: letters, digits and underscores."""
+    return re.sub("[^A-Za-z0-9_]+", "_", name)
+
+
+def _names(names: Sequence[str]) -> list[str]:
+    """The names, each once."""
+    return [f"{name}_{k + 1}" if names.count(name) > 1 else name for k, name in enumerate(names)]
+
+
+def _units(columns: Iterable[Column]) -> dict[str, str]:
+    """Units by heading without unit: those of q, v and u are of position, velocity and effort."""
+    return {f"unit of {each.quantity} {each.of}".rstrip(): each.unit for each in columns if each.unit}

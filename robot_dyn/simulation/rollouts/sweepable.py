@@ -1,0 +1,95 @@
+"""The parameters of a setup that `rollouts` can sweep, with values and units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.answer import Answer, Block, Table
+from robot_dyn.codegen.parameters import sweepable_parameters
+from robot_dyn.control.digital_loop.block import SIGNAL
+from robot_dyn.control.digital_loop.loop import SIGNALS
+from robot_dyn.effects.plant import Plant
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.queries.units import coefficient_unit
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.values import Value, read_only
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SweptParameter(Value):
+    """A parameter that may differ from run to run.
+
+    Attributes:
+        name: Its key in `params` of `rollouts`.
+        value: That of the setup.
+        unit: Of a joint that turns, and of one that slides where its unit differs; empty if it has none.
+        shape: Of its values over B runs, as "(B,) or (B, 6)".
+    """
+
+    name: str
+    value: np.ndarray
+    unit: str
+    shape: str
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweepable(Answer):
+    """The parameters of a setup that `rollouts` can sweep.
+
+    Attributes:
+        parameters: In the order of robot, effects, controller and its models.
+    """
+
+    parameters: tuple[SweptParameter, ...]
+
+    def blocks(self) -> Iterator[Block]:
+        yield "parameters that rd.rollouts(setup, params={name: values}) can sweep over B runs:"
+        rows = ((each.name, _shown(each.value), each.unit, each.shape) for each in self.parameters)
+        yield Table(("name", "value", "unit", "values"), tuple(rows))
+
+
+def sweepable(what: Setup | Plant | Dynamics) -> Sweepable:
+    """The parameters that `rollouts` can sweep: names, values, units and shapes.
+
+    They are coefficients of effects, gains of the controller, gravity, payloads, armature, the factor on all masses,
+    mass and inertia of each link, and the same of the controller's models. Its `repr` is the table that
+    `robot-dyn sweepable` prints, `to_json()` the document of its `--json`.
+
+    Args:
+        what: A setup, a plant or a robot.
+
+    Raises:
+        EffectError: If it is none of these.
+    """
+    setup = what if isinstance(what, Setup) else None
+    plant = setup.plant if setup is not None else what if isinstance(what, Plant) else Plant(what)  # pyright: ignore[reportArgumentType]
+    controller = None if setup is None else setup.controller
+    known = sweepable_parameters(plant.dynamics, plant.effects, controller)
+    return Sweepable(tuple({each.name: _swept(each, plant.dynamics) for each in reversed(known)}.values())[::-1])
+
+
+def _swept(known: Any, dynamics: Any) -> SweptParameter:
+    types = getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * dynamics.n)
+    of_joints, size = known.declared.of_joints, known.value.size
+    signal = SIGNALS.get(known.name.partition(".")[0], SIGNAL)
+    unit = coefficient_unit(replace(known.declared, unit=known.declared.unit.replace(SIGNAL, signal)), types)
+    shape = f"(B,) or (B, {size})" if of_joints else f"(B{''.join(f', {n}' for n in known.value.shape)})"
+    return SweptParameter(known.name, known.value, unit, shape.replace("(B)", "(B,)"))
+
+
+def _shown(value: np.ndarray) -> str:
+    """One number, all of them where they differ, or the diagonal of a matrix."""
+    if value.ndim == 2:
+        return f"diagonal {', '.join(f'{x:g}' for x in value.diagonal())}"
+    if value.ndim == 1 and value.size > 1 and (value == value[0]).all():
+        return f"{value[0]:g} each"
+    return ", ".join(f"{x:g}" for x in value.flat)

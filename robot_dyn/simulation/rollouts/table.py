@@ -1,0 +1,87 @@
+"""The runs of a batch as columns, a row for each run: what was swept, how it ended, rms and extremes by joint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from robot_dyn.codegen.parameters import parameters
+from robot_dyn.queries.units import of_joint, unit, units
+from robot_dyn.simulation.columns import LONG_NAMES, Column, Variable
+from robot_dyn.simulation.results.provenance import joint_types
+from robot_dyn.simulation.results.samples import root_mean_squares
+from robot_dyn.simulation.rollouts.result import Rollouts
+
+Types = Mapping[str, str | None]  # of joints, by name
+
+
+def columns(runs: Rollouts) -> Iterator[Column]:
+    """A number for each run; the rms is over the samples up to its end, extremes are over its steps."""
+    types = dict(zip(runs.joint_names, joint_types(runs), strict=True))
+    yield Column("run", np.arange(len(runs)))
+    yield from _of_parameters(runs, types)
+    for key, start in (("q", runs.q0), ("v", runs.v0)):
+        if start is not None:
+            yield from _of_joints(f"start {key}", start, key, types)
+    yield Column("ended", runs.ended, "s")
+    yield Column("outcome", np.array([runs.outcome(i).ending.value for i in range(len(runs))]))
+    yield Column("steps", runs.steps)
+    if runs.tracking_error is not None:
+        yield Column("tracking error", runs.tracking_error, _tracking_unit(runs, types))
+    yield from _of_remarks(runs)
+    for key in ("v", "u"):
+        if (x := getattr(runs, key)) is not None:
+            yield from _of_joints(f"rms {key}", root_mean_squares(x), key, types)
+    if runs.observed is not None:
+        for row, key in enumerate(("q", "v", "u")):
+            for side, which in enumerate(("least", "largest")):
+                yield from _of_joints(f"{which} {key}", runs.observed.extremes[:, row, side], key, types)
+
+
+def samples(runs: Rollouts) -> dict[str, Variable]:
+    """What was recorded of the runs, over runs and sample times."""
+    kinds = joint_types(runs)
+    found: dict[str, Variable] = {"t": (("t",), runs.t, {"units": "s", "long_name": LONG_NAMES["t"]})}
+    for key in ("q", "v", "u"):
+        if (x := getattr(runs, key)) is not None:
+            found[key] = ("run", "t", "joint"), x, {"units": units(key, kinds), "long_name": LONG_NAMES[key]}
+    for key in ("kinetic", "potential"):
+        if (x := getattr(runs, key)) is not None:
+            found[key] = ("run", "t"), x, {"units": "J", "long_name": f"{key} energy"}
+    for name, x in (runs.work or {}).items():
+        found[f"work_{name}"] = ("run", "t"), x, {"units": "J", "long_name": f"work of {name}"}
+    return found
+
+
+def _of_joints(quantity: str, values: np.ndarray, like: str, types: Types) -> Iterator[Column]:
+    for (name, kind), x in zip(types.items(), values.T, strict=True):
+        yield Column(quantity, x, unit(like, kind), name)
+
+
+def _tracking_unit(runs: Rollouts, types: Types) -> str:
+    return "m" if "frame" in runs.about else units("q", types.values())
+
+
+def _of_remarks(runs: Rollouts) -> Iterator[Column]:
+    """How many remarks are about a run, and what they are about."""
+    about = [(set(each.runs), f"{each.kind} {each.quantity} {each.joint}") for each in runs.remarks]
+    of_run = [[text for of, text in about if i in of] for i in range(len(runs))]
+    yield Column("number of remarks", np.array([len(texts) for texts in of_run]))
+    yield Column("remarks", np.array(["; ".join(texts) for texts in of_run]))
+
+
+def _of_parameters(runs: Rollouts, types: Types) -> Iterator[Column]:
+    """What was swept: by joint, where its setup is known and says that it is of joints; else numbered if of several."""
+    setup = runs.setup
+    known = (
+        () if setup is None else parameters(setup.plant.dynamics, setup.plant.effects, setup.controller, runs.params)
+    )
+    of_joints = {each.name: each.declared for each in known if each.declared.of_joints}
+    for name, values in runs.params.items():
+        columns = values.T
+        if name in of_joints and len(columns) == len(types):
+            for (joint, kind), x in zip(types.items(), columns, strict=True):
+                yield Column(name, x, of_joint(of_joints[name].unit, kind), joint)
+        else:
+            yield from (Column(name, x, of=str(k + 1) * (len(columns) > 1)) for k, x in enumerate(columns))

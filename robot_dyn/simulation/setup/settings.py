@@ -1,0 +1,143 @@
+"""The settings of a run by name, as exact texts: effects and controller with their numbers, reference, method."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robot_dyn.coefficients import declared
+from robot_dyn.control.reference import PiecewisePolynomial, Reference
+from robot_dyn.description.edits import Payload
+from robot_dyn.queries.units import coefficient_unit
+from robot_dyn.simulation.setup.explanation import pace
+
+if TYPE_CHECKING:
+    from robot_dyn.control.controller import Controller
+    from robot_dyn.simulation.setup.setup import Setup
+
+_MOST = 64  # numbers of an array that are written; of longer ones a digest
+
+Setting = tuple[str, str]  # its name and its value
+
+
+def settings_of(setup: Setup) -> dict[str, str]:
+    """What a setup integrates, by name, the start apart; numbers as float() reads them.
+
+    Names are those of sweeps, as "viscous_friction.damping". Of several settings of one name the later ones are
+    numbered. What is no number, text or reference is named by its class.
+    """
+    found: dict[str, str] = {}
+    for name, value in _all(setup):
+        number, known = 1, name
+        while known in found:
+            number += 1
+            known = f"{name} ({number})"
+        found[known] = value
+    return found
+
+
+def _all(setup: Setup) -> Iterator[Setting]:
+    robot = getattr(setup.plant.dynamics, "robot", setup.plant.dynamics)
+    types = getattr(robot, "joint_types", (None,))
+    yield from edits_by_name(robot)
+    for effect in setup.plant.effects:
+        yield effect.name, type(effect).__name__
+        yield from _numbers(effect.name, effect, types)
+    if setup.controller is not None:
+        yield from _of_controller(setup.controller, types)
+    method: Any = setup.integrator
+    yield "method", method.name
+    if method.controls_error:
+        yield from (("rtol", _number(method.rtol)), ("atol", _number(method.atol)))
+    else:
+        yield "step", f"{_number(setup.nominal_step_s)} s"
+    yield from (("event", each.name) for each in setup.events)
+
+
+def edits_by_name(robot: Any) -> Iterator[Setting]:
+    """What was changed of a robot."""
+    if not hasattr(robot, "edits"):
+        return
+    edits = robot.edits
+    yield "gravity", f"{_text(np.array(edits.gravity))} m/s²"
+    for each in edits.payloads:
+        yield f"payload on {each.frame}", _payload(each)
+    yield "mass_scale", _text(edits.mass_scale)
+    for key in ("lock", "armature", "masses", "inertias"):
+        yield from ((f"{key}.{name}", _text(np.array(value))) for name, value in getattr(edits, key))
+
+
+def _of_controller(controller: Controller, types: Any) -> Iterator[Setting]:
+    yield "control", f"{controller.name}, {pace(controller.period_s)}"
+    yield from _numbers("control", controller, types)
+    for path, _, part in controller.parts:
+        yield f"control.{path}", part.name
+        yield from _numbers(f"control.{path}", part, types)
+    for path, model in controller.models.items():
+        robot = getattr(model, "robot", model)
+        yield f"control.{path}", getattr(robot, "name", type(robot).__name__)
+        yield from ((f"control.{path}.{name}", value) for name, value in edits_by_name(robot))
+    for path, each in controller.references.items():
+        yield path if path == "reference" else f"control.{path}", _motion(each)
+
+
+def _numbers(name: str, part: Any, types: Any) -> Iterator[Setting]:
+    """The numbers and texts that a part was built with, those that are declared with their units."""
+    names = [each.name for each in fields(part)] if is_dataclass(part) else list(vars(part))
+    known = declared(type(part))
+    for key in names:
+        value = getattr(part, key)
+        if isinstance(value, Payload):
+            yield f"{name}.{key} on {value.frame}", _payload(value)
+        if key.startswith("_") or key == "period_s" or not _is_plain(value):
+            continue
+        unit = coefficient_unit(known[key], types) if key in known and not isinstance(value, str) else ""
+        yield f"{name}.{key}", f"{_text(value)} {unit}".rstrip()
+
+
+def _payload(payload: Payload) -> str:
+    inertia = np.array(payload.inertia)
+    turns = f", inertia {_text(inertia)} kg m²" if inertia.any() else ""
+    place = f" at {', '.join(map(_number, payload.com))} m" if any(payload.com) else ""
+    return f"{_number(payload.mass)} kg{place}{turns}"
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether it is a text, a number, or numbers."""
+    if isinstance(value, tuple | list):
+        return bool(value) and all(isinstance(each, float | int) for each in value)
+    return isinstance(value, np.ndarray | np.number | float | int | str)
+
+
+def _text(value: Any) -> str:
+    """A text, a number, or numbers; a vector of equal ones as one number."""
+    if isinstance(value, str | int):
+        return str(value)
+    numbers = np.asarray(value, dtype=float)
+    entries = [_number(x) for x in numbers.flat]
+    if numbers.ndim <= 1 and len(set(entries)) == 1:
+        return entries[0]
+    return ", ".join(entries) if len(entries) <= _MOST else f"{len(entries)} numbers, {_digest(numbers)}"
+
+
+def _number(x: float) -> str:
+    """As float() reads it, without a decimal point that says nothing."""
+    return repr(float(x)).removesuffix(".0")
+
+
+def _motion(reference: Reference) -> str:
+    """Its class, its end, and a digest of its numbers."""
+    parts = reference.polynomials.values()
+    held = [each for part in (reference, *parts) for each in vars(part).values()]
+    numbers = [np.asarray(each, dtype=float) for each in held if isinstance(each, np.ndarray)]
+    ends = [each.end for each in parts if isinstance(each, PiecewisePolynomial)]
+    until = f", to {max(ends):g} s" if ends else ""
+    return f"{type(reference).__name__}{until}, numbers {_digest(*numbers)}"
+
+
+def _digest(*numbers: np.ndarray) -> str:
+    return hashlib.sha256(b"".join(np.ascontiguousarray(x).tobytes() for x in numbers)).hexdigest()[:8]

@@ -1,0 +1,40 @@
+"""What a cost says: a line for each alternative, by what they are of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isfinite
+from typing import TYPE_CHECKING
+
+from robot_dyn.answer import Block, Table
+from robot_dyn.queries.units import format_duration
+from robot_dyn.studies.costs.ab_comparison import ABComparison
+
+if TYPE_CHECKING:
+    from robot_dyn.studies.costs.cost import Cost
+
+
+def cost_tables(result: Cost) -> Iterator[Block]:
+    """A line for each alternative, by what they are of."""
+    yield f"{result.robot}: {', '.join(result.acting) or 'no effects'}"
+    headings = ("per", "what", "first / second", "instructions", "ratio", "time", "ratio")
+    yield Table(headings, tuple(map(tuple, cost_rows(result))), right=headings[3:])
+    yield "instructions are exact; times of the processor, in machine code on one thread, and their ratios are medians"
+    yield "over turns; ± half of the interquartile range"
+
+
+def cost_rows(result: Cost) -> Iterator[list[str]]:
+    """A row for each alternative: per, what, versions, instructions and their ratio, times and theirs."""
+    for k, each in enumerate(result.alternatives):
+        again = k > 0 and result.alternatives[k - 1].per == each.per
+        yield ["" if again else each.per, *_cells(each)]
+
+
+def _cells(each: ABComparison) -> Iterator[str]:
+    first, second = each.first, each.second
+    yield each.what
+    yield f"{first.name} / {second.name}"
+    yield f"{first.instructions} / {second.instructions}"
+    yield f"{each.instructions_ratio:.3g}" if isfinite(each.instructions_ratio) else "—"
+    yield " / ".join("—" if of.time_s is None else format_duration(of.time_s) for of in (first, second))
+    yield "—" if each.time_ratio is None else f"{each.time_ratio:.2f} ± {each.time_ratio_spread:.2f}"

@@ -1,0 +1,212 @@
+"""Whether motors suffice for a motion: what each joint needs, its limits, and which cause asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import inf, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.effects.actuator import EffortLimit
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import PlanError, QueryError, shown
+from robot_dyn.model.robot import Robot
+from robot_dyn.plan.extremes import extremes
+from robot_dyn.plan.limits import Limits, limits_of
+from robot_dyn.plan.motors import Motors
+from robot_dyn.plan.path_plan import PathPlan
+from robot_dyn.plan.plan import Plan
+from robot_dyn.queries.units import of_joint
+from robot_dyn.simulation.observation.remarks import Kind, lines
+from robot_dyn.simulation.results.provenance import robot_of
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.studies.environment import environment
+from robot_dyn.studies.motor_budget.breakaway import breakaway, static_friction
+from robot_dyn.studies.motor_budget.demand import Demand, of_motion, of_run
+from robot_dyn.studies.motor_budget.joint_budget import JointBudget, joint_budgets
+from robot_dyn.studies.motor_budget.result import MotorBudget
+from robot_dyn.validate import instance
+
+_DRIVES = "series_elastic", "rigid_backlash"  # whose motors turn at other speeds than their joints
+_BEYOND = 1e-9  # of a position limit, that rounding may pass
+
+
+def budget(
+    motion: Any,
+    plant: Any = None,
+    *,
+    payload: Any = None,
+    motors: Motors | None = None,
+    effort: Any = None,
+    velocity: Any = None,
+    continuous: Any = None,
+) -> MotorBudget:
+    """What a motion asks of the motors: torque by cause, speed, power and energy of each joint, and its headroom.
+
+        τ = M(q) a + C(q, v) v + ∂V/∂q − Σ τ_effect
+
+    Along a plan τ is that of the inverse dynamics; of a run it is the actuation that was recorded. It is compared with
+    peak torque, its root mean square over the motion with continuous torque. Powers are those at the joint, τ v,
+    without losses of motor and gear. A rotor inertia of `motors` acts as armature where the arm has none.
+
+    Args:
+        motion: A plan of `rd.plan`, a `PiecewisePolynomial`, or a run of `rd.simulate`.
+        plant: The arm, or a plant with effects; of a run it is known.
+        payload: What a plan's arm carries, a `Payload` or several.
+        motors: Of `rd.plan.read_motors`: peak and continuous torques, speeds and rotors.
+        effort: Peak torques, one number, by joint name or (n,), in [N m] or [N]; those of the motors or, without them,
+            of the robot's file unless given.
+        velocity: Speed limits, likewise, in [rad/s] or [m/s].
+        continuous: Continuous torques, likewise, in [N m] or [N]; those of the motors unless given.
+
+    Raises:
+        QueryError: If the motion is of other joints, or a run is given with a plant or a payload, has diverged or
+            cannot be split by cause.
+        PlanError: If a limit is not allowed, or a rotor is not that of the arm.
+        EffectError: If an effect has states, which a plan does not determine: give a run.
+
+    Source: Siciliano et al. 2009, sec. 5.2; Armstrong-Hélouvry 1991 for breaking away.
+    """
+    if motors is not None:
+        instance("motors", motors, Motors, "read them with rd.plan.read_motors(path)", error=PlanError)
+    given = _Given(motors, effort, velocity, continuous)
+    if isinstance(motion, Trajectory):
+        if plant is not None or payload is not None:
+            raise QueryError(
+                f"a run has its own {'plant' if plant is not None else 'payload'}: leave it out and simulate again, or"
+                " give its motion, rd.budget(rd.plan.from_samples(arm, run.table(), ends='measured'), plant, payload=…)"
+            )
+        return _of_run(motion, given)
+    if not isinstance(motion, PiecewisePolynomial | Plan | PathPlan):
+        raise QueryError(
+            f"motion: give a plan of rd.plan, a PiecewisePolynomial, or a run of rd.simulate, got {shown(motion)}"
+        )
+    if plant is None:
+        raise QueryError("plant: a plan does not know its arm; give it, rd.budget(plan, arm), or a plant with effects")
+    return _of_plan(motion, _loaded(plant, payload, motors), given)
+
+
+class _Given(NamedTuple):
+    """Limits as they were given."""
+
+    motors: Motors | None
+    effort: Any
+    velocity: Any
+    continuous: Any
+
+    def limits(self, plant: Plant) -> tuple[Limits, np.ndarray]:
+        """Peak torques and speeds of a plant, and continuous torques, (n,)."""
+        stated = (self.motors.continuous if self.motors is not None else None) or inf
+        lasting = Limits(effort=stated if self.continuous is None else self.continuous).on(plant.dynamics).effort
+        return limits_of(plant, self.motors, self.effort, self.velocity, None), lasting
+
+    @property
+    def words(self) -> str:
+        """Where they are from."""
+        file, motors = "the robot's file", self.motors
+        stated = {
+            "continuous torque": (self.continuous, motors.source if motors and motors.continuous else "not known")
+        }
+        stated["peak torque"] = self.effort, motors.source if motors else file
+        stated["speed"] = self.velocity, motors.source if motors and motors.speed else file
+        sources: dict[str, list[str]] = {}
+        for name, (given, otherwise) in stated.items():
+            sources.setdefault(otherwise if given is None else "given", []).append(name)
+        return "; ".join(f"{', '.join(names)}: {source}" for source, names in sources.items())
+
+
+def _loaded(plant: Any, payload: Any, motors: Motors | None) -> Plant:
+    """The plant with a payload, and with the rotors of motors where the arm has none."""
+    plant = plant if isinstance(plant, Plant) else Plant(plant)
+    robot = instance("plant", plant.dynamics, Robot, "give that of a robot, such as rd.Plant(rd.load('ur5'))")
+    if payload is not None:
+        robot = robot.with_(payload=payload)
+    if motors is not None and motors.armature:
+        stated = zip(robot.joint_names, robot.armature.tolist(), strict=True)
+        robot = robot.with_(armature={**motors.armature, **{name: x for name, x in stated if x}})
+    return plant if robot is plant.dynamics else replace(plant, dynamics=robot)
+
+
+def _of_plan(motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, given: _Given) -> MotorBudget:
+    robot: Any = plant.dynamics
+    plan = motion.plan if isinstance(motion, PathPlan) else motion if isinstance(motion, Plan) else None
+    reference = motion if isinstance(motion, PiecewisePolynomial) else motion.reference
+    joints = robot.joint_names if plan is None else plan.joint_names
+    if reference.n != robot.n or joints != robot.joint_names:
+        raise QueryError(
+            f"the motion is of {reference.n} joints{'' if plan is None else ', ' + ', '.join(joints)}; {robot.name} has"
+            f" {robot.n}, {', '.join(robot.joint_names)}"
+        )
+    limits, continuous = given.limits(plant)
+    demand = of_motion(reference, plant)
+    assert demand.cells is not None
+    found = joint_budgets(demand, limits, continuous, static_friction(plant), breakaway(demand.cells, plant))
+    findings = (*(() if plan is None else plan.findings), *_outside(reference, robot))
+    what = f"{'motion' if plan is None else plan.method}, {demand.duration:.6g} s"
+    if any(isinstance(each, EffortLimit) for each in plant.effects):
+        findings += ("peak torques are never above the EffortLimit of the plant; leave it out for those of the motors",)
+    return _result(robot, what, demand, tuple(found), given, findings, (), (plant, reference, limits, continuous))
+
+
+def _of_run(run: Trajectory, given: _Given) -> MotorBudget:
+    demand, robot = of_run(run), robot_of(run)
+    limits, continuous = given.limits(Plant(robot))
+    cut = frozenset(each.joint for each in run.remarks if each.kind == Kind.EFFORT_REACHED)
+    found = joint_budgets(demand, limits, continuous, np.full(robot.n, nan), None, cut)
+    findings = lines(each for each in run.remarks if each.kind in (Kind.EFFORT_REACHED, Kind.COARSE))
+    if run.outcome.ending == Ending.STOPPED:
+        findings.append(f"the run was stopped at {run.outcome.t:.6g} s; the budget is of what was simulated")
+    left = ["torque at which joints break away: a run does not hold its static friction"]
+    if driven := [name for name in run.effect_torques or {} if name.startswith(_DRIVES)]:
+        left.append(f"power at the motors of {', '.join(driven)}, which turn at other speeds than their joints")
+    what = f"run of {demand.duration:.6g} s"
+    return _result(robot, what, demand, tuple(found), given, tuple(findings), tuple(left), None)
+
+
+def _result(
+    robot: Robot, what: str, demand: Demand, joints: tuple[JointBudget, ...], given: _Given, findings: tuple[str, ...],
+    left_out: tuple[str, ...], case: Any,
+) -> MotorBudget:  # fmt: skip
+    carried = ", ".join(f"{each.mass:g} kg on {each.frame}" for each in robot.edits.payloads)
+    return MotorBudget(
+        robot=robot.name,
+        motion=f"{what}, carrying {carried}" if carried else what,
+        duration=demand.duration,
+        joints=joints,
+        limits=given.words,
+        resolution=demand.resolution,
+        error=demand.error,
+        findings=(*findings, *_unknown(joints)),
+        left_out=left_out,
+        environment=environment(("robot-dyn", "pin", "numpy")),
+        demand=demand,
+        case=case,
+    )
+
+
+def _unknown(joints: tuple[JointBudget, ...]) -> Iterator[str]:
+    """Limits that are not known of joints that move or bear a load."""
+    for what, names in {
+        "peak torque": [x.joint for x in joints if x.peak_limit == inf and x.peak > 0],
+        "speed": [x.joint for x in joints if x.speed_limit == inf and x.speed > 0],
+    }.items():
+        if names:
+            yield f"no limit of {what} is known of {', '.join(names)}, so it is not judged; give motors or limits"
+
+
+def _outside(motion: PiecewisePolynomial, robot: Robot) -> Iterator[str]:
+    """Positions beyond the limits of the joints."""
+    found = extremes(motion)
+    for i, name in enumerate(robot.joint_names):
+        low, high = robot.lower[i] - found.least[i], found.greatest[i] - robot.upper[i]
+        if max(low, high) > _BEYOND:
+            q, t = (found.least, found.at_least) if low > high else (found.greatest, found.at_greatest)
+            unit = of_joint("rad", robot.joint_types[i])
+            yield (
+                f"{name} is at {q[i]:.5g} {unit} at {t[i]:.4g} s, outside its limits {robot.lower[i]:.5g} to"
+                f" {robot.upper[i]:.5g}; check the motion"
+            )

@@ -1,0 +1,182 @@
+"""What a motion asks of the joints: torque by cause and speed, along a plan or at the samples of a run.
+
+Along a plan they are taken in cells in which it is smooth, and near their largest values again and again, closer and
+closer. At a place where the torque jumps, as at a break of the acceleration, both sides are taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.effects.causes import Causes, causes, exerted_torques
+from robot_dyn.effects.effect import Stateful
+from robot_dyn.effects.plant import Plant
+from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.plan.extremes import extremes
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.studies.motor_budget.cells import GAUSS, KRONROD, Cells, X, cells
+
+_PEAKS = 4  # local maxima of a quantity that are looked at more closely
+_ROUNDS, _POINTS = 7, 9  # of doing so, and points of each: every round is 4 times closer
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Demand:
+    """Torque by cause and velocity at k times.
+
+    Attributes:
+        split: The torque by cause.
+        v: Velocities, (k, n), in [rad/s] or [m/s].
+        weights: Of an integral over time, (k,), in [s].
+        coarse: Those of a coarser rule, whose difference shows the error.
+        peak: Largest |τ| of each joint, (n,), in [N m] or [N].
+        speed: Largest |v|, (n,), and when, (n,).
+        resolution: What it was taken at, in words.
+        cells, cell, x: Of a plan: its cells, and in which and where in it each time is, (k,); else None.
+    """
+
+    split: Causes
+    v: np.ndarray
+    weights: np.ndarray
+    coarse: np.ndarray
+    peak: np.ndarray
+    speed: tuple[np.ndarray, np.ndarray]
+    resolution: str
+    cells: Cells | None = None
+    cell: Any = None
+    x: Any = None
+
+    @cached_property
+    def power(self) -> np.ndarray:
+        """P = τ v of each joint, (k, n), in [W]."""
+        return self.split.tau * self.v
+
+    @property
+    def duration(self) -> float:
+        """Of the motion, in [s]."""
+        return float(self.weights.sum())
+
+    def mean(self, y: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+        """The mean over time of columns (k, n), or of one (k,)."""
+        weights = self.weights if weights is None else weights
+        total = weights.sum()
+        return weights @ y / total if total > 0 else y[0]
+
+    @cached_property
+    def error(self) -> float:
+        """Largest difference between both rules of the means of τ² and of |P|, as a part of the largest mean."""
+        tau, size = self.split.tau, np.abs(self.split.tau).max(initial=0.0)
+        parts = ((tau / (size or 1.0)) ** 2, np.abs(self.power))
+        off = [np.abs(self.mean(y) - self.mean(y, self.coarse)).max() / (self.mean(y).max() or 1.0) for y in parts]
+        return float(max(off))
+
+
+def of_motion(motion: PiecewisePolynomial, plant: Plant) -> Demand:
+    """The demand along a plan.
+
+    Raises:
+        EffectError: If an effect has states, which a motion does not determine.
+    """
+    for effect in plant.forces:
+        if isinstance(effect, Stateful):
+            raise EffectError(
+                f"budget: {effect.name} has states, which a motion alone does not determine; simulate it, and give the"
+                " run"
+            )
+    made = cells(motion, plant)
+    count = len(made.piece)
+    cell, x = np.repeat(np.arange(count), len(X)), np.tile(X, count)
+    tau, v = torques(made, plant, cell, x)
+    closer = _closer(made, plant, tau, v)
+    cell, x = np.concatenate([cell, closer[0]]), np.concatenate([x, closer[1]])
+    rules = [
+        np.concatenate([np.outer(made.length / 2, rule).ravel(), np.zeros(len(closer[0]))]) for rule in (KRONROD, GAUSS)
+    ]
+    order = np.lexsort((x, cell))
+    cell, x = cell[order], x[order]
+    t, q, v, a = made.states(cell, x)
+    split = causes(plant, t, q, v, a)
+    fastest = extremes(made.motion, 1)
+    at = np.where(-fastest.least > fastest.greatest, fastest.at_least, fastest.at_greatest)
+    gap = float(made.length.max() * np.diff(X).max() / 2)
+    return Demand(
+        split, v, rules[0][order], rules[1][order], np.abs(split.tau).max(axis=0), (fastest.largest, at),
+        f"peaks are the largest of {len(t)} times, at most {gap:.2g} s apart, and closer around the {_PEAKS} largest of"
+        " each joint", made, cell, x,
+    )  # fmt: skip
+
+
+def torques(cells: Cells, plant: Plant, cell: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Torque and velocity at places of cells, (k, n) each; the torque is that of `causes`, without its parts."""
+    t, q, v, a = cells.states(cell, x)
+    acts = plant.forces or plant.equation_of_motion.payloads
+    exerted = exerted_torques(plant, t, q, v, a).values() if acts else ()
+    return plant.dynamics.inverse_dynamics(q, v, a) - sum(exerted, start=np.zeros_like(q)), v
+
+
+def root_mean_squares(motion: PiecewisePolynomial, plant: Plant) -> np.ndarray:
+    """√(1/T ∫ τ² dt) of each joint along a motion, (n,), in [N m] or [N]."""
+    made = cells(motion, plant)
+    count = len(made.piece)
+    tau, _ = torques(made, plant, np.repeat(np.arange(count), len(X)), np.tile(X, count))
+    weights = np.outer(made.length / 2, KRONROD).ravel()
+    return np.sqrt(weights @ tau**2 / weights.sum())
+
+
+def _closer(cells: Cells, plant: Plant, tau: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cells and places of the largest |τ| and |τ v| of each joint, close to the largest of the points of the rule."""
+    y = np.abs(np.concatenate([tau, tau * v], axis=1)).reshape(len(cells.piece), len(X), -1)
+    padded = np.pad(y, ((0, 0), (1, 1), (0, 0)), constant_values=-np.inf)
+    highest = np.where((y >= padded[:, :-2]) & (y >= padded[:, 2:]), y, -np.inf).reshape(-1, y.shape[-1])
+    rows = np.argsort(-highest, axis=0, kind="stable")[:_PEAKS]
+    column = np.tile(np.arange(y.shape[-1]), len(rows))
+    cell, node = np.divmod(rows.ravel(), len(X))
+    low, high = X[np.maximum(node - 1, 0)], X[np.minimum(node + 1, len(X) - 1)]
+    best = X[node]
+    for _ in range(_ROUNDS):
+        x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _POINTS)
+        found, speed = torques(cells, plant, np.repeat(cell, _POINTS), x.ravel())
+        all_of = np.abs(np.concatenate([found, found * speed], axis=1)).reshape(len(cell), _POINTS, -1)
+        k = all_of[np.arange(len(cell)), :, column].argmax(axis=1)
+        row = np.arange(len(cell))
+        best, low, high = x[row, k], x[row, np.maximum(k - 1, 0)], x[row, np.minimum(k + 1, _POINTS - 1)]
+    return cell, best
+
+
+def of_run(run: Trajectory) -> Demand:
+    """The demand at the samples of a run, with its extremes over all steps.
+
+    Raises:
+        QueryError: If it diverged, has one sample, or does not hold what its effects exerted.
+    """
+    if run.outcome.ending == Ending.DIVERGED:
+        raise QueryError(f"the run diverged at {run.outcome.t:.6g} s: what it asks of motors says nothing")
+    if len(run.t) < 2:
+        raise QueryError("the run has one sample: record more of it")
+    split = run.causes()
+    weights = _trapezoidal(run.t, np.arange(len(run.t)))
+    every_other = np.unique(np.append(np.arange(0, len(run.t), 2), len(run.t) - 1))
+    row, column = np.abs(run.v).argmax(axis=0), np.arange(run.v.shape[1])
+    peak, speed = np.abs(split.tau).max(axis=0), np.abs(run.v[row, column])
+    resolution = f"at {len(run.t)} samples, at most {np.diff(run.t).max():.2g} s apart"
+    if run.extremes is not None:
+        largest = np.abs(run.extremes).max(axis=1)
+        peak, speed = (np.fmax(x, y) for x, y in ((peak, largest[2]), (speed, largest[1])))
+        resolution += "; peaks of torque and speed are those of all steps"
+    coarse = _trapezoidal(run.t, every_other)
+    return Demand(split, run.v, weights, coarse, peak, (speed, run.t[row]), resolution)
+
+
+def _trapezoidal(t: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Weights of the trapezoidal rule with the times of these numbers, (k,)."""
+    weights, half = np.zeros(len(t)), np.diff(t[at]) / 2
+    weights[at[:-1]] += half
+    weights[at[1:]] += half
+    return weights

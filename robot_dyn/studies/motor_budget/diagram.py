@@ -1,0 +1,126 @@
+"""A budget drawn: what is used of each limit, the rms torque by cause, and the torque of each joint over time."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robot_dyn.queries.units import of_joint
+from robot_dyn.studies.figure import Colours, ResultError, ink, key, legend, lines, sheet, styled
+from robot_dyn.studies.motor_budget.joint_budget import KINDS, JointBudget
+from robot_dyn.studies.motor_budget.result import MotorBudget
+from robot_dyn.view.plots.figure import NEAR, shortened
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WIDE, _ROW, _CELL, _HEAD, _GAP, _FOOT = 13.0, 0.42, 2.3, 1.35, 0.75, 1.15  # [inch]
+_ACROSS, _MOST = 3, 64  # joints beside each other; that one figure shows
+_LETTERS = 24  # of the name of a joint beside bars
+_BAR = 0.27
+_SHADES = {"peak": 0.9, "continuous": 0.55, "speed": 0.25}  # of ink, of bars: colours are those of causes
+
+
+def draw(result: MotorBudget, theme: str = "light") -> Figure:
+    """The figure.
+
+    Raises:
+        ResultError: If there are too many joints.
+    """
+    if not 0 < len(result.joints) <= _MOST:
+        raise ResultError(f"a budget of {len(result.joints)} joints cannot be drawn, up to {_MOST} can")
+    rows, above = -(-len(result.joints) // _ACROSS), _ROW * len(result.joints) + 0.5
+    height = _HEAD + above + _GAP + _CELL * rows + _FOOT
+    figure, colours = sheet(_WIDE, height, result, f"Limits: {result.limits}; {result.resolution}.", theme)
+    top = 1 - _HEAD / height
+    bars = figure.add_gridspec(1, 2, left=0.14, right=0.985, top=top, bottom=top - above / height, wspace=0.05)
+    _used(figure.add_subplot(bars[0]), result, colours)
+    _by_cause(figure.add_subplot(bars[1]), result, colours)
+    below = top - (above + _GAP) / height
+    grid = figure.add_gridspec(
+        rows, _ACROSS, left=0.055, right=0.985, top=below, bottom=_FOOT / height, wspace=0.26, hspace=0.6
+    )
+    for i, joint in enumerate(result.joints):
+        _over_time(figure.add_subplot(grid[divmod(i, _ACROSS)]), result, i, joint, colours)
+    legend(figure, _handles(result, colours), colours)
+    return figure
+
+
+def _names(result: MotorBudget) -> list[str]:
+    return [lines(shortened(each.joint, _LETTERS)) for each in result.joints]
+
+
+def _used(axes: Any, result: MotorBudget, colours: Colours) -> None:
+    styled(axes, colours, "", "Used of each limit [%]")
+    most = 100.0
+    for place, joint in enumerate(result.joints):
+        for k, (kind, share) in enumerate(joint.shares.items()):
+            if not share:
+                continue
+            most = max(most, 100 * share)
+            y = place + (k - 1) * _BAR
+            axes.barh(y, 100 * share, 0.9 * _BAR, color=colours["ink"], alpha=_SHADES[kind])
+            axes.text(100 * share, y, f" {100 * share:.3g}", va="center", fontsize=6.5, **ink(colours))
+    axes.axvline(100, color=colours["ink"], linewidth=1.0, linestyle="--")
+    axes.set_xlim(0, 1.08 * most)
+    _named(axes, _names(result), colours)
+
+
+def _by_cause(axes: Any, result: MotorBudget, colours: Colours) -> None:
+    styled(axes, colours, "", "By cause: parts of the rms torque [%]")
+    low, high = 0.0, 100.0
+    for place, joint in enumerate(result.joints):
+        ends = {True: 0.0, False: 0.0}
+        for k, part in enumerate(joint.of_rms.values()):
+            share = 100 * part / joint.rms if joint.rms else 0.0
+            start = ends[share > 0]
+            ends[share > 0] = start + share
+            axes.barh(place, share, 0.6, left=start, color=_colour(colours, k))
+        low, high = min(low, ends[False]), max(high, ends[True])
+    axes.axvline(0, color=colours["ink"], linewidth=0.8)
+    axes.set_xlim(1.05 * low, 1.02 * high)
+    _named(axes, [""] * len(result.joints), colours)
+
+
+def _named(axes: Any, names: list[str], colours: Colours) -> None:
+    axes.set_yticks(range(len(names)), names)
+    axes.tick_params(axis="y", length=0)
+    for label in axes.get_yticklabels():
+        label.set(color=colours["ink"], fontsize=8, parse_math=False)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.grid(visible=False, axis="y")
+
+
+def _over_time(axes: Any, result: MotorBudget, i: int, joint: JointBudget, colours: Colours) -> None:
+    split, unit = result.demand.split, of_joint("N m", joint.type)
+    rows = np.arange(len(split.t)) if result.demand.cells is None else np.flatnonzero(result.demand.weights == 0)
+    limit = f" of {joint.peak_limit:.4g}" if joint.peak_limit < inf else ""
+    title = f"{shortened(joint.joint, _LETTERS)}: {joint.peak:.4g}{limit} {unit}"
+    styled(axes, colours, "t [s]", lines(title), f"τ [{unit}]")
+    for k, torque in enumerate(split.torques.values()):
+        axes.plot(split.t[rows], torque[rows, i], color=_colour(colours, k), linewidth=0.9)
+    axes.plot(split.t[rows], split.tau[rows, i], color=colours["ink"], linewidth=1.5)
+    row = int(np.abs(split.tau[:, i]).argmax())
+    axes.plot(split.t[row], split.tau[row, i], "o", color=colours["ink"], markersize=4)
+    if joint.peak >= NEAR * joint.peak_limit:
+        for side in (1, -1):
+            axes.axhline(side * joint.peak_limit, color=colours["ink"], linewidth=0.9, linestyle="--")
+    axes.margins(x=0.01)
+
+
+def _colour(colours: Colours, k: int) -> str:
+    """Of a cause: those of the theme that are not of the total."""
+    hues = [colours["lines"][j] for j in (1, 2, 3, 5, 6)]
+    return hues[k % len(hues)]
+
+
+def _handles(result: MotorBudget, colours: Colours) -> list[Any]:
+    causes = result.joints[0].of_rms
+    return [
+        key("τ, and its peak", colours["ink"], marker="o", markersize=4),
+        *(key(lines(name), _colour(colours, k)) for k, name in enumerate(causes)),
+        key("± peak torque, where it is near", colours["ink"], linestyle="--", linewidth=0.9),
+        *(key(f"used of {KINDS[kind]}", colours["ink"], linewidth=5, alpha=x) for kind, x in _SHADES.items()),
+    ]

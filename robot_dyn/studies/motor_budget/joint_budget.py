@@ -1,0 +1,170 @@
+"""What a motion asks of the motor of each joint, beside its limits, and which cause asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import isnan, nan
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.plan.limits import Limits
+from robot_dyn.queries.units import of_joint
+from robot_dyn.result import reported
+from robot_dyn.studies.motor_budget.breakaway import Breakaway
+from robot_dyn.studies.motor_budget.demand import Demand
+
+TOLERANCE = 1e-3  # of a limit, by which plans at their limits may pass it
+KINDS: Mapping[str, str] = {"peak": "peak torque", "continuous": "continuous torque", "speed": "speed"}
+
+
+@final
+@dataclass(frozen=True)
+class JointBudget:
+    """What a motion asks of the motor of a joint; [N m] is [N] and [rad] is [m] where it slides.
+
+    Attributes:
+        joint, type: Its name, and a type such as "revolute".
+        peak, peak_at: Largest |τ|, in [N m], and when, in [s]; of a run the time is that of the largest sample.
+        rms: √(1/T ∫ τ² dt), in [N m].
+        speed, speed_at: Largest |v|, in [rad/s], and when.
+        power, power_at: Largest |τ v|, in [W], and when.
+        mean_power: 1/T ∫ τ v dt, in [W].
+        energy: ∫ max(τ v, 0) dt, that the motor gives, in [J].
+        regenerated: ∫ max(−τ v, 0) dt, that it takes back, in [J].
+        static_friction: f_s of dry friction, in [N m]; 0 without, nan of a run.
+        breakaway, breakaway_at: Largest |τ| at which the joint leaves rest against f_s, and when; nan if it never does.
+        peak_limit, continuous_limit, speed_limit: Inf for none.
+        of_peak: τ at `peak_at` by cause; the parts add up to it.
+        of_rms: Part of `rms` that each cause asks for, 1/(T rms) ∫ τ_cause τ dt; they add up to it, and are negative of
+            a cause that relieves the motor.
+        cut: Whether the actuation of a run was cut at an effort limit: more was asked for than that.
+    """
+
+    joint: str
+    type: str | None
+    peak: float
+    peak_at: float
+    rms: float
+    speed: float
+    speed_at: float
+    power: float
+    power_at: float
+    mean_power: float
+    energy: float
+    regenerated: float
+    static_friction: float
+    breakaway: float
+    breakaway_at: float
+    peak_limit: float
+    continuous_limit: float
+    speed_limit: float
+    of_peak: dict[str, float]
+    of_rms: dict[str, float]
+    cut: bool = False
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """What is used of the limits of "peak", "continuous" and "speed"; 0 of one that is not known."""
+        peak = max(self.peak, 0.0 if isnan(self.breakaway) else self.breakaway)
+        used = peak / self.peak_limit, self.rms / self.continuous_limit, self.speed / self.speed_limit
+        return dict(zip(KINDS, used, strict=True))
+
+    @reported
+    def headroom(self) -> dict[str, float]:
+        """What is left of each limit, as a part of it; 1 where it is not known, negative where it is passed."""
+        return {kind: 1 - used for kind, used in self.shares.items()}
+
+    @reported
+    def too_small(self) -> tuple[str, ...]:
+        """The limits that are passed, by more than a thousandth: "peak", "continuous" or "speed".
+
+        Also a peak torque that is reached where more was asked for.
+        """
+        most = {"peak": 1 - TOLERANCE} if self.cut else {}
+        return tuple(kind for kind, used in self.shares.items() if used > most.get(kind, 1 + TOLERANCE))
+
+    def says(self, kind: str) -> str:
+        """The need and the limit of a kind in words, with the cause that asks for most of it."""
+        unit = of_joint("rad/s" if kind == "speed" else "N m", self.type)
+        if kind == "continuous":
+            return f"{self.rms:.4g} of {self.continuous_limit:.4g} {unit} rms{_most(self.of_rms)}"
+        if kind == "speed":
+            return f"{self.speed:.4g} of {self.speed_limit:.4g} {unit} at {self.speed_at:.4g} s"
+        starts = self.breakaway > self.peak
+        need, at = (self.breakaway, self.breakaway_at) if starts else (self.peak, self.peak_at)
+        more = " to break away" if starts else ", where it was cut" if self.cut else ""
+        return f"{need:.4g} of {self.peak_limit:.4g} {unit} at {at:.4g} s{more or _most(self.of_peak)}"
+
+
+def joint_budgets(
+    demand: Demand, limits: Limits, continuous: np.ndarray, friction: np.ndarray, starts: Breakaway | None,
+    cut: frozenset[str] = frozenset(),
+) -> Iterator[JointBudget]:  # fmt: skip
+    """The budget of each joint.
+
+    Args:
+        demand: What the motion asks for.
+        limits: Peak torques and speeds, (n,).
+        continuous: Continuous torques, (n,).
+        friction: Static friction, (n,).
+        starts: Torques at which joints break away; None of a run.
+        cut: Joints whose actuation was cut at an effort limit.
+    """
+    split, power = demand.split, demand.power
+    rms = np.sqrt(demand.mean(split.tau**2))
+    given, taken = (demand.duration * demand.mean(each.clip(0.0)) for each in (power, -power))
+    for i, (name, kind) in enumerate(zip(split.joints, split.types, strict=True)):
+        row, strongest = (int(np.abs(each[:, i]).argmax()) for each in (split.tau, power))
+        breakaway, since = _largest(starts, i)
+        yield JointBudget(
+            joint=name,
+            type=kind,
+            peak=float(demand.peak[i]),
+            peak_at=_time(split.t[row]),
+            rms=float(rms[i]),
+            speed=float(demand.speed[0][i]),
+            speed_at=_time(demand.speed[1][i]),
+            power=float(abs(power[strongest, i])),
+            power_at=_time(split.t[strongest]),
+            mean_power=float(demand.mean(power[:, i])),
+            energy=float(given[i]),
+            regenerated=float(taken[i]),
+            static_friction=float(friction[i]),
+            breakaway=breakaway,
+            breakaway_at=since,
+            peak_limit=float(limits.effort[i]),
+            continuous_limit=float(continuous[i]),
+            speed_limit=float(limits.velocity[i]),
+            of_peak={cause: float(torque[row, i]) for cause, torque in split.torques.items()},
+            of_rms={cause: _part(demand, torque[:, i], split.tau[:, i]) for cause, torque in split.torques.items()},
+            cut=name in cut,
+        )
+
+
+def _most(parts: Mapping[str, float]) -> str:
+    """The cause with the largest part of a sum, in words."""
+    sign = 1.0 if sum(parts.values()) >= 0 else -1.0
+    cause = max(parts, key=lambda name: sign * parts[name])
+    return f", {sign * parts[cause]:.4g} for {cause}"
+
+
+def _largest(starts: Breakaway | None, i: int) -> tuple[float, float]:
+    """The largest torque at which a joint breaks away, and when; nan if it never does."""
+    of_joint = np.flatnonzero(starts.joint == i) if starts is not None else np.zeros(0, int)
+    if starts is None or not len(of_joint):
+        return nan, nan
+    k = of_joint[np.abs(starts.torque[of_joint]).argmax()]
+    return float(abs(starts.torque[k])), _time(starts.t[k])
+
+
+def _time(t: Any) -> float:
+    """A time in [s], to a picosecond: places at the ends of cells are a little inside."""
+    return round(float(t), 12)
+
+
+def _part(demand: Demand, torque: np.ndarray, tau: np.ndarray) -> float:
+    """The part of the rms of τ that a torque in it asks for."""
+    rms = float(np.sqrt(demand.mean(tau**2)))
+    return float(demand.mean(torque * tau)) / rms if rms else 0.0

@@ -1,0 +1,57 @@
+"""The base of the results of studies: a sentence, tables, what was left out, versions; in a notebook with a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, ClassVar
+
+from robot_dyn.answer import Answer, Block
+from robot_dyn.errors import RobotDynError
+
+
+class Result(Answer):
+    """A result of a study, a dataclass; `to_json` gives its JSON, and its rows are a CSV table.
+
+    Attributes:
+        columns: Of the table; those that a row lacks are empty, and what else it has is left out.
+        left_out: What was left out, and why.
+        environment: Versions and processor.
+        interrupted: Whether the study was ended by the user.
+    """
+
+    columns: ClassVar[tuple[str, ...]] = ()
+    left_out: tuple[str, ...]
+    environment: dict[str, str]
+    interrupted: bool
+
+    @property
+    def sentence(self) -> str:
+        """The result in a sentence."""
+        raise NotImplementedError
+
+    @property
+    def rows(self) -> Iterable[Mapping[str, Any]]:
+        """Rows of the table, values by column."""
+        return ()
+
+    def tables(self) -> Iterable[Block]:
+        """What is between the sentence and what was left out."""
+        raise NotImplementedError
+
+    def blocks(self) -> Iterator[Block]:
+        yield self.sentence
+        yield ""
+        yield from self.tables()
+        yield from (f"left out: {each}" for each in self.left_out)
+        yield ", ".join(f"{name} {value}" for name, value in self.environment.items())
+
+    @property
+    def drawing(self) -> str:
+        from robot_dyn.studies.figure import inline
+        from robot_dyn.studies.save import DRAWINGS
+
+        draw = DRAWINGS.get(type(self))
+        try:
+            return "" if draw is None else inline(draw(self, "page"))
+        except RobotDynError:  # there is nothing to draw
+            return ""

@@ -1,0 +1,58 @@
+"""The table of all runs as one file, a chunk at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from robot_dyn.errors import SweepError
+from robot_dyn.extras import needs
+from robot_dyn.files import Kind, save, target
+from robot_dyn.sweeps.folder.folder import Folder, read_all
+from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep
+
+_CSV, _PARQUET = Kind("a table", ".csv"), Kind("a table", ".parquet", b"PAR1")
+
+
+def export(sweep: Sweep, folder: Folder, path: str | Path) -> Path:
+    """Write the rows of a complete folder to a .csv or .parquet file; SweepError if it cannot be written."""
+    path = target(path, (_CSV, _PARQUET), SweepError)
+    write = _parquet if path.suffix.lower() == ".parquet" else _csv
+    return save(path, lambda stream: write(_tables(folder), stream), SweepError)
+
+
+def _tables(folder: Folder) -> Iterator[Mapping[str, np.ndarray]]:
+    for rows in read_all(folder):
+        run = {"run": np.arange(rows.start, rows.start + len(rows))}
+        ends = {"outcome": np.array(OUTCOMES)[rows.outcome], "ended": rows.ended, "reason": rows.reason}
+        yield run | rows.varied | rows.figures | ends
+
+
+def _csv(tables: Iterator[Mapping[str, np.ndarray]], stream: BinaryIO) -> None:
+    heading = False
+    for table in tables:
+        if not heading:
+            stream.write((",".join(map(_cell, table)) + "\n").encode())
+            heading = True
+        columns = [[_cell(x) for x in column.tolist()] for column in table.values()]
+        stream.write("".join(",".join(row) + "\n" for row in zip(*columns, strict=True)).encode())
+
+
+def _cell(value: object) -> str:
+    text = value if isinstance(value, str) else repr(value)
+    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
+
+
+def _parquet(tables: Iterator[Mapping[str, np.ndarray]], stream: BinaryIO) -> None:
+    pa, parquet = needs("pyarrow", extra="data"), needs("pyarrow.parquet", extra="data")
+    writer = None
+    for each in tables:
+        strings = {name: pa.array(each[name].astype(str).tolist(), pa.string()) for name in ("outcome", "reason")}
+        table = pa.table(dict(each) | strings)
+        writer = writer or parquet.ParquetWriter(stream, table.schema)
+        writer.write_table(table)
+    if writer is not None:
+        writer.close()

@@ -1,0 +1,219 @@
+"""The folder of a sweep: its specification, and a file for each chunk that is done. What has no file is left to do.
+
+sweep.json                   the specification
+design.npy                   rows of the design, where they were given as a table
+rows/000123.parquet          a chunk; of more than 20 000 chunks rows/0004/080123.parquet
+samples/                     samples of runs, where they are kept
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.errors import SweepError
+from robot_dyn.files import read, why
+from robot_dyn.sweeps.folder.chunk_file import FORMAT, Columns, Format
+from robot_dyn.sweeps.folder.files import Exclusive, Files, make_folder, remove_abandoned, write
+from robot_dyn.sweeps.folder.rows import Rows
+from robot_dyn.sweeps.folder.samples import SampleStore
+
+MOST_FILES = 20_000  # of a folder
+_MOST_TEXT, _MOST_TABLE = 2**26, 2**34
+_SPECIFICATION, _DESIGN, _SAMPLES = "sweep.json", "design.npy", "samples"
+
+
+@final
+@dataclass(frozen=True)
+class Folder:
+    """Chunks of the runs 0, …, N − 1 as files.
+
+    Attributes:
+        path: Of the folder.
+        runs: N.
+        chunk: Runs of a chunk; the last one may have fewer.
+        digest: Of the specification.
+        format: Of the files.
+        names: Of the columns.
+        about: What footers state beside the digest: versions and processor.
+        samples: Where samples of runs are; None where none are kept.
+        files: The calls that a write consists of.
+    """
+
+    path: Path
+    runs: int
+    chunk: int
+    digest: str
+    format: Format
+    names: Columns
+    about: dict[str, Any] = field(default_factory=dict)
+    samples: SampleStore | None = None
+    files: Files = field(default_factory=Files, compare=False)
+
+    @property
+    def count(self) -> int:
+        """Number of chunks."""
+        return -(-self.runs // self.chunk)
+
+    def of(self, chunk: int) -> tuple[int, int]:
+        """The first run of a chunk, and that after its last."""
+        return chunk * self.chunk, min((chunk + 1) * self.chunk, self.runs)
+
+    def file(self, chunk: int) -> Path:
+        """The file of a chunk."""
+        name = f"{chunk:06d}{self.format.suffix}"
+        return self._subfolder(chunk) / name
+
+    @property
+    def subfolders(self) -> list[Path]:
+        """The folders of files."""
+        return [self._subfolder(chunk) for chunk in range(0, self.count, MOST_FILES)]
+
+    def _subfolder(self, chunk: int) -> Path:
+        rows = self.path / "rows"
+        return rows if self.count <= MOST_FILES else rows / f"{chunk // MOST_FILES:04d}"
+
+    def present(self) -> np.ndarray:
+        """Whether each chunk has a file, (count,)."""
+        found = np.zeros(self.count, bool)
+        suffix = self.format.suffix
+        for folder in self.subfolders:
+            with suppress(FileNotFoundError), os.scandir(folder) as entries:
+                for each in entries:
+                    stem = each.name.removesuffix(suffix)
+                    if stem.isdigit() and stem != each.name and int(stem) < self.count:
+                        found[int(stem)] = True
+        return found
+
+    def missing(self) -> np.ndarray:
+        """Numbers of the chunks without a file."""
+        return np.flatnonzero(~self.present())
+
+    def prepare(self) -> None:
+        """Make the folders, and remove what dead writers left."""
+        for folder in self.subfolders:
+            make_folder(folder)
+        remove_abandoned((self.path, *self.subfolders))
+
+    def write(self, chunk: int, rows: Rows, samples: Mapping[str, np.ndarray] = MappingProxyType({})) -> None:
+        """Write a chunk, its samples first; SweepError if it cannot be written, with what is there unchanged."""
+        start, stop = self.of(chunk)
+        footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": rows.digest()}
+        try:
+            if self.samples is not None:
+                self.samples.write(chunk, samples, self.files)
+            write(self.file(chunk), self.format.packed(rows, footer | self.about), self.files)
+        except OSError as error:
+            raise SweepError(
+                f"chunk {chunk} (runs {start} to {stop - 1}) cannot be written to {self.file(chunk)} ({why(error)});"
+                " the chunks that are there are kept: make room, and run the sweep again"
+            ) from None
+
+    def read(self, chunk: int) -> Rows:
+        """The rows of a chunk.
+
+        Raises:
+            SweepError: If its file is missing, damaged, or of another sweep.
+        """
+        path = self.file(chunk)
+        rows, footer = self.format.rows(path, self.names)
+        self._check(path, chunk, footer)
+        if rows.digest() != footer.get("rows"):
+            raise SweepError(f"{path}: was changed after it was written; run the sweep again, after removing this file")
+        return rows
+
+    def footer(self, chunk: int) -> dict[str, Any]:
+        """The footer of a chunk; errors as of `read`."""
+        footer = self.format.footer(self.file(chunk))
+        self._check(self.file(chunk), chunk, footer)
+        return footer
+
+    def columns(self, names: Iterable[str]) -> dict[str, np.ndarray]:
+        """Columns of all rows, (N,), the reasons as texts; errors as of `read`."""
+        names = list(dict.fromkeys(names))
+        found = {name: np.empty(self.runs, _type(name)) for name in names}
+        for chunk in range(self.count):
+            start, stop = self.of(chunk)
+            table, footer = self.format.table(self.file(chunk), names)
+            self._check(self.file(chunk), chunk, footer)
+            for name, x in table.items():
+                found[name][start:stop] = x
+        return found
+
+    def _check(self, path: Path, chunk: int, footer: dict[str, Any]) -> None:
+        if footer.get("sweep") != self.digest:
+            raise SweepError(f"{path}: is of another sweep; remove it, and run the sweep again")
+        if (footer.get("chunk"), footer.get("start"), footer.get("stop")) != (chunk, *self.of(chunk)):
+            raise SweepError(f"{path}: is of other runs than its name says; remove it, and run the sweep again")
+
+
+def _type(name: str) -> Any:
+    return {"outcome": np.int8, "reason": object}.get(name, float)
+
+
+def folder_of(path: Path, data: dict[str, Any], digest: str, names: Columns, about: dict[str, Any]) -> Folder:
+    """The folder of a specification with the size of its chunks."""
+    kept = data["samples"]
+    dense = kept is not None and kept["every"] == 1 and not kept["failed"]
+    store = kept and SampleStore(path / _SAMPLES, data["runs"], data["chunk"], tuple(kept["names"]), dense)
+    return Folder(path, data["runs"], data["chunk"], digest, FORMAT[data["storage"]], names, about, store)
+
+
+def has_specification(path: Path) -> bool:
+    """Whether a folder holds a sweep."""
+    return (path / _SPECIFICATION).is_file()
+
+
+def read_specification(path: Path) -> tuple[str, np.ndarray | None]:
+    """The text of the specification of a folder, and the rows of its design if they were given.
+
+    Raises:
+        SweepError: If the folder holds no sweep, or it cannot be read.
+    """
+    remedy = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
+    text = read(path / _SPECIFICATION, _MOST_TEXT, SweepError, remedy).decode("utf-8", "replace")
+    table = None
+    if (path / _DESIGN).exists():
+        data = read(path / _DESIGN, _MOST_TABLE, SweepError, remedy)
+        try:
+            table = np.load(io.BytesIO(data), allow_pickle=False)
+        except (ValueError, EOFError) as error:
+            raise SweepError(f"{path / _DESIGN}: is not a table of numbers ({error})") from None
+    return text, table
+
+
+def begin(path: Path, text: str, table: np.ndarray | None, files: Files | None = None) -> bool:
+    """Write the specification of a new sweep; False if another process was first.
+
+    Raises:
+        SweepError: If the folder holds other files, or cannot be written.
+    """
+    make_folder(path)
+    own = (_DESIGN, _SAMPLES)
+    strange = [each for each in sorted(os.listdir(path)) if each not in own and not each.endswith(".unfinished")]
+    if strange and _SPECIFICATION not in strange:
+        raise SweepError(f"{path}: holds other files, such as {strange[0]}; give a new folder")
+    try:
+        if table is not None:
+            stream = io.BytesIO()
+            np.save(stream, table, allow_pickle=False)
+            write(path / _DESIGN, stream.getvalue(), files)
+        write(path / _SPECIFICATION, text.encode(), files or Exclusive())
+    except FileExistsError:
+        return False
+    except OSError as error:
+        raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
+    return True
+
+
+def read_all(folder: Folder) -> Iterator[Rows]:
+    """The rows of all chunks, one after the other."""
+    return map(folder.read, range(folder.count))

@@ -1,0 +1,92 @@
+"""Samples of runs as Zarr v3: an array over run, t and joint for each quantity, a shard for each chunk of the sweep.
+
+A shard is encoded in memory and written whole, before the rows of its chunk: a chunk with rows has its samples. The
+place of a run in an array is its number; runs that are not kept are nan, and take no room.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.errors import SweepError
+from robot_dyn.extras import needs
+from robot_dyn.sweeps.folder.files import Files, make_folder, write
+
+_INNER = 64  # runs that are read together, where all are kept
+_EXTRA = "data"
+
+
+@final
+@dataclass(frozen=True)
+class SampleStore:
+    """The arrays of a sweep.
+
+    Attributes:
+        path: Of the group.
+        runs: Of the sweep.
+        chunk: Runs of a shard.
+        names: Of the quantities.
+        dense: Whether all runs are kept.
+    """
+
+    path: Path
+    runs: int
+    chunk: int
+    names: tuple[str, ...]
+    dense: bool
+
+    def create(self, t: np.ndarray, joint_names: tuple[str, ...]) -> None:
+        """Write what describes the arrays, and the times of samples, (m,)."""
+        make_folder(self.path)
+        zarr = needs("zarr", extra=_EXTRA)
+        group = zarr.create_group(self.path, overwrite=True, zarr_format=3, attributes={"joint": list(joint_names)})
+        times = group.create_array("t", data=t, dimension_names=("t",), compressors=None)
+        times.attrs["units"] = "s"
+        for name in self.names:
+            self._array(zarr, group.store, name, t, joint_names)
+
+    def times(self) -> np.ndarray:
+        """Of the samples, (m,), in [s]."""
+        zarr = needs("zarr", extra=_EXTRA)
+        return zarr.open_group(self.path, mode="r")["t"][:]
+
+    def write(self, chunk: int, kept: Mapping[str, np.ndarray], files: Files) -> None:
+        """Write the samples (k, m, n) of the runs of a chunk, nan where they are not kept; OSError if that fails."""
+        zarr = needs("zarr", extra=_EXTRA)
+        for name, x in kept.items():
+            memory = zarr.storage.MemoryStore()
+            array = self._array(zarr, memory, name, np.empty(x.shape[1]), ("",) * x.shape[2])
+            start = chunk * self.chunk
+            array[start : start + len(x)] = x
+            folder = self.path / name / "c" / str(chunk) / "0"
+            folder.mkdir(parents=True, exist_ok=True)
+            shard = memory._store_dict.get(f"{name}/c/{chunk}/0/0")
+            if shard is not None:  # it has something
+                write(folder / "0", shard.to_bytes(), files)
+
+    def open(self) -> Any:
+        """All as a lazy `xarray.Dataset` over run, t and joint."""
+        xarray = needs("xarray", extra="data")
+        needs("zarr", extra=_EXTRA)
+        found = xarray.open_zarr(self.path, consolidated=False, chunks=None)
+        return found.assign_coords(joint=list(found.attrs.pop("joint")))
+
+    def _array(self, zarr: Any, store: Any, name: str, t: np.ndarray, joints: tuple[str, ...]) -> Any:
+        """An array of the store without numbers."""
+        inner = min(_INNER, self.chunk) if self.dense and self.chunk % _INNER == 0 else 1
+        return zarr.create_array(
+            store, name=name, shape=(self.runs, len(t), len(joints)), dtype="float64",
+            chunks=(inner, len(t), len(joints)), shards=(self.chunk, len(t), len(joints)), compressors=None,
+            fill_value=float("nan"), dimension_names=("run", "t", "joint"), zarr_format=3,
+        )  # fmt: skip
+
+
+def check_times(t: np.ndarray, known: np.ndarray) -> None:
+    """Raise SweepError unless the times of a batch are the first of those that all runs have."""
+    if len(t) > len(known) or (t != known[: len(t)]).any():
+        raise SweepError("samples: the runs are not sampled at the same times; give the scene a record_period_s")

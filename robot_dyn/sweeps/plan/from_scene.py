@@ -1,0 +1,36 @@
+"""The sweep of a scene that states one in its table `[sweep]`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from robot_dyn.errors import SweepError
+from robot_dyn.sweeps.imported import imported
+from robot_dyn.sweeps.plan.sweep import Sweep
+from robot_dyn.sweeps.plan.texts import distribution_of, figure_of
+
+_READER = "robot_dyn.scene.sweep:sweep_table"  # a room above, named as users' functions are
+
+
+def from_scene(path: str | Path, **changes: Any) -> Sweep:
+    """The sweep that a scene states in its table `[sweep]`.
+
+    Args:
+        path: Of the scene.
+        **changes: Attributes of `Sweep` in place of those that are stated.
+
+    Raises:
+        SceneError: If the scene cannot be read.
+        SweepError: If it states no sweep, or one that is not allowed.
+    """
+    table = imported(_READER)(path) or {}
+    vary = {name: distribution_of(text) for name, text in table.pop("vary", {}).items()}
+    figures = {name: figure_of(name, text, imports=False) for name, text in table.pop("figures", {}).items()}
+    stated = {"vary": vary, "figures": figures} | table
+    for name in ("vary", "figures"):
+        changes[name] = {**stated.pop(name), **changes.get(name, {})}
+    stated |= changes
+    if "runs" not in stated:
+        raise SweepError(f"{path}: how many runs? give runs=, or a table [sweep] with them")
+    return Sweep(str(path), **stated)

@@ -1,0 +1,147 @@
+"""The specification of a sweep as JSON: all that its rows depend on, and how the folder stores them.
+
+A folder has one, `sweep.json`; another sweep in it is refused with the first difference by name.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.codegen.store.keys import processor_of_code, version_of
+from robot_dyn.errors import SweepError, shorten
+from robot_dyn.simulation.setup.settings import settings_of
+from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.sweeps import distributions
+from robot_dyn.sweeps.imported import digest_of
+from robot_dyn.sweeps.plan import figures
+from robot_dyn.sweeps.plan.samples import samples
+from robot_dyn.sweeps.plan.sweep import Sweep
+
+FORMAT = 1
+_PLACES = ("scene",)  # that may differ: where the scene lies
+
+
+def versions() -> dict[str, str]:
+    """Versions of what the bits of rows depend on."""
+    return {name: version_of(name) for name in ("robot-dyn", "numpy", "scipy", "pin")}
+
+
+def processor() -> dict[str, str]:
+    """Name and features of the processor."""
+    name, features = processor_of_code()
+    return {"processor": name, "features": ",".join(each[1:] for each in features.split(",") if each.startswith("+"))}
+
+
+@final
+@dataclass(frozen=True)
+class Specification:
+    """What `sweep.json` holds.
+
+    Attributes:
+        data: As JSON can hold it.
+    """
+
+    data: dict[str, Any]
+
+    @property
+    def text(self) -> str:
+        """As the file has it."""
+        return json.dumps(self.data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all but where the scene lies."""
+        data = {key: value for key, value in self.data.items() if key not in _PLACES}
+        return sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+    @property
+    def chunk(self) -> int:
+        """Number of runs in a chunk."""
+        return self.data["chunk"]
+
+    def with_chunk(self, runs: int) -> Specification:
+        """The same in chunks of so many runs."""
+        return Specification(self.data | {"chunk": runs})
+
+    def check_same(self, other: Specification, where: str) -> None:
+        """Raise SweepError unless another specification has all that this one states; names the first difference."""
+        for name, here, there in _differences(self.data, other.data, ""):
+            if name not in _PLACES:
+                raise SweepError(
+                    f"{where}: holds another sweep: {name} is {shorten(here)} there, {shorten(there)} here; give"
+                    " another folder, or the sweep that was begun"
+                )
+
+
+def specification(sweep: Sweep) -> Specification:
+    """The specification of a sweep, without the size of its chunks."""
+    given = isinstance(sweep.design, str)
+    table = {} if given else {"table_sha256": sha256(np.ascontiguousarray(sweep.design, float).tobytes()).hexdigest()}
+    source = {} if sweep.scene.lower().endswith(".toml") else {"function_sha256": digest_of(sweep.scene)}
+    data = {
+        "format": FORMAT,
+        "scene": sweep.scene,
+        "setup": _setup(sweep.setup) | source,
+        "runs": int(sweep.runs),
+        "design": sweep.design if given else "table",
+        **table,
+        "seed": int(sweep.seed),
+        "vary": {name: each.to_dict() for name, each in sweep.vary.items()},
+        "order": list(sweep.vary),
+        "figures": {name: each.to_dict() for name, each in sweep.figures.items()},
+        "storage": sweep.storage,
+        "samples": None if sweep.samples is None else asdict(sweep.samples),
+        "versions": versions(),
+    }
+    return Specification(json.loads(json.dumps(data)))  # as it is read again
+
+
+def sweep_of(data: Mapping[str, Any], table: np.ndarray | None, where: str) -> Sweep:
+    """The sweep of a specification, with its scene as it is now.
+
+    Raises:
+        SweepError: If it is not one, or is one of another version.
+    """
+    try:
+        if data["format"] != FORMAT:
+            raise SweepError(f"{where}: has format {data['format']}, this version reads {FORMAT}")
+        vary = {name: distributions.from_dict(data["vary"][name]) for name in data["order"]}
+        of = {name: figures.from_dict(each) for name, each in data["figures"].items()}
+        design = data["design"] if table is None else table
+        kept = data["samples"]
+        kept = kept and samples(*kept["names"], every=kept["every"], failed=kept["failed"])
+        return Sweep(data["scene"], data["runs"], vary, of, design, data["seed"], data["storage"], kept)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise SweepError(f"{where}: is not the specification of a sweep ({error!r})") from None
+
+
+def _setup(setup: Setup) -> dict[str, Any]:
+    """What a setup integrates, as texts and numbers."""
+    robot = getattr(setup.plant.dynamics, "robot", setup.plant.dynamics)
+    described = getattr(robot, "description", None)
+    file = {} if described is None else {"robot_sha256": sha256(described.text).hexdigest()}
+    return {
+        "robot": getattr(robot, "name", type(robot).__name__),
+        **file,
+        "settings": settings_of(setup),
+        "q0": setup.q0.tolist(),
+        "v0": setup.v0.tolist(),
+        "duration_s": setup.duration_s,
+        "record_period_s": setup.record_period_s,
+        "engine": setup.engine,
+    }
+
+
+def _differences(a: Any, b: Any, name: str) -> Iterator[tuple[str, Any, Any]]:
+    """Where two values differ: name, first, second; "—" where there is none."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        for key in dict.fromkeys([*a, *b]):
+            yield from _differences(a.get(key, "—"), b.get(key, "—"), f"{name}.{key}" if name else str(key))
+    elif a != b:
+        yield name, a, b

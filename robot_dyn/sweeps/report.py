@@ -1,0 +1,139 @@
+"""The report of a sweep as one HTML page, without scripts: distributions, failures over two parameters, worst runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robot_dyn.display import page, side_by_side, table, text
+from robot_dyn.errors import SweepError
+from robot_dyn.files import Kind, save, target
+from robot_dyn.studies.figure import PAGE, ink, inline, styled
+from robot_dyn.sweeps.plan.sweep import OUTCOMES
+
+if TYPE_CHECKING:
+    from robot_dyn.sweeps.result import SweepResult
+
+_KIND = Kind("a page", ".html", b"<!doctype html>")
+_BINS, _CELLS, _MOST_CROSSES = 60, 24, 500
+_WORST = 10
+_PROBABILITIES = (0.05, 0.5, 0.95, 0.99)
+_HEAD = (
+    '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="color-scheme" content="light dark">'
+    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
+    "<title>{title}</title><style>body{{margin:1.5em auto;max-width:72em;padding:0 1em}}"
+    "h2{{font:600 1em system-ui,sans-serif;margin:1.6em 0 .4em}}</style></head><body>\n{body}\n</body></html>\n"
+)
+
+
+def save_report(result: SweepResult, path: str | Path) -> Path:
+    """Write the page; SweepError if the sweep is not complete, or the page cannot be written."""
+    path = target(path, _KIND, SweepError)
+    data = report(result).encode()
+    return save(path, lambda stream: stream.write(data), SweepError)
+
+
+def report(result: SweepResult) -> str:
+    """The page."""
+    x, columns = result.table("outcome", "reason", *result.sweep.columns, *result.sweep.figures), result.sweep.columns
+    failed = x["outcome"] != OUTCOMES[0]
+    parts = [text("\n".join(repr(result).splitlines()))]
+    parts += ["<h2>Failures</h2>", text(repr(result.probability("failed")))]
+    if failed.any():
+        some = np.flatnonzero(failed)[:_WORST].tolist()
+        rows = [(i, str(x["outcome"][i]), str(x["reason"][i]), _repeat(result, i)) for i in some]
+        parts.append(table(("first runs that failed", "outcome", "reason", "repeat it by"), rows))
+    if failed.any() and len(columns) > 1:
+        pair = strongest(failed, np.column_stack([x[name] for name in columns]))
+        names = tuple(columns[k] for k in pair)
+        shown = f"Share of runs that failed over {names[0]} and {names[1]}, the two that it depends on most"
+        parts.append(f"<p>{escape(shown)}; cells without runs are empty, each cross is a run that failed.</p>")
+        parts.append(_failure_map(names, [x[name] for name in names], failed))
+    for name in result.sweep.figures:
+        parts += _of_figure(result, name, x[name])
+    body = page(result.title, *parts)
+    return _HEAD.format(title=escape(result.title), body=body)
+
+
+def strongest(failed: np.ndarray, x: np.ndarray) -> tuple[int, int]:
+    """The two columns of x (N, d) on which failure depends most: by the variance of its share over 16 bins of each."""
+    explained = []
+    for column in x.T:
+        edges = np.quantile(column, np.arange(1, 16) / 16)
+        bins = np.searchsorted(edges, column, side="right")
+        sizes = np.maximum(np.bincount(bins, minlength=16), 1)
+        shares = np.bincount(bins, failed, 16) / sizes
+        explained.append(float(np.sum(sizes * (shares - failed.mean()) ** 2)))
+    first, second = np.argsort(-np.array(explained), kind="stable")[:2].tolist()
+    return first, second
+
+
+def _of_figure(result: SweepResult, name: str, x: np.ndarray) -> Iterator[str]:
+    """Distribution, quantiles and worst runs of a figure."""
+    yield f"<h2>{escape(name)}</h2>"
+    finite = x[np.isfinite(x)]
+    quantiles = result.quantiles(name, _PROBABILITIES)
+    rows = [(each.statistic, each.estimate, each.low, each.high) for each in quantiles]
+    level = f"{100 * quantiles[0].level:g} % interval from"
+    parts = [table(("", "estimate", level, "to"), rows), text(f"{quantiles[0].n} runs, {quantiles[0].failed} failed")]
+    worst = [(i, float(x[i]), _repeat(result, i)) for i in result.worst(name, min(_WORST, len(x)), given="finished")]
+    yield side_by_side([*([_histogram(name, finite)] if len(finite) else []), f"<div>{''.join(parts)}</div>"])
+    yield table(("worst runs that finished", name, "repeat it by"), worst)
+
+
+def _repeat(result: SweepResult, run: int) -> str:
+    """The line that repeats a run."""
+    return f"sw.read({str(result.path)!r}).run({run})"
+
+
+def _histogram(name: str, x: np.ndarray) -> str:
+    figure, axes = _figure(4.6, 2.6)
+    low, high = np.quantile(x, (0.0, 0.999))
+    axes.hist(x, _BINS, range=(low, high if high > low else low + 1.0), color=PAGE["lines"][1])
+    beyond = int((x > high).sum())
+    styled(axes, PAGE, name, f"{len(x)} runs that finished" + (f", {beyond} beyond the right end" if beyond else ""))
+    axes.set_ylabel("runs", fontsize=8.5, **ink(PAGE))
+    return inline(figure)
+
+
+def _failure_map(names: tuple[str, ...], x: list[np.ndarray], failed: np.ndarray) -> str:
+    """The share of runs that failed in cells over two parameters."""
+    figure, axes = _figure(5.6, 3.8)
+    edges = [_edges(each) for each in x]
+    count = np.histogram2d(*x, bins=edges)[0]
+    of_failed = np.histogram2d(x[0][failed], x[1][failed], bins=edges)[0]
+    share = np.where(count > 0, of_failed / np.maximum(count, 1), np.nan)
+    mesh = axes.pcolormesh(*edges, share.T, vmin=0.0, vmax=1.0, cmap="viridis")
+    some = np.flatnonzero(failed)[:_MOST_CROSSES]
+    axes.plot(x[0][some], x[1][some], "x", color=PAGE["lines"][1], markersize=3)
+    styled(axes, PAGE, names[0], "")
+    axes.set_ylabel(names[1], fontsize=8.5, **ink(PAGE))
+    bar = figure.colorbar(mesh, ax=axes)
+    bar.solids.set_rasterized(False)  # a picture would not be shown
+    bar.set_label("share that failed", fontsize=8.5, **ink(PAGE))
+    bar.ax.tick_params(labelsize=8, colors=PAGE["ink"])
+    return inline(figure)
+
+
+def _edges(x: np.ndarray) -> np.ndarray:
+    """Edges of cells: around each of a few values, else of one width."""
+    values = np.unique(x)
+    if len(values) <= _CELLS:
+        between = (values[1:] + values[:-1]) / 2
+        return (
+            np.array([2 * values[0] - between[0], *between, 2 * values[-1] - between[-1]])
+            if len(between)
+            else (values[0] + np.array([-0.5, 0.5]))
+        )
+    return np.linspace(values[0], values[-1], _CELLS + 1)
+
+
+def _figure(width: float, height: float) -> tuple[Any, Any]:
+    from robot_dyn.view.plots.shown import Figure
+
+    figure = Figure(figsize=(width, height), facecolor=PAGE["paper"])
+    return figure, figure.add_subplot()

@@ -1,0 +1,285 @@
+"""`SweepResult`: what a folder holds, and the questions to it; statistics say how many runs failed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from robot_dyn.answer import Answer, Block
+from robot_dyn.errors import SweepError, nearest, shown
+from robot_dyn.result import UNREPORTED, reported
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.sweeps.expression import Expression, Truth
+from robot_dyn.sweeps.folder.folder import Folder, read_all
+from robot_dyn.sweeps.folder.rows import FINISHED, digest_of
+from robot_dyn.sweeps.plan.specification import specification
+from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep
+from robot_dyn.sweeps.plan.work import Work
+from robot_dyn.validate import choice, integer
+
+if TYPE_CHECKING:
+    from robot_dyn.sweeps.estimate import Estimate
+    from robot_dyn.sweeps.sensitivity import Sensitivity
+
+_SHOWN = 5  # reasons, and worst runs
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class SweepResult(Answer):
+    """The rows of a sweep in its folder.
+
+    Attributes:
+        sweep: What was swept.
+        folder: What holds the rows.
+    """
+
+    sweep: Sweep = field(metadata=UNREPORTED)
+    folder: Folder = field(metadata=UNREPORTED)
+
+    @property
+    def path(self) -> Path:
+        """Of the folder."""
+        return self.folder.path
+
+    @property
+    def missing(self) -> np.ndarray:
+        """Numbers of the chunks that are left to do."""
+        return self.folder.missing()
+
+    def table(self, *names: str) -> dict[str, np.ndarray]:
+        """Columns of all runs, (N,) by name: "run", what varies, figures, "outcome", "ended" in [s], "reason"."""
+        self._check_complete()
+        known = ("run", *self.sweep.columns, *self.sweep.figures, "outcome", "ended", "reason")
+        names = names or known
+        for name in names:
+            if name not in known:
+                raise SweepError(f"no column {name!r}; {nearest(name, known)}")
+        found = self.folder.columns(name for name in names if name != "run")
+        found["run"] = np.arange(self.sweep.runs)
+        if "outcome" in names:
+            found["outcome"] = np.array(OUTCOMES)[found["outcome"]]
+        return {name: found[name] for name in names}
+
+    def quantiles(
+        self, figure: str, probabilities: Any = (0.05, 0.5, 0.95), level: float = 0.95
+    ) -> tuple[Estimate, ...]:
+        """Quantiles of a figure over all runs, with intervals; runs that failed count as +∞.
+
+        Args:
+            figure: Its name, or that of another column.
+            probabilities: Of the quantiles, each in (0, 1).
+            level: Of the intervals.
+        """
+        from robot_dyn.sweeps import statistics
+
+        return statistics.quantiles(self._figure(figure), probabilities, level, self._replicate)
+
+    def probability(self, event: str, level: float = 0.95, given: str | None = None) -> Estimate:
+        """Probability of an event, such as "diverged | error > 0.1", with its interval.
+
+        Args:
+            event: Of names of columns and outcomes, numbers, comparisons, | & ! and parentheses. "failed" is a run that
+                diverged or raised.
+            level: Of the interval.
+            given: "finished" for the probability among the runs that finished.
+
+        Raises:
+            SweepError: If the event is unknown in a run that failed, of which there is no figure.
+        """
+        from robot_dyn.sweeps import statistics
+
+        truth, keep, replicate = self._event(event), self._given(given), self._replicate
+        unknown = (truth.certain != truth.possible) & keep
+        if unknown.any():
+            raise SweepError(
+                f"{event!r} is unknown in {int(unknown.sum())} runs that failed or have no figure, such as run"
+                f" {int(unknown.argmax())}: write 'failed | {event}', or ask with given='finished'"
+            )
+        failed = int((self._outcome() != FINISHED).sum()) if given is None else 0
+        of = None if replicate is None else replicate[keep]
+        found = statistics.probability(truth.certain[keep], level, of, failed=failed)
+        return replace(found, statistic=f"probability of {event}{'' if given is None else ' given finished'}")
+
+    def mean(self, figure: str, level: float = 0.95, given: str | None = None) -> Estimate:
+        """Mean of a figure with its interval; refused where runs failed, unless asked for with given="finished"."""
+        from robot_dyn.sweeps import statistics
+
+        return statistics.mean(self._figure(figure), level, self._replicate, given=_checked(given))
+
+    def sensitivity(self, figure: str, level: float = 0.95, given: str | None = None) -> Sensitivity:
+        """Which of what varies matters: first and total Sobol' indices of design "saltelli", else of given data."""
+        from robot_dyn.sweeps import sensitivity
+
+        y, names, design = self._figure(figure), self.sweep.dimensions, self.sweep.rows
+        if isinstance(self.sweep.design, str) and self.sweep.design == "saltelli":
+            return sensitivity.saltelli(y, names, self._replicate, level, given=_checked(given))
+        return sensitivity.given_data(
+            y, design.rows(0, self.sweep.runs), names, level, self._replicate, given=_checked(given)
+        )
+
+    def worst(self, figure: str, count: int = 5, given: str | None = None) -> tuple[int, ...]:
+        """Numbers of the runs with the largest values of a figure; `run(i)` repeats one.
+
+        Runs that failed come first, in their order, unless `given` is "finished".
+        """
+        count = integer("count", count, least=1, most=self.sweep.runs, error=SweepError)
+        runs, x = np.flatnonzero(self._given(given)), self._figure(figure)[self._given(given)]
+        order = np.argsort(-np.where(np.isnan(x), np.inf, x), kind="stable")
+        return tuple(runs[order[:count]].tolist())
+
+    def samples(self) -> Any:
+        """Samples of runs as a lazy `xarray.Dataset` over run, t and joint, nan where a run was not kept.
+
+        Raises:
+            SweepError: If the sweep keeps none.
+        """
+        if self.folder.samples is None:
+            raise SweepError("no samples are kept: give the Sweep samples='q', or sw.samples('q', every=100)")
+        return self.folder.samples.open()
+
+    def export(self, path: str | Path) -> Path:
+        """Write the table of all runs to a .csv or .parquet file, whole or not at all.
+
+        Raises:
+            SweepError: If it cannot be written.
+        """
+        from robot_dyn.sweeps.export import export
+
+        self._check_complete()
+        return export(self.sweep, self.folder, path)
+
+    def save_report(self, path: str | Path) -> Path:
+        """Write one HTML page: distributions, failures over the two strongest parameters, worst runs.
+
+        Raises:
+            SweepError: If it cannot be written.
+        """
+        from robot_dyn.sweeps.report import save_report
+
+        return save_report(self, path)
+
+    def run(self, i: int) -> Trajectory:
+        """Repeat run i by itself, with all that is recorded of runs: the same bits.
+
+        Raises:
+            SweepError: If there is no such run, or it raised; says why.
+        """
+        return Work(self.sweep).run(integer("run", i, most=self.sweep.runs - 1, error=SweepError))
+
+    def verify(self) -> str:
+        """Read every file, and return the digest of all rows; that of another folder of the same sweep is the same.
+
+        Raises:
+            SweepError: If a file is missing, damaged, or was changed.
+        """
+        self._check_complete()
+        return digest_of(read_all(self.folder))
+
+    @property
+    def processors(self) -> dict[str, int]:
+        """Number of chunks by processor; the last bits of rows may differ between processors of other features."""
+        found: dict[str, int] = {}
+        for chunk in np.flatnonzero(self.folder.present()).tolist():
+            footer = self.folder.footer(chunk)
+            features = sha256(str(footer.get("features")).encode()).hexdigest()[:8]
+            name = f"{footer.get('processor')} (features {features})"
+            found[name] = found.get(name, 0) + 1
+        return found
+
+    @reported
+    def status(self) -> dict[str, int]:
+        """Runs, chunks, and chunks that are left to do."""
+        return {"runs": self.sweep.runs, "chunks": self.folder.count, "missing": len(self.missing)}
+
+    @reported
+    def specification(self) -> dict[str, Any]:
+        """As the folder states it."""
+        return specification(self.sweep).data
+
+    @reported
+    def outcomes(self) -> dict[str, int] | None:
+        """Number of runs by outcome; None where chunks are left to do."""
+        if len(self.missing):
+            return None
+        outcome = self._outcome()
+        return {name: int((outcome == k).sum()) for k, name in enumerate(OUTCOMES)}
+
+    def reasons(self) -> dict[str, int]:
+        """Number of runs by reason of failure, the most frequent first."""
+        columns = self.folder.columns(("outcome", "reason"))
+        texts, counts = np.unique(columns["reason"][columns["outcome"] != FINISHED].astype(str), return_counts=True)
+        order = np.argsort(-counts, kind="stable")
+        return {str(texts[k]): int(counts[k]) for k in order}
+
+    @property
+    def title(self) -> str:
+        return self.sweep.title
+
+    def blocks(self) -> Iterator[Block]:
+        yield from self.sweep.blocks()
+        if len(missing := self.missing):
+            yield f"{len(missing)} of {self.folder.count} chunks are left to do: sw.run(sweep, {str(self.path)!r})"
+            return
+        yield ", ".join(f"{count} {name}" for name, count in (self.outcomes or {}).items())
+        if len(processors := self.processors) > 1:
+            yield f"rows of several processors, whose last bits may differ: {', '.join(processors)}"
+        for text, count in list(self.reasons().items())[:_SHOWN]:
+            yield f"{count} times: {text}"
+
+    def _check_complete(self) -> None:
+        if len(missing := self.missing):
+            raise SweepError(
+                f"{self.path}: {len(missing)} of {self.folder.count} chunks are left to do, the first is {missing[0]};"
+                " run the sweep again, which does them alone"
+            )
+
+    def _outcome(self) -> np.ndarray:
+        self._check_complete()
+        return self.folder.columns(("outcome",))["outcome"]
+
+    def _figure(self, name: str) -> np.ndarray:
+        self._check_complete()
+        known = (*self.sweep.figures, *self.sweep.columns, "ended")
+        return self.folder.columns((choice("figure", name, known, error=SweepError),))[name]
+
+    def _columns(self, names: Iterable[str]) -> Mapping[str, np.ndarray]:
+        """Columns and outcomes by name."""
+        self._check_complete()
+        known = {*self.sweep.figures, *self.sweep.columns, "ended"}
+        outcomes = {*OUTCOMES, "failed"}
+        for name in names:
+            if name not in known | outcomes:
+                raise SweepError(f"no column {name!r}; {nearest(name, sorted(known | outcomes))}")
+        found = self.folder.columns(name for name in names if name in known)
+        if outcomes & set(names):
+            outcome = self._outcome()
+            found |= {name: outcome == k for k, name in enumerate(OUTCOMES)} | {"failed": outcome != FINISHED}
+        return found
+
+    def _given(self, given: str | None) -> np.ndarray:
+        """Which runs are asked about, (N,)."""
+        given = _checked(given)
+        return np.ones(self.sweep.runs, bool) if given is None else self._outcome() == FINISHED
+
+    @property
+    def _replicate(self) -> np.ndarray | None:
+        """The scrambling of each run; None of independent ones."""
+        design = self.sweep.rows
+        return None if design.independent else design.replicate_of(np.arange(self.sweep.runs))
+
+    def _event(self, text: str) -> Truth:
+        """Of each run, whether an event happened."""
+        expression = Expression(text)
+        return expression.of(self._columns(expression.names))
+
+
+def _checked(given: Any) -> str | None:
+    if given is not None and not (isinstance(given, str) and given == "finished"):
+        raise SweepError(f"given is None or 'finished', got {shown(given)}")
+    return given

@@ -1,0 +1,159 @@
+"""`run`: fill the folder of a sweep, by threads, a cluster or a job of an array; begun before, it is resumed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from shutil import disk_usage
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.codegen.threads import thread_count
+from robot_dyn.errors import SweepError, shown
+from robot_dyn.files import file_path
+from robot_dyn.sweeps.engines.share import share as share_of
+from robot_dyn.sweeps.engines.threads import Threads
+from robot_dyn.sweeps.folder.chunk_file import Columns
+from robot_dyn.sweeps.folder.folder import Folder, begin, folder_of, has_specification, read_specification
+from robot_dyn.sweeps.plan.pilot import pilot
+from robot_dyn.sweeps.plan.specification import Specification, processor, specification, sweep_of, versions
+from robot_dyn.sweeps.plan.sweep import Sweep
+from robot_dyn.sweeps.plan.work import Work
+from robot_dyn.sweeps.result import SweepResult
+from robot_dyn.validate import integer
+
+Progress = Callable[[int, int], object]
+_SCAN_S = 1.0  # between looks into the folder
+
+
+def run(
+    sweep: Sweep,
+    folder: str | Path,
+    *,
+    threads: int | None = None,
+    cluster: Any = None,
+    share: str | None = None,
+    chunk: int | None = None,
+    on_progress: Progress | None = None,
+) -> SweepResult:
+    """Make the runs of a sweep that a folder lacks, and return what it holds.
+
+    Several processes, on this machine or others, may fill one folder. Rows have the same bits whatever fills it.
+    Ctrl-C ends the work and drops the chunks under way.
+
+    Args:
+        sweep: What to run.
+        folder: A new folder, or that of the same sweep.
+        threads: Of this process; None for all processors.
+        cluster: Workers of Dask.distributed in place of them: "local:2", the address of a scheduler, or a `Client`.
+        share: In the third of 16 jobs "3/16": only a part of the chunks.
+        chunk: Runs of a file; None for about 2 s of work, by a pilot of 64 runs. Fixed once the folder is begun.
+        on_progress: Called with the number of runs that are done, and of all.
+
+    Raises:
+        SweepError: If an argument is not allowed, the folder holds another sweep, or a file cannot be written.
+    """
+    if not isinstance(sweep, Sweep):
+        raise SweepError(f"run takes a Sweep, got {shown(sweep)}; sw.read(folder).sweep is that of a folder")
+    path, mine, work = file_path(folder, SweepError), share_of(share), Work(sweep)
+    count = thread_count(threads)
+    if on_progress is not None and not callable(on_progress):
+        raise SweepError(
+            f"on_progress must be a function of the runs that are done and of all, got {shown(on_progress)}"
+        )
+    if cluster is not None and (share is not None or threads is not None):
+        raise SweepError("cluster: its scheduler shares out the chunks; leave out share and threads")
+    known = begun(sweep, path, chunk)
+    known.prepare()
+    tell, t = _Progress(known, on_progress), None if known.samples is None else known.samples.times()
+
+    def missing() -> list[int]:
+        return mine.of(known.missing()).tolist()
+
+    with suppress(KeyboardInterrupt):
+        if cluster is not None:
+            from robot_dyn.sweeps.engines.cluster import Cluster, client_of
+
+            with client_of(cluster) as client:
+                Cluster(client, known).run(missing, tell)
+        else:
+
+            def make(number: int, look: Callable[[float], object]) -> None:
+                if not known.file(number).exists():  # another driver was first
+                    known.write(number, *work.made(*known.of(number), t, look))
+
+            Threads(make, count).run(missing(), tell)
+    tell(True)
+    return SweepResult(sweep, known)
+
+
+def read(folder: str | Path) -> SweepResult:
+    """What the folder of a sweep holds.
+
+    Raises:
+        SweepError: If it holds none, or its scene has changed since.
+    """
+    known, work = opened(file_path(folder, SweepError))
+    return SweepResult(work.sweep, known)
+
+
+def opened(path: Path) -> tuple[Folder, Work]:
+    """The folder of a sweep, and its work; SweepError as of `read`."""
+    text, table = read_specification(path)
+    where = str(path / "sweep.json")
+    try:
+        stored = Specification(json.loads(text))
+    except ValueError as error:
+        raise SweepError(f"{where}: is not JSON ({error})") from None
+    sweep = sweep_of(stored.data, table, where)
+    stored.check_same(specification(sweep).with_chunk(stored.chunk), where)
+    return _folder(path, sweep, stored), Work(sweep)
+
+
+def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
+    """The folder of a sweep, begun now unless it was; arguments and errors as of `run`."""
+    if chunk is not None:
+        chunk = integer("chunk", chunk, least=1, most=2**31, error=SweepError)
+    own, where = specification(sweep), str(path / "sweep.json")
+    if not has_specification(path):
+        _check_room(sweep, path)
+        stated = own.with_chunk(pilot(sweep, chunk))
+        if (store := _folder(path, sweep, stated).samples) is not None:
+            store.create(Work(sweep).times(), sweep.setup.plant.dynamics.joint_names)
+        table = None if isinstance(sweep.design, str) else np.asarray(sweep.design, float)
+        if begin(path, stated.text, table):
+            return _folder(path, sweep, stated)
+    stored = Specification(json.loads(read_specification(path)[0]))
+    stored.check_same(own.with_chunk(chunk or stored.chunk), where)
+    return _folder(path, sweep, stored)
+
+
+def _check_room(sweep: Sweep, path: Path) -> None:
+    """Raise SweepError if the disk has not as much room as the sweep will take."""
+    there = next(each for each in (path.absolute(), *path.absolute().parents) if each.exists())
+    free = disk_usage(there).free
+    if sweep.bytes_expected > free:
+        sizes = f"{sweep.bytes_expected / 2**30:.3g} GiB, and {there} has {free / 2**30:.3g} GiB"
+        raise SweepError(f"{path}: the sweep will take {sizes}; give another folder, fewer runs or fewer samples")
+
+
+def _folder(path: Path, sweep: Sweep, stated: Specification) -> Folder:
+    names = Columns(sweep.columns, tuple(sweep.figures))
+    return folder_of(path, stated.data, stated.digest, names, {"versions": versions()} | processor())
+
+
+class _Progress:
+    """Tells how many runs are done, as the folder has them, some once a second."""
+
+    def __init__(self, folder: Folder, on_progress: Progress | None) -> None:
+        self._folder, self._on_progress, self._last = folder, on_progress, 0.0
+
+    def __call__(self, now: bool = False) -> None:
+        if self._on_progress is not None and (now or perf_counter() - self._last > _SCAN_S):
+            self._last = perf_counter()
+            done = int(self._folder.present().sum()) * self._folder.chunk
+            self._on_progress(min(done, self._folder.runs), self._folder.runs)

@@ -1,0 +1,208 @@
+"""Sensitivity of a figure to its parameters, as shares of its variance or as differences of its distribution.
+
+    S_j = Var(E[y | x_j]) / Var(y)            first order: what x_j explains alone
+    T_j = 1 − Var(E[y | x_k, k ≠ j]) / Var(y)  total: with all interactions of x_j
+    PAWN_j = median over x_j of sup_y |F(y | x_j) − F(y)|
+
+`saltelli` gives S and T and needs the design of that name; `given_data` gives S and PAWN of any other design. Total
+indices cannot be computed from such runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.answer import Answer, Block, Table
+from robot_dyn.errors import SweepError
+from robot_dyn.sweeps.estimate import Estimate, text
+from robot_dyn.sweeps.replicates import Groups, groups_of, jackknife
+from robot_dyn.sweeps.statistics import check_figure, check_finished, check_level
+from robot_dyn.validate import numbers
+
+_RANDOM_GROUPS = 16
+_RUNS_OF_A_BIN, _MOST_BINS = 64, 32
+
+
+@final
+@dataclass(frozen=True, repr=False)
+class Sensitivity(Answer):
+    """Sensitivity of a figure to each parameter.
+
+    Attributes:
+        names: Of the parameters.
+        first: First-order indices S.
+        total: Total indices T; empty if the design gives none.
+        pawn: PAWN indices; empty if they were not computed.
+        pawn_noise: The PAWN index of a parameter without influence, of as many runs.
+        n: Runs.
+        failed: Runs without a finite value.
+        method: How the indices were computed.
+    """
+
+    names: tuple[str, ...]
+    first: tuple[Estimate, ...]
+    total: tuple[Estimate, ...]
+    pawn: tuple[float, ...]
+    pawn_noise: float
+    n: int
+    failed: int
+    method: str
+
+    def blocks(self) -> Iterator[Block]:
+        given = " given finished" if self.failed else ""
+        yield f"sensitivity{given}: {self.method}; {self.n} runs, {self.failed} failed"
+        columns: dict[str, list[str]] = {"parameter": list(self.names)}
+        for index, estimates in (("first order", self.first), ("total", self.total)):
+            if estimates:
+                columns[index] = [text(each.estimate) for each in estimates]
+                columns[f"{index}, {100 * estimates[0].level:g} %"] = [_interval(each) for each in estimates]
+        if self.pawn:
+            columns["PAWN"] = [text(x) for x in self.pawn]
+        yield Table(tuple(columns), tuple(zip(*columns.values(), strict=True)))
+        if self.pawn:
+            yield f"PAWN of a parameter without influence: {text(self.pawn_noise)}; total indices need design saltelli"
+
+
+def saltelli(
+    y: Any, names: Sequence[str], replicate: Any, level: float = 0.95, *, given: str | None = None
+) -> Sensitivity:
+    """First-order and total Sobol' indices from the runs of design "saltelli", in its order.
+
+        S_j = mean f(B) (f(A_B^j) − f(A)) / V,    T_j = mean (f(A) − f(A_B^j))² / 2V
+
+    Intervals: jackknife over the scramblings. A bootstrap of pairs would take them as independent.
+
+    Args:
+        y: The figure of each run, shape (N,).
+        names: Of the d parameters.
+        replicate: The scrambling of each run, shape (N,).
+        level: Of the intervals.
+        given: "finished" leaves out pairs of rows of which a run failed.
+
+    Raises:
+        SweepError: If an argument has another form, or runs failed and `given` is not "finished".
+
+    Sources: Saltelli et al., Comput. Phys. Commun. 181, 2010, table 2 (b), (f); Jansen, ibid. 117, 1999.
+    """
+    y, level, names = check_figure(y), check_level(level), tuple(names)
+    block = len(names) + 2
+    if len(y) % block or not names:
+        raise SweepError(f"of {len(names)} parameters a saltelli design has a multiple of {block} runs, got {len(y)}")
+    finite = check_finished(y, "sensitivity", given)
+    pairs = finite.reshape(-1, block).all(axis=1)
+    groups = groups_of(replicate, len(y)).part(np.repeat(pairs, block) & (np.arange(len(y)) % block == 0))
+    rows = y.reshape(-1, block)[pairs]
+    _check_enough(rows[:, :2], groups)
+    theta, low, high = jackknife(lambda mask: _indices(rows[mask]), groups, level)
+    d, failed = len(names), int(np.sum(~finite))
+    made = [
+        Estimate(f"{kind} index of {name}", float(x), float(a), float(b), level, len(y), failed, "jackknife")
+        for kind, *columns in zip(("first-order", "total"), theta, low, high, strict=True)
+        for name, x, a, b in zip(names, *columns, strict=True)
+    ]
+    method = f"Sobol' indices (Saltelli 2010, Jansen), jackknife over {groups.count} scramblings"
+    return Sensitivity(names, tuple(made[:d]), tuple(made[d:]), (), 0.0, len(y), failed, method)
+
+
+def given_data(
+    y: Any, x: Any, names: Sequence[str], level: float = 0.95, replicate: Any = None, *, given: str | None = None
+) -> Sensitivity:
+    """First-order indices from bins of each parameter, and PAWN indices, of the runs of any random design.
+
+    Bins hold about equally many runs; of a parameter of few values each is a bin. First-order indices are the
+    correlation ratio of the analysis of variance, without the part that chance gives to M bins:
+    S = (SS_between − (M − 1) MS_within) / SS_total. Intervals: jackknife over the scramblings, of independent runs over
+    16 groups.
+
+    Args:
+        y: The figure of each run, shape (N,).
+        x: The parameters, or their columns of the design, shape (N, d).
+        names: Of the d parameters.
+        level: Of the intervals.
+        replicate: The scrambling of each run, shape (N,); None for independent runs.
+        given: "finished" leaves out runs that failed.
+
+    Raises:
+        SweepError: If an argument has another form, or runs failed and `given` is not "finished".
+
+    Sources: Plischke, Borgonovo, Smith, Global sensitivity measures from given data, Eur. J. Oper. Res. 226, 2013;
+    Pianosi, Wagener, A simple and efficient method for global sensitivity analysis based on cumulative distribution
+    functions, Environ. Model. Softw. 67, 2015.
+    """
+    y, level, names = check_figure(y), check_level(level), tuple(names)
+    x = numbers("x", x, ("N", "d"), error=SweepError)
+    if x.shape != (len(y), len(names)) or not names:
+        raise SweepError(f"x must have shape ({len(y)}, {len(names)}), a row a run and a column a name, got {x.shape}")
+    finite = check_finished(y, "sensitivity", given)
+    of = np.arange(len(y)) % _RANDOM_GROUPS if replicate is None else replicate
+    groups = groups_of(of, len(y)).part(finite)
+    y, x = y[finite], x[finite]
+    _check_enough(y, groups)
+    bins = np.column_stack([_bins(column) for column in x.T])
+    theta, low, high = jackknife(lambda mask: _correlation_ratios(y[mask], bins[mask]), groups, level)
+    n, failed = len(finite), int(np.sum(~finite))
+    estimates = tuple(
+        Estimate(f"first-order index of {name}", float(x), float(a), float(b), level, n, failed, "jackknife")
+        for name, x, a, b in zip(names, theta, low, high, strict=True)
+    )
+    noise = _pawn(y, _bins(np.random.default_rng(0).random(len(y))))
+    over = f"{groups.count} {'groups of runs' if replicate is None else 'scramblings'}"
+    method = f"first order from {bins.max() + 1} bins, jackknife over {over}; PAWN, median over the bins"
+    return Sensitivity(names, estimates, (), tuple(_pawn(y, each) for each in bins.T), noise, n, failed, method)
+
+
+def _indices(rows: np.ndarray) -> np.ndarray:
+    """S and T, shape (2, d), of rows (f(A), f(B), f(A_B^1), …), from which a mean is subtracted: it changes neither."""
+    variance, centre = np.var(rows[:, :2]), np.mean(rows)
+    A, B, AB = rows[:, :1] - centre, rows[:, 1:2] - centre, rows[:, 2:] - centre
+    return np.array([np.mean(B * (AB - A), axis=0), np.mean((A - AB) ** 2, axis=0) / 2]) / variance
+
+
+def _bins(x: np.ndarray) -> np.ndarray:
+    """The bin of each run, 0, …, M − 1: equal values lie in one bin."""
+    count = min(max(len(x) // _RUNS_OF_A_BIN, 2), _MOST_BINS)
+    edges = np.quantile(x, np.arange(1, count) / count)
+    return np.unique(np.searchsorted(edges, x, side="right"), return_inverse=True)[1]
+
+
+def _correlation_ratios(y: np.ndarray, bins: np.ndarray) -> np.ndarray:
+    """The first-order index of each column of bins, shape (d,)."""
+    y = y - y.mean()
+    total = float(y @ y)
+    ratios = []
+    for column in bins.T:
+        sizes = np.bincount(column)
+        filled = sizes > 0
+        between = float(np.sum(np.bincount(column, y)[filled] ** 2 / sizes[filled]))
+        M = int(filled.sum())
+        within = (total - between) / max(len(y) - M, 1)
+        ratios.append((between - (M - 1) * within) / total)
+    return np.array(ratios)
+
+
+def _pawn(y: np.ndarray, bins: np.ndarray) -> float:
+    """The median over bins of the Kolmogorov–Smirnov distance of y in a bin from all y."""
+    order = np.argsort(y, kind="stable")
+    ordered, bins = y[order], bins[order]
+    last = np.append(ordered[1:] != ordered[:-1], True)  # of equal values: there both functions have jumped
+    F = np.arange(1, len(y) + 1)[last] / len(y)
+    distances = []
+    for k in range(bins.max() + 1):
+        inside = np.cumsum(bins == k)
+        distances.append(np.max(np.abs(inside[last] / inside[-1] - F)))
+    return float(np.median(distances))
+
+
+def _check_enough(y: np.ndarray, groups: Groups) -> None:
+    if groups.count < 3:
+        raise SweepError(f"sensitivities need runs that finished of 3 scramblings or more, got {groups.count}")
+    if not np.var(y) > 0:
+        raise SweepError("the figure is the same in all runs: no parameter matters")
+
+
+def _interval(each: Estimate) -> str:
+    return f"{text(each.low)} … {text(each.high)}"

@@ -1,0 +1,53 @@
+"""The torque of each joint by cause, as the page shows it at a time: whole numbers of a step, at samples of a run."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from robot_dyn.errors import RobotDynError
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.units import unit
+from robot_dyn.simulation.results.trajectory import Trajectory
+
+_MOST = 2000  # samples; no slider is wider in pixels of a screen
+_STEPS = 32767  # of 16 bits, for the largest torque of a joint
+
+
+def causes(run: Trajectory, robot: Robot) -> dict[str, Any] | None:
+    """The entry `causes` of the document of a run; None if it cannot be split."""
+    try:
+        split = run.causes()
+    except RobotDynError:
+        return None
+    parts = np.stack([*split.torques.values(), split.tau])
+    known = np.flatnonzero(np.isfinite(parts).all(axis=(0, 2)))
+    if not len(known):
+        return None
+    at = known[np.unique(np.linspace(0, len(known) - 1, min(len(known), _MOST)).round().astype(int))]
+    of_joints = zip(split.joints, split.types, robot.effort_limit, np.moveaxis(parts[:, at], 2, 0), strict=True)
+    return {"t": split.t[at], "names": list(split.torques), "joints": [_joint(*each) for each in of_joints]}
+
+
+def resolution(entry: dict[str, Any]) -> str:
+    """In words, how far the numbers of the page are from those of the run."""
+    return (
+        f"torque by cause is shown at {len(entry['t'])} samples, the latest one at each time, to"
+        f" 1/{2 * _STEPS} of the largest of its joint"
+    )
+
+
+def _joint(name: str, kind: str | None, limit: float, parts: np.ndarray) -> dict[str, Any]:
+    """A joint with its torques (c + 1, k), of the causes and their sum."""
+    step = float(np.abs(parts).max()) / _STEPS or 1.0
+    extent = max(float(parts[:-1].clip(0.0).sum(axis=0).max()), float((-parts[:-1]).clip(0.0).sum(axis=0).max()))
+    return {
+        "name": name,
+        "unit": unit("tau", kind),
+        "limit": limit if isfinite(limit) and limit > 0 else None,
+        "extent": extent,
+        "step": step,
+        "values": (parts / step).round().astype(np.int16),
+    }

@@ -1,0 +1,49 @@
+"""Coarse meshes, for small pages: corners that share a cell of a grid become one.
+
+Source: Rossignac and Borrel, Multi-resolution 3D approximations for rendering complex scenes, 1993 (vertex clustering).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from robot_dyn.shapes.triangles import Mesh, welded
+from robot_dyn.validate import choice
+from robot_dyn.view.geometry.visuals import Drawing, drawing
+
+CELLS = 32  # of the longest side of a mesh
+
+
+def coarse(mesh: Mesh) -> Mesh:
+    """The mesh with the corners in each cubic cell at their mean, without the triangles that collapse.
+
+    No corner moves by more than the diagonal of a cell, √3 / `CELLS` of the longest side.
+    """
+    points = mesh.vertices.astype(float)
+    low = points.min(axis=0)
+    cells = np.floor((points - low) * (CELLS / np.ptp(points, axis=0).max()))
+    _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    means = np.stack([np.bincount(cell, each) for each in points.T], axis=1) / count[:, None]
+    columns = (None if each is None else each[mesh.faces] for each in (mesh.uv, mesh.colors))
+    return welded(means[cell[mesh.faces]], None, *columns) or mesh  # which leaves out what has no area
+
+
+def look_of(meshes: str) -> Callable[..., Drawing]:
+    """What draws a robot, as `visuals.drawing`: with the meshes of its files, or coarse ones."""
+    choice("meshes", meshes, ("full", "coarse"))
+    return drawing if meshes == "full" else lambda *args, **options: _coarsened(drawing(*args, **options))
+
+
+def _coarsened(look: Drawing) -> Drawing:
+    """A drawing with its meshes coarse; pieces that share one still do."""
+    meshes = {id(piece.mesh): piece.mesh for piece in look.pieces}
+    known = {key: coarse(mesh) for key, mesh in meshes.items()}
+    before, after = (sum(len(each.faces) for each in some.values()) for some in (meshes, known))
+    remark = (
+        f"meshes are coarse: {after} of {before} triangles, corners moved by up to {np.sqrt(3) / CELLS:.1%} of a mesh"
+    )
+    pieces = tuple(replace(piece, mesh=known[id(piece.mesh)]) for piece in look.pieces)
+    return replace(look, pieces=pieces, remarks=(*look.remarks, remark))

@@ -1,0 +1,283 @@
+"""What figures of a batch show: quantiles over time, how runs ended, a figure of each run, and it over a parameter.
+
+Bands are of the runs that did not diverge; those that did are drawn by themselves and counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.errors import QueryError, nearest, shown
+from robot_dyn.queries.units import unit
+from robot_dyn.simulation.results.provenance import joint_types
+from robot_dyn.simulation.results.samples import tracking_of
+from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.view.plots.figure import Style, drawable, named, scale
+from robot_dyn.view.plots.parts import PlotError
+from robot_dyn.view.plots.sheet import Panel
+
+LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
+_MOST_LINES = 100  # of runs that diverged
+_CELL_MM, _LOST = 42.0, 1  # the least width of a cell; colour of what diverged
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BatchView:
+    """A batch, the columns of its joints that are shown, what a histogram and a scatter show, and the width [mm]."""
+
+    runs: Rollouts
+    joints: tuple[int, ...]
+    x: str | None
+    y: str | None
+    width: float
+
+    @property
+    def lost(self) -> str:
+        """How many runs diverged."""
+        count = int(self.runs.diverged.sum())
+        return f"; {count} of {len(self.runs)} diverged" if count else ""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Fan:
+    """Quantiles `bands` (levels, m) over t (m,), and `lost` (k, m), runs that diverged: lines up to a cross."""
+
+    title: str
+    y: str
+    t: np.ndarray
+    bands: np.ndarray
+    lost: np.ndarray
+    x: str = "t [s]"
+    note: str = ""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Of the median, the bands, and what diverged."""
+        return ("median", "25 to 75 %", "5 to 95 %") + (f"diverged ({len(self.lost)})",) * bool(len(self.lost))
+
+    def fill(self, axes: Any, style: Style, diverged: bool) -> None:
+        """Draw them; what diverged leaves the scale of the others."""
+        colours = style.colours["lines"]
+        named(axes, self, style)
+        axes.plot(self.t, self.bands[2], color=colours[0], linewidth=style.line, label="median")
+        for low, high, alpha, label in ((1, 3, 0.4, "25 to 75 %"), (0, 4, 0.18, "5 to 95 %")):
+            between = self.bands[low], self.bands[high]
+            axes.fill_between(self.t, *between, color=colours[0], alpha=alpha, linewidth=0, label=label)
+        known = np.isfinite(self.bands).any()
+        scale(axes, "y", (self.bands if known else self.lost).ravel(), np.inf, diverged and not known, False)
+        low, high = axes.get_ylim()
+        for k, line in enumerate(self.lost[:_MOST_LINES]):
+            style_of = {"color": colours[_LOST], "linewidth": 0.6 * style.line, "linestyle": (0, (4, 2))}
+            axes.plot(self.t, line, label="_diverged" if k else self.labels[-1], **style_of)
+            if len(last := np.flatnonzero(np.isfinite(line))):
+                end = self.t[last[-1]], np.clip(line[last[-1]], low, high)
+                axes.plot(*end, "x", color=colours[_LOST], markersize=4, clip_on=False, label="_end")
+        scale(axes, "x", self.t[[0, -1]], np.inf, False, False)
+        axes.set_xlim(self.t[0], self.t[-1] if self.t[-1] > self.t[0] else self.t[0] + 1)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """Counts between `edges`; `lost` of what diverged, beside them. Without edges each count has a name."""
+
+    title: str
+    x: str
+    counts: np.ndarray
+    edges: np.ndarray | None = None
+    names: tuple[str, ...] = ()
+    lost: int = 0
+    y: str = "runs [1]"
+    note: str = ""
+    labels: tuple[str, ...] = ()
+
+    def fill(self, axes: Any, style: Style, diverged: bool) -> None:
+        """Draw bars, with the count where they have names, and of what diverged."""
+        colours = style.colours["lines"]
+        named(axes, self, style)
+        if self.edges is None:
+            at, wide = np.arange(len(self.counts)), np.full(len(self.counts), 0.6)
+            axes.set_xticks(at, [drawable(name) for name in self.names])
+            axes.set_xlim(-0.6, max(len(at), 4) - 0.4)
+        else:
+            at, wide = (self.edges[1:] + self.edges[:-1]) / 2, np.diff(self.edges)
+        hues = [colours[_LOST if name == Ending.DIVERGED.value else 0] for name in self.names] or colours[0]
+        axes.bar(at, self.counts, wide, color=hues, edgecolor=style.colours["paper"], linewidth=0.5, label="_counts")
+        told = list(zip(at, self.counts, strict=True)) if self.edges is None else []
+        if self.lost and self.edges is not None:
+            width = self.edges[-1] - self.edges[0]
+            beyond = self.edges[-1] + 0.12 * width
+            bar = {"color": colours[_LOST], "hatch": "///", "edgecolor": style.colours["paper"]}
+            axes.bar([beyond], [self.lost], 0.08 * width, label="_diverged", **bar)
+            told.append((beyond, self.lost))
+        for place, count in told:
+            words = f"{count}" if self.edges is None else f"{count} diverged"
+            axes.annotate(
+                words, (place, count), (0, 1), textcoords="offset points", ha="center", va="bottom",
+                fontsize=style.small - 0.5, **style.ink,
+            )  # fmt: skip
+        axes.set_ylim(0, 1.18 * max(1, *self.counts, self.lost))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Points:
+    """y over x of each run; those that diverged are crosses at the upper edge, whatever their y."""
+
+    title: str
+    x: str
+    y: str
+    at: np.ndarray
+    values: np.ndarray
+    lost: np.ndarray
+    note: str = ""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Two, where runs diverged."""
+        return ("run", f"diverged ({self.lost.sum()})") if self.lost.any() else ("run",)
+
+    def fill(self, axes: Any, style: Style, diverged: bool) -> None:
+        """Draw them."""
+        colours, held = style.colours["lines"], ~self.lost
+        named(axes, self, style)
+        dots = {"linestyle": "", "markersize": 3, "rasterized": len(self.at) > 20_000}
+        axes.plot(self.at[held], self.values[held], marker="o", color=colours[0], label="run", **dots)
+        scale(axes, "y", self.values[held], np.inf, False, False)
+        scale(axes, "x", self.at, np.inf, False, False)
+        if self.lost.any():
+            edge = {"transform": axes.get_xaxis_transform(), "clip_on": False} | dots | {"markersize": 4}
+            top = np.ones(int(self.lost.sum()))
+            axes.plot(self.at[self.lost], top, marker="x", color=colours[_LOST], label=self.labels[1], **edge)
+
+
+def fan(view: BatchView) -> list[Panel]:
+    """Quantiles of q of each joint over time.
+
+    Raises:
+        PlotError: If q was not recorded.
+    """
+    if view.runs.q is None:
+        raise PlotError("the positions of the runs were not recorded; add q to record of rollouts")
+    kinds = joint_types(view.runs)
+    names = [(view.runs.joint_names[i], f"q [{unit('q', kinds[i])}]") for i in view.joints]
+    return [_fans(view, "Positions", names, view.runs.q[:, :, list(view.joints)])]
+
+
+def tracking(view: BatchView) -> list[Panel]:
+    """Quantiles of the tracking error of each joint, or of the frame along each axis, over time.
+
+    Raises:
+        PlotError: If q was not recorded, or the runs have no reference, or come from a file.
+    """
+    runs = view.runs
+    if runs.setup is None or runs.q is None:
+        raise PlotError("tracking: the runs were read from a file, or have no positions")
+    found = tracking_of(runs.setup, runs.t, np.nan_to_num(runs.q))
+    if found.deviation is None:
+        raise PlotError("tracking: the runs followed no reference")
+    off = np.where(np.isfinite(runs.q.sum(axis=2))[..., None], found.deviation, np.nan)
+    if found.desired is None:
+        return [_fans(view, "Tracking error", [(f"frame, {axis}", "p − p_d [m]") for axis in "xyz"], off)]
+    kinds = joint_types(runs)
+    names = [(runs.joint_names[i], f"q − q_d [{unit('q', kinds[i])}]") for i in view.joints]
+    return [_fans(view, "Tracking error", names, off[:, :, list(view.joints)])]
+
+
+def outcomes(view: BatchView) -> list[Panel]:
+    """How many runs finished, ended by an event, diverged, or were stopped."""
+    runs = view.runs
+    by_event = np.array([text != "" for text in runs.advice]) & ~runs.diverged & ~runs.stopped
+    other = ~(by_event | runs.diverged | runs.stopped)
+    kinds = (
+        ("finished", other),
+        ("ended by an event", by_event),
+        ("diverged", runs.diverged),
+        ("stopped", runs.stopped),
+    )
+    counts = {name: int(some.sum()) for name, some in kinds if some.any()}
+    return [Panel("Outcomes", ((Bars("", "outcome", np.array(list(counts.values())), names=tuple(counts)),),), 30.0)]
+
+
+def histogram(view: BatchView) -> list[Panel]:
+    """How often a figure of the runs has which value; by default the tracking error, else the first extreme."""
+    name, values = _column(view.runs, "y", view.y, ("tracking error", "largest", "ended"))
+    some = np.isfinite(values) & ~view.runs.diverged
+    if not some.any():
+        raise PlotError(f"no run that did not diverge has a {name}")
+    counts, edges = np.histogram(values[some], bins=min(30, max(5, int(np.sqrt(some.sum()) * 1.5))))
+    bars = Bars(_title(view, some), name, counts, edges, lost=int(view.runs.diverged.sum()))
+    return [Panel(f"Histogram of {name}", ((bars,),), 34.0)]
+
+
+def scatter(view: BatchView) -> list[Panel]:
+    """A figure of the runs over what was swept; by default as `histogram`, over the first column that differs.
+
+    Raises:
+        PlotError: If nothing differs from run to run.
+    """
+    runs = view.runs
+    varied = [name for name, x in runs.table().items() if name != "run" and _numeric(x) and np.ptp(x) > 0]
+    if view.x is None and not (varied := [name for name in varied if name.startswith((*runs.params, "start "))]):
+        raise PlotError("scatter: no parameter and no start differs from run to run; name a column by x=")
+    x, at = _column(runs, "x", view.x or varied[0], ())
+    y, values = _column(runs, "y", view.y, ("tracking error", "largest", "ended"))
+    points = Points(_title(view, np.isfinite(values) & ~runs.diverged), x, y, at, values, runs.diverged)
+    return [Panel(f"{y} over {x}", ((points,),), 50.0)]
+
+
+BATCH_PLOTS: Mapping[str, Callable[[BatchView], list[Panel]]] = MappingProxyType(
+    {f.__name__: f for f in (fan, tracking, outcomes, histogram, scatter)}
+)
+
+
+def _fans(view: BatchView, what: str, names: list[tuple[str, str]], values: np.ndarray) -> Panel:
+    """A fan of each column of values (B, m, c)."""
+    gone, cells = view.runs.diverged, []
+    for k, (name, y) in enumerate(names):
+        held = values[~gone, :, k]
+        known = np.isfinite(held).any(axis=0)
+        bands = np.full((len(LEVELS), values.shape[1]), np.nan)
+        if known.any():
+            bands[:, known] = np.nanquantile(held[:, known], LEVELS, axis=0)
+        cells.append(Fan(name, y, view.runs.t, bands, values[gone, :, k]))
+    across = min(len(cells), int(view.width / _CELL_MM))
+    rows = tuple(tuple(cells[k : k + across]) for k in range(0, len(cells), across))
+    early = int(((view.runs.ended < view.runs.t[-1]) & ~gone).sum())
+    counted = f"; {early} ended early, bands are of those still running" if early else ""
+    many = f", {_MOST_LINES} of them drawn" if gone.sum() > _MOST_LINES else ""
+    return Panel(f"{what} of {int((~gone).sum())} runs{view.lost}{many}{counted}", rows, 28.0, shared=True)
+
+
+def _title(view: BatchView, some: np.ndarray) -> str:
+    missing = int((~some & ~view.runs.diverged).sum())
+    return f"{int(some.sum())} runs{view.lost}" + (f"; {missing} without this figure" if missing else "")
+
+
+def _column(runs: Rollouts, option: str, name: str | None, preferred: tuple[str, ...]) -> tuple[str, np.ndarray]:
+    """Heading and numbers of a column of the table of runs, named with or without its unit.
+
+    Raises:
+        QueryError: If there is none of that name, or it holds no numbers.
+    """
+    table = {heading: x for heading, x in runs.table().items() if _numeric(x)}
+    if name is None:
+        name = next(heading for start in preferred for heading in table if heading.startswith(start))
+    if not isinstance(name, str):
+        raise QueryError(f"{option} must name a column of the table of runs, got {shown(name)}")
+    for heading, x in table.items():
+        if name in (heading, heading.partition(" [")[0]):
+            return heading, x.astype(float)
+    raise QueryError(f"{option}: no column {name!r}; {nearest(name, table)}")
+
+
+def _numeric(x: np.ndarray) -> bool:
+    return x.dtype.kind in "fiu"

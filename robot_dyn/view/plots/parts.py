@@ -1,0 +1,268 @@
+"""What figures of a run show: joints, torques against limits, energy ledger, tracking error, phase portrait, error.
+
+The overview has a row for each joint, and a column for each of q, v, u and the tracking error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import final
+
+import numpy as np
+
+from robot_dyn.errors import RobotDynError
+from robot_dyn.queries.units import unit
+from robot_dyn.simulation.results.error_estimate import ErrorEstimate
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.view.plots.figure import DESIRED, NEAR, Cell, Curve
+from robot_dyn.view.plots.sheet import Panel
+from robot_dyn.view.rests import Rest, rests
+
+_CELL_MM, _WIDE_MM = 36.0, 60.0  # the least width of a cell, and of one with a legend
+_HIGH_MM, _LOW_MM = 26.0, 19.0  # rows of details, and of the overview
+
+
+class PlotError(RobotDynError):
+    """A run with nothing to draw, or a picture that cannot be written."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class View:
+    """The shown part of a run, and the width of the figure.
+
+    Attributes:
+        run: The whole.
+        joints: Columns of the joints shown.
+        types: Type of each joint of the run; None where it is not known.
+        efforts, speeds: Limits of u and v of each joint of the run, in SI units; inf for none.
+        width: Of the figure, in [mm].
+    """
+
+    run: Trajectory
+    joints: tuple[int, ...]
+    types: tuple[str | None, ...]
+    efforts: np.ndarray
+    speeds: np.ndarray
+    width: float
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the joints shown."""
+        return [self.run.joint_names[i] for i in self.joints]
+
+    @property
+    def columns(self) -> int:
+        """Cells beside each other at most."""
+        return int(self.width / _CELL_MM)
+
+    def unit(self, quantity: str, i: int) -> str:
+        """Unit of a quantity of a joint; both units where its type is not known."""
+        return unit(quantity, self.types[i])
+
+
+def overview(view: View) -> list[Panel]:
+    """A row for each joint with q, u, tracking error and v, those that are known and fit; energy and errors below."""
+    run, held = view.run, rests(view.run)
+    known = {"q": _position}
+    known |= {"u": _torque} if np.nan_to_num(run.u).any() else {}
+    known |= {"error": _off} if run.deviation is not None and run.desired is not None else {}
+    known |= {"v": _velocity}
+    shown = [name for name in ("q", "v", "u", "error") if name in list(known)[: view.columns]]
+    rows = []
+    for i in view.joints:
+        x = "t [s]" if i == view.joints[-1] else ""
+        cells = [known[name](view, i, x, held[i]) for name in shown]
+        rows.append((replace(cells[0], title=run.joint_names[i]), *cells[1:]))
+    limits = {name: values for name, values in (("v", view.speeds), ("u", view.efforts)) if name in shown}
+    heading = f"Joints{_legend(view, held)}{_limits(view, **limits)}"
+    heading += "; u is 0 throughout" if not run.u.any() else ""
+    hidden = " and ".join(name for name in known if name not in shown)
+    heading += f"; no room for {hidden}" if hidden else ""
+    panels = [Panel(heading, tuple(rows), _LOW_MM, shared=True)]
+    if run.deviation is not None and run.desired is None:
+        panels += tracking(view)
+    lower = [*_ledger(view), _residual(view)] if run.ledger.known else []
+    lower += [_growth(view, run.error)] if run.error is not None and len(run.error.t) > 1 else []
+    lower = [replace(cell, x="t [s]", y=cell.y[cell.y.index("[") :]) for cell in lower]  # titles name the quantity
+    across = max(1, min(2, int(view.width / _WIDE_MM)))
+    grid = tuple(tuple(lower[k : k + across]) for k in range(0, len(lower), across))
+    return [*panels, Panel("", grid, _LOW_MM)] if grid else panels
+
+
+def joints(view: View) -> list[Panel]:
+    """Position and velocity of each joint, with the desired position where there is a reference, and its rests."""
+    held = rests(view.run)
+    q = [_position(view, i, "", held[i]) for i in view.joints]
+    v = [_velocity(view, i, "t [s]", held[i]) for i in view.joints]
+    pairs = zip(_grid(view, q), _grid(view, v), strict=True)
+    heading = f"Joint positions and velocities{_legend(view, held)}{_limits(view, v=view.speeds)}"
+    return [Panel(heading, tuple(row for pair in pairs for row in pair), _HIGH_MM, shared=True)]
+
+
+def torques(view: View) -> list[Panel]:
+    """Actuation of each joint against ± its effort limit, with the part of it that was used, between samples too.
+
+    Raises:
+        PlotError: If it was not recorded.
+    """
+    if np.isnan(view.run.u).all():
+        raise PlotError("the torques of the run were not recorded; add u to record of rollouts")
+    cells = [replace(_torque(view, i, "t [s]"), title=view.run.joint_names[i]) for i in view.joints]
+    cells = [replace(each, note=f", {each.note}" if each.note else "") for each in cells]
+    return [Panel(f"Actuation{_limits(view, u=view.efforts)}", _grid(view, cells), _HIGH_MM)]
+
+
+def energy(view: View) -> list[Panel]:
+    """K, V and E from the start, the work of each source, and what the ledger leaves over, on an axis of its own.
+
+    Raises:
+        PlotError: If they were not recorded.
+    """
+    ledger = view.run.ledger
+    if not ledger.known:
+        raise PlotError("energy and work of the run were not recorded; add energy and work to record of rollouts")
+    known = np.isfinite(ledger.residual).any() and np.isfinite(ledger.exchanged)
+    part = f": the residual is {ledger.closure:.1e} of what was exchanged" if known and ledger.exchanges else ""
+    cells = [*_ledger(view), replace(_residual(view), x="t [s]")]
+    return [Panel(f"Energy ledger{part}", tuple((cell,) for cell in cells), 32.0)]
+
+
+def tracking(view: View) -> list[Panel]:
+    """Deviation of each joint, or of the frame along each axis, from the reference.
+
+    Raises:
+        PlotError: If the run followed no reference.
+    """
+    run = view.run
+    if run.deviation is None:
+        raise PlotError(
+            "the run has no tracking error, since it followed no reference; simulate with a controller that has one"
+        )
+    if run.desired is None:
+        columns, units = [0, 1, 2], ["m"] * 3
+        each = zip("xyz", run.deviation.T, strict=True)
+        cells = [Cell(f"frame, {axis}", "t [s]", "p − p_d [m]", (Curve("error", run.t, y),)) for axis, y in each]
+    else:
+        columns, units = list(view.joints), [view.unit("q", i) for i in view.joints]
+        cells = [replace(_off(view, i, "t [s]"), title=run.joint_names[i], note="") for i in view.joints]
+    off = run.deviation[:, columns]
+    rms = {unit: _rms(off[:, [each == unit for each in units]]) for unit in dict.fromkeys(units)}
+    heading = "Tracking error, rms " + ", ".join(f"{x:.2e} {unit}" for unit, x in rms.items())
+    return [Panel(heading, _grid(view, cells), _HIGH_MM)]
+
+
+def phase(view: View) -> list[Panel]:
+    """Phase portrait of each joint: v over q."""
+    run, cells = view.run, []
+    for i, name in zip(view.joints, view.names, strict=True):
+        path = Curve("path", run.q[:, i], run.v[:, i])
+        start = Curve("start", run.q[:1, i], run.v[:1, i], (1, 0))
+        cells.append(Cell(name, f"q [{view.unit('q', i)}]", f"v [{view.unit('v', i)}]", (path, start)))
+    return [Panel("Phase portrait", _grid(view, cells), 40.0, shared=True)]
+
+
+def error_growth(view: View) -> list[Panel]:
+    """Estimated error of the positions, the largest over the joints, and the time until which it is resolved.
+
+    Raises:
+        PlotError: If the run has no estimate.
+    """
+    error = view.run.error
+    if error is None or len(error.t) < 2:
+        why = "estimate_error was False" if error is None else error.note or "it ended too soon"
+        raise PlotError(f"the run has no estimate of its error ({why}); simulate with estimate_error=True")
+    return [Panel(f"Error of the positions: {error}", ((replace(_growth(view, error), title=""),),), 32.0)]
+
+
+PLOTS: Mapping[str, Callable[[View], list[Panel]]] = MappingProxyType(
+    {f.__name__: f for f in (overview, joints, torques, energy, tracking, phase, error_growth)}
+)
+
+
+def _position(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
+    run = view.run
+    q = [Curve("actual", run.t, run.q[:, i])]
+    if run.desired is not None:
+        q.append(Curve("desired", run.t, run.desired[:, i], DESIRED))
+    return Cell(run.joint_names[i], x, f"q [{view.unit('q', i)}]", tuple(q), marks=_marks(run, i), rests=held)
+
+
+def _velocity(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
+    run, limit = view.run, float(view.speeds[i])
+    curves = (Curve("actual", run.t, run.v[:, i]),)
+    return Cell("", x, f"v [{view.unit('v', i)}]", curves, limit=limit, marks=_marks(run, i), rests=held)
+
+
+def _torque(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
+    u, limit = view.run.u[:, i], float(view.efforts[i])
+    every = u if view.run.extremes is None else np.append(u, view.run.extremes[2, :, i])
+    peak = float(np.max(np.abs(every), where=np.isfinite(every), initial=0.0))
+    share = peak / limit
+    used = "under 1%" if 0 < share < 0.005 else f"{share:.0%}" if share < 10 else "over 1000%"
+    note = f"{used} of the limit" if np.isfinite(limit) else ""
+    return Cell("", x, f"u [{view.unit('u', i)}]", (Curve("u", view.run.t, u),), limit=limit, note=note)
+
+
+def _off(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
+    off = np.zeros_like(view.run.t) if view.run.deviation is None else view.run.deviation[:, i]
+    curves = (Curve("error", view.run.t, off),)
+    return Cell("", x, f"q − q_d [{view.unit('q', i)}]", curves, note=f"rms {_rms(off):.2e} {view.unit('q', i)}")
+
+
+def _ledger(view: View) -> list[Cell]:
+    t, ledger = view.run.t, view.run.ledger
+    E, V = ledger.energy, ledger.potential
+    own = (("K", ledger.kinetic), ("V − V(0)", V - V[0]), ("E − E(0)", E - E[0]))
+    stores = tuple(Curve(label, t, y, (i, i)) for i, (label, y) in enumerate(own))
+    works = tuple(Curve(f"W {name}", t, y, (i + 3, i)) for i, (name, y) in enumerate(ledger.work.items()))
+    sole = f" by {next(iter(ledger.work))}" if len(works) == 1 else ""
+    cells = [Cell("Energy since the start", "", "energy [J]", stores)]
+    done = any(np.nan_to_num(work.y).any() for work in works)
+    return [*cells, Cell(f"Work since the start{sole}", "", "work [J]", works)] if done else cells
+
+
+def _residual(view: View) -> Cell:
+    left = Curve("|residual|", view.run.t, np.abs(view.run.ledger.residual))
+    return Cell("Residual |E − E(0) − Σ W|", "", "residual [J]", (left,), log=True)
+
+
+def _growth(view: View, error: ErrorEstimate) -> Cell:
+    units = {unit("q", each) for each in view.types}
+    of_q = units.pop() if len(units) == 1 else unit("q", None)
+    until = error.resolved_until if error.resolved_until < error.t[-1] else np.inf
+    curve = Curve("estimated error", error.t, error.error)
+    return Cell("Estimated error |q − exact|", "t [s]", f"|q − exact| [{of_q}]", (curve,), log=True, until=until)
+
+
+def _marks(run: Trajectory, i: int) -> tuple[float, ...]:
+    return tuple(each.t for each in run.events if each.joint in ("", run.joint_names[i]))
+
+
+def _legend(view: View, held: tuple[tuple[Rest, ...], ...]) -> str:
+    """What is drawn without an entry in a legend, for a heading."""
+    run, shown = view.run, [each for i in view.joints for each in held[i]]
+    legend = [("events are dotted", run.events), ("where a joint is held is shaded", shown)]
+    legend.append(("at a stop in colour", [each for each in shown if each.at_stop]))
+    return "".join(f"; {text}" for text, some in legend if some)
+
+
+def _limits(view: View, **limits: np.ndarray) -> str:
+    """Which limits are drawn, for a heading."""
+    shown = list(view.joints)
+    peaks = {name: np.nan_to_num(np.abs(getattr(view.run, name)[:, shown])).max(axis=0) for name in limits}
+    drawn = [name for name, x in limits.items() if ((peaks[name] > 0) & (peaks[name] >= NEAR * x[shown])).any()]
+    return f"; limits of {' and '.join(drawn)} are dash-dotted where over {NEAR:.0%} is used" if drawn else ""
+
+
+def _rms(z: np.ndarray) -> float:
+    known = z[np.isfinite(z)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+
+
+def _grid(view: View, cells: list[Cell]) -> tuple[tuple[Cell, ...], ...]:
+    n, most = len(cells), view.columns
+    wide = n if n <= most else -(-n // -(-n // most))
+    return tuple(tuple(cells[i : i + wide]) for i in range(0, n, wide))

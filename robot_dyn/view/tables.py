@@ -1,0 +1,62 @@
+"""Tables of runs: in what their settings differ; what they took, and the cost of one digit more or fewer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from robot_dyn.queries.units import format_duration, units
+from robot_dyn.simulation.comparison.difference import comparable
+from robot_dyn.simulation.comparison.differing_settings import differing_settings
+from robot_dyn.simulation.results.provenance import joint_types
+from robot_dyn.simulation.results.trajectory import Trajectory
+
+_NONE = "–"
+_MOST_SETTINGS = 60
+
+
+def settings_table(named: Sequence[tuple[str, Trajectory]]) -> dict[str, Any]:
+    """The settings in which runs of one robot differ from the first, as of `cost_table`; no rows for others."""
+    (_, first), *others = named
+    if any(not comparable(first, other) for _, other in others):
+        return {"runs": [], "rows": []}
+    pairs = [{each.name: each for each in differing_settings(first, other)} for _, other in others]
+    rows = []
+    for name in list(dict.fromkeys(name for pair in pairs for name in pair))[:_MOST_SETTINGS]:
+        of_first = next(pair[name].a for pair in pairs if name in pair)
+        rows.append([name, of_first, *(pair[name].b if name in pair else of_first for pair in pairs)])
+    return {"runs": [name for name, _ in named], "rows": rows}
+
+
+def cost_table(named: Sequence[tuple[str, Trajectory]]) -> dict[str, Any]:
+    """Return the run names and the rows, each a heading and one text per run; empty rows are left out."""
+    columns = [dict(_rows(run)) for _, run in named]
+    headings = dict.fromkeys(heading for column in columns for heading in column)
+    rows = [[heading, *(column.get(heading, _NONE) for column in columns)] for heading in headings]
+    return {"runs": [name for name, _ in named], "rows": rows}
+
+
+def _rows(run: Trajectory) -> Iterator[tuple[str, str]]:
+    s, unit = run.statistics, units("q", joint_types(run))
+    yield "method", f"{s.method}, step {s.step_s:.4g} s" if s.step_s else s.method
+    yield "engine", s.engine
+    yield "steps", str(s.steps)
+    yield "evaluations", str(s.evaluations)
+    yield f"estimated error of q [{unit}]", "not estimated" if run.error is None else str(run.error)
+    yield "time of the loop", format_duration(s.wall_s)
+    if s.companion_evaluations:
+        yield "error estimate", f"{s.companion_evaluations} evaluations, {format_duration(s.companions_s)}"
+    if run.accuracy is not None:
+        yield from _accuracy(run)
+
+
+def _accuracy(run: Trajectory) -> Iterator[tuple[str, str]]:
+    """Requested accuracy, and the cost of one digit more or fewer; time is assumed proportional to evaluations."""
+    of = run.accuracy
+    assert of is not None
+    at = f", at rtol {of.rtol:.1e}" if of.rtol else ""
+    yield "accuracy asked for", f"{of.requested:.1e}{at}"
+    yield "pilots and check", f"{of.pilots} and {of.check} evaluations"
+    for name, evaluations in (("a digit more", of.digit_more), ("a digit less", of.digit_less)):
+        part = evaluations / max(of.run, 1)
+        yield name, f"about {evaluations:.0f} evaluations, {format_duration(part * run.statistics.wall_s)}"

@@ -1,0 +1,96 @@
+"""A video of a page: checks, then the browser, the frames and the encoder; the file is written when all is done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from shutil import copyfileobj
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from robot_dyn.errors import VideoError
+from robot_dyn.files import Kind, save, target
+from robot_dyn.validate import function, integer, truth
+from robot_dyn.view.video import encoders
+from robot_dyn.view.video.browser import browser
+from robot_dyn.view.video.frames import frame_times, frames, load
+from robot_dyn.view.video.installed import installed
+
+KINDS = Kind("an MP4 video", ".mp4", b"\0\0\0"), Kind("a GIF", ".gif", b"GIF8")
+_FPS, _MOST_FPS = {".mp4": 60, ".gif": 25}, {".mp4": 240, ".gif": 50}  # browsers slow down GIFs of more
+_MOST_FRAMES = 20_000
+_MOST_PIXELS = 5 * 10**8  # of a GIF, whose frames are held in memory
+_LEAST_SIZE, _MOST_SIZE = 160, 3840
+
+
+def save_video(
+    text: str,
+    duration_s: float,
+    path: str | Path,
+    fps: int | None,
+    size: tuple[int, int],
+    dark: bool,
+    program: str | Path | None,
+    on_progress: Callable[[float, str], object] | None,
+) -> Path:
+    """Write the video of a page, given as its text; arguments and errors as of `Page.save_video`."""
+    file = target(path, KINDS, VideoError)
+    kind = file.suffix.lower()
+    rate = integer("fps", _FPS[kind] if fps is None else fps, least=1, most=_MOST_FPS[kind], error=VideoError)
+    size, dark = _checked_size(size), truth("dark", dark, error=VideoError)
+    function("on_progress", on_progress, "a part and a text", error=VideoError)
+    times = _checked_times(duration_s, rate, kind, size)
+    if kind == ".mp4":
+        encoders.ffmpeg()  # raises before the work
+    with TemporaryDirectory(prefix="robot_dyn-") as folder:
+        video = Path(folder) / f"video{kind}"
+        with browser(installed(program)) as tab:
+            load(tab, text, size, dark)
+            pictures = _reported(frames(tab, times), len(times), on_progress)
+            if kind == ".mp4":
+                encoders.mp4(pictures, video, size, rate)
+            else:
+                encoders.gif(pictures, video, rate)
+        with video.open("rb") as content:
+            return save(file, lambda stream: copyfileobj(content, stream), VideoError)
+
+
+def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
+    if not isinstance(size, tuple | list) or len(size) != 2:
+        raise VideoError(f"size must be a width and a height in pixels, got {size!r}")
+    width, height = (
+        integer(f"size[{k}]", each, least=_LEAST_SIZE, most=_MOST_SIZE, error=VideoError) for k, each in enumerate(size)
+    )
+    if width % 2 or height % 2:
+        raise VideoError(
+            f"size must have even numbers, got {width} and {height}; videos halve the resolution of colours"
+        )
+    return width, height
+
+
+def _checked_times(duration_s: float, fps: int, kind: str, size: tuple[int, int]) -> np.ndarray:
+    """Times of the frames."""
+    if not duration_s > 0:
+        raise VideoError("the page has no run of a length above 0, so that nothing moves; .save(path) writes the page")
+    count = duration_s * fps
+    if count > _MOST_FRAMES:
+        raise VideoError(
+            f"{duration_s:g} s at {fps} frames a second are {count:.0f} frames, more than {_MOST_FRAMES}; take fewer a"
+            " second"
+        )
+    if kind == ".gif" and count * size[0] * size[1] > _MOST_PIXELS:
+        raise VideoError(
+            f"{count:.0f} frames of {size[0]} × {size[1]} pixels are too many for a .gif; take fewer a second, a"
+            " smaller size, or an .mp4"
+        )
+    return frame_times(duration_s, fps)
+
+
+def _reported(
+    pictures: Iterable[bytes], count: int, on_progress: Callable[[float, str], object] | None
+) -> Iterator[bytes]:
+    for k, picture in enumerate(pictures):
+        yield picture
+        if on_progress is not None:
+            on_progress((k + 1) / count, "drawing frames")

@@ -1,0 +1,79 @@
+"""The HTML text of a page: one file that contains the viewer, the plots, the slider and all data.
+
+The viewer's script, most of the text, stands in it compressed; the page inflates it, and the browser runs it only if
+the content policy has the digest of what came out.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from base64 import b64encode
+from collections.abc import Iterable, Iterator, Mapping
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from robot_dyn.view.commands import as_text, packed
+
+# Nothing is loaded, and only the scripts in the page run; pictures are data; only the live page has a socket.
+_POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'; script-src {}; style-src {}; img-src data: blob:"
+_LIVE = "; connect-src 'self' ws://127.0.0.1:* ws://localhost:*"
+# One concept a file; they share their names.
+_SCRIPTS = (
+    "keys.js", "clock.js", "sliders.js", "camera.js", "layers.js", "plots.js", "panels.js", "why.js", "film.js",
+    "replay.js",
+)  # fmt: skip
+_PANEL = re.compile(r'\}\("(\.dg ul\{(?:[^"\\]|\\.)*)"\)')  # the style that meshcat's panel, dat.gui, gives itself
+
+
+def page_text(document: Mapping[str, Any]) -> str:
+    """The HTML text of a document: title, outcome, notes, duration, scene, plots, and commands unless it is `live`."""
+    web = Path(__file__).parent
+    meshcat = _read(_meshcat() / "viewer" / "dist" / "main.min.js")
+    scripts = {
+        "uplot": _inline(_read(web / "uplot" / "uPlot.iife.min.js")),
+        "script": _inline("\n".join(_read(web / name) for name in _SCRIPTS)),
+    }
+    styles = {"uplot_style": _read(web / "uplot" / "uPlot.min.css"), "style": _read(web / "replay.css")}
+    policy = _POLICY.format(_hashes([meshcat, *scripts.values()]), _hashes([*styles.values(), *_own_styles(meshcat)]))
+    return Template(_read(web / "replay.html")).substitute(
+        policy=policy + (_LIVE if document["live"] else ""),
+        title=html.escape(document["title"]),
+        data=json.dumps(as_text(document)),
+        meshcat=packed(meshcat.encode()),
+        **scripts,
+        **styles,
+    )
+
+
+def _hashes(texts: Iterable[str]) -> str:
+    """The sources of a content policy that are these texts and no others [CSP 3, §2.3.1]."""
+    digests = (sha256(text.encode()).digest() for text in texts)
+    return " ".join(f"'sha256-{b64encode(digest).decode()}'" for digest in digests)
+
+
+def _own_styles(meshcat: str) -> Iterator[str]:
+    """The styles that meshcat puts into its page: an empty one, filled later, and that of its panel."""
+    yield ""
+    for text in _PANEL.findall(meshcat):
+        yield json.loads(f'"{text}"')
+
+
+def _meshcat() -> Path:
+    """The folder of the package meshcat; importing it would import IPython."""
+    found = find_spec("meshcat")
+    assert found is not None and found.submodule_search_locations, "meshcat is a dependency"
+    return Path(found.submodule_search_locations[0])
+
+
+def _read(file: Path) -> str:
+    return file.read_text(encoding="utf-8")
+
+
+def _inline(script: str) -> str:
+    """Return a script that HTML parsers do not end early."""
+    return script.replace("</script", "<\\/script").replace("<!--", "<\\!--")

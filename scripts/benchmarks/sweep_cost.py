@@ -1,0 +1,214 @@
+"""What a sweep costs: memory, CPU time beside rd.rollouts of the same runs, the time to plan and to resume.
+
+    PYTHONPATH=scripts python -m benchmarks.sweep_cost memory --runs 1000000
+    PYTHONPATH=scripts python -m benchmarks.sweep_cost samples --runs 340000
+    PYTHONPATH=scripts python -m benchmarks.sweep_cost overhead --arm panda --seconds 60
+    PYTHONPATH=scripts python -m benchmarks.sweep_cost plan
+    PYTHONPATH=scripts python -m benchmarks.sweep_cost resume
+    PYTHONPATH=scripts python -m benchmarks.sweep_cost scheduler --chunks 20000
+
+CPU times are of the process; overhead is summed over chunks that alternate with the same runs by rd.rollouts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+import robot_dyn as rd
+from benchmarks.planar_scene import planar_scene
+from robot_dyn import sweeps as sw
+from robot_dyn.scene.starters import starter
+from robot_dyn.sweeps.plan.work import Work
+from robot_dyn.sweeps.run_sweep import begun
+
+MIB = 2**20
+RESUME = """
+import time
+from robot_dyn import sweeps as sw
+from robot_dyn.sweeps.plan.work import Work
+began, cpu, plain, first = time.perf_counter(), time.process_time(), Work.rows, []
+def rows(self, *given):
+    first.append(time.perf_counter() - began)
+    return plain(self, *given)
+Work.rows = rows
+done = sw.read({out!r})
+sw.run(done.sweep, {out!r}, threads=2)
+print(f"{{done.folder.count}} chunks: the work begins {{first[0]:.2f}} s after the import of the room;"
+      f" with its last chunk {{time.perf_counter() - began:.2f}} s, CPU {{time.process_time() - cpu:.2f}} s")
+"""
+
+
+def planar(folder: str, runs: int) -> sw.Sweep:
+    """200 steps of two bars, with friction, starts and masses that vary."""
+    (Path(folder) / "scene.toml").write_text(planar_scene(duration_s=0.2))
+    vary = {
+        "viscous_friction.damping": sw.lognormal(median=0.5, sigma_of_log=0.2),
+        "q0": sw.normal(mean=[0.4, 0.9], sd=0.05),
+        "mass_scale": sw.normal(mean=1.0, sd=0.1),
+    }
+    return sw.Sweep(f"{folder}/scene.toml", runs, vary, {"peak": sw.peak("v"), "end": sw.final("q", "joint_2")})
+
+
+def panda(folder: str, runs: int) -> sw.Sweep:
+    """Computed torque of a Panda with friction and masses that vary, half a second by RK4 at 1 ms."""
+    text = starter("panda_computed_torque").replace("duration_s = 1.5", "duration_s = 0.5", 1)
+    lines = [line for line in text.splitlines() if not line.startswith(("method", "step_s"))]
+    at = next(k for k, line in enumerate(lines) if line.startswith("duration_s"))
+    lines[at + 1 : at + 1] = ['method = "rk4"', "step_s = 0.001"]
+    (Path(folder) / "scene.toml").write_text("\n".join(lines))
+    vary = {
+        "viscous_friction.damping": sw.lognormal(median=0.5, sigma_of_log=0.2),
+        "mass_scale": sw.normal(mean=1, sd=0.1),
+    }
+    return sw.Sweep(f"{folder}/scene.toml", runs, vary, {"error": sw.rms_error(), "peak": sw.peak("u")})
+
+
+def peak_rss() -> float:
+    """Largest resident set of this process so far, in [MiB]."""
+    status = Path("/proc/self/status").read_text()
+    return int(status.split("VmHWM:")[1].split()[0]) / 1024
+
+
+def rss() -> float:
+    return psutil.Process().memory_info().rss / MIB
+
+
+def memory(given: argparse.Namespace) -> None:
+    """Peak RSS of a sweep and of its statistics."""
+    with tempfile.TemporaryDirectory() as folder:
+        began, cpu = time.perf_counter(), time.process_time()
+        done = sw.run(planar(folder, given.runs), f"{folder}/out", threads=2)
+        ran = peak_rss()
+        spent = f"CPU {time.process_time() - cpu:.1f} s, wall {time.perf_counter() - began:.1f} s"
+        chunks = f"{done.folder.count} chunks of {done.folder.chunk}"
+        print(f"{given.runs} runs, {chunks}: peak RSS {ran:.0f} MiB; {spent}", flush=True)
+        print(*done.quantiles("peak", (0.5, 0.99)), done.probability("failed | peak > 5"), sep="\n")
+        print(f"with statistics: peak RSS {peak_rss():.0f} MiB")
+
+
+def samples(given: argparse.Namespace) -> None:
+    """Peak RSS of a sweep that keeps q, v and u of all runs, 9.6 kB each, and of quantiles read back."""
+    with tempfile.TemporaryDirectory() as folder:
+        done = sw.run(
+            replace(planar(folder, given.runs), samples=sw.samples("q", "v", "u")), f"{folder}/out", threads=2
+        )
+        size = sum(path.stat().st_size for path in Path(folder, "out", "samples").rglob("*") if path.is_file())
+        ran, data = peak_rss(), done.samples()
+        last = data.q[:, -1, 1].values  # of all runs, which reads every shard
+        print(f"{given.runs} runs, {size / 2**30:.2f} GiB of samples in chunks of {done.folder.chunk}: peak RSS"
+              f" {ran:.0f} MiB; quantiles of q read back {np.quantile(last, (0.05, 0.5, 0.95))}, equal to the rows:"
+              f" {(last == done.table('end')['end']).all()}; peak RSS {peak_rss():.0f} MiB", flush=True)  # fmt: skip
+
+
+def overhead(given: argparse.Namespace) -> None:
+    """CPU time of chunks, written, over that of rd.rollouts of the same runs and values."""
+    with tempfile.TemporaryDirectory() as folder:
+        plan = (panda if given.arm == "panda" else planar)(folder, 10**7)
+        known, work = begun(plan, Path(folder) / "out"), Work(plan)
+        known.prepare()
+        setup, spent = replace(plan.setup, estimate_error=False), {"sweep": 0.0, "rollouts": 0.0}
+        chunk = 0
+        for chunk in range(10**6):
+            start, stop = known.of(chunk)
+
+            def sweep(chunk: int = chunk, start: int = start, stop: int = stop) -> None:
+                known.write(chunk, work.rows(start, stop))
+
+            values = plan.values(start, stop)
+
+            def rollouts(values: dict[str, np.ndarray] = values) -> None:
+                params = {name: x[:, 0] if x.shape[1] == 1 else x for name, x in values.items() if name != "q0"}
+                rd.rollouts(setup, values.get("q0"), params=params, record=work.record, threads=1)
+
+            turns = {"sweep": sweep, "rollouts": rollouts}
+            for name in sorted(turns, reverse=bool(chunk % 2)):
+                began = time.process_time()
+                turns[name]()
+                spent[name] += time.process_time() - began
+            if chunk == 0:  # the first compiles
+                spent = dict.fromkeys(spent, 0.0)
+            else:
+                ratio = spent["sweep"] / spent["rollouts"] - 1
+                print(f"{chunk} chunks of {known.chunk}: {spent['sweep']:.2f} s, {100 * ratio:+.2f} %", flush=True)
+            if spent["sweep"] > given.seconds:
+                break
+        ratio = spent["sweep"] / spent["rollouts"] - 1
+        print(f"{given.arm}: chunks of {known.chunk}, {chunk} of them; sweep {spent['sweep']:.2f} s of CPU,"
+              f" rd.rollouts {spent['rollouts']:.2f} s: {100 * ratio:+.2f} %")  # fmt: skip
+
+
+def plan(given: argparse.Namespace) -> None:
+    """1e8 runs: time from the import to the first row, without a pilot, and memory."""
+    with tempfile.TemporaryDirectory() as folder:
+        before, began = rss(), time.perf_counter()
+        sweep = planar(folder, 10**8)
+        known = begun(sweep, Path(folder) / "out", chunk=16_384)
+        known.prepare()
+        left = known.missing()
+        spent = time.perf_counter() - began
+        cpu = f"CPU {time.process_time():.2f} s with the import"
+        print(f"1e8 runs, {len(left)} chunks planned in {spent:.2f} s ({cpu}),"
+              f" {peak_rss() - before:.0f} MiB over the import ({before:.0f} MiB)")  # fmt: skip
+        sweep.values(10**8 - 10, 10**8)
+
+
+def resume(given: argparse.Namespace) -> None:
+    """1e4 chunks, all but the last there: from after the import until the first run begins."""
+    with tempfile.TemporaryDirectory() as folder:
+        sweep = planar(folder, 640_000)
+        known = begun(sweep, Path(folder) / "out", chunk=64)
+        known.prepare()
+        known.write(0, Work(sweep).rows(0, 64))
+        for chunk in range(1, known.count - 1):
+            os.link(known.file(0), known.file(chunk))
+        # in a process of its own, whose kernels are in the store
+        code = RESUME.format(out=f"{folder}/out")
+        subprocess.run(
+            [sys.executable, "-c", code], check=True, env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        )
+
+
+def scheduler(given: argparse.Namespace) -> None:
+    """RSS of a scheduler, in a process of its own, after many chunks of nearly no work."""
+    import distributed
+
+    with tempfile.TemporaryDirectory() as folder:
+        sweep = planar(folder, given.chunks)
+        with (
+            distributed.LocalCluster(
+                n_workers=2,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address=None,  # pyright: ignore[reportArgumentType]  for none
+            ) as local,
+            distributed.Client(local, set_as_default=False) as client,
+        ):
+            before, began = rss(), time.perf_counter()
+            done = sw.run(sweep, f"{folder}/out", cluster=client, chunk=1)
+            print(json.dumps({
+                "chunks": done.folder.count, "missing": len(done.missing), "rss_before": before, "rss_after": rss(),
+                "peak": peak_rss(), "wall_s": time.perf_counter() - began,
+            }))  # fmt: skip
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = {each.__name__: each for each in (memory, samples, overhead, plan, resume, scheduler)}
+    parser.add_argument("what", choices=commands)
+    parser.add_argument("--runs", type=int, default=1_000_000)
+    parser.add_argument("--arm", choices=("panda", "planar"), default="panda")
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--chunks", type=int, default=20_000)
+    options = parser.parse_args()
+    commands[options.what](options)

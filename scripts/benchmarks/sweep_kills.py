@@ -1,0 +1,162 @@
+"""Kills of drivers, of workers and of both while sweeps run: what is lost, what is doubled, whether bits differ.
+
+    PYTHONPATH=scripts python -m benchmarks.sweep_kills --drivers 200 --workers 20
+
+Drivers are forked and run 1 to 3 threads; they are killed (SIGKILL) at a random moment, or end themselves at a random
+call to the system inside a write, of which half may have been written. Workers are processes of Dask, killed one or all
+at a time; then the driver is killed with them. Each is resumed, by another engine, until the sweep is complete. The
+digest of all rows must be that of a sweep without kills, in other chunks, and each chunk must have one file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import random
+import signal
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from benchmarks.planar_scene import planar_scene
+from robot_dyn import sweeps as sw
+from robot_dyn.sweeps.folder import files
+from robot_dyn.sweeps.run_sweep import begun
+
+RUNS, CHUNK = 20_000, 256
+CALLS = "open", "write", "sync", "close", "rename", "sync_folder"
+
+
+def sweep(folder: str) -> sw.Sweep:
+    """The sweep that is killed; 0.6 % of its runs raise."""
+    vary = {
+        "viscous_friction.damping": sw.lognormal(median=0.5, sigma_of_log=0.3),
+        "q0": sw.normal(mean=[0.4, 0.9], sd=0.1),
+        "mass_scale": sw.normal(mean=1.0, sd=0.4),
+    }
+    figures = {"peak": sw.peak("v"), "end": sw.final("q", "joint_2")}
+    return sw.Sweep(f"{folder}/scene.toml", RUNS, vary, figures, seed=5, storage="npz")
+
+
+def fill(plan: sw.Sweep, out: str, calls: int, options: dict[str, Any]) -> None:
+    """A driver; after so many calls inside writes it ends itself, if that is not 0."""
+    left = [calls]
+    for name in CALLS if calls else ():
+        setattr(files.Files, name, _counted(name, getattr(files.Files, name), left))
+    sw.run(plan, out, **options)
+
+
+def _counted(name: str, plain: Any, left: list[int]) -> Any:
+    """A call that ends the process when no more are left."""
+
+    def call(self: Any, *given: Any) -> Any:
+        left[0] -= 1
+        if left[0] == 0:
+            if name == "write":
+                plain(self, given[0], given[1][: len(given[1]) // 2])
+            os._exit(9)
+        return plain(self, *given)
+
+    return call
+
+
+def start(plan: sw.Sweep, out: str, calls: int = 0, **options: Any) -> Any:
+    """A driver in a forked process."""
+    driver = multiprocessing.get_context("fork").Process(target=fill, args=(plan, out, calls, options))
+    driver.start()
+    return driver
+
+
+def descendants(driver: Any) -> list[psutil.Process]:
+    """Processes that make chunks: those that Dask's nannies started, and start again."""
+    with suppress(psutil.Error):
+        every = psutil.Process(driver.pid).children(recursive=True)
+        return [each for each in every if "spawn_main" in " ".join(each.cmdline())]
+    return []
+
+
+def kill(processes: list[psutil.Process]) -> int:
+    """How many were killed."""
+    killed = 0
+    for each in processes:
+        with suppress(psutil.Error):
+            each.send_signal(signal.SIGKILL)
+            killed += 1
+    return killed
+
+
+def check(plan: sw.Sweep, out: str, expected: str) -> str:
+    """What is wrong with a complete folder; "complete, same bits" if nothing is."""
+    result = sw.run(plan, out, threads=1)  # removes what was left, makes nothing
+    names = sorted(path.name for path in (Path(out) / "rows").iterdir())
+    if names != [f"{k:06d}.npz" for k in range(result.folder.count)]:
+        return f"WRONG: {len(names)} files, {result.folder.count} chunks"
+    if len(result.table("run")["run"]) != RUNS:
+        return "WRONG: rows are lost or doubled"
+    return "complete, same bits" if result.verify() == expected else "WRONG: other bits"
+
+
+def drivers(plan: sw.Sweep, out: str, counts: dict[str, int], most: int) -> None:
+    """Drivers that are killed until the sweep is complete."""
+    while True:
+        spent, inside = counts["driver"] + counts["inside a write"] >= most, random.random() < 0.5
+        calls = random.randint(1, 150) if inside and not spent else 0
+        driver = start(plan, out, calls, threads=random.randint(1, 3))
+        if not spent and not inside:
+            driver.join(random.uniform(0.0, 1.5))
+            if driver.is_alive():
+                driver.kill()
+        driver.join()
+        counts["driver"] += driver.exitcode == -signal.SIGKILL
+        counts["inside a write"] += driver.exitcode == 9
+        if driver.exitcode == 0:
+            return
+
+
+def workers(plan: sw.Sweep, out: str, counts: dict[str, int], most: int) -> None:
+    """A driver of two workers, of which one or both are killed; at last all processes at once, then a resumption."""
+    driver, before = start(plan, out, cluster="local:2x1"), counts["worker"]
+    end = before + random.randint(1, 6)
+    while driver.is_alive() and counts["worker"] < min(end, most):
+        time.sleep(random.uniform(0.2, 3.0))
+        if some := descendants(driver):
+            counts["worker"] += kill(some if random.random() < 0.3 else random.sample(some, 1))
+    if driver.is_alive():
+        every = psutil.Process(driver.pid).children(recursive=True)
+        driver.kill()
+        counts["all at once"] += 1 + kill(every)
+    driver.join()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--drivers", type=int, default=200)
+    parser.add_argument("--workers", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    random.seed(given.seed)
+    counts = {"driver": 0, "inside a write": 0, "worker": 0, "all at once": 0}
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "scene.toml").write_text(planar_scene(duration_s=0.1))
+        plan = sweep(folder)
+        expected = sw.run(plan, f"{folder}/whole", chunk=1024).verify()
+        print(f"without kills: {expected}", flush=True)
+        for number in range(given.drivers + given.workers):
+            left = counts["driver"] + counts["inside a write"] < given.drivers
+            if not left and counts["worker"] >= given.workers:
+                break
+            out = f"{folder}/out{number}"
+            begun(plan, Path(out), CHUNK).prepare()
+            if not left:
+                workers(plan, out, counts, given.workers)
+            drivers(plan, out, counts, given.drivers)
+            print(f"sweep {number}: {counts}; {check(plan, out, expected)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

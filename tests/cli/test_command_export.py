@@ -1,0 +1,59 @@
+"""The command export: a run file, or one of rollouts, in the format of its suffix; or one line that says why not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import robot_dyn as rd
+from tests.command import refusal, run
+
+
+@pytest.fixture
+def files(tmp_path: Path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, integrator="rk4")
+    rd.save_run(rd.simulate(setup), "run.npz")
+    rd.save_rollouts(rd.rollouts(setup, [[0.1], [0.2]]), "runs.npz")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", ["run", "runs"])
+def test_export_writes_the_table_of_a_file(files: Path, name: str) -> None:
+    done = run("export", f"{name}.npz", "-o", "x.csv")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "written: x.csv (0.0 MB)\n"
+    table = rd.load_run("run.npz").table() if name == "run" else rd.load_rollouts("runs.npz").table()
+    lines = (files / "x.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == ",".join(table) and len(lines) == 1 + len(next(iter(table.values())))
+
+
+@pytest.mark.parametrize(("suffix", "package"), [("parquet", "pyarrow"), ("nc", "xarray"), ("mcap", "mcap_ros2")])
+def test_the_suffix_says_the_format(files: Path, suffix: str, package: str) -> None:
+    pytest.importorskip(package)
+    done = run("export", "run.npz", "-o", f"x.{suffix}")
+    assert done.returncode == 0, done.stderr
+    assert (files / f"x.{suffix}").read_bytes() == rd.export(rd.load_run("run.npz"), f"y.{suffix}").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["run.npz", "-o", "run.npz"],
+            "'.npz' is not the suffix of a table of a run; end the name with .csv, .parquet",
+        ),
+        (["run.npz", "-o", "old.csv"], "old.csv: exists; add --force"),
+        (["runs.npz", "-o", "x.mcap"], "end the name with .csv, .parquet, .nc"),
+        (["none.npz", "-o", "x.csv"], "none.npz: there is no such file"),
+        (["old.csv", "-o", "x.csv"], "old.csv: is not a complete run file"),
+        (["run.npz", "-o", "link.csv", "--force"], "is the same file as run.npz, which would be lost"),
+    ],
+)
+def test_what_cannot_be_exported_is_refused(files: Path, arguments: list[str], message: str) -> None:
+    (files / "old.csv").write_text("t [s],q\n", encoding="utf-8")
+    (files / "link.csv").symlink_to("run.npz")
+    before = {path.name: path.read_bytes() for path in files.iterdir()}
+    assert message in refusal(["export", *arguments])
+    assert {path.name: path.read_bytes() for path in files.iterdir()} == before

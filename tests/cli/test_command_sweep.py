@@ -1,0 +1,59 @@
+"""The command sweep: a scene into a folder, resumed, and what is asked of the folder."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from tests import command
+from tests.sweeps.swept import SCENE, scene
+
+
+def test_a_scene_is_swept_into_a_folder_and_asked(tmp_path: Path) -> None:
+    path, out = (
+        scene(tmp_path, SCENE + '\n[sweep]\nruns = 70\nvary = {kp = "uniform(low=10, high=20)"}\n'),
+        tmp_path / "out",
+    )
+    said = command.run(
+        "sweep", str(path), "-o", str(out), "--figure", "worst=peak('error')", "--runs", "96", "--design", "latin",
+        "--probability", "worst > 0.001",
+    )  # fmt: skip
+    assert said.returncode == 0, said.stderr
+    assert "96 finished, 0 diverged, 0 raised" in said.stdout and "probability of worst > 0.001" in said.stdout
+    again = command.run("sweep", "run", str(out), "--json", "--probability", "failed")
+    found = json.loads(again.stdout)
+    promised = (
+        (command.ROOT / "docs" / "json.md")
+        .read_text(encoding="utf-8")
+        .split("## `robot-dyn sweep SCENE")[1]
+        .split("\n## ")[0]
+    )
+    assert set(re.findall(r"^\| `(\w+)` \|", promised, re.MULTILINE)) == found.keys()
+    assert found["status"] == {"runs": 96, "chunks": 2, "missing": 0}
+    assert found["specification"]["design"] == "latin" and found["probabilities"]["failed"]["estimate"] == 0.0
+    assert "SHA-256" in command.run("sweep", "verify", str(out)).stderr
+    assert command.run("sweep", "export", str(out), "-o", str(tmp_path / "rows.csv")).returncode == 0
+    assert len((tmp_path / "rows.csv").read_text().splitlines()) == 97
+
+
+def test_a_sweep_that_is_not_complete_says_what_is_left(tmp_path: Path) -> None:
+    path, out = scene(tmp_path), tmp_path / "out"
+    options = "--runs", "100", "--vary", "kp=uniform(low=10, high=20)", "--chunk", "10", "--share", "1/2"
+    said = command.run("sweep", str(path), "-o", str(out), *options)
+    assert said.returncode == 0 and "5 of 10 chunks are left to do" in said.stdout
+    assert "5 of 10 chunks" in command.run("sweep", "status", str(out)).stdout
+
+
+def test_mistakes_are_told(tmp_path: Path) -> None:
+    path = scene(tmp_path)
+    for arguments, text in {
+        ("sweep", str(path)): "-o FOLDER",
+        ("sweep", str(path), "-o", str(tmp_path / "o")): "how many runs",
+        ("sweep", str(path), "-o", str(tmp_path / "o"), "--runs", "9", "--vary", "kp"): "--vary must be NAME=VALUE",
+        ("sweep", str(path), "-o", str(tmp_path / "o"), "--runs", "9", "--vary", "kp=3"): "is not a name with numbers",
+        ("sweep", "stat", str(tmp_path)): "nearest: status",
+        ("sweep", "status", str(tmp_path / "nothing")): "there is no such file",
+    }.items():
+        said = command.run(*arguments)
+        assert said.returncode == 2 and text in said.stderr, said.stderr

@@ -1,0 +1,132 @@
+"""The torque along a motion by cause: τ = M a + C v + ∂V/∂q − Σ τ_effect, each cause by an independent way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import robot_dyn as rd
+from robot_dyn.effects.causes import causes
+from robot_dyn.errors import EffectError, QueryError
+from tests.random_trees import RandomTree, trees
+
+BODY = rd.Payload("tool0", 5.0, (0.1, 0.0, 0.2))
+ROUNDING = 1e-12  # of the largest torque: some thousand units of rounding
+
+
+def motion(n: int, k: int = 9, seed: int = 4) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """General states, without zeros."""
+    q, v, a = np.random.default_rng(seed).uniform(-1.5, 1.5, (3, k, n))
+    return np.linspace(0.1, 0.9, k), q, v, a
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@given(tree=trees(most_joints=7), seed=st.integers(0, 1000))
+def test_causes_of_random_arms_add_up_to_inverse_dynamics(tree: RandomTree, seed: int) -> None:
+    """With a payload in the hand, viscous and dry friction and springs: to 1e-12 of the largest torque."""
+    arm = tree.robot
+    frame = list(arm.frame_names)[-1]
+    arm = arm.with_(payload=rd.Payload(frame, 1.7, (0.1, -0.2, 0.05)))
+    friction = rd.effects.ViscousFriction(0.4), rd.effects.DryFriction(0.7, 0.9, 0.05)
+    plant = rd.Plant(arm, [*friction, rd.effects.Spring(2.0, 0.1)])
+    t, q, v, a = motion(arm.n, seed=seed)
+    split = causes(plant, t, q, v, a)
+    tau = np.array([plant.inverse_dynamics(*each) for each in zip(t.tolist(), q, v, a, strict=True)])
+    largest = max(np.abs(each).max() for each in split.torques.values())
+    assert np.abs(split.tau - tau).max() <= ROUNDING * largest
+    assert np.abs(sum(split.torques.values()) - tau).max() <= ROUNDING * largest
+    assert list(split.torques) == ["inertia", "Coriolis", "gravity", "viscous_friction", "dry_friction", "spring"]
+
+
+@pytest.mark.parametrize("arm", ["ur5", "panda", "mimic_chain", "cart_pole"])
+def test_each_cause_is_its_term_of_the_equation(arm: str) -> None:
+    """M a, C v and ∂V/∂q of matrices of the closed form, which shares no code with the recursion; laws of effects."""
+    robot = rd.load(arm)
+    own = rd.Lagrangian(robot)
+    plant = rd.Plant(robot, [rd.effects.ViscousFriction(0.4), rd.effects.Spring(2.0, 0.1)])
+    t, q, v, a = motion(robot.n)
+    found = causes(plant, t, q, v, a).torques
+    expected = {
+        "inertia": np.einsum("kij,kj->ki", own.M(q), a),
+        "Coriolis": np.einsum("kij,kj->ki", own.C(q, v), v),
+        "gravity": own.N(q),
+        "viscous_friction": 0.4 * v,
+        "spring": 2.0 * (q - 0.1),
+    }
+    for name, torque in expected.items():
+        np.testing.assert_allclose(found[name], torque, rtol=1e-10, atol=1e-11, err_msg=name)  # digits of two engines
+
+
+def test_causes_are_differences_of_the_energies() -> None:
+    """∂V/∂q, and d/dt ∂K/∂v − ∂K/∂q = M a + C v, by central differences: O(h²) and rounding / h, 1e-8 at h = 1e-5."""
+    arm, h = rd.load("panda"), 1e-5
+    t, q, v, a = motion(arm.n, 3)
+    found = causes(arm, t, q, v, a).torques
+    ways = h * np.eye(arm.n)
+
+    def slope(f):
+        return np.stack([(f(+way) - f(-way)) / (2 * h) for way in ways], axis=-1)
+
+    def momentum(s):  # after a time s of the motion q + v s + a s²/2
+        return arm.momentum(q + v * s + a * s**2 / 2, v + a * s)
+
+    gravity = slope(lambda way: arm.potential_energy(q + way))
+    kinetic = (momentum(h) - momentum(-h)) / (2 * h) - slope(lambda way: arm.kinetic_energy(q + way, v))
+    np.testing.assert_allclose(found["gravity"], gravity, atol=1e-8)
+    np.testing.assert_allclose(found["inertia"] + found["Coriolis"], kinetic, atol=1e-8)
+
+
+def test_a_payload_that_comes_and_goes_is_one_cause() -> None:
+    """While it is carried, what the arm with that body in its hand needs more; two of them by a number."""
+    arm, t_carried = rd.load("ur5"), (0.3, 0.7)
+    second = rd.Payload("forearm_link", 2.0, (0.0, 0.1, 0.0))
+    plant = rd.Plant(arm, [rd.effects.CarriedPayload(BODY, *t_carried), rd.effects.CarriedPayload(second, 0.5)])
+    t, q, v, a = motion(6)
+    split = causes(plant, t, q, v, a)
+    carried = (t >= t_carried[0]) & (t < t_carried[1])
+    needs = arm.with_(payload=BODY).inverse_dynamics(q, v, a) - arm.inverse_dynamics(q, v, a)
+    expected = np.where(carried[:, None], needs, 0.0)
+    np.testing.assert_allclose(split.torques["carried_payload"], expected, rtol=1e-11, atol=1e-11)
+    lifted = split.torques["carried_payload 2"][:, :2]  # the joints below the link that carries it
+    assert not lifted[t < 0.5].any() and lifted[t >= 0.5].all()
+    tau = np.array([plant.inverse_dynamics(*each) for each in zip(t.tolist(), q, v, a, strict=True)])
+    assert np.abs(split.tau - tau).max() <= ROUNDING * np.abs(tau).max()
+    assert np.abs(split.unexplained).max() <= ROUNDING * np.abs(tau).max()
+
+
+def test_why_splits_the_same_torque_by_link() -> None:
+    """The sums of `rd.why` over the links, and its effects, at one state."""
+    plant = rd.Plant(rd.load("ur5").with_(payload=BODY, armature=0.2), [rd.effects.DryFriction(0.7, 0.9, 0.05)])
+    t, q, v, a = motion(6, 2)
+    split = causes(plant, t, q, v, a)
+    for i, joint in enumerate(plant.dynamics.joint_names):
+        why = rd.why(plant, q[1], v[1], a[1], joint, t=float(t[1]))
+        sums = [sum(getattr(each, of) for each in why.shares) for of in ("inertia", "coriolis", "gravity")]
+        np.testing.assert_allclose(
+            [split.torques[x][1, i] for x in ("inertia", "Coriolis", "gravity")], sums, atol=1e-11
+        )
+        assert split.torques["dry_friction"][1, i] == pytest.approx(why.effects["dry_friction"], rel=1e-13)
+
+
+def test_what_a_motion_does_not_determine_is_refused() -> None:
+    plant = rd.Plant(rd.load("ur5"), [rd.effects.DahlFriction(50.0, 0.4)])
+    t, q, v, a = motion(6)
+    with pytest.raises(EffectError, match=r"causes: dahl_friction has states.*simulate the motion"):
+        causes(plant, t, q, v, a)
+    with pytest.raises(QueryError, match=r"v must have shape \(k, 6\) for times t of shape \(k,\)"):
+        causes(plant.dynamics, t, q, v[:3], a)
+    with pytest.raises(QueryError, match="a must be finite"):
+        causes(plant.dynamics, t, q, v, a * np.nan)
+
+
+def test_the_table_names_the_time_of_the_largest_torque() -> None:
+    split = causes(rd.load("ur5"), *motion(6))
+    heading, *lines = repr(split).splitlines()[1:]
+    assert heading.split() == ["joint", "t", "[s]", "unit", "torque", "inertia", "Coriolis", "gravity"]
+    k = int(np.abs(split.tau[:, 2]).argmax())
+    name, t, *_, torque, inertia, coriolis, gravity = lines[2].split()
+    shown = [float(x) for x in (t, torque, inertia, coriolis, gravity)]
+    expected = [split.t[k], split.tau[k, 2], *(each[k, 2] for each in split.torques.values())]
+    assert name == "elbow_joint" and shown == pytest.approx(expected, rel=1e-5)

@@ -1,0 +1,63 @@
+"""rd.plan.read_motors: columns, units, and the side of the gear."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+
+
+def _file(folder: Path, text: str) -> Path:
+    path = folder / "motors.csv"
+    path.write_text(text)
+    return path
+
+
+def test_values_at_the_motor_and_at_the_joint_agree(tmp_path: Path) -> None:
+    """Torque times the ratio, speed divided by it, the rotor's inertia times its square."""
+    motors = rd.plan.read_motors(
+        _file(
+            tmp_path,
+            "joint,peak [N m],continuous [N m],speed [rpm],gear_ratio,rotor_inertia [kg cm^2],at\n"
+            "a,150,60,30,100,1.5,joint\n"
+            "b,1.5,0.6,3000,100,1.5,motor\n"
+            "c,7,,,,,\n",
+        )
+    )
+    assert motors.peak == pytest.approx({"a": 150.0, "b": 150.0, "c": 7.0})
+    assert motors.continuous == pytest.approx({"a": 60.0, "b": 60.0})
+    assert motors.speed == pytest.approx({"a": np.pi, "b": np.pi})
+    assert motors.armature == pytest.approx({"a": 1.5, "b": 1.5})
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("joint,peak\na,1\n", "unit of peak"),
+        ("joint,peek [N m]\na,1\n", "peek"),
+        ("joint,peak [N m],gear_ratio\na,1,100\n", "'at'"),
+        ("joint,peak [N m]\na,-1\n", "line 2: peak must be a positive number"),
+        ("joint,peak [N m]\na,1,2\n", "3 entries for 2"),
+        ("joint,peak [N m]\na,1\na,2\n", "twice"),
+        ("joint,peak [N m]\n", "names no motor"),
+        ("joint,peak [N m],rotor_inertia [kg m^2]\na,1,2\n", "needs its gear_ratio"),
+    ],
+)
+def test_a_file_that_does_not_say_what_it_means_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(rd.RobotDynError, match=said):
+        rd.plan.read_motors(_file(tmp_path, text))
+
+
+def test_a_rotor_that_the_arm_lacks_is_refused_and_one_that_it_has_is_taken(tmp_path: Path) -> None:
+    pytest.importorskip("toppra")
+    motors = rd.plan.read_motors(
+        _file(tmp_path, "joint,peak [N m],gear_ratio,rotor_inertia [kg m^2],at\nelbow_joint,90,100,1e-4,joint\n")
+    )
+    robot, points = rd.load("ur5"), np.array([[0.1] * 6, [0.5] * 6])
+    limits = {"velocity": 3.0, "effort": 150.0}
+    with pytest.raises(rd.RobotDynError, match="with_"):
+        rd.plan.path(robot, points, motors=motors, **limits)
+    assert rd.plan.path(robot.with_(armature=motors.armature), points, motors=motors, **limits).largest <= 1.001

@@ -1,0 +1,252 @@
+"""rd.plan.path: time-optimal motions against closed forms, phase-plane integration and the inverse dynamics."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import robot_dyn as rd
+from robot_dyn.errors import MissingExtraError, PlanError
+from robot_dyn.plan.geometric_path import in_time, through
+
+LIMITS = {"effort": 20.0, "velocity": 3.0}  # for arms whose files state none
+WAY = np.array(  # the fourth and fifth joint reverse at one place
+    [[0.0, -1.0, 1.2, 0.0, 0.5, 0.0], [0.6, -0.8, 0.9, 0.2, 0.4, 0.3], [1.2, -1.1, 1.1, -0.2, 0.6, 0.5]]
+)
+WITHOUT_GRAVITY = (0.0, 0.0, 0.0)
+toppra = pytest.mark.skipif(find_spec("toppra") is None, reason="the extra plan")
+
+
+def _arm(name: str) -> rd.Robot:
+    return rd.load(name).with_(lock={"panda_finger_joint1": 0.0}) if name == "panda" else rd.load(name)
+
+
+def _way_points(robot: rd.Robot, seed: int, count: int = 5) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+    return (low + high) / 2 + rng.uniform(-0.25, 0.25, (count, robot.n)) * (high - low)
+
+
+@toppra
+@pytest.mark.parametrize("friction", ["none", "viscous and dry", "regularised"])
+@pytest.mark.parametrize("name", ["ur5", "panda", "kinova", "ur10", "xarm7"])
+def test_no_torque_is_above_its_limit_and_nearly_always_one_limit_binds(name: str, friction: str) -> None:
+    """Inverse dynamics at 10 000 times, viscous friction of 20 % of the limit at full speed."""
+    robot = _arm(name)
+    viscous = rd.effects.ViscousFriction(0.2 * robot.effort_limit / robot.velocity_limit)
+    effects = {
+        "none": [],
+        "viscous and dry": [viscous, rd.effects.DryFriction(0.05 * robot.effort_limit)],
+        "regularised": [rd.effects.RegularisedCoulombFriction(0.05 * robot.effort_limit)],
+    }[friction]
+    plant = rd.Plant(robot, effects)
+    found = rd.plan.path(plant, _way_points(robot, seed=3))
+    q, v, a = found.reference.at((np.arange(10_000) + 0.3) * found.duration / 10_000)
+    torque = np.abs(plant.inverse_dynamics(0.0, q, v, a)) / robot.effort_limit
+    speed = np.abs(v) / robot.velocity_limit
+    assert torque.max() <= 1.001
+    assert speed.max() <= 1.001
+    assert (np.maximum(torque.max(axis=1), speed.max(axis=1)) >= 0.99).mean() >= 0.98
+    assert sum(found.elsewhere.values()) == pytest.approx(1 - found.at_limits, abs=1e-12)
+
+
+@toppra
+def test_one_joint_between_two_points_takes_twice_the_square_root_of_distance_over_acceleration() -> None:
+    """Double integrator: T = 2 √(d I / τ)."""
+    robot = rd.load("simple_pendulum").with_(gravity=WITHOUT_GRAVITY)
+    inertia = float(robot.M(np.array([0.3]))[0, 0])
+    found = rd.plan.path(robot, [[0.2], [1.7]], effort=2.5)
+    assert found.duration == pytest.approx(2 * np.sqrt(1.5 * inertia / 2.5), rel=1e-4)
+
+
+@toppra
+def test_one_joint_with_viscous_friction_takes_the_time_of_its_linear_equation() -> None:
+    """I v' + b v = ±τ, switched once: the sum of both times, from exponentials; the switch found by bisection.
+
+    Pieces of constant acceleration end at the limit and start up to 1 % below it, which takes some 1e-3 of the time.
+    """
+    robot = rd.load("simple_pendulum").with_(gravity=WITHOUT_GRAVITY)
+    inertia, b, tau, distance = float(robot.M(np.array([0.3]))[0, 0]), 0.4, 1.0, 2.3
+    rate, most = b / inertia, tau / b
+
+    def motion(t1: float) -> tuple[float, float]:
+        """Time and way if the torque changes its sign at t1."""
+        v1 = most * (1 - np.exp(-rate * t1))
+        t2 = np.log(1 + v1 / most) / rate
+        return t1 + t2, most * t1 - v1 / rate + (v1 / rate - most * t2)
+
+    low, high = 0.0, 100.0
+    for _ in range(100):
+        middle = (low + high) / 2
+        low, high = (middle, high) if motion(middle)[1] < distance else (low, middle)
+    plant = rd.Plant(robot, [rd.effects.ViscousFriction(b)])
+    found = rd.plan.path(plant, [[-1.0], [-1.0 + distance]], effort=tau)
+    assert found.duration == pytest.approx(motion(low)[0], rel=2e-3)
+    assert found.duration > motion(low)[0]  # nothing is faster than the optimum
+
+
+@toppra
+def test_a_planar_arm_takes_the_time_of_the_phase_plane() -> None:
+    """Forward at the greatest s̈, backward at the least, until both meet: Bobrow's method, by another code."""
+    robot = rd.load("planar_2r")
+    limits, ends = np.array([60.0, 20.0]), np.array([[0.3, 0.4], [0.9, 0.1]])
+    path = through(ends)
+
+    def extreme(s: float, x: float, sign: int) -> float:
+        q, slope, bend = path.at(np.float64(s))
+        rest = robot.inverse_dynamics(q, slope * np.sqrt(max(x, 0.0)), bend * x)
+        A = robot.M(q) @ slope
+        bounds = (sign * np.sign(A) * limits - rest) / A
+        return bounds.min() if sign > 0 else bounds.max()
+
+    tight = {"rtol": 1e-10, "atol": 1e-14, "dense_output": True, "max_step": path.end / 50}
+    forward = solve_ivp(lambda s, x: [2 * extreme(s, x[0], 1)], (0.0, path.end), [1e-12], **tight).sol
+    backward = solve_ivp(lambda s, x: [2 * extreme(s, x[0], -1)], (path.end, 0.0), [1e-12], **tight).sol
+    r = np.linspace(0, 1, 20_001)
+    s = path.end * (3 * r**2 - 2 * r**3)  # ds/√x stays finite at rest
+    x = np.minimum(forward(s)[0], backward(s)[0])
+    inside = slice(1, -1)
+    rate = path.end * 6 * (r - r**2)[inside] / np.sqrt(x[inside])
+    duration = np.concatenate([[rate[0]], rate, [rate[-1]]])
+    found = rd.plan.path(robot, ends, effort=limits)
+    assert found.duration == pytest.approx(float(np.trapezoid(duration, r)), rel=1e-3)
+
+
+def test_the_motion_is_the_path_with_the_speed_exactly() -> None:
+    """q(s(t)), q' ṡ and q' s̈ + q'' ṡ², to the rounding of polynomials of degree 6."""
+    path = through(np.random.default_rng(5).uniform(-1, 1, (4, 3)))
+    s = np.unique(np.concatenate([path.breaks, np.linspace(0, path.end, 40)]))
+    x = 0.3 + np.cos(2.1 * s) ** 2
+    motion = in_time(path, s, x)
+    u = np.diff(x) / (2 * np.diff(s))
+    t = np.random.default_rng(6).uniform(0, motion.end, 200)
+    k = np.searchsorted(motion.breaks, t, side="right") - 1
+    h = t - motion.breaks[k]
+    at, speed = s[k] + np.sqrt(x[k]) * h + u[k] / 2 * h**2, np.sqrt(x[k]) + u[k] * h
+    q, slope, bend = path.at(at)
+    expected = q, slope * speed[:, None], slope * u[k][:, None] + bend * (speed**2)[:, None]
+    for given, wanted in zip(motion.at(t), expected, strict=True):
+        np.testing.assert_allclose(given, wanted, rtol=0, atol=1e-12)
+
+
+@toppra
+def test_a_run_follows_the_plan_that_leaves_a_share_of_the_limits() -> None:
+    """With friction in the plant that the controller's model lacks: feedback stays within what the plan left.
+
+    No effort limit acts, so that none hides what is asked for. A PD of stiffness K lags by friction/K: 30/4000 at
+    the shoulder at most, 5.6/800 at the wrist; 2e-2 allows for speeds that change within the time constant.
+    """
+    arm = rd.load("ur5").with_(payload=rd.Payload("tool0", 2.0))
+    plant = rd.Plant(arm, [rd.effects.ViscousFriction(0.2 * arm.effort_limit / arm.velocity_limit)])
+    found = rd.plan.path(plant, WAY, share=0.95, velocity=0.98 * arm.velocity_limit)
+    gains = [4000.0] * 3 + [800.0] * 3, [160.0] * 3 + [16.0] * 3
+    controller = rd.control.FeedForward(arm, found.reference, *gains)
+    run = rd.simulate(
+        plant,
+        WAY[0],
+        duration_s=found.duration,
+        controller=controller,
+        integrator="rk4",
+        step_s=2e-3,
+        engine="interpreted",
+        estimate_error=False,
+    )
+    assert run.extremes is not None and run.desired is not None
+    _, speed, torque = np.abs(run.extremes).max(axis=1)  # over all steps
+    assert 0.9 < (torque / arm.effort_limit).max() <= 1  # the plan is at its limits, the run within those of the motors
+    assert (speed <= arm.velocity_limit).all()
+    np.testing.assert_allclose(run.q, run.desired, rtol=0, atol=2e-2)
+
+
+@toppra
+def test_more_torque_is_faster_and_the_path_is_the_same() -> None:
+    robot = rd.load("ur5")
+    points = _way_points(robot, seed=8)
+    slow, fast = (rd.plan.path(robot, points, share=share) for share in (0.6, 1.0))
+    assert fast.duration < slow.duration
+    passed = fast.reference.at(np.linspace(0, fast.duration, 20_000))[0]
+    for point in points:
+        assert np.abs(passed - point).max(axis=1).min() < 2e-3  # what it moves in 1/20 000 of the time
+
+
+@toppra
+def test_a_polynomial_counts_as_a_path_alone() -> None:
+    robot = rd.load("planar_2r")
+    slow = rd.control.PiecewisePolynomial([0.0, 100.0], [[[0.1, 0.2], [0.01, -0.02], [1e-5, 3e-5]]])
+    once = rd.control.PiecewisePolynomial([5.0, 6.0], [[[0.1, 0.2], [1.0, -2.0], [0.1, 0.3]]])
+    first, second = (rd.plan.path(robot, each, effort=60.0) for each in (slow, once))
+    assert first.duration == pytest.approx(second.duration, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("effect", "named"),
+    [
+        (rd.effects.LuGreFriction(1e4, 10.0, 0.4, 1.0, 1.5, 0.1), "lugre_friction"),
+        (rd.effects.ActuatorLag(0.01), "actuator_lag"),
+        (rd.effects.CarriedPayload(rd.Payload("tool0", 1.0), 0.1, 0.2), "carried_payload"),
+        (rd.effects.ExternalWrench("tool0", [1.0, 2.0, 3.0, 0.1, 0.2, 0.3], end_s=1.0), "external_wrench"),
+    ],
+)
+def test_what_depends_on_time_or_has_states_is_refused_by_name(effect: rd.effects.Effect, named: str) -> None:
+    plant = rd.Plant(rd.load("ur5"), [effect])
+    with pytest.raises(PlanError, match=named):
+        rd.plan.path(plant, np.array([[0.1] * 6, [0.5] * 6]))
+
+
+@pytest.mark.parametrize(
+    ("name", "points", "options", "said"),
+    [
+        ("ur5", [[0.1] * 6], {}, "2 to 2000"),
+        ("ur5", [[0.1] * 5] * 2, {}, "shape"),
+        ("ur5", [[0.1] * 6, [0.1] * 6, [0.3] * 6], {}, "equal"),
+        ("ur5", [[0.1] * 6, [9.0] * 6], {}, "beyond its limits"),
+        ("ur5", [[0.1] * 6, [0.5] * 6], {"share": 1.2}, "at most 1"),
+        ("ur5", [[0.1] * 6, [0.5] * 6], {"effort": {"elbow": 3.0}}, "elbow"),
+        ("ur5", [[0.1] * 6, [0.5] * 6], {"effort": 3.0}, "'shoulder_lift_joint' needs"),
+        ("planar_2r", [[0.1] * 2, [0.5] * 2], {}, "nothing limits"),
+    ],
+)
+def test_a_path_that_cannot_be_planned_says_why(name: str, points: list[list[float]], options: dict, said: str) -> None:
+    with pytest.raises(rd.RobotDynError, match=said):
+        rd.plan.path(rd.load(name), np.array(points), **options)
+
+
+def test_without_its_extra_it_says_the_line_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [each for each in sys.modules if each.partition(".")[0] == "toppra"]:
+        monkeypatch.delitem(sys.modules, name)
+
+    class Nothing:
+        def find_spec(self, name: str, *_: object) -> None:
+            if name.partition(".")[0] == "toppra":
+                raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+    monkeypatch.setattr(sys, "meta_path", [Nothing(), *sys.meta_path])
+    with pytest.raises(MissingExtraError, match=r"pip install 'robot-dyn\[plan\]'"):
+        rd.plan.path(rd.load("ur5"), np.array([[0.1] * 6, [0.5] * 6]))
+
+
+@toppra
+def test_a_plan_tells_which_limit_binds_when(tmp_path: Path) -> None:
+    robot = rd.load("ur5")
+    found = rd.plan.path(robot, _way_points(robot, seed=3))
+    text = repr(found)
+    assert f"{found.duration:.6g} s" in text
+    assert "shoulder_pan_joint" in text
+    assert found.phases[0].start == pytest.approx(0.0, abs=0.01 * found.duration)
+    assert all(first.end <= second.start + 1e-12 for first, second in zip(found.phases, found.phases[1:], strict=False))
+    assert "<svg" in found.drawing
+    assert '"at_limits"' in found.to_json()
+
+
+@toppra
+def test_joints_that_reverse_at_one_place_are_planned() -> None:
+    """In proportion, so that the roots of their slopes differ by rounding: that is no cell of the grid."""
+    robot = rd.load("ur5")
+    found = rd.plan.path(rd.Plant(robot, [rd.effects.DryFriction(5.0)]), WAY)
+    assert found.largest <= 1.001 and found.at_limits >= 0.98
+    assert np.diff(found.reference.breaks).min() > 1e-9 * found.duration

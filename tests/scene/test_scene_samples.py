@@ -1,0 +1,87 @@
+"""Recorded motions in a scene: those of rd.plan.from_samples, with its options; what is doubtful is a warning."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.errors import PlanWarning
+from robot_dyn.scene.scene import SceneError
+
+SCENE = """robot = "planar_2r"
+duration_s = 0.1
+[control]
+kind = "pd"
+frequency_rad_per_s = 5
+[reference]
+kind = "samples"
+"""
+ARM, T = rd.load("planar_2r"), np.linspace(0, 1, 21)
+Q = 0.2 + np.outer(10 * T**3 - 15 * T**4 + 6 * T**5, [0.7, -0.4])
+
+
+def reference(folder: Path, text: str) -> rd.control.PiecewisePolynomial:
+    path = folder / "scene.toml"
+    path.write_text(SCENE + text, encoding="utf-8")
+    return rd.read_scene(path).controller.desired
+
+
+def write(path: Path, heads: str, *columns: np.ndarray) -> Path:
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=heads, comments="", fmt="%.17g")
+    return path
+
+
+def test_the_motion_of_a_scene_is_that_of_from_samples(tmp_path: Path) -> None:
+    """Headings of a logger, in degrees and milliseconds: each option reaches the file."""
+    path = write(tmp_path / "log.csv", "clock [ms],J2,J1", 1000 * T + 500, np.degrees(Q[:, 1]), np.degrees(Q[:, 0]))
+    joints = 'joints = {joint_1 = "J1", joint_2 = "J2"}\n'
+    options = {"time": "clock [ms]", "unit": "deg", "joints": {"joint_1": "J1", "joint_2": "J2"}, "start_s": 0.3}
+    text = 'file = "log.csv"\ntime = "clock [ms]"\nunit = "deg"\nstart_s = 0.3\n' + joints
+    for ends in ("rest", "measured"):
+        found, expected = (
+            reference(tmp_path, f'{text}ends = "{ends}"\n'),
+            rd.plan.from_samples(ARM, path, ends=ends, **options).reference,
+        )
+        np.testing.assert_array_equal(found.breaks, expected.breaks)
+        np.testing.assert_array_equal(found.coefficients, expected.coefficients)
+    np.testing.assert_allclose(found.at(T + 0.3)[0], Q, atol=1e-12)
+
+
+def test_way_points_of_a_logger_are_those_of_the_scene(tmp_path: Path) -> None:
+    write(tmp_path / "way.csv", "t [ms],J2,J1", 1000 * T[::5] + 500, np.degrees(Q[::5, 1]), np.degrees(Q[::5, 0]))
+    scene = SCENE.replace('"samples"', '"via_points"')
+    (tmp_path / "scene.toml").write_text(
+        scene + 'file = "way.csv"\nunit = "deg"\njoints = {joint_1 = "J1", joint_2 = "J2"}\n', encoding="utf-8"
+    )
+    desired = rd.read_scene(tmp_path / "scene.toml").controller.desired
+    np.testing.assert_allclose(desired.at(T[::5] + 0.5)[0], Q[::5], atol=1e-12)
+
+
+def test_what_is_doubtful_is_a_warning(tmp_path: Path) -> None:
+    """A gap of 3 s between samples 0.05 s apart."""
+    write(tmp_path / "log.csv", "t,joint_1,joint_2", T + 3 * (T > 0.5), Q)
+    with pytest.warns(PlanWarning, match=r"log\.csv: 1 gap in time, the longest of 3\.05 s"):
+        reference(tmp_path, 'file = "log.csv"\n')
+
+
+@pytest.mark.parametrize(
+    ("heads", "columns", "text", "message"),
+    [
+        ("t,joint_1,joint_2", (T, np.degrees(3 * Q)), "", "angles look like degrees: joint_1"),
+        ("t,joint_1,elbow", (T, Q), "", "column 'elbow' is of no joint"),
+        ("t,joint_1,joint_2", (1000 * T, Q), "", "times look like ms"),
+        ("t,joint_1,joint_2", (T[::-1], Q), "", "times must increase"),
+        ("t,joint_1,joint_2", (T, Q), 'joints = {elbow = "joint_2"}\n', "no joint 'elbow'"),
+        ("t,joint_1,joint_2", (T, Q), 'unit = "turns"\n', "unit"),
+        ("t,joint_1,joint_2", (T, Q), 'topic = "/joint_states"\n', "is of an MCAP log"),
+    ],
+)
+def test_what_has_no_single_meaning_is_refused(
+    tmp_path: Path, heads: str, columns: tuple[np.ndarray, ...], text: str, message: str
+) -> None:
+    write(tmp_path / "log.csv", heads, *columns)
+    with pytest.raises(SceneError, match=rf"scene\.toml: .*{message}"):
+        reference(tmp_path, 'file = "log.csv"\n' + text)

@@ -1,0 +1,229 @@
+"""Inertias from shapes: laws of rigid bodies, marks that stay, and what is refused."""
+
+from __future__ import annotations
+
+import re
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import robot_dyn as rd
+from robot_dyn.description import solids
+from robot_dyn.description.inertia import MassProperties, combined
+from robot_dyn.spatial import rotation_rpy
+
+pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
+MEASURED = '<inertial><origin xyz="0.01 0.02 0.3"/><mass value="3.1"/><inertia ixx="0.2" ixy="0.01" ixz="0" iyy="0.3"'
+MEASURED += ' iyz="0.02" izz="0.25"/></inertial>'
+BOX = '<collision><origin xyz="0.1 0.2 0.3" rpy="0.3 -0.7 1.1"/><geometry><box size="0.3 0.2 0.5"/></geometry>'
+BOX += "</collision>"
+BALL = '<visual><geometry><sphere radius="0.2"/></geometry></visual>'
+ROD = '<collision><geometry><cylinder radius="0.05" length="0.8"/></geometry></collision>'
+MESH = '<collision><geometry><mesh filename="{}" scale="{}"/></geometry></collision>'
+
+
+def arm(folder: Path, *links: str) -> Path:
+    """A URDF of a base and links behind hinges that stand 0.4 m apart, with this content each."""
+    text = f'<link name="base">{BALL}</link>'
+    for i, content in enumerate(links, start=1):
+        text += f'<link name="link{i}">{content}</link><joint name="joint{i}" type="continuous"><axis xyz="0 1 0"/>'
+        text += f'<parent link="{"base" if i == 1 else f"link{i - 1}"}"/><child link="link{i}"/>'
+        text += '<origin xyz="0.4 0 0.1" rpy="0.1 0.2 0.3"/></joint>'
+    path = folder / "arm.urdf"
+    path.write_text(f'<robot name="arm">{text}</robot>')
+    return path
+
+
+def estimated(path: Path, **masses: object) -> rd.Robot:
+    return rd.load(path, inertia="from_shapes", **masses)  # pyright: ignore[reportArgumentType]
+
+
+def body(robot: rd.Robot, link: str) -> MassProperties:
+    """The mass properties of a link as the checked file states them, in its frame."""
+    inertial = robot.description.element.find(f"link[@name='{link}']/inertial")
+    assert inertial is not None
+    at = {key: float(value) for key, value in inertial.find("inertia").items()}
+    inertia = np.array([[at[f"i{min(i, j)}{max(i, j)}"] for j in "xyz"] for i in "xyz"])
+    com, rpy = (np.array(inertial.find("origin").get(key).split(), dtype=float) for key in ("xyz", "rpy"))
+    R = rotation_rpy(rpy)
+    return MassProperties(float(inertial.find("mass").get("value")), com, R @ inertia @ R.T)
+
+
+def same(a: MassProperties, b: MassProperties, tolerance: float = 1e-12) -> None:
+    assert a.mass == pytest.approx(b.mass, rel=tolerance)
+    np.testing.assert_allclose(a.com, b.com, atol=tolerance)
+    np.testing.assert_allclose(a.inertia, b.inertia, atol=tolerance * np.trace(b.inertia))
+
+
+def test_primitives_have_their_closed_forms(tmp_path: Path) -> None:
+    """Where its <origin> puts the box; of two elements the sum, by parallel axes."""
+    robot = estimated(arm(tmp_path, BOX, BALL, ROD + BOX), density=1000)
+    box = solids.box(1000 * 0.03, 0.3, 0.2, 0.5).moved(rotation_rpy(np.array([0.3, -0.7, 1.1])), [0.1, 0.2, 0.3])
+    same(body(robot, "link1"), box)
+    same(body(robot, "link2"), solids.sphere(1000 * 4 / 3 * pi * 0.008, 0.2))
+    same(body(robot, "link3"), combined([solids.cylinder(1000 * pi * 0.002, 0.05, 0.8), box]))
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "dae"])
+def test_a_closed_mesh_is_the_solid_within_and_scales(tmp_path: Path, suffix: str) -> None:
+    """Of a box, away from the origin: its lengths times `scale`; float32 corners allow 1e-6."""
+    mesh = trimesh.creation.box((0.3, 0.2, 0.5))
+    mesh.apply_translation([0.1, 0.05, 0.2])
+    mesh.export(tmp_path / f"box.{suffix}")
+    robot = estimated(arm(tmp_path, MESH.format(f"box.{suffix}", "2 1 0.5")), mass={"link1": 40.0}, density=900)
+    same(body(robot, "link1"), solids.box(40.0, 0.6, 0.2, 0.25).moved(np.eye(3), [0.2, 0.05, 0.1]), 1e-6)
+    assert "closed collision mesh" in robot.estimated["link1"]
+
+
+def test_an_open_mesh_is_taken_by_its_convex_hull_and_that_is_said(tmp_path: Path) -> None:
+    mesh = trimesh.creation.box((0.3, 0.2, 0.5))
+    trimesh.Trimesh(mesh.vertices, mesh.faces[1:]).export(tmp_path / "open.stl")
+    robot = estimated(arm(tmp_path, MESH.format("open.stl", "1 1 1")), mass={"link1": 40.0})
+    same(body(robot, "link1"), solids.box(40.0, 0.3, 0.2, 0.5), 1e-6)
+    assert "open collision mesh, by its convex hull" in robot.estimated["link1"]
+
+
+def test_parts_that_overlap_are_taken_by_their_convex_hull(tmp_path: Path) -> None:
+    """Closed, but one box twice has twice its volume, more than its hull."""
+    mesh = trimesh.creation.box((0.3, 0.2, 0.5))
+    shifted = mesh.copy()
+    shifted.apply_translation([0.03, 0, 0])
+    trimesh.util.concatenate([mesh, shifted]).export(tmp_path / "twice.stl")
+    robot = estimated(arm(tmp_path, MESH.format("twice.stl", "1 1 1")), density=1000)
+    same(body(robot, "link1"), solids.box(33.0, 0.33, 0.2, 0.5).moved(np.eye(3), [0.015, 0, 0]), 1e-6)
+    assert "by its convex hull" in robot.estimated["link1"]
+
+
+def test_a_shape_without_volume_takes_no_share(tmp_path: Path) -> None:
+    flat = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    flat.export(tmp_path / "flat.stl")
+    robot = estimated(arm(tmp_path, MESH.format("flat.stl", "1 1 1"), ROD), total_mass=8.0)
+    assert "link1" not in robot.estimated and robot.total_mass == pytest.approx(8.0)
+    assert any("'link1' moves but has no mass" in each for each in robot.findings)
+
+
+def test_a_light_housing_is_a_shell(tmp_path: Path) -> None:
+    """Below 200 kg/m³ of its hull, ⅔ m r² in place of ⅖ m r²."""
+    volume = 4 / 3 * pi * 0.2**3
+    robot = estimated(arm(tmp_path, BALL, BALL), mass={"link1": 199 * volume, "link2": 201 * volume})
+    assert body(robot, "link1").inertia[0, 0] == pytest.approx(2 / 3 * 199 * volume * 0.04, rel=1e-12)
+    assert body(robot, "link2").inertia[0, 0] == pytest.approx(2 / 5 * 201 * volume * 0.04, rel=1e-12)
+    assert "shell" in robot.estimated["link1"] and "shell" not in robot.estimated["link2"]
+
+
+def test_masses_add_up_to_the_total_and_follow_the_volume(tmp_path: Path) -> None:
+    robot = estimated(arm(tmp_path, BOX, BALL + MEASURED, ROD, BALL), mass={"link4": 1.7}, total_mass=19.0)
+    assert robot.total_mass == pytest.approx(19.0, rel=1e-14)
+    volumes = {"base": 4 / 3 * pi * 0.008, "link1": 0.03, "link3": pi * 0.002}
+    shared = {link: body(robot, link).mass / volume for link, volume in volumes.items()}
+    assert min(shared.values()) == pytest.approx(max(shared.values()), rel=1e-12)
+    assert body(robot, "link4").mass == 1.7 and robot.estimated.keys() == {*volumes, "link4"}
+
+
+def test_the_volume_that_shares_a_total_is_that_of_the_hull(tmp_path: Path) -> None:
+    """A tube shares as the full cylinder, and at a density weighs what its wall does."""
+    trimesh.creation.annulus(0.15, 0.2, 0.3, sections=64).export(tmp_path / "tube.stl")
+    trimesh.creation.cylinder(0.2, 0.3, sections=64).export(tmp_path / "full.stl")
+    path = arm(tmp_path, MESH.format("tube.stl", "1 1 1"), MESH.format("full.stl", "1 1 1"))
+    by_total, by_density = estimated(path, total_mass=50), estimated(path, density=1000)
+    assert body(by_total, "link1").mass == pytest.approx(body(by_total, "link2").mass, rel=1e-5)
+    ratio = body(by_density, "link1").mass / body(by_density, "link2").mass
+    assert ratio == pytest.approx(1 - 0.75**2, rel=1e-5)
+
+
+def test_what_is_measured_stays_to_the_last_digit(tmp_path: Path) -> None:
+    path = arm(tmp_path, BOX + MEASURED, ROD)
+    with_shapes, plain = estimated(path, density=800), rd.load(path)
+    text = re.compile(rb'<link name="link1">.*?</link>', re.DOTALL)
+    assert text.search(with_shapes.description.xml)[0] == text.search(plain.description.xml)[0]  # pyright: ignore
+    assert "link1" not in with_shapes.estimated and not plain.estimated
+    assert MEASURED in with_shapes.description.text.decode()
+
+
+def test_moments_alone_are_estimated_where_the_mass_is_stated(tmp_path: Path) -> None:
+    """The parallel axes of the file stay: mass and centre of mass are measured."""
+    stated = (
+        '<inertial><origin xyz="0 0 0.1" rpy="0.4 0 0"/><mass value="2.5"/><inertia ixx="0" ixy="0" ixz="0" iyy="0"'
+    )
+    robot = estimated(arm(tmp_path, ROD + stated + ' iyz="0" izz="0"/></inertial>'), density=700)
+    rod = solids.cylinder(2.5, 0.05, 0.8)
+    same(body(robot, "link1"), MassProperties(2.5, np.array([0, 0, 0.1]), rod.inertia))
+    assert robot.estimated["link1"].startswith("moments alone")
+
+
+def test_the_mark_stays_with_the_robot(tmp_path: Path) -> None:
+    """In its text and findings, in `info`, in the summary of a run, on the page, and in a file that is read again."""
+    path = arm(tmp_path, BOX, ROD)
+    with pytest.warns(rd.ModelWarning, match=r"estimated from shapes, not measured"):
+        robot = estimated(path, total_mass=12.0)
+    again = rd.Robot.from_text(robot.description.text).with_(payload=rd.Payload("link2", 1.0))
+    assert again.estimated == robot.estimated and len(again.estimated) == 3
+    assert rd.info(again).estimated == dict(robot.estimated)
+    assert robot.description.text.count(b"<!-- estimated, not measured: ") == 3
+    run = rd.simulate(rd.Plant(again), q0=[0.1, 0.2], duration_s=0.01)
+    assert "inertia of 3 links estimated from shapes" in run.summary
+    from robot_dyn.view.geometry.visuals import drawing
+
+    assert any("estimated from shapes" in remark for remark in drawing(again).remarks)
+
+
+def test_the_corrected_file_of_the_doctor_is_the_robot_that_is_loaded(tmp_path: Path) -> None:
+    path = arm(tmp_path, BOX, ROD)
+    masses = {"mass": {"link1": 3.0}, "total_mass": 9.0}
+    checkup = rd.check(path, **masses)  # pyright: ignore[reportArgumentType]
+    assert checkup.repaired is not None and b"<!-- robot-dyn check: " in checkup.repaired
+    repaired, loaded = rd.Robot.from_text(checkup.repaired), estimated(path, **masses)
+    assert repaired.estimated == loaded.estimated
+    np.testing.assert_array_equal(repaired.M([0.3, -0.4]), loaded.M([0.3, -0.4]))
+    found = [each for each in rd.check(path).findings if each.kind == "inertial_missing"]
+    assert len(found) == 3 and not any(each.changes for each in found)
+    (tmp_path / "fixed.urdf").write_bytes(checkup.repaired)
+    kinds = [each.kind for each in rd.check(tmp_path / "fixed.urdf").findings]
+    assert kinds.count("inertial_estimated") == 3 and "inertial_missing" not in kinds
+
+
+@pytest.mark.parametrize(
+    ("masses", "message"),
+    [
+        ({}, "need a mass: give mass by link, total_mass or density"),
+        ({"mass": {"link3": 1.0}}, "no link 'link3'"),
+        ({"mass": {"link1": -2.0}}, "mass of link 'link1' must be positive, got -2"),
+        ({"mass": {"link1": float("nan")}}, "mass of link 'link1' must be"),
+        ({"mass": {"link2": 2.0}}, "link 'link2' has 3.1 kg in its file"),
+        ({"mass": {"base": 2.0}}, "link 'link1' moves with joint 'joint1' and has no mass"),
+        ({"mass": 3.0}, "mass must give masses by link"),
+        ({"total_mass": 0.0}, "total_mass must be positive"),
+        ({"total_mass": 3.0}, "leaves nothing: 3.1 kg are known"),
+        ({"density": -1.0}, "density must be positive"),
+        ({"total_mass": 9.0, "density": 900.0}, "contradict each other"),
+    ],
+)  # fmt: skip
+def test_masses_that_say_nothing_are_refused(tmp_path: Path, masses: dict[str, object], message: str) -> None:
+    path = arm(tmp_path, BOX, ROD + MEASURED)
+    with pytest.raises(rd.RobotDynError, match=re.escape(message)):
+        estimated(path, **masses)
+    if masses:
+        with pytest.raises(rd.RobotDynError, match=re.escape(message)):
+            rd.check(path, **masses)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_shape_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    """A missing mesh, for which nothing may be guessed; a readable <visual> serves in its place."""
+    path = arm(tmp_path, MESH.format("missing.stl", "1 1 1"))
+    with pytest.raises(rd.RobotDynError, match=r"link 'link1'.*cannot be estimated.*missing\.stl"):
+        estimated(path, density=900)
+    robot = estimated(arm(tmp_path, MESH.format("missing.stl", "1 1 1") + BALL), density=900)
+    assert robot.estimated["link1"].startswith("visual sphere")
+    with pytest.raises(rd.RobotDynError, match=r"link 'link1' has no <collision> or <visual>"):
+        estimated(arm(tmp_path, "", ROD), mass={"link1": 1.0})
+
+
+def test_masses_are_refused_where_nothing_is_estimated(tmp_path: Path) -> None:
+    path = arm(tmp_path, BOX)
+    with pytest.raises(rd.RobotDynError, match=r"are for inertia='from_shapes'"):
+        rd.load(path, total_mass=3.0)
+    with pytest.raises(rd.RobotDynError, match=r"no inertia 'from_shape'; .*from_shapes"):
+        rd.load(path, inertia="from_shape", total_mass=3.0)

@@ -1,0 +1,509 @@
+"""rd.budget: against Pinocchio's inverse dynamics on a model of its own, closed forms and energy; payloads, runs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.errors import EditError, EffectError, MissingExtraError, PlanError, QueryError
+from robot_dyn.studies.motor_budget.cells import GAUSS, KRONROD, X
+from robot_dyn.studies.motor_budget.pace import least_pace
+from tests.cli.test_command_documents import PROMISE, names
+from tests.command import document, refusal
+from tests.command import run as ran
+
+UR5 = rd.load("ur5")
+POINTS = np.array(  # pick, lift, carry, place
+    [
+        [0.1, -1.2, 1.9, -2.2, -1.5, 0.2],
+        [0.2, -1.5, 1.6, -1.7, -1.4, 0.4],
+        [0.9, -1.3, 1.4, -1.6, -1.6, 0.9],
+        [1.4, -1.1, 1.8, -2.1, -1.5, 1.3],
+    ]
+)
+TIMES = [0.0, 0.6, 1.1, 1.7]
+PLAN = rd.plan.from_samples(UR5, POINTS, time=TIMES)
+LOAD = rd.Payload("wrist_3_link", 5.0, (0.12, 0.03, 0.05))
+FRICTION = [rd.effects.ViscousFriction(1.5), rd.effects.DryFriction([4.0, 5.0, 3.0, 1.0, 1.0, 1.0], 6.0)]
+ROD = rd.load("simple_pendulum")  # one joint
+FREE = ROD.with_(gravity=(0.0, 0.0, 0.0))
+INERTIA = float(ROD.M(np.array([0.3]))[0, 0])
+toppra = pytest.mark.skipif(find_spec("toppra") is None, reason="the extra plan")
+
+
+def with_appended_body(armature: float) -> tuple[Any, Any]:
+    """Pinocchio's own model of the UR5's file, with the payload appended to the last joint."""
+    model: Any = pin.buildModelFromXML(UR5.description.text.decode())
+    frame = model.frames[model.getFrameId("wrist_3_link")]
+    model.appendBodyToJoint(frame.parentJoint, pin.Inertia(5.0, np.array(LOAD.com), np.zeros((3, 3))), frame.placement)
+    model.armature, model.gravity.linear = np.full(6, armature), np.array(rd.STANDARD_GRAVITY)
+    return model, model.createData()
+
+
+def test_a_pick_and_place_with_5_kg_asks_for_the_torque_of_pinocchio() -> None:
+    """At 1000 times to 1e-12 of the largest torque; and no peak at 20 000 other times is above that of the budget."""
+    found = rd.budget(PLAN, UR5.with_(armature=0.3), payload=LOAD)
+    model, data = with_appended_body(0.3)
+    split = found.demand.split
+    rows = np.linspace(0, len(split.t) - 1, 1000).astype(int)
+    states = zip(*PLAN.reference.at(split.t[rows]), strict=True)
+    tau = np.array([pin.rnea(model, data, q, v, a) for q, v, a in states])
+    size = np.abs(tau).max()
+    np.testing.assert_allclose(split.tau[rows], tau, rtol=0, atol=1e-12 * size)
+    dense = np.linspace(0.0, TIMES[-1], 20_001)
+    other = np.array([pin.rnea(model, data, *each) for each in zip(*PLAN.reference.at(dense), strict=True)])
+    peaks = np.array([each.peak for each in found.joints])
+    # a maximum between 20 001 times is missed by τ̈ h²/8: 1e4 N m/s² · (8.5e-5 s)² / 8
+    assert (np.abs(other).max(axis=0) <= peaks + 1e-12 * size).all()
+    np.testing.assert_allclose(np.abs(other).max(axis=0), peaks, rtol=0, atol=1e-5)
+    mean = np.trapezoid(other**2, dense, axis=0) / TIMES[-1]  # smooth: O(h²) of the ends
+    np.testing.assert_allclose([each.rms for each in found.joints], np.sqrt(mean), rtol=1e-6)
+    assert found.error < 1e-4
+
+
+@pytest.mark.parametrize("plant", [UR5, rd.Plant(UR5, [*FRICTION, rd.effects.Spring(3.0, POINTS[0])])])
+def test_causes_add_up_to_the_torque_and_their_parts_to_its_rms(plant) -> None:
+    """To 1e-12 of the largest torque."""
+    found = rd.budget(PLAN, plant, payload=LOAD)
+    split = found.demand.split
+    assert np.abs(split.unexplained).max() <= 1e-12 * np.abs(split.tau).max()
+    for each in found.joints:
+        assert abs(sum(each.of_peak.values())) == pytest.approx(each.peak, rel=1e-12)
+        assert sum(each.of_rms.values()) == pytest.approx(each.rms, rel=1e-12)
+
+
+def test_a_joint_without_load_has_the_closed_forms_of_the_quintic() -> None:
+    """I a with a = Δ/T² (60 s − 180 s² + 120 s³): peak 10/√3, rms √(120/7); energy ½ I (15/8 Δ/T)², all of it back."""
+    delta, T = 1.3, 0.8
+    (joint,) = rd.budget(rd.control.quintic([0.2], [0.2 + delta], T), FREE).joints
+    assert joint.peak == pytest.approx(INERTIA * 10 / np.sqrt(3) * delta / T**2, rel=1e-9)
+    assert joint.rms == pytest.approx(INERTIA * np.sqrt(120 / 7) * delta / T**2, rel=1e-9)
+    assert joint.speed == pytest.approx(15 / 8 * delta / T, rel=1e-9) and joint.speed_at == pytest.approx(T / 2)
+    kinetic = INERTIA / 2 * (15 / 8 * delta / T) ** 2
+    assert (joint.energy, joint.regenerated) == pytest.approx((kinetic, kinetic), rel=1e-5)  # P has a kink
+    assert joint.mean_power == pytest.approx(0.0, abs=1e-9)
+
+
+def test_both_sides_of_a_jump_of_the_acceleration_count() -> None:
+    """+A, then −2A: the peak is 2 I A, and its rms the root of the mean square."""
+    A, T = 3.0, 0.5
+    motion = rd.control.PiecewisePolynomial(
+        [0.0, T, 1.5 * T], [[[0.0], [0.0], [A / 2]], [[A / 2 * T**2], [A * T], [-A]]]
+    )
+    (joint,) = rd.budget(motion, FREE).joints
+    assert joint.peak == pytest.approx(2 * INERTIA * A, rel=1e-12)
+    assert joint.rms == pytest.approx(INERTIA * A * np.sqrt(2.0), rel=1e-12)
+
+
+def test_the_work_of_the_motors_is_the_change_of_potential_energy_and_what_friction_takes() -> None:
+    """∫ τ v dt = ΔV + ∫ b v² dt + f ∫ |v| dt, of each sum; the integrals of the motion by the trapezoidal rule."""
+    found = rd.budget(PLAN, rd.Plant(UR5, FRICTION), payload=LOAD)
+    t = np.linspace(0.0, TIMES[-1], 200_001)
+    q, v, _ = PLAN.reference.at(t)
+    loaded = UR5.with_(payload=LOAD)
+    taken = np.trapezoid(1.5 * v**2 + np.array([4.0, 5.0, 3.0, 1.0, 1.0, 1.0]) * np.abs(v), t, axis=0).sum()
+    gained = loaded.potential_energy(q[-1]) - loaded.potential_energy(q[0])
+    given = sum(each.energy - each.regenerated for each in found.joints)
+    assert given == pytest.approx(gained + taken, rel=1e-7)
+    assert given == pytest.approx(found.duration * sum(each.mean_power for each in found.joints), rel=1e-9)
+
+
+def test_a_joint_breaks_away_against_its_load_and_static_friction() -> None:
+    """From rest: τ_b = N + f_s; it counts for the peak torque, whose limit it passes though the motion does not."""
+    plant = rd.Plant(ROD, [rd.effects.DryFriction(0.5, 4.0)])
+    motion = rd.control.quintic([0.7], [0.9], 5.0)
+    load = float(ROD.N(np.array([0.7]))[0])
+    (joint,) = rd.budget(motion, plant, effort=100.0).joints
+    assert load > 0 and joint.static_friction == 4.0 and joint.breakaway_at == 0.0
+    assert joint.breakaway == pytest.approx(load + 4.0, rel=1e-9)
+    found = rd.budget(motion, plant, effort=(joint.breakaway + joint.peak) / 2)
+    assert joint.peak < joint.breakaway and not found.fits and "to break away" in found.sentence
+    (resting,) = rd.budget(rd.control.hold([0.7]), plant, effort=100.0).joints
+    assert np.isnan(resting.breakaway) and resting.peak == pytest.approx(load, rel=1e-12)
+
+
+def test_rules_are_exact_for_their_degrees() -> None:
+    """∫ xᵏ over [−1, 1], to 11 and 5; beyond that they are not."""
+    for rule, degree in ((KRONROD, 11), (GAUSS, 5)):
+        errors = [abs(float(rule @ X**k) - (1 + (-1) ** k) / (k + 1)) for k in range(degree + 2)]
+        assert max(errors[:-1]) < 1e-14 < errors[-1]
+
+
+def test_the_rotor_of_a_motor_acts_as_armature_where_the_arm_has_none(tmp_path: Path) -> None:
+    """n² J a on top, and torques at the shaft times n."""
+    file = tmp_path / "motors.csv"
+    file.write_text(
+        "joint,peak [N m],continuous [N m],speed [rpm],gear_ratio,rotor_inertia [kg m^2],at\n"
+        + f"{ROD.joint_names[0]},2,1,3000,50,1e-4,motor\n"
+    )
+    motors, motion = rd.plan.read_motors(file), rd.control.quintic([0.2], [1.5], 0.8)
+    (bare,), (joint,) = rd.budget(motion, FREE).joints, rd.budget(motion, FREE, motors=motors).joints
+    assert joint.peak == pytest.approx(bare.peak * (1 + 0.25 / INERTIA), rel=1e-9)
+    assert (joint.peak_limit, joint.continuous_limit) == (100.0, 50.0)
+    assert joint.speed_limit == pytest.approx(3000 * np.pi / 30 / 50)
+    assert joint.headroom["continuous"] == pytest.approx(1 - joint.rms / 50)
+    with pytest.raises(PlanError, match=r"the rotor of .* the arm has 0\.5"):
+        rd.budget(motion, FREE.with_(armature=0.5), motors=motors)
+
+
+def test_a_limit_that_is_passed_is_named_with_the_cause_that_asks_for_it() -> None:
+    found = rd.budget(PLAN, UR5, payload=LOAD, effort={"shoulder_lift_joint": 60.0}, continuous=90.0, velocity=0.9)
+    small = {each.joint: each.too_small for each in found.joints if each.too_small}
+    assert small["shoulder_lift_joint"][0] == "peak" and not found.fits
+    assert all(kinds[-1] == "speed" for kinds in small.values() if "speed" in kinds)
+    lift = found.joints[1]
+    assert f"shoulder_lift_joint needs {lift.peak:.4g} of 60 N m" in found.sentence and "for gravity" in found.sentence
+    assert any("no limit of peak torque is known of shoulder_pan_joint" in each for each in found.findings)
+    free = rd.budget(rd.control.quintic([0.0], [1.0], 1.0), FREE, effort=np.inf, velocity=np.inf)
+    assert free.fits and "no limit is known" in free.sentence
+    some = rd.budget(PLAN, UR5)  # its file states no continuous torque
+    assert "the motors suffice where limits are known; " in some.sentence
+    every = rd.budget(PLAN, UR5, continuous=100.0)
+    assert "the motors suffice; " in every.sentence
+
+
+@pytest.mark.parametrize("continuous", [np.inf, [150.0, 45.0, 40.0, 20.0, 20.0, 20.0]])
+def test_the_largest_payload_is_that_of_budgets_with_many_masses(continuous) -> None:
+    """Every mass up to it fits, none of those beyond; with it a limit is reached to 1e-9."""
+    plant, com = rd.Plant(UR5, FRICTION), (0.1, 0.02, 0.08)
+    found = rd.budget(PLAN, plant, continuous=continuous).max_payload("wrist_3_link", com)
+    assert found.mass is not None and found.least == 0.0
+    assert found.limit in (("continuous torque",) if np.ndim(continuous) else ("peak torque", "break-away torque"))
+    assert found.largest_share == pytest.approx(1.0, abs=1e-9)
+    tolerated = 1.01  # the budget tolerates a thousandth of the limit, some 2e-3 of the mass
+    for factor, fits in ((0.5, True), (0.999, True), (2.0, False)):
+        loaded = rd.budget(
+            PLAN, plant, payload=rd.Payload("wrist_3_link", factor * found.mass, com), continuous=continuous
+        )
+        assert loaded.fits == fits, factor
+    beyond = rd.budget(
+        PLAN, plant, payload=rd.Payload("wrist_3_link", tolerated * found.mass, com), continuous=continuous
+    )
+    assert [each.joint for each in beyond.joints if each.too_small] == [found.joint]
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("kind", ["effort", "continuous"])
+def test_the_payload_of_a_held_rod_balances_its_weight(side: int, kind: str) -> None:
+    """Held at q: τ = N + m g x sin q. On the other side it is a counterweight: too light a one does not do, either."""
+    q, x, limit = 0.8, 0.4, 1.7
+    N = float(ROD.N(np.array([q]))[0])
+    per_mass = float(ROD.with_(payload=rd.Payload("bar", 1.0, (0.0, 0.0, -side * x))).N(np.array([q]))[0]) - N
+    assert abs(per_mass) == pytest.approx(9.80665 * x * np.sin(q), rel=1e-9)
+    budget = rd.budget(rd.control.hold([q]), ROD, **({"effort": np.inf} | {kind: limit}))
+    found = budget.max_payload("bar", (0.0, 0.0, -side * x))
+    least, most = sorted(((limit - N) / per_mass, (-limit - N) / per_mass))
+    if most < 0:
+        assert found.mass is None and found.joint == ROD.joint_names[0]
+    else:
+        assert (found.least, found.mass) == pytest.approx((max(0.0, least), most), rel=1e-9)
+
+
+def test_the_largest_payload_counts_what_is_carried_already() -> None:
+    """The same place: the mass in all is that of the arm without it."""
+    motion, com = rd.control.hold([0.8]), (0.0, 0.0, -0.4)
+    alone = rd.budget(motion, ROD, effort=15.0).max_payload("bar", com)
+    found = rd.budget(motion, ROD, payload=rd.Payload("bar", 0.3, com), effort=15.0).max_payload("bar", com)
+    assert found.mass is not None and alone.mass is not None and (alone.carried, found.carried) == (0.0, 0.3)
+    assert found.mass + found.carried == pytest.approx(alone.mass, rel=1e-9)
+    assert f"{found.mass:.5g} kg more, {alone.mass:.5g} kg in all" in repr(found) and "more," not in repr(alone)
+
+
+def test_no_payload_fits_where_speed_is_passed_and_any_where_nothing_limits() -> None:
+    motion = rd.control.quintic([0.2], [0.9], 0.5)
+    fast = rd.budget(motion, ROD, effort=100.0, velocity=1.0).max_payload("bar")
+    assert fast.mass is None and fast.limit == "speed" and "no payload" in repr(fast)
+    free = rd.budget(motion, ROD, effort=np.inf, velocity=np.inf).max_payload("bar")
+    assert free.mass == np.inf and "no limit" in repr(free)
+    with pytest.raises(EditError, match="no frame 'nowhere'"):
+        rd.budget(motion, ROD, effort=9.0).max_payload("nowhere")
+
+
+def test_an_effect_that_knows_the_mass_of_the_arm_has_no_closed_form_and_says_so() -> None:
+    class Heavy(rd.effects.Active):
+        def torque(self, dynamics, t, q, v):
+            return -0.1 * dynamics.N(q) ** 2
+
+    plant = rd.Plant(ROD, [Heavy()])
+    with pytest.raises(QueryError, match="not affine in the mass"):
+        rd.budget(rd.control.quintic([0.3], [0.9], 1.0), plant, effort=50.0).max_payload("bar", (0.0, 0.0, -0.4))
+
+
+def followed(plant: rd.Plant, **options: Any) -> rd.Trajectory:
+    law = rd.control.ComputedTorque(plant.dynamics, PLAN.reference, 400.0, 40.0)  # pyright: ignore
+    return rd.simulate(
+        plant, POINTS[0], **{"duration_s": TIMES[-1], "controller": law, "estimate_error": False} | options
+    )
+
+
+def test_the_budget_of_a_run_is_that_of_what_its_control_did() -> None:
+    """Energies against the ledger, O(Δt²) between samples; peaks are those of all steps; causes add up."""
+    plant = rd.Plant(UR5.with_(payload=LOAD), FRICTION[:1])
+    run = followed(plant)
+    found, planned = rd.budget(run), rd.budget(PLAN, plant)
+    given = sum(each.energy - each.regenerated for each in found.joints)
+    assert given == pytest.approx(run.ledger.work["control"][-1], rel=1e-4)
+    assert run.extremes is not None
+    largest = np.maximum(np.abs(run.extremes[2]).max(axis=0), np.abs(run.u).max(axis=0))
+    np.testing.assert_array_equal([x.peak for x in found.joints], largest)
+    for a, b in zip(found.joints, planned.joints, strict=True):  # the reference is followed: its model has no friction
+        assert a.peak == pytest.approx(b.peak, rel=0.05) and a.rms == pytest.approx(b.rms, rel=0.05)
+    split = found.demand.split
+    assert np.abs(split.unexplained).max() <= 1e-12 * np.abs(split.tau).max()
+    motion = rd.plan.from_samples(UR5, run.table(), ends="measured")
+    for a, b in zip(rd.budget(motion, plant).joints, found.joints, strict=True):
+        assert a.peak == pytest.approx(b.peak, rel=1e-3)
+
+
+def test_a_run_whose_actuation_was_cut_at_the_limit_needs_a_larger_motor() -> None:
+    limit = [150.0, 60.0, 150.0, 28.0, 28.0, 28.0]
+    run = followed(rd.Plant(UR5.with_(payload=LOAD), [rd.effects.EffortLimit(limit)]), duration_s=0.6)
+    cut, larger = rd.budget(run, effort=limit), rd.budget(run)
+    assert not cut.fits and "peak" in cut.joints[1].too_small and "where it was cut" in cut.sentence
+    assert "peak" not in larger.joints[1].too_small and any("effort limit reached" in each for each in larger.findings)
+
+
+def test_what_has_no_budget_is_refused() -> None:
+    run = rd.simulate(rd.Plant(ROD), [0.4], duration_s=0.05)
+    lugre = rd.effects.LuGreFriction(100.0, 1.0, 0.1, 1.0, 1.5, 0.1)
+    for call, error, message in (
+        (lambda: rd.budget(PLAN), QueryError, "a plan does not know its arm"),
+        (lambda: rd.budget(PLAN, ROD), QueryError, "of 6 joints, shoulder_pan_joint.*has 1"),
+        (lambda: rd.budget(PLAN.reference, ROD), QueryError, "of 6 joints; .* has 1"),
+        (lambda: rd.budget(POINTS, UR5), QueryError, "motion: give a plan"),  # pyright: ignore
+        (lambda: rd.budget(PLAN, UR5, motors="motors.csv"), PlanError, "read them with"),  # pyright: ignore
+        (lambda: rd.budget(PLAN, UR5, effort=-1.0), PlanError, "effort"),
+        (lambda: rd.budget(PLAN, UR5, continuous={"elbow": 1.0}), PlanError, "elbow"),
+        (lambda: rd.budget(PLAN, rd.Plant(UR5, [lugre])), EffectError, "lugre_friction has states.*give the run"),
+        (lambda: rd.budget(run, ROD), QueryError, "has its own plant"),
+        (lambda: rd.budget(run, payload=LOAD), QueryError, "has its own payload"),
+        (lambda: rd.budget(run).max_payload("bar"), QueryError, "this budget is of a run: give its motion"),
+        (lambda: rd.budget(run).fastest(), QueryError, "this budget is of a run"),
+        (lambda: rd.budget(replace(run, t=run.t[:1], v=run.v[:1])), QueryError, "one sample"),
+    ):
+        with pytest.raises(error, match=message):
+            call()
+
+
+@toppra
+def test_the_fastest_motion_keeps_path_stops_and_pauses_and_passes_no_limit() -> None:
+    """Two strokes with a pause of 0.4 s between; torque at 10 000 times within a thousandth of the limits."""
+    there, back = rd.control.quintic(POINTS[0], POINTS[2], 2.0), rd.control.quintic(POINTS[2], POINTS[1], 1.5)
+    breaks = [0.0, 2.0, 2.4, 3.9]
+    pause = np.zeros((1, 6, 6))
+    pause[0, 0] = POINTS[2]
+    table = np.concatenate([there.coefficients, pause, back.coefficients])
+    plant = rd.Plant(UR5, FRICTION[:1])
+    found = rd.budget(rd.control.PiecewisePolynomial(breaks, table), plant, payload=LOAD)
+    fast = found.fastest()
+    assert fast.strokes == 2 and fast.before == pytest.approx(3.9) and 0.4 < fast.duration < 2.0
+    t = np.linspace(0, fast.duration, 10_000)
+    q, v, a = fast.plan.reference.at(t)
+    loaded = rd.Plant(UR5.with_(payload=LOAD), FRICTION[:1])
+    assert (np.abs(loaded.inverse_dynamics(0.0, q, v, a)) <= 1.001 * UR5.effort_limit).all()
+    assert (np.abs(v) <= 1.001 * UR5.velocity_limit).all()
+    at_rest = np.abs(v).max(axis=1) == 0
+    assert at_rest.mean() * fast.duration == pytest.approx(0.4, abs=1e-3)
+    np.testing.assert_allclose(q[at_rest][1:-1], np.tile(POINTS[2], (at_rest.sum() - 2, 1)), atol=1e-9)
+    for start, end, part in ((0, 2, q[: np.argmax(at_rest[1:])]), (2, 1, q[len(q) - np.argmax(at_rest[::-1][1:]) :])):
+        along = (POINTS[end] - POINTS[start]) / np.linalg.norm(POINTS[end] - POINTS[start])
+        off = part - POINTS[start] - np.outer((part - POINTS[start]) @ along, along)
+        assert np.abs(off).max() < 1e-6
+    assert fast.budget.fits and fast.budget.verdict in repr(fast)
+
+
+@toppra
+def test_the_fastest_motion_is_slowed_down_until_it_keeps_continuous_torque() -> None:
+    """As little as that needs, to 1e-3 of the time; a limit below the weight has no pace, and is said."""
+    lasting = np.array([150.0, 60.0, 60.0, 28.0, 28.0, 28.0])
+    found = rd.budget(PLAN, UR5, payload=LOAD, continuous=lasting)
+    fast, free = found.fastest(), rd.budget(PLAN, UR5, payload=LOAD).fastest()
+    assert free.slowed == 1.0 and fast.slowed > 1.0
+    assert fast.duration == pytest.approx(fast.slowed * free.duration, rel=1e-12)
+    used = max(each.rms / each.continuous_limit for each in fast.budget.joints)
+    assert used == pytest.approx(1.0, abs=1e-6) and fast.budget.fits and "slowed down by" in repr(fast)
+    held = rd.budget(PLAN, UR5, payload=LOAD, continuous=lasting / 3).fastest()
+    assert held.slowed == 1.0 and "too small: shoulder_lift_joint" in repr(held)
+    assert "no pace fits: shoulder_lift_joint needs" in held.no_pace and held.no_pace in repr(held)
+
+
+SWING = rd.control.quintic([0.9], [-0.9], 0.9)  # inertia relieves gravity on the way: the mean square has a minimum
+
+
+def mean_square_of_the_swing(b: float = 0.0) -> np.ndarray:
+    """Coefficients of ⟨(N + u b v + u² I a)²⟩ by powers of u = 1/λ, (5,), by the trapezoidal rule."""
+    t = np.linspace(0, 0.9, 20_001)
+    q, v, a = SWING.at(t)
+    parts = [ROD.N(q)[:, 0], b * v[:, 0], INERTIA * a[:, 0]]
+    table = np.zeros(5)
+    for i, x in enumerate(parts):
+        for j, y in enumerate(parts):
+            table[i + j] += np.trapezoid(x * y, t) / 0.9
+    return table
+
+
+@pytest.mark.parametrize("b", [0.0, 0.3])
+def test_the_least_pace_is_the_first_root_of_the_mean_square_though_neither_1_nor_100_fit(b: float) -> None:
+    """⟨τ²⟩ is a polynomial of u = 1/λ; halfway from its minimum to the lower of both ends an interval of λ fits."""
+    square = np.polynomial.Polynomial(mean_square_of_the_swing(b))
+    at = np.linspace(0.01, 1.0, 10_001)
+    least = square(at).min()
+    limit = np.sqrt((least + min(square(0.01), square(1.0))) / 2)
+    assert least < limit**2 < min(square(0.01), square(1.0))
+    roots = (square - limit**2).roots()
+    largest = max(x.real for x in roots if abs(x.imag) < 1e-9 and 0 < x.real < 1)
+    plant = rd.Plant(ROD, [rd.effects.ViscousFriction(b)] if b else [])
+    pace = least_pace(SWING, plant, np.array([limit]))
+    assert pace.fits and pace.factor == pytest.approx(1 / largest, rel=1e-6)  # O(h²) of the rule
+    none = least_pace(SWING, plant, np.array([0.9 * np.sqrt(least)]))
+    assert not none.fits and none.share == pytest.approx(1 / 0.9, rel=1e-3)  # the best of 201 places of an octave
+
+
+def test_the_least_pace_keeps_the_limits_of_all_joints() -> None:
+    """Of Pinocchio: neither a λ below it nor 100 fits, by the rms of rnea at 2000 times."""
+    arm = rd.load("ur10")
+    limit = np.array([150.0, 150.0, 60.0, 20.0, 20.0, 20.0])
+    points = np.radians([[0, -90, 90, -90, -90, 0], [50, -60, 90, -120, -90, 20], [100, -80, 100, -100, -90, 0]])
+    motion = rd.plan.from_samples(arm, points, time=[0.0, 0.3, 0.6], unit="rad").reference
+    loaded = arm.with_(payload=rd.Payload("tool0", 5.0, (0.0, 0.0, 0.1)))
+    model: Any = pin.buildModelFromXML(arm.description.text.decode())
+    frame = model.frames[model.getFrameId("tool0")]
+    body = pin.Inertia(5.0, np.array([0.0, 0.0, 0.1]), np.zeros((3, 3)))
+    model.appendBodyToJoint(frame.parentJoint, body, frame.placement)
+    model.gravity.linear = np.array(rd.STANDARD_GRAVITY)
+    data, t = model.createData(), np.linspace(0, motion.end, 2000)
+
+    def share(factor: float) -> float:
+        states = zip(*(x / factor**k for k, x in enumerate(motion.at(t))), strict=True)
+        tau = np.array([pin.rnea(model, data, q, v, a) for q, v, a in states])
+        return float((np.sqrt(np.trapezoid(tau**2, t, axis=0) / t[-1]) / limit).max())
+
+    pace = least_pace(motion, rd.Plant(loaded), limit)
+    assert pace.fits and pace.factor > 1 and share(pace.factor) == pytest.approx(1.0, rel=1e-4)
+    assert min(share(each) for each in np.linspace(1.0, 0.999 * pace.factor, 12)) > 1.0 < share(100.0)
+
+
+@toppra
+def test_the_given_motion_is_the_answer_where_it_fits_and_none_that_is_faster_does() -> None:
+    """Close to what it needs as continuous torque; with a share of the peak torques that it passes, it is not."""
+    needs = rd.budget(PLAN, UR5, payload=LOAD)
+    given = rd.budget(PLAN, UR5, payload=LOAD, continuous=[1.001 * each.rms + 0.01 for each in needs.joints])
+    fast = given.fastest()
+    assert (
+        fast.given and fast.budget is given and fast.duration == fast.before and fast.plan.reference is PLAN.reference
+    )
+    assert "the given one fits, and is the answer" in repr(fast)
+    half = given.fastest(share=0.4)
+    assert not half.given and "at 40 % of the peak torques" in repr(half)
+
+
+def test_a_budget_needs_no_extra_and_the_fastest_motion_says_which(monkeypatch) -> None:
+    for name in ("toppra", "ruckig", "pandas", "xarray", "pyarrow", "mcap"):
+        monkeypatch.setitem(sys.modules, name, None)
+    found = rd.budget(PLAN, UR5)
+    assert found.fits and found.max_payload("wrist_3_link").mass
+    for name in [each for each in sys.modules if each.startswith("toppra.")]:
+        monkeypatch.delitem(sys.modules, name)
+    with pytest.raises(MissingExtraError, match=r"robot-dyn\[plan\]"):
+        found.fastest()
+
+
+def test_a_budget_loads_no_drawing() -> None:
+    code = (
+        "import sys, robot_dyn as rd; arm = rd.load('simple_pendulum')\n"
+        "print(rd.budget(rd.control.quintic([0.0], [1.0], 1.0), arm, effort=9.0).fits)\n"
+        "print([x for x in ('matplotlib', 'toppra', 'ruckig', 'pandas') if x in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["True", "[]"]
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    heads = ["t [s]", *(f"{name} [rad]" for name in UR5.joint_names)]
+    rows = [",".join(map(str, [t, *q])) for t, q in zip(TIMES, POINTS, strict=True)]
+    (tmp_path / "plan.csv").write_text("\n".join([",".join(heads), *rows]) + "\n")
+    lines = [f"{name},{peak},{0.2 * peak}" for name, peak in zip(UR5.joint_names, UR5.effort_limit, strict=True)]
+    (tmp_path / "motors.csv").write_text("joint,peak [N m],continuous [N m]\n" + "\n".join(lines) + "\n")
+    return tmp_path
+
+
+def test_the_command_ends_with_1_if_a_motor_is_too_small(files: Path) -> None:
+    plan, motors = files / "plan.csv", files / "motors.csv"
+    assert ran("budget", "ur5", plan).returncode == 0
+    heavy = ran("budget", "ur5", plan, "--payload", "wrist_3_link=5kg@0.12,0.03,0.05", "--limits", motors)
+    assert (heavy.returncode, heavy.stderr) == (1, "") and "too small: shoulder_lift_joint needs" in heavy.stdout
+    assert refusal(["budget", "ur5"]).startswith("ur5: give its motion as well")
+    assert "is for a robot with a plan" in refusal(["budget", "s.toml", plan])
+    assert "--share is of the fastest motion: add --fastest" in refusal(["budget", "ur5", plan, "--share", "0.9"])
+    assert "--joint must be JOINT=COLUMN" in refusal(["budget", "ur5", plan, "--joint", "J1"])
+    assert "--max-payload must be LINK@X,Y,Z" in refusal(["budget", "ur5", plan, "--max-payload", "tool0@1"])
+
+
+def test_the_document_of_the_command_has_the_keys_of_its_page(files: Path) -> None:
+    keys = promised_keys()
+    found = document("budget", "ur5", files / "plan.csv", "--max-payload", "wrist_3_link@0.1,0,0.05")
+    assert found.keys() == keys.keys() - {"fastest"}
+    assert all(each.keys() == promised_keys(of_joints=True).keys() for each in found["joints"])
+    assert found["max_payload"].keys() == names(keys["max_payload"].partition(": ")[2])
+    assert found["joints"][1]["headroom"].keys() == {"peak", "continuous", "speed"}
+    own = rd.budget(rd.plan.from_samples(UR5, files / "plan.csv"), UR5).max_payload("wrist_3_link", (0.1, 0.0, 0.05))
+    assert found["max_payload"]["mass"] == pytest.approx(own.mass, rel=1e-12)
+
+
+def promised_keys(of_joints: bool = False) -> dict[str, str]:
+    """Meaning by key, of the table of the command, or of that of its joints."""
+    (section,) = [each for each in PROMISE.split("\n## ") if each.startswith("`robot-dyn budget")]
+    tables = section.split("Each of `joints`")
+    rows = [line.strip("| ").split(" | ", 1) for line in tables[of_joints].splitlines() if line.startswith("| `")]
+    return {key: meaning for keys, meaning in rows for key in names(keys)}
+
+
+@toppra
+def test_the_document_of_the_fastest_motion(files: Path) -> None:
+    found = document("budget", "ur5", files / "plan.csv", "--fastest")
+    assert found["fastest"].keys() == names(promised_keys()["fastest"].partition(": ")[2])
+    assert found["fastest"]["budget"]["fits"] and found["fastest"]["duration"] < found["duration"]
+
+
+@toppra
+def test_the_command_ends_with_1_if_the_fastest_motion_or_the_given_one_is_too_small(files: Path) -> None:
+    """And its figure and table are those of the fastest one."""
+    plan, motors = files / "plan.csv", files / "motors.csv"
+    done = ran("budget", "ur5", plan, "--fastest", "--share", "0.9", "-o", files / "b.svg", "--csv", files / "b.csv")
+    assert done.returncode == 0 and "at 90 % of the peak torques" in done.stdout
+    assert "the same path at its limits" in (files / "b.svg").read_text(encoding="utf-8")
+    heavy = ran("budget", "ur5", plan, "--limits", motors, "--fastest", "--payload", "wrist_3_link=5kg@0.12,0.03,0.05")
+    assert heavy.returncode == 1 and heavy.stdout.rstrip().splitlines()[-1].startswith("too small: ")
+
+
+def test_the_command_takes_columns_by_name(files: Path) -> None:
+    """J1 to J6 over a clock: the same budget."""
+    text = (files / "plan.csv").read_text().replace("t [s]", "clock [s]")
+    for i, name in enumerate(UR5.joint_names):
+        text = text.replace(name, f"J{i + 1}")
+    (files / "named.csv").write_text(text)
+    columns = [x for i, name in enumerate(UR5.joint_names) for x in ("--joint", f"{name}=J{i + 1}")]
+    found = document("budget", "ur5", files / "named.csv", "--time", "clock", *columns)
+    assert found["joints"] == document("budget", "ur5", files / "plan.csv")["joints"]
+    told = refusal(["budget", "ur5", files / "named.csv", "--time", "clock [s]"])
+    assert "--joint JOINT=COLUMN" in told
+
+
+def test_the_command_takes_scenes_and_runs_and_writes_figure_and_table(files: Path) -> None:
+    run = rd.save_run(rd.simulate(rd.Plant(ROD), [0.4], duration_s=0.05), files / "run")
+    (files / "scene.toml").write_text('robot = "simple_pendulum"\nduration_s = 0.05\n[start]\nq = [0.4]\n')
+    for what in (run, files / "scene.toml"):
+        assert ran("budget", what).returncode == 0
+    done = ran("budget", run, "-o", files / "b.svg", "--csv", files / "b.csv", "--dark")
+    assert done.returncode == 0 and (files / "b.svg").read_bytes().startswith(b"<?xml")
+    assert (files / "b.csv").read_text(encoding="utf-8").startswith("joint,unit,peak,peak_at,")

@@ -1,0 +1,194 @@
+"""Two runs compared: closed forms of their difference, when they part, and the settings that differ."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.errors import QueryError
+from tests.cli.test_command_documents import names, promised
+from tests.command import document
+from tests.command import run as ran
+
+DAMPING, SPEED, DURATION = 0.8, 1.3, 0.5
+FREE = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
+
+
+def loaded(mass: float) -> rd.Robot:
+    return FREE.with_(payload=rd.Payload("rod", mass, (0.0, 0.0, -0.3)))
+
+
+def coasting(arm: rd.Robot, **given: Any) -> rd.Trajectory:
+    """A pendulum without gravity that viscous friction slows: q = v₀ I/b (1 − e^(−b t/I)), with the I of `arm.M`."""
+    plant = rd.Plant(arm, [rd.effects.ViscousFriction(DAMPING)])
+    options: Any = {"duration_s": DURATION, "record_period_s": 0.01} | given
+    return rd.simulate(plant, q0=[0.0], v0=[SPEED], **options)
+
+
+def motion(arm: rd.Robot, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    I = float(arm.M(np.zeros(1))[0, 0])  # noqa: E741
+    return SPEED * I / DAMPING * (1 - np.exp(-DAMPING * t / I)), SPEED * np.exp(-DAMPING * t / I)
+
+
+def over_time(t: np.ndarray, x: np.ndarray) -> float:
+    return float(np.sqrt(np.trapezoid(x**2, t) / (t[-1] - t[0])))
+
+
+def test_two_payloads_differ_by_the_closed_form() -> None:
+    """Runs are accurate to rtol 1e-10, and differences are some 0.1: nine digits of them."""
+    a, b = loaded(1.0), loaded(2.5)
+    found = rd.compare_runs(coasting(a), coasting(b))
+    t = np.linspace(0.0, DURATION, 51)
+    for each, x, y in zip(found.joints[:2], motion(a, t), motion(b, t), strict=True):
+        assert each.rms == pytest.approx(over_time(t, y - x), rel=1e-8)
+        assert each.largest == pytest.approx(np.abs(y - x).max(), rel=1e-8)
+        assert each.at == pytest.approx(t[np.abs(y - x).argmax()])
+    assert [each.quantity for each in found.joints] == ["q", "v", "u"] and not found.interpolated
+    assert found.samples == 51 and (found.start, found.end) == (0.0, DURATION)
+    (setting,) = found.settings
+    assert (setting.name, setting.a, setting.b) == ("payload on rod", "1 kg at 0, 0, -0.3 m", "2.5 kg at 0, 0, -0.3 m")
+    assert found.parted == pytest.approx(0.01) and "part at t = 0.01 s" in repr(found)
+
+
+def test_a_run_does_not_differ_from_itself() -> None:
+    run = coasting(loaded(1.0))
+    found = rd.compare_runs(run, coasting(loaded(1.0)))
+    assert all(each.rms == each.largest == 0 for each in found.joints)
+    assert found.parted is None and found.settings == () and found.left_out == ()
+    assert "are equal at all 51 times" in found.sentence and "no setting differs" in repr(found)
+
+
+def test_a_known_shift_is_found_with_its_time() -> None:
+    """A shift of one joint of two from t = 0.3 s on, twice as large at 0.4 s."""
+    arm, shift = rd.load("planar_2r"), 1e-3
+    run = rd.simulate(arm, q0=[0.4, -0.7], duration_s=0.5, record_period_s=0.01)
+    bump = np.where(run.t >= 0.3 - 1e-9, shift, 0.0) * np.where(np.isclose(run.t, 0.4), 2.0, 1.0)
+    found = rd.compare_runs(run, replace(run, q=run.q + np.outer(bump, [0, 1])))
+    first, _, _, second, *_ = found.joints
+    assert (first.rms, first.largest) == (0.0, 0.0)
+    assert second.largest == pytest.approx(2 * shift) and second.at == pytest.approx(0.4)
+    assert second.rms == pytest.approx(over_time(run.t, bump), rel=1e-9)
+    assert found.parted == pytest.approx(0.3)
+
+
+def test_one_motion_by_two_methods_does_not_part_within_their_errors() -> None:
+    """rk4 with a long step differs from DOP853 by more than the tolerance, and by no more than it says."""
+    a = coasting(loaded(1.0))
+    b = coasting(loaded(1.0), integrator="rk4", step_s=0.05, record_period_s=0.05)
+    found = rd.compare_runs(a, b)
+    assert b.error is not None and found.parted is None and 0 < found.joints[0].largest < 4 * b.error.final
+    assert {each.name for each in found.settings} == {"method", "rtol", "atol", "step"}
+    blind = rd.compare_runs(replace(a, error=None), b, tolerance=found.joints[0].largest / 2)
+    assert blind.parted is not None and any("no estimate" in each for each in blind.left_out)
+    assert rd.compare_runs(replace(a, error=None), b, tolerance=found.joints[0].largest * 2).parted is None
+
+
+def test_samples_at_other_times_are_interpolated_without_parting() -> None:
+    """What a cubic leaves between samples 0.013 s apart, 1e-9 of q, is above the errors; it must not look like them."""
+    a, b = coasting(loaded(1.0)), coasting(loaded(1.0), record_period_s=0.013)
+    found = rd.compare_runs(a, b)
+    assert found.interpolated and found.parted is None and 0 < found.joints[0].largest < 1e-7
+    parts = rd.compare_runs(a, coasting(loaded(1.001), record_period_s=0.013))
+    t = np.linspace(0, DURATION, 5001)
+    gap = abs(motion(loaded(1.0), t)[0] - motion(loaded(1.001), t)[0]).max()
+    assert parts.parted is not None and parts.joints[0].largest == pytest.approx(gap, rel=1e-4)
+
+
+def test_the_common_part_of_runs_of_different_length_is_compared_and_said() -> None:
+    a, b = coasting(loaded(1.0)), coasting(loaded(1.0), duration_s=0.8)
+    found = rd.compare_runs(a, b)
+    assert found.end == DURATION and found.parted is None
+    assert found.left_out == ("0.5 to 0.8 s, which only run 2 has",)
+
+
+@pytest.mark.parametrize("changes", ["damping", "gain", "reference", "period", "model", "start", "gravity"])
+def test_each_setting_that_differs_is_named_and_no_other(changes: str) -> None:
+    arm, q = rd.load("planar_2r"), np.array([0.4, -0.7])
+
+    def run(changed: str) -> rd.Trajectory:
+        is_it = lambda name: changed == name  # noqa: E731
+        plan = rd.control.quintic(q, q + (0.3 if is_it("reference") else 0.2), 0.1)
+        model = arm.with_(mass_scale=1.1) if is_it("model") else arm
+        period = 0.002 if is_it("period") else 0.001
+        law = rd.control.ComputedTorque(model, plan, 101.0 if is_it("gain") else 100.0, 20.0, period_s=period)
+        moved = arm.with_(gravity=(0.0, 0.0, -1.0)) if is_it("gravity") else arm
+        plant = rd.Plant(moved, [rd.effects.ViscousFriction(0.1000000001 if is_it("damping") else 0.1)])
+        start = q + (0.01 if is_it("start") else 0.0)
+        return rd.simulate(plant, q0=start, duration_s=0.1, controller=law, estimate_error=False)
+
+    found = {each.name: (each.a, each.b) for each in rd.compare_runs(run(""), run(changes)).settings}
+    expected = {
+        "damping": {"viscous_friction.damping": ("0.1 N m s/rad", "0.1000000001 N m s/rad")},
+        "gain": {"control.kp": ("100 1/s²", "101 1/s²")},
+        "period": {"control": tuple(f"ComputedTorque, every {x} s, constant between" for x in ("0.001", "0.002"))},
+        "model": {"control.model.mass_scale": ("1", "1.1")},
+        "start": {"start q": ("0.4, -0.7", "0.41, -0.69")},
+    }
+    if changes in expected:
+        assert found == expected[changes]
+    else:
+        assert list(found) == [changes]
+
+
+def test_runs_that_have_nothing_in_common_are_refused() -> None:
+    run = coasting(FREE)
+    other = rd.simulate(rd.load("planar_2r"), q0=[0.1, 0.2], duration_s=0.1)
+    for a, b in ((run, other), (other, run)):
+        with pytest.raises(QueryError, match=r"different joints .* planar_2r \(.*; give two of one robot"):
+            rd.compare_runs(a, b)
+    named = replace(run, about=run.about | {"robot": "another"})
+    with pytest.raises(QueryError, match="different robots, pendulum and another"):
+        rd.compare_runs(run, named)
+    with pytest.raises(QueryError, match=r"no time in common: 0 to 0\.5 s and 1 to 1\.5 s"):
+        rd.compare_runs(run, replace(run, t=run.t + 1))
+    with pytest.raises(QueryError, match="tolerance"):
+        rd.compare_runs(run, run, tolerance=0.0)
+
+
+def test_files_name_their_runs_and_old_files_say_what_is_not_known(tmp_path: Path) -> None:
+    for name, mass in (("light", 1.0), ("heavy", 2.0)):
+        rd.save_run(coasting(loaded(mass)), tmp_path / name)
+    light, heavy = (rd.load_run(tmp_path / f"{name}.npz") for name in ("light", "heavy"))
+    found = rd.compare_runs(light, heavy)
+    assert found.names == ("light", "heavy") and [each.name for each in found.settings] == ["payload on rod"]
+    old = replace(light, about={name: text for name, text in light.about.items() if name != "settings"})
+    assert "edits" in {each.name for each in rd.compare_runs(old, heavy).settings}
+    assert any("carries no settings" in each for each in rd.compare_runs(old, heavy).left_out)
+
+
+def test_the_command_writes_its_figure_and_its_document(tmp_path: Path) -> None:
+    """JSON has the keys that docs/json.md promises; the exit code is 0 though the runs differ."""
+    for name, mass in (("a", 1.0), ("b", 2.0)):
+        rd.save_run(coasting(loaded(mass)), tmp_path / name)
+    paths = (tmp_path / "a.npz", tmp_path / "b.npz")
+    keys, found = promised("diff"), document("diff", *paths)
+    assert found.keys() == keys.keys()
+    assert found["joints"][0].keys() == names(keys["joints"].partition(": ")[2])
+    assert found["settings"][0].keys() == names(keys["settings"].partition(": ")[2])
+    assert ran("diff", *paths, "-o", tmp_path / "d.svg", "--csv", tmp_path / "d.csv").returncode == 0
+    assert (tmp_path / "d.svg").read_bytes().startswith(b"<?xml")
+    assert (tmp_path / "d.csv").read_text(encoding="utf-8").startswith("joint,quantity,unit,rms,largest,at\n")
+
+
+def test_runs_are_named_by_both_settings_in_which_they_differ() -> None:
+    """By one where one differs, by both where two do; "…" says that more than two differ. Pages have the same names."""
+    arm, q = rd.load("planar_2r"), np.array([0.4, -0.7])
+
+    def run(kp: float, kd: float, damping: float = 0.1) -> rd.Trajectory:
+        law = rd.control.PD(rd.control.hold(q + 0.1), kp, kd)
+        plant = rd.Plant(arm, [rd.effects.ViscousFriction(damping)])
+        return rd.simulate(plant, q0=q, duration_s=0.05, controller=law, estimate_error=False)
+
+    a = run(100.0, 20.0)
+    one = rd.compare_runs(a, run(400.0, 20.0)).names
+    assert one == ("control.kp 100 N m/rad", "control.kp 400 N m/rad")
+    two = rd.compare_runs(a, run(400.0, 40.0)).names
+    assert two == ("kp 100, kd 20", "kp 400, kd 40")
+    assert all(each.endswith(", …") for each in rd.compare_runs(a, run(400.0, 40.0, 0.2)).names)
+    title = rd.replay(a, run(400.0, 20.0)).document["title"]
+    assert title == f"planar_2r: {one[0]} / {one[1]} (transparent, dashed)"

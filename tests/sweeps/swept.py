@@ -1,0 +1,55 @@
+"""A small sweep that tests share: two bars in a plane, of which some runs diverge and some cannot be made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from robot_dyn import sweeps as sw
+
+SCENE = """
+robot = "planar_2r"
+duration_s = 0.05
+method = "rk4"
+step_s = 0.001
+record_period_s = 0.001
+
+[start]
+q = [0.4, 0.9]
+
+[[effect]]
+kind = "gravity"
+
+[[effect]]
+kind = "viscous_friction"
+damping_N_m_s_per_rad = 0.5
+
+[control]
+kind = "pd"
+kp = 40.0
+kd = 4.0
+
+[reference]
+kind = "hold"
+"""
+VARY = {
+    "viscous_friction.damping": sw.lognormal(median=0.5, sigma_of_log=0.3),
+    "q0": sw.normal(mean=[0.4, 0.9], sd=0.1),
+    "mass_scale": sw.normal(mean=1.0, sd=0.45),  # 1.3 % are negative, which is refused
+    "kd": sw.choice([4.0, 4000.0]),  # too much for the step
+}
+FIGURES = {"error": sw.rms_error(), "peak": sw.peak("v"), "end": sw.final("q", "joint_2")}
+
+
+def scene(folder: Path, text: str = SCENE) -> Path:
+    """The scene as a file."""
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def swept(folder: Path, runs: int = 200, **changes: Any) -> sw.Sweep:
+    """The sweep of a scene in a folder."""
+    path = folder / "scene.toml"
+    given = {"runs": runs, "seed": 3, "vary": VARY, "figures": FIGURES, "storage": "npz"} | changes
+    return sw.Sweep(str(path if path.exists() else scene(folder)), **given)

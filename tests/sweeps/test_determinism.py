@@ -1,0 +1,131 @@
+"""Run i is a function of the specification and i: equal bits whatever the chunk, the threads, the jobs, the engine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn import sweeps as sw
+from robot_dyn.sweeps.plan.work import Work
+from tests.sweeps.swept import SCENE, scene, swept
+
+NOISE = '\n[[control.position]]\nkind = "noise"\ndeviation_rad = 0.01\n'
+NOISY = SCENE.replace('kind = "pd"\n', 'kind = "pd"\nperiod_s = 0.005\n') + NOISE
+STOPS = (
+    '[[effect]]\nkind = "joint_stops"\nstiffness_N_m_per_rad = 100.0\nlower_rad = -1.0\nupper_rad = 1.0\n\n[control]'
+)
+
+
+@pytest.mark.parametrize(("chunk", "threads"), [(1, 3), (7, 2), (64, 1), (65, 5), (150, 2)])
+def test_rows_do_not_depend_on_chunks_and_threads(tmp_path: Path, chunk: int, threads: int) -> None:
+    sweep = swept(tmp_path, 150)
+    whole = Work(sweep).rows(0, 150).digest()
+    done = sw.run(sweep, tmp_path / "out", chunk=chunk, threads=threads)
+    assert done.verify() == whole
+    assert {name for name, count in done.outcomes.items() if count} == {"finished", "diverged", "raised"}
+
+
+def test_rows_do_not_depend_on_where_steps_are_cut_in_other_runs(tmp_path: Path) -> None:
+    """A stop of stiffness 0 is no threshold: such runs go in lock step beside runs whose steps are cut, and alone."""
+    vary = {"joint_stops.stiffness": sw.choice([0.0, 500.0]), "q0": sw.normal(mean=[0.4, 0.9], sd=1.5)}
+    sweep = swept(scene(tmp_path, SCENE.replace("[control]", STOPS)).parent, 40, vary=vary)
+    work = Work(sweep)
+    whole = work.rows(0, 40)
+    for i in range(0, 40, 3):
+        alone = work.rows(i, i + 1)
+        assert {name: x[0].tobytes() for name, x in alone.columns.items()} == {
+            name: x[i].tobytes() for name, x in whole.columns.items()
+        }, i
+
+
+def test_noise_is_numbered_by_the_run_not_by_its_place(tmp_path: Path) -> None:
+    sweep = swept(scene(tmp_path, NOISY).parent, 20, vary={"kp": sw.choice([40.0])})
+    rows = Work(sweep).rows(0, 20)
+    assert len(set(rows.figures["error"].tolist())) == 20  # nothing but noise differs
+    assert Work(sweep).rows(7, 8).figures["error"][0] == rows.figures["error"][7]
+
+
+def test_a_run_by_itself_has_the_bits_of_its_row(tmp_path: Path) -> None:
+    sweep = swept(tmp_path, 120)
+    done = sw.run(sweep, tmp_path / "out", chunk=50)
+    table = done.table()
+    for i in (0, 49, 50, 119):
+        if table["outcome"][i] == "finished":
+            run = done.run(i)
+            assert isinstance(run, rd.Trajectory)
+            assert run.q[-1, 1] == table["end"][i]
+            assert np.abs(run.extremes[1]).max() == table["peak"][i]
+            assert run.tracking_error == pytest.approx(table["error"][i], rel=1e-12)  # another order of the sum
+            assert run.q[0].tolist() == [table["q0[0]"][i], table["q0[1]"][i]]
+
+
+SCENES = {
+    "noise": NOISY,
+    "stops": SCENE.replace("[control]", STOPS),
+    "steps that are chosen": SCENE.replace('method = "rk4"\nstep_s = 0.001\n', ""),
+    "samples between steps": SCENE.replace("[control]", STOPS).replace(
+        "record_period_s = 0.001", "record_period_s = 0.0017"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_else_is_recorded_changes_no_bits(tmp_path: Path, name: str) -> None:
+    """`run(i)` records torques, energies and works too, and goes by itself."""
+    sweep = swept(scene(tmp_path, SCENES[name]).parent, 12, vary={"q0": sw.normal(mean=[0.4, 0.9], sd=0.6)})
+    rows = Work(sweep).rows(0, 12)
+    for i in (0, 11):
+        run = Work(sweep).run(i)
+        assert run.q[-1, 1] == rows.figures["end"][i]
+        assert np.abs(run.extremes[1]).max() == rows.figures["peak"][i]
+
+
+def test_figures_are_those_of_simulate(tmp_path: Path) -> None:
+    """The run of `simulate` with the values of a row; to rounding, since lock step orders operations otherwise."""
+    sweep = swept(tmp_path, 30, vary={"q0": sw.normal(mean=[0.4, 0.9], sd=0.1), "kp": sw.uniform(low=20, high=60)})
+    rows = Work(sweep).rows(0, 30)
+    setup = sweep.setup
+    for i in (0, 17):
+        controller = setup.controller
+        gains = rd.control.PD(controller.desired, rows.varied["kp"][i], controller.kd)
+        q0 = [rows.varied["q0[0]"][i], rows.varied["q0[1]"][i]]
+        run = rd.simulate(
+            setup.plant, q0, controller=gains, duration_s=setup.duration_s, integrator="rk4", step_s=0.001,
+            record_period_s=0.001, estimate_error=False,
+        )  # fmt: skip
+        assert run.tracking_error == pytest.approx(rows.figures["error"][i], rel=1e-9)
+        assert run.q[-1, 1] == pytest.approx(rows.figures["end"][i], rel=1e-9)
+        assert np.abs(run.v).max() == pytest.approx(rows.figures["peak"][i], rel=1e-9)
+
+
+def test_jobs_of_an_array_make_each_chunk_once(tmp_path: Path) -> None:
+    sweep = swept(tmp_path, 150)
+    left = [len(sw.run(sweep, tmp_path / "out", chunk=10, share=f"{job}/4").missing) for job in (3, 1, 4)]
+    assert left == [11, 7, 4]  # of 15 chunks these jobs make 4, 4 and 3, and the second makes 4
+    done = sw.run(sweep, tmp_path / "out", share="2/4")
+    assert done.status["missing"] == 0
+    assert done.verify() == Work(sweep).rows(0, 150).digest()
+
+
+def test_parquet_and_npz_hold_the_same_rows(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    done = [sw.run(swept(tmp_path, 100, storage=name), tmp_path / name, chunk=30) for name in ("npz", "parquet")]
+    assert done[0].verify() == done[1].verify()
+    tables = [each.table() for each in done]
+    for name, x in tables[0].items():
+        assert x.tolist() == tables[1][name].tolist() or (np.isnan(x) == np.isnan(tables[1][name])).all()
+
+
+def test_rollouts_numbered_otherwise_are_those_runs() -> None:
+    """`numbers` of rd.rollouts: the noise of run 5 wherever it stands."""
+    arm = rd.load("planar_2r")
+    hold = rd.control.quintic([0.1, 0.2], [0.3, 0.1], 0.05)
+    loop = rd.control.Loop(rd.control.PD(hold, 40.0, 4.0, period_s=0.005), position=rd.control.Noise(0.01), seed=1)
+    setup = rd.Setup(rd.Plant(arm), [0.1, 0.2], duration_s=0.05, controller=loop, integrator="rk4")
+    whole = rd.rollouts(setup, np.tile([0.1, 0.2], (8, 1)))
+    part = rd.rollouts(setup, np.tile([0.1, 0.2], (2, 1)), numbers=[5, 2])
+    assert part.q.tobytes() == whole.q[[5, 2]].tobytes()
+    assert whole.q[5].tobytes() != whole.q[2].tobytes()

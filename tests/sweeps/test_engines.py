@@ -1,0 +1,247 @@
+"""Engines fill the folder: what they report is not believed, what dies is made again, what disagrees is refused."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robot_dyn import sweeps as sw
+from robot_dyn.errors import SweepError
+from robot_dyn.sweeps.engines import cluster
+from robot_dyn.sweeps.engines.cluster import Cluster, client_of
+from robot_dyn.sweeps.engines.share import share
+from robot_dyn.sweeps.engines.threads import Threads
+from robot_dyn.sweeps.plan.work import Stopped, Work
+from robot_dyn.sweeps.run_sweep import begun
+from tests.sweeps.swept import swept
+
+
+class Future:
+    def __init__(self, error: BaseException | None = None) -> None:
+        self.status, self._error = "error" if error else "finished", error
+
+    def exception(self) -> BaseException | None:
+        return self._error
+
+    def add_done_callback(self, call: Callable[[Any], object]) -> None:
+        call(self)
+
+
+class Client:
+    """A scheduler of one worker in this process, some of whose tasks do nothing and report that they are done."""
+
+    def __init__(self, forgets: Callable[[int], bool] = lambda chunk: False) -> None:
+        self.forgets, self.submitted = forgets, list[int]()
+
+    def wait_for_workers(self, count: int, timeout: float) -> None: ...
+
+    def nthreads(self) -> dict[str, int]:
+        return {"tcp://127.0.0.1:1": 1}
+
+    def run(self, function: Callable[..., Any], ticket: Any, on_error: str) -> dict[str, Any]:
+        try:
+            return {"tcp://127.0.0.1:1": function(ticket)}
+        except SweepError as error:
+            return {"tcp://127.0.0.1:1": error}
+
+    def submit(self, function: Callable[..., Any], ticket: Any, chunk: int, **_: Any) -> Future:
+        self.submitted.append(chunk)
+        if self.forgets(chunk):
+            return Future()
+        try:
+            function(ticket, chunk)
+        except Exception as error:
+            return Future(error)
+        return Future()
+
+    def cancel(self, futures: list[Future], force: bool) -> None: ...
+
+
+@pytest.fixture
+def filled(tmp_path: Path) -> Iterator[Any]:
+    """A folder of 10 chunks, none of which is made, and what the rows are."""
+    pytest.importorskip("distributed")
+    sweep = swept(tmp_path, 100)
+    folder = begun(sweep, tmp_path / "out", chunk=10)
+    folder.prepare()
+    yield folder, Work(sweep).rows(0, 100).digest()
+    cluster._work.cache_clear()
+
+
+def missing(folder: Any) -> Callable[[], list[int]]:
+    return lambda: folder.missing().tolist()
+
+
+def test_completeness_is_asked_of_the_folder(filled: Any) -> None:
+    """A scheduler that reports all done with chunks missing is asked for these again."""
+    folder, expected = filled
+    client = Client()
+    client.forgets = lambda chunk: chunk in (3, 7) and client.submitted.count(chunk) < 3
+    Cluster(client, folder).run(missing(folder), lambda: None)
+    assert sorted(client.submitted) == sorted([*range(10), 3, 3, 7, 7])
+    assert sw.read(folder.path).verify() == expected
+    assert sorted(path.name for path in folder.path.iterdir()) == ["rows", "sweep.json"]  # tokens are gone
+
+
+def test_a_chunk_that_always_ends_its_worker_is_named(filled: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, _ = filled
+    monkeypatch.setattr(cluster, "_ATTEMPTS", 4)
+    client = Client(lambda chunk: chunk == 5)
+    with pytest.raises(SweepError, match="chunk 5 ended its worker 4 times"):
+        Cluster(client, folder).run(missing(folder), lambda: None)
+    assert folder.missing().tolist() == [5]
+
+
+def test_an_error_of_a_task_is_raised(filled: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, _ = filled
+
+    def full(*_: Any) -> None:
+        raise SweepError("chunk 0 cannot be written (No space left on device)")
+
+    monkeypatch.setattr(cluster.Folder, "write", full)
+    with pytest.raises(SweepError, match="No space left"):
+        Cluster(Client(), folder).run(missing(folder), lambda: None)
+
+
+def test_workers_with_other_versions_are_refused_by_name(filled: Any) -> None:
+    folder, _ = filled
+    of = Cluster(Client(), folder)
+    other = tuple((name, "0.1" if name == "scipy" else version) for name, version in of._ticket.versions)
+    of._ticket = replace(of._ticket, versions=other)
+    with pytest.raises(SweepError, match=r"worker tcp://127.0.0.1:1: scipy is .* on .*, 0\.1 at the driver"):
+        of.run(missing(folder), lambda: None)
+    assert len(folder.missing()) == 10
+
+
+def test_workers_that_see_another_folder_are_refused(filled: Any, tmp_path: Path) -> None:
+    folder, _ = filled
+    other = tmp_path / "same path on another disk"
+    other.mkdir()
+    of = Cluster(Client(), folder)
+    of._ticket = replace(of._ticket, folder=str(other))
+    with pytest.raises(SweepError, match="is not the folder of the driver"):
+        of.run(missing(folder), lambda: None)
+
+    class Elsewhere(Client):  # reads the folder, as of a cache, and writes to another one
+        def run(self, function: Any, ticket: Any, on_error: str) -> dict[str, Any]:
+            return {"tcp://10.0.0.1:1": f"{ticket.token}.host.1"}
+
+    with pytest.raises(SweepError, match=r"worker tcp://10.0.0.1:1 writes to another folder"):
+        Cluster(Elsewhere(), folder).run(missing(folder), lambda: None)
+
+
+def test_few_tasks_wait_at_a_scheduler(filled: Any) -> None:
+    folder, _ = filled
+    waiting, most = list[Callable[[], object]](), [0]
+
+    class Slow(Client):
+        def submit(self, function: Any, ticket: Any, chunk: int, **_: Any) -> Future:
+            future = Future()
+            future.add_done_callback = lambda call: waiting.append(lambda: (function(ticket, chunk), call(future)))  # type: ignore[method-assign]
+            self.submitted.append(chunk)
+            most[0] = max(most[0], len(waiting) + 1)
+            return future
+
+    def look() -> None:
+        if waiting:
+            waiting.pop(0)()
+
+    Cluster(Slow(), folder).run(missing(folder), look)
+    assert 2 <= most[0] <= 4 and not len(folder.missing())
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("tcp://10.0.0.3:8786", r"not encrypted, and whoever reaches an open port .* runs code"),
+        ("ws://example.org:8786", "not encrypted"),
+        ("local:0", "'local:2' is 2 processes"),
+        ("local:2x0", "'local:2x4' has 4 threads"),
+        ("local:two", "'local:2' is 2 processes"),
+        ("slurm", "give 'local:2', the address of a scheduler"),
+        (3, "give 'local:2', the address of a scheduler"),
+    ],
+)
+def test_clusters_that_cannot_be_are_refused(given: Any, said: str) -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(SweepError, match=said), client_of(given):
+        raise AssertionError("connected")
+
+
+def test_addresses_of_this_machine_and_encrypted_ones_are_allowed() -> None:
+    for address in ("tcp://127.0.0.1:8786", "tcp://[::1]:8786", "tcp://localhost:8786", "tls://10.0.0.3:8786"):
+        cluster._check_address(address)
+
+
+@pytest.mark.parametrize("given", ["0/4", "5/4", "1/0", "1", "a/b", "1/4/2", 3, "-1/4"])
+def test_shares_that_cannot_be_are_refused(given: Any) -> None:
+    with pytest.raises(SweepError, match="share: give job and number of jobs"):
+        share(given)
+
+
+# --- threads
+
+
+def test_ctrl_c_drops_the_chunks_under_way_and_keeps_the_rest(tmp_path: Path) -> None:
+    sweep, calls = swept(tmp_path, 200), []
+
+    def interrupted(done: int, runs: int) -> None:
+        calls.append(done)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+
+    done = sw.run(sweep, tmp_path / "out", chunk=5, threads=2, on_progress=interrupted)
+    assert 0 < len(done.missing) <= 40 and f"{len(done.missing)} of 40 chunks are left to do" in repr(done)
+    assert not list((tmp_path / "out" / "rows").glob(".*"))
+    again = sw.run(sweep, tmp_path / "out")
+    assert again.verify() == Work(sweep).rows(0, 200).digest()
+
+
+def test_an_error_of_a_chunk_ends_the_others_and_is_raised() -> None:
+    made, ended = [], threading.Event()
+
+    def make(chunk: int, look: Callable[[float], object]) -> None:
+        if chunk == 2:
+            raise SweepError("chunk 2 cannot be written")
+        if chunk > 2:
+            try:
+                while True:
+                    look(0.0)
+            except Stopped:
+                ended.set()
+                raise
+        made.append(chunk)
+
+    with pytest.raises(SweepError, match="chunk 2"):
+        Threads(make, 2).run(range(100), lambda: None)
+    assert set(made) <= {0, 1}
+
+
+# --- workers of Dask in processes of their own
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore")
+def test_workers_in_processes_make_the_same_bits_and_one_that_is_killed_is_replaced(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    sweep = swept(tmp_path, 400)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=2, host="127.0.0.1", dashboard_address=None) as local,
+        distributed.Client(local, set_as_default=False) as client,
+    ):
+        pids, killed = list(client.run(os.getpid).values()), []
+
+        def progress(done: int, runs: int) -> None:
+            if not killed:
+                killed.append(pids[0])
+                os.kill(pids[0], signal.SIGKILL)
+
+        done = sw.run(sweep, tmp_path / "out", chunk=5, cluster=client, on_progress=progress)
+    assert killed and done.verify() == Work(sweep).rows(0, 400).digest()

@@ -1,0 +1,199 @@
+"""The folder: files whole or not there, whatever fails while they are written; damage and strangers are refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robot_dyn import sweeps as sw
+from robot_dyn.errors import SweepError
+from robot_dyn.sweeps.folder import files
+from robot_dyn.sweeps.folder.files import Files, remove_abandoned, write
+from robot_dyn.sweeps.folder.folder import MOST_FILES, Folder
+from robot_dyn.sweeps.plan.work import Work
+from robot_dyn.sweeps.run_sweep import begun
+from tests.sweeps.swept import swept
+
+CALLS = ("open", "write", "sync", "close", "rename", "sync_folder")
+
+
+class Failing(Files):
+    """Of the calls of a write, one fails; the write itself after half of its bytes."""
+
+    def __init__(self, call: str, error: BaseException) -> None:
+        self._call, self._error = call, error
+
+    def __getattribute__(self, name: str):
+        if name not in CALLS or name != object.__getattribute__(self, "_call"):
+            return object.__getattribute__(self, name)
+
+        def fail(*arguments):
+            if name == "write":
+                Files.write(self, arguments[0], arguments[1][: len(arguments[1]) // 2])
+            raise object.__getattribute__(self, "_error")
+
+        return fail
+
+
+@pytest.mark.parametrize("call", CALLS[:-1])
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_a_write_that_fails_leaves_no_file(tmp_path: Path, call: str, error: BaseException) -> None:
+    write(tmp_path / "there", b"old")
+    for name in ("there", "new"):
+        with pytest.raises(type(error)):
+            write(tmp_path / name, b"x" * 1000, Failing(call, error))
+    assert [path.name for path in tmp_path.iterdir()] == ["there"]
+    assert (tmp_path / "there").read_bytes() == b"old"
+
+
+def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path) -> None:
+    sweep = swept(tmp_path, 100)
+    folder = begun(sweep, tmp_path / "out", chunk=20)
+    folder.prepare()
+    work = Work(sweep)
+    folder.write(0, work.rows(0, 20))
+    full = replace(folder, files=Failing("write", OSError(28, "No space left on device")))
+    with pytest.raises(SweepError, match=r"chunk 3 \(runs 60 to 79\) cannot be written .* \(No space left on device\)"):
+        full.write(3, work.rows(60, 80))
+    assert folder.missing().tolist() == [1, 2, 3, 4]
+    done = sw.run(sweep, tmp_path / "out")
+    assert done.verify() == work.rows(0, 100).digest()
+
+
+def test_what_dead_writers_left_is_removed_and_what_others_write_is_not(tmp_path: Path) -> None:
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    host = files._HOST
+    names = {
+        f".000001.npz.{host}.{dead.pid}.0123abcd.unfinished": False,
+        f".000002.npz.{host}.{os.getpid()}.0123abcd.unfinished": True,
+        f".000003.npz.elsewhere.{dead.pid}.0123abcd.unfinished": True,
+        f".000004.npz.elsewhere.{dead.pid}.89abcdef.unfinished": False,  # a day old
+        "note.unfinished": True,  # not ours
+    }
+    for name in names:
+        (tmp_path / name).write_bytes(b"half")
+    old = time.time() - 90_000
+    os.utime(tmp_path / f".000004.npz.elsewhere.{dead.pid}.89abcdef.unfinished", (old, old))
+    assert remove_abandoned([tmp_path]) == 2
+    assert {path.name for path in tmp_path.iterdir()} == {name for name, stays in names.items() if stays}
+
+
+@pytest.mark.parametrize("storage", ["npz", "parquet"])
+@pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "other sweep", "other chunk"])
+def test_a_damaged_chunk_is_refused_by_name(tmp_path: Path, storage: str, damage: str) -> None:
+    if storage == "parquet":
+        pytest.importorskip("pyarrow")
+    sweep = swept(tmp_path, 60, storage=storage)
+    done = sw.run(sweep, tmp_path / "out", chunk=20)
+    file = done.folder.file(1)
+    data = file.read_bytes()
+    if damage == "other sweep":
+        other = sw.run(swept(tmp_path, 60, storage=storage, seed=4), tmp_path / "other", chunk=20)
+        data = other.folder.file(1).read_bytes()
+    elif damage == "other chunk":
+        data = done.folder.file(2).read_bytes()
+    elif damage == "flipped":
+        x = done.folder.read(1).figures["end"][5].tobytes()
+        at = data.find(x)
+        data = data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :] if at >= 0 else data[:-1]
+    else:
+        data = data[: len(data) // 2] if damage == "cut" else b""
+    file.write_bytes(data)
+    with pytest.raises(SweepError, match=f"000001.{storage}"):
+        done.verify()
+    if damage != "flipped":  # one bit of a number, which the digest of all rows alone tells
+        with pytest.raises(SweepError, match=f"000001.{storage}"):
+            done.quantiles("end")
+    file.unlink()
+    with pytest.raises(SweepError, match="1 of 3 chunks are left to do, the first is 1"):
+        done.table()
+    assert sw.run(sweep, tmp_path / "out").verify() == Work(sweep).rows(0, 60).digest()
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"seed": 4}, "seed is 3 there, 4 here"),
+        ({"runs": 101}, "runs is 100 there, 101 here"),
+        ({"vary": {"kp": sw.uniform(low=1.0, high=2.0)}}, "vary.viscous_friction.damping is"),
+        ({"figures": {}}, "figures.error is"),
+        ({"design": "latin", "runs": 96}, "runs is 100"),
+    ],
+)
+def test_another_sweep_in_the_folder_is_refused_with_the_first_difference(tmp_path: Path, change, named) -> None:
+    sw.run(swept(tmp_path, 100), tmp_path / "out", chunk=50)
+    with pytest.raises(SweepError, match=f"holds another sweep: {named}"):
+        sw.run(swept(tmp_path, **{"runs": 100} | change), tmp_path / "out")
+
+
+def test_a_scene_that_changed_is_refused_by_the_name_of_what_changed(tmp_path: Path) -> None:
+    sweep = swept(tmp_path, 50)
+    sw.run(sweep, tmp_path / "out", chunk=50)
+    path = tmp_path / "scene.toml"
+    path.write_text(path.read_text().replace("kp = 40.0", "kp = 41.0"))
+    with pytest.raises(SweepError, match=r"setup.settings.control.kp is 40.* there, 41.* here"):
+        sw.read(tmp_path / "out")
+
+
+def test_other_versions_are_refused_by_name(tmp_path: Path) -> None:
+    sweep = swept(tmp_path, 50)
+    sw.run(sweep, tmp_path / "out", chunk=50)
+    path = tmp_path / "out" / "sweep.json"
+    data = json.loads(path.read_text())
+    data["versions"]["numpy"] = "1.0"
+    path.write_text(json.dumps(data))
+    with pytest.raises(SweepError, match=r"versions.numpy is 1.0 there"):
+        sw.run(sweep, tmp_path / "out")
+
+
+def test_other_chunks_and_other_files_are_refused(tmp_path: Path) -> None:
+    sweep = swept(tmp_path, 50)
+    sw.run(sweep, tmp_path / "out", chunk=50)
+    with pytest.raises(SweepError, match="chunk is 50 there, 20 here"):
+        sw.run(sweep, tmp_path / "out", chunk=20)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thesis.tex").write_text("")
+    with pytest.raises(SweepError, match=r"holds other files, such as thesis\.tex"):
+        sw.run(sweep, tmp_path / "full")
+
+
+def test_chunks_beyond_20_000_go_to_subfolders(tmp_path: Path) -> None:
+    folder = begun(swept(tmp_path, 10), tmp_path / "out", chunk=5)
+    many = replace(folder, runs=5 * 2 * MOST_FILES + 1)
+    assert isinstance(many, Folder) and many.count == 2 * MOST_FILES + 1
+    names = [many.file(chunk) for chunk in range(many.count)]
+    assert len(set(names)) == many.count
+    folders = [path.parent for path in names]
+    assert max(folders.count(each) for each in set(folders)) == MOST_FILES
+    many.prepare()
+    for chunk in (0, MOST_FILES, many.count - 1):
+        many.file(chunk).write_bytes(b"")
+    assert np.flatnonzero(many.present()).tolist() == [0, MOST_FILES, many.count - 1]
+
+
+def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
+    """The specification of the first stays; the second takes its chunks."""
+    sweep = swept(tmp_path, 50)
+    assert begun(sweep, tmp_path / "out", chunk=20) == begun(sweep, tmp_path / "out")
+    text = (tmp_path / "out" / "sweep.json").read_text()
+    with pytest.raises(FileExistsError):
+        write(tmp_path / "out" / "sweep.json", b"{}", files.Exclusive())
+    assert (tmp_path / "out" / "sweep.json").read_text() == text
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["sweep.json"]
+
+
+def test_a_disk_without_room_is_said_before_the_start(tmp_path: Path) -> None:
+    sweep = swept(tmp_path, 10**14, design="random")
+    assert sweep.bytes_expected == 10**14 * (8 * 9 + 5)  # 5 numbers that vary, 3 figures, the end; outcome and reason
+    with pytest.raises(SweepError, match=r"the sweep will take 7\.17e\+06 GiB, and .* has"):
+        sw.run(sweep, tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,284 @@
+"""Questions to a sweep: failures are counted, unknown events are refused, and pages and tables hold the rows."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from robot_dyn import sweeps as sw
+from robot_dyn.errors import SweepError
+from robot_dyn.sweeps.plan.work import Work
+from tests.sweeps.swept import SCENE, VARY, scene, swept
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> sw.SweepResult:
+    folder = tmp_path_factory.mktemp("sweep")
+    return sw.run(swept(folder, 400), folder / "out", chunk=64)
+
+
+def test_runs_that_fail_are_rows_with_a_reason(done: sw.SweepResult) -> None:
+    table = done.table()
+    failed = table["outcome"] != "finished"
+    assert 0 < failed.sum() < 400 and (table["reason"][failed] != "").all()
+    raised = table["outcome"] == "raised"
+    assert (raised == (table["mass_scale"] <= 0)).all()
+    assert all("mass_scale must be positive" in text for text in table["reason"][raised])
+    assert np.isnan(table["error"][failed]).all() and np.isfinite(table["error"][~failed]).all()
+    assert sum(done.reasons().values()) == failed.sum()
+
+
+def test_quantiles_count_failures_as_infinite(done: sw.SweepResult) -> None:
+    x = done.table("error")["error"]
+    counted = np.sort(np.where(np.isnan(x), np.inf, x))
+    (median,) = done.quantiles("error", [0.5])
+    assert median.estimate == counted[199] and median.failed == np.isnan(x).sum() > 0
+    (last,) = done.quantiles("error", [0.999])
+    assert last.estimate == np.inf
+
+
+def test_a_probability_is_that_of_clopper_and_pearson(done: sw.SweepResult) -> None:
+    table = done.table("error", "outcome")
+    events = (table["outcome"] != "finished") | (table["error"] > 0.05)
+    expected = stats.binomtest(int(events.sum()), 400).proportion_ci(0.95)
+    found = done.probability("failed | error > 0.05")
+    assert found.estimate == events.mean()
+    assert (found.low, found.high) == pytest.approx((expected.low, expected.high), rel=1e-9)
+
+
+def test_an_event_that_is_unknown_in_failed_runs_is_refused(done: sw.SweepResult) -> None:
+    failed = int((done.table("outcome")["outcome"] != "finished").sum())
+    with pytest.raises(SweepError, match=rf"unknown in {failed} runs .* write 'failed \| error > 0.05'"):
+        done.probability("error > 0.05")
+    assert done.probability("error > 0.05", given="finished").n == 400 - failed
+    assert "given finished" in done.probability("error > 0.05", given="finished").statistic
+
+
+def test_means_and_sensitivities_of_failed_runs_are_refused(done: sw.SweepResult) -> None:
+    for question in (done.mean, done.sensitivity):
+        with pytest.raises(SweepError, match='given="finished"'):
+            question("error")
+    x = done.table("error")["error"]
+    assert done.mean("error", given="finished").estimate == pytest.approx(np.nanmean(x), rel=1e-12)
+
+
+def test_worst_runs_are_those_that_failed_then_the_largest(done: sw.SweepResult) -> None:
+    x = done.table("error")["error"]
+    failed = np.flatnonzero(np.isnan(x)).tolist()
+    worst = done.worst("error", len(failed) + 2)
+    assert list(worst[:-2]) == failed
+    assert worst[-2:] == done.worst("error", 2, given="finished")
+    assert x[list(worst[-2:])].tolist() == sorted(x[~np.isnan(x)])[::-1][:2]
+
+
+def test_a_run_that_raised_says_why(done: sw.SweepResult) -> None:
+    run = int((done.table("outcome")["outcome"] == "raised").argmax())
+    with pytest.raises(SweepError, match=f"run {run} raised: .*mass_scale must be positive"):
+        done.run(run)
+
+
+def test_scramblings_are_told_from_independent_runs(tmp_path: Path) -> None:
+    vary = {"q0": sw.normal(mean=[0.4, 0.9], sd=0.1)}
+    done = sw.run(swept(tmp_path, 512, vary=vary, design="sobol"), tmp_path / "out")
+    assert "16 scramblings" in done.mean("error").method
+    assert "16 scramblings" in done.probability("error > 0.05").method
+    saltelli = sw.run(swept(tmp_path, 512, vary=vary, design="saltelli"), tmp_path / "saltelli")
+    assert [each.statistic for each in saltelli.sensitivity("end").total] == [
+        "total index of q0[0]", "total index of q0[1]"
+    ]  # fmt: skip
+
+
+def test_a_table_of_ones_own_is_a_design(tmp_path: Path) -> None:
+    rows = np.array([[0.5, 0.25], [0.1, 0.9], [0.9, 0.1]])
+    vary = {"kp": sw.uniform(low=10.0, high=20.0), "kd": sw.uniform(low=1.0, high=2.0)}
+    done = sw.run(swept(tmp_path, 3, vary=vary, design=rows), tmp_path / "out", chunk=2)
+    assert done.table("kp")["kp"].tolist() == pytest.approx([15.0, 11.0, 19.0])
+    assert sw.read(tmp_path / "out").verify() == done.verify()  # the table is in the folder
+    with pytest.raises(SweepError, match="table_sha256"):
+        sw.run(swept(tmp_path, 3, vary=vary, design=rows + 0.01), tmp_path / "out")
+
+
+def test_a_csv_holds_the_table_to_the_bit(done: sw.SweepResult, tmp_path: Path) -> None:
+    with open(done.export(tmp_path / "rows.csv"), newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    table = done.table()
+    assert len(rows) == 400 and list(rows[0]) == [
+        "run",
+        *done.sweep.columns,
+        "error",
+        "peak",
+        "end",
+        *list(rows[0])[-3:],
+    ]
+    for name, x in table.items():
+        if x.dtype.kind == "f":
+            np.testing.assert_array_equal([float(row[name]) for row in rows], x)
+        else:
+            assert [row[name] for row in rows] == [str(each) for each in x]
+
+
+def test_the_report_has_each_figure_and_the_lines_that_repeat_runs(done: sw.SweepResult, tmp_path: Path) -> None:
+    text = done.save_report(tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in text and "default-src 'none'" in text
+    for name in done.sweep.figures:
+        assert f"<h2>{name}</h2>" in text
+    assert f".run({done.worst('error', 1, given='finished')[0]})" in text
+    assert text.count("<svg") == 1 + len(done.sweep.figures)
+
+
+# --- figures that users write
+
+MODULE = """
+import numpy as np
+
+def last(run):
+    return float(run.q[-1, 0])
+
+def together(runs):
+    return runs.q[np.arange(len(runs)), runs.known.sum(axis=1) - 1, 0] + OFFSET
+
+OFFSET = 0.0
+last.record = ("q",)
+last.batch = together
+
+def fails_sometimes(run):
+    if run.params["q0"][0] > 0.45:
+        raise ValueError("beyond the table")
+    return run.t[-1]
+
+def text(run):
+    return "long"
+"""
+
+
+@pytest.fixture
+def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    path = tmp_path / "figures_of_a_test.py"
+    path.write_text(MODULE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delitem(sys.modules, "figures_of_a_test", raising=False)
+    return path
+
+
+QUIET = {"q0": VARY["q0"]}
+
+
+def test_a_function_of_a_run_is_a_figure(tmp_path: Path, module: Path) -> None:
+    figures = {"mine": "figures_of_a_test:last", "end": sw.final("q", "joint_1")}
+    done = sw.run(swept(tmp_path, 70, vary=QUIET, figures=figures), tmp_path / "out", chunk=30)
+    table = done.table("mine", "end")
+    assert table["mine"].tolist() == table["end"].tolist()
+
+
+def test_a_batch_form_that_differs_is_refused(tmp_path: Path, module: Path) -> None:
+    module.write_text(MODULE.replace("OFFSET = 0.0", "OFFSET = 1e-15"))
+    with pytest.raises(SweepError, match=r"last\.batch: gives .* of run \d+ of the pilot"):
+        sw.run(swept(tmp_path, 70, vary=QUIET, figures={"mine": "figures_of_a_test:last"}), tmp_path / "out")
+
+
+def test_a_module_that_changed_is_refused(tmp_path: Path, module: Path) -> None:
+    sweep = swept(tmp_path, 70, vary=QUIET, figures={"mine": "figures_of_a_test:last"})
+    sw.run(sweep, tmp_path / "out")
+    module.write_text(MODULE + "\n# changed\n")
+    with pytest.raises(SweepError, match=r"figures\.mine\.sha256 is"):
+        sw.read(tmp_path / "out")
+
+
+def test_a_figure_that_raises_makes_its_run_one_that_raised(tmp_path: Path, module: Path) -> None:
+    figures = {"mine": "figures_of_a_test:fails_sometimes"}
+    done = sw.run(swept(tmp_path, 70, vary=QUIET, figures=figures), tmp_path / "out", chunk=30)
+    table = done.table()
+    raised = table["outcome"] == "raised"
+    assert (raised == (table["q0[0]"] > 0.45)).all() and raised.any()
+    assert all("figure mine: line" in text and "beyond the table" in text for text in table["reason"][raised])
+
+
+@pytest.mark.parametrize(
+    ("figures", "said"),
+    [
+        ({"mine": "figures_of_a_test:text"}, "all 64 runs of the pilot raise.*return a number"),
+        ({"mine": "figures_of_a_test:absent"}, "cannot be imported"),
+        ({"mine": "no_such_module_here:f"}, "cannot be imported"),
+        ({"mine": lambda run: 0.0}, "which other processes cannot import: write it to my_figures.py"),
+        ({"kp": sw.rms_error()}, None),
+        ({"diverged": sw.rms_error()}, "'diverged' is the name of another column"),
+        ({"q0[0]": sw.rms_error()}, "is the name of another column"),
+        ({"mine": sw.final("q")}, "of which joint"),
+        ({"mine": sw.peak("u", "elbow")}, "no joint 'elbow'; known: joint_1, joint_2"),
+    ],
+)
+def test_figures_that_cannot_be_are_refused(tmp_path: Path, module: Path, figures, said) -> None:
+    if said is None:
+        sw.run(swept(tmp_path, 70, vary=QUIET, figures=figures), tmp_path / "out")
+        return
+    with pytest.raises(SweepError, match=said):
+        sw.run(swept(tmp_path, 70, vary=QUIET, figures=figures), tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"vary": {"payload_mass:tool0": sw.uniform(low=0, high=3)}}, "the arm carries no payload"),
+        ({"vary": {"kq": sw.uniform(low=0, high=3)}}, "no 'kq'; nearest: kp, kd|no 'kq'; "),
+        ({"vary": {"q0": sw.uniform(low=0, high=3)}}, "q0 has 2 numbers, got a distribution of 1"),
+        ({"vary": {}}, "nothing varies"),
+        ({"vary": {"kp": 3.0}}, "vary: kp: a distribution must be"),
+        ({"design": "sobol"}, "nearest"),
+        ({"runs": 0}, "runs"),
+        ({"storage": "xlsx"}, "storage must be one of npz, parquet"),
+        ({"seed": -1}, "seed"),
+    ],
+)
+def test_sweeps_that_cannot_be_are_refused(tmp_path: Path, changes, said) -> None:
+    with pytest.raises(SweepError, match=said):
+        swept(tmp_path, **{"runs": 100} | changes)
+
+
+def test_a_setup_and_a_function_of_a_script_are_refused_with_the_remedy(tmp_path: Path) -> None:
+    setup = swept(tmp_path).setup
+    with pytest.raises(SweepError, match="give a scene file, or a function that returns the setup"):
+        sw.Sweep(setup, 10, QUIET)  # pyright: ignore[reportArgumentType]
+
+
+def test_runs_that_end_by_an_event_keep_their_figures_whatever_is_beside_them(tmp_path: Path) -> None:
+    """Samples of a run that ends early are padded to those of the longest beside it; sums do not depend on that."""
+    module = tmp_path / "setup_with_an_event.py"
+    module.write_text(
+        "import robot_dyn as rd\n"
+        "def reached(t, q, v):\n    return q[0] - 0.45\n"
+        "def setup():\n"
+        "    arm = rd.load('planar_2r')\n"
+        "    control = rd.control.PD(rd.control.hold([0.6, 0.9]), 40.0, 4.0)\n"
+        "    return rd.Setup(rd.Plant(arm), [0.4, 0.9], duration_s=0.1, controller=control, integrator='rk4',\n"
+        "                    events=rd.Event(reached, terminal=True), record_period_s=0.001)\n"
+    )
+    sys.path.insert(0, str(tmp_path))
+    try:
+        sweep = sw.Sweep("setup_with_an_event:setup", 24, {"q0": sw.normal(mean=[0.4, 0.9], sd=0.1)},
+                         {"error": sw.rms_error()}, storage="npz")  # fmt: skip
+        rows = Work(sweep).rows(0, 24)
+        assert len(set(rows.ended.tolist())) > 3
+        alone = [Work(sweep).rows(i, i + 1) for i in range(0, 24, 5)]
+    finally:
+        sys.path.remove(str(tmp_path))
+    assert [each.figures["error"][0] for each in alone] == rows.figures["error"][::5].tolist()
+
+
+def test_a_scene_states_a_sweep_as_data(tmp_path: Path) -> None:
+    table = '\n[sweep]\nruns = 70\nvary = {kp = "uniform(low=10, high=20)"}\nfigures = {worst = "peak(\'error\')"}\n'
+    path = scene(tmp_path, SCENE + table)
+    sweep = sw.from_scene(path, seed=3)
+    assert (sweep.runs, sweep.seed, sweep.figures) == (70, 3, {"worst": sw.peak("error")})
+    for text, said in (
+        ('"my_module:f"', "runs code, and a scene is data"),
+        ("\"peak(__import__('os'))\"", "is not a name with numbers"),
+        ("\"peek('u')\"", "no figure 'peek'; nearest: peak"),
+    ):
+        path.write_text(SCENE + table.replace("\"peak('error')\"", text))
+        with pytest.raises(SweepError, match=said):
+            sw.from_scene(path)

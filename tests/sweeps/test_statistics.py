@@ -1,0 +1,210 @@
+"""Statistics: intervals are those of SciPy's tests, hold known values as often as they say, and count failed runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from math import inf, isnan
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.special import ndtri
+from scipy.stats import binom, binomtest, quantile_test, ttest_1samp
+
+from robot_dyn.errors import SweepError
+from robot_dyn.sweeps import designs, statistics
+from robot_dyn.sweeps.estimate import Estimate
+from robot_dyn.sweeps.replicates import groups_of, jackknife
+
+N = 1600
+X = np.random.default_rng(5).gamma(2.0, size=N)
+SIXTEEN = np.arange(N) % 16
+
+
+def ends(made: Estimate) -> tuple[float, float]:
+    return made.low, made.high
+
+
+@pytest.mark.parametrize(("k", "n", "level"), [(0, 50, 0.95), (1, 50, 0.9), (13, 50, 0.99), (50, 50, 0.95)])
+def test_probabilities_of_independent_runs_have_the_interval_of_clopper_and_pearson(
+    k: int, n: int, level: float
+) -> None:
+    expected = binomtest(k, n).proportion_ci(level, method="exact")
+    made = statistics.probability(np.arange(n) < k, level)
+    assert made.estimate == k / n
+    assert ends(made) == pytest.approx((expected.low, expected.high), rel=1e-12)
+
+
+@pytest.mark.parametrize("level", [0.9, 0.95])
+def test_means_of_independent_runs_have_students_interval(level: float) -> None:
+    expected = ttest_1samp(X, 0).confidence_interval(level)
+    assert ends(statistics.mean(X, level)) == pytest.approx((expected.low, expected.high), rel=1e-12)
+
+
+def test_means_of_scramblings_have_students_interval_of_their_means() -> None:
+    expected = ttest_1samp(X.reshape(-1, 16).mean(axis=0), 0).confidence_interval(0.95)
+    assert ends(statistics.mean(X, replicate=SIXTEEN)) == pytest.approx((expected.low, expected.high), rel=1e-12)
+
+
+@pytest.mark.parametrize("p", [0.01, 0.5, 0.9, 0.99])
+@pytest.mark.parametrize("n", [60, 1000, 10**8])
+def test_ranks_hold_the_level_by_less_than_a_step_of_the_binomial_distribution(n: int, p: float) -> None:
+    low, high = statistics.ranks(n, p, 0.95)
+    if low > 0 and high <= n:
+        within = binom.cdf(high - 1, n, p) - binom.cdf(low - 1, n, p)
+        assert 0.95 <= within < 0.95 + max(binom.pmf(low, n, p), binom.pmf(high - 1, n, p))
+    else:  # every rank inside would lack the level of its side
+        assert min(p, 1 - p) * n < 4
+
+
+@pytest.mark.parametrize("p", [0.1, 0.5, 0.97])
+def test_quantiles_of_independent_runs_lie_within_the_interval_of_scipys_quantile_test(p: float) -> None:
+    """Which leaves 2.5 % on each side; one end is moved inward by at most one rank."""
+    (made,) = statistics.quantiles(X, p)
+    outer = quantile_test(X, q=1, p=p).confidence_interval(0.95)
+    assert outer.low <= made.low <= made.estimate <= made.high <= outer.high
+    between = abs(np.searchsorted(np.sort(X), [outer.low, outer.high]) - np.searchsorted(np.sort(X), ends(made))).sum()
+    assert between <= 2
+    assert np.mean(made.estimate >= X) == pytest.approx(p, abs=1 / N)
+
+
+@pytest.mark.parametrize("replicate", [None, SIXTEEN], ids=["independent", "scramblings"])
+def test_quantiles_follow_a_change_of_unit_and_of_sign_of_order(replicate: Any) -> None:
+    before = statistics.quantiles(X, [0.3, 0.9], replicate=replicate)
+    for one, other in zip(before, statistics.quantiles(2 * X + 1, [0.3, 0.9], replicate=replicate), strict=True):
+        assert (other.estimate, *ends(other)) == pytest.approx([2 * x + 1 for x in (one.estimate, *ends(one))])
+
+
+FUNCTIONS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], float, float]] = {  # with mean and quantile of 0.9
+    "sum of normals": (lambda u: ndtri(u).sum(axis=1) / 3**0.5, 0.0, float(ndtri(0.9))),
+    "largest": (lambda u: u.max(axis=1), 0.75, 0.9 ** (1 / 3)),
+}
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
+@pytest.mark.parametrize("name", ["random", "latin"])
+def test_intervals_hold_known_values_as_often_as_they_say(name: str, function: str) -> None:
+    """200 seeds: 95 % ± 4 σ is 89 … 100 %. scripts/benchmark.py sweeps has 4000 seeds and all designs."""
+    value, mean, quantile = FUNCTIONS[function]
+    held = []
+    for seed in range(200):
+        design = designs.design(name, 512, 3, seed)
+        y = value(np.clip(design.rows(0, 512), 2.0**-54, 1))
+        replicate = None if design.independent else design.replicate_of(np.arange(512))
+        made = statistics.mean(y, replicate=replicate), *statistics.quantiles(y, 0.9, replicate=replicate)
+        chance = statistics.probability(y > quantile, replicate=replicate)
+        held.append([a.low <= x <= a.high for a, x in zip((*made, chance), (mean, quantile, 0.1), strict=True)])
+    assert (np.mean(held, axis=0) > 0.95 - 4 * (0.95 * 0.05 / 200) ** 0.5).all()
+    assert np.mean(held) < 1
+
+
+def test_the_interval_of_scramblings_shows_that_they_are_better_than_independent_runs() -> None:
+    design = designs.design("sobol", 4096, 2, 1)
+    y = design.rows(0, 4096).sum(axis=1)
+    replicate = design.replicate_of(np.arange(4096))
+    one, other = statistics.mean(y, replicate=replicate), statistics.mean(y)
+    assert one.high - one.low < (other.high - other.low) / 10
+    one, other = statistics.probability(y > 1.5, replicate=replicate), statistics.probability(y > 1.5)
+    assert one.high - one.low < (other.high - other.low) / 2
+
+
+def test_sixteen_equal_counts_do_not_show_that_nothing_varies() -> None:
+    """The Clopper–Pearson bound of 0 in 16 is 0.206 of one event a scrambling."""
+    made = statistics.probability(np.arange(N) < 16 * 20, replicate=SIXTEEN)
+    bound = binomtest(0, 16).proportion_ci(0.95, method="exact").high / (N / 16)
+    assert made.estimate == 0.2 and made.high - 0.2 == pytest.approx(bound, rel=0.06) == 0.2 - made.low
+
+
+@pytest.mark.parametrize("replicate", [None, SIXTEEN], ids=["independent", "scramblings"])
+def test_no_event_has_a_bound_and_is_never_shown_as_0(replicate: Any) -> None:
+    made = statistics.probability(np.zeros(N, bool), replicate=replicate)
+    assert made.estimate == made.low == 0 < made.high < 4 / N
+    assert repr(made).startswith(f"probability: below {made.high:.4g} (95 % interval 0 … ")
+    assert "the interval is conservative" in repr(made)
+    every = statistics.probability(np.ones(N, bool), replicate=replicate)
+    assert every.estimate == every.high == 1 > every.low > 1 - 4 / N
+    assert repr(every).startswith("probability: above 0.99")
+
+
+@pytest.mark.parametrize(("k", "said"), [(4, True), (5, False), (N - 4, True), (N - 5, False)])
+def test_few_events_are_said_to_give_a_conservative_interval(k: int, said: bool) -> None:
+    assert ("conservative" in statistics.probability(np.arange(N) < k).note) == said
+
+
+@pytest.mark.parametrize("replicate", [None, SIXTEEN], ids=["independent", "scramblings"])
+def test_quantiles_count_failed_runs_as_infinite(replicate: Any) -> None:
+    failed = X.copy()
+    failed[:100] = np.nan
+    failed[100:120] = -inf
+    counted = np.where(np.isfinite(failed), failed, inf)
+    for made, same in zip(
+        statistics.quantiles(failed, [0.5, 0.99], replicate=replicate),
+        statistics.quantiles(counted, [0.5, 0.99], replicate=replicate),
+        strict=True,
+    ):
+        assert (made.estimate, *ends(made), made.failed) == (same.estimate, *ends(same), 120)
+        assert "1600 runs, 120 failed" in repr(made)
+    assert made.estimate == made.high == inf and "among the runs that failed" in made.note
+    assert made.to_json().count("null") >= 2
+
+
+def test_means_with_failed_runs_are_refused_unless_asked_for() -> None:
+    failed = np.concatenate([X, [np.nan, inf, -inf]])
+    with pytest.raises(SweepError, match=r'3 of 1603 runs failed and have no value: .*given="finished"'):
+        statistics.mean(failed)
+    made = statistics.mean(failed, given="finished")
+    assert (made.estimate, *ends(made)) == (lambda a: (a.estimate, *ends(a)))(statistics.mean(X))
+    assert made.failed == 3 and repr(made).startswith("mean given finished: ") and "1603 runs, 3 failed" in repr(made)
+    replicate = np.arange(1603) % 16
+    assert statistics.mean(failed, replicate=replicate, given="finished").estimate == pytest.approx(X.mean(), rel=0.01)
+
+
+def test_points_that_are_not_random_have_no_interval() -> None:
+    fixed = np.zeros(N, int)
+    made = [statistics.mean(X, replicate=fixed), *statistics.quantiles(X, 0.5, replicate=fixed)]
+    for each in (*made, statistics.probability(X > 1, replicate=fixed)):
+        assert isnan(each.low) and isnan(each.high) and not isnan(each.estimate)
+        assert "without an interval" in repr(each) and "not random" in each.method
+        assert json.loads(each.to_json())["low"] is None
+
+
+def test_runs_that_do_not_bound_a_quantile_say_how_many_would() -> None:
+    """1 − pᴺ ≥ 97.5 %: from N = 3688 on at p = 0.999."""
+    (made,) = statistics.quantiles(X, 0.999)
+    assert made.high == inf and "independent ones need 3688 at least" in made.note
+    (made,) = statistics.quantiles(np.arange(3688.0), 0.999)
+    assert made.high == 3687 and not made.note
+
+
+def test_a_mean_of_skewed_runs_warns_by_cochrans_rule() -> None:
+    assert "skewness" in statistics.mean(np.exp(3 * np.random.default_rng(1).normal(size=500))).note
+    assert not statistics.mean(X).note
+
+
+def test_the_jackknife_of_a_mean_is_students_interval() -> None:
+    groups = groups_of(SIXTEEN, N)
+    theta, low, high = jackknife(lambda mask: np.array(X[mask].mean()), groups, 0.95)
+    made = statistics.mean(X, replicate=SIXTEEN)
+    assert (float(theta), float(low), float(high)) == pytest.approx((made.estimate, *ends(made)), rel=1e-9)
+
+
+WRONG: dict[str, Callable[[], Any]] = {
+    "probabilities must be below 1, got 99": lambda: statistics.quantiles(X, 99),
+    "probabilities must be positive, got 0": lambda: statistics.quantiles(X, [0.0]),
+    "a figure must have shape": lambda: statistics.quantiles([], 0.5),
+    "a figure must be real numbers": lambda: statistics.mean(["a"]),
+    "level must be below 1, such as 0.95, got 95": lambda: statistics.mean(X, 95),
+    'given must be "finished" or None': lambda: statistics.mean(X, given="all"),
+    "a mean needs two runs that finished, got 1": lambda: statistics.mean([1.0, np.nan], given="finished"),
+    "events must be truth values, .* float64": lambda: statistics.probability(X),
+    "failed must be a whole number": lambda: statistics.probability(X > 1, failed=N + 1),
+    "replicate must be 1600 whole numbers": lambda: statistics.mean(X, replicate=[1, 2]),
+    "replicate must be the number": lambda: statistics.mean(X, replicate=["a"] * N),
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_what_has_no_statistic_is_refused(message: str) -> None:
+    with pytest.raises(SweepError, match=message):
+        WRONG[message]()

@@ -1,0 +1,69 @@
+"""One notation: each letter in use is on its page, the actuation is τ, and no name competes with ours."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "notation.md"
+LETTER = re.compile(r"[\u0370-\u03ff\u2110-\u2138\U0001d400-\U0001d7ff]")
+COMPETING = re.compile(r"\b(?:tau_cmd|u_cmd|tau_c|qdot|q_dot|qddot|q_ddot|ddq|qdd|Gamma|Upsilon)\b|Υ|\\tau|\\Upsilon")
+EQUATION = re.compile(r"C(?:\(q, v\))? v \+ N(?:\([^)]*\))? = ([^\W\d]\w*)")
+OF_OTHERS = {"docs/notation.md"}  # what books write
+TAU = ("τ", "Y", "Q", "ID", "Σ")  # Y θ of the regressor; Q of coordinates that are no joints; computed otherwise
+
+
+def texts() -> Iterator[tuple[str, str]]:
+    """What the project says: name and text of its code, pages, scripts and examples."""
+    places = [
+        *ROOT.glob("*.md"),
+        *(path for room in ("docs", "robot_dyn", "scripts", "examples") for path in (ROOT / room).rglob("*")),
+    ]
+    for path in places:
+        if path.suffix in (".py", ".pyi", ".md", ".toml", ".ipynb"):
+            yield path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")
+
+
+def listed() -> set[str]:
+    """Letters in the first column of the tables of the page."""
+    rows = re.findall(r"^\| ([^|]*) \|", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {letter for row in rows for letter in LETTER.findall(row)}
+
+
+def unlisted(text: str) -> set[str]:
+    """Letters of a text that are not on the page."""
+    return set(LETTER.findall(text)) - listed()
+
+
+def test_every_letter_is_on_the_page() -> None:
+    missing = {name: found for name, text in texts() if (found := unlisted(text)) and name not in OF_OTHERS}
+    assert {name: [unicodedata.name(x) for x in each] for name, each in missing.items()} == {}
+
+
+def test_no_name_competes() -> None:
+    found = {name: COMPETING.findall(text) for name, text in texts() if name not in OF_OTHERS}
+    assert {name: each for name, each in found.items() if each} == {}
+
+
+def test_the_equation_of_motion_ends_with_tau() -> None:
+    ends = [(name, end) for name, text in texts() for end in EQUATION.findall(text)]
+    assert len(ends) > 10
+    assert [each for each in ends if not each[1].startswith(TAU)] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "fails"), [("M a + C v + N = Υ", True), ("M a + C v + N = u", True), ("M a + C v + N = τ", False)]
+)
+def test_these_tests_can_fail(text: str, fails: bool) -> None:
+    ends = [end for end in EQUATION.findall(text) if not end.startswith(TAU)]
+    assert bool(unlisted(text) or COMPETING.search(text) or ends) is fails
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/architecture.md"])
+def test_the_page_is_linked(page: str) -> None:
+    assert "notation.md)" in (ROOT / page).read_text(encoding="utf-8")

@@ -1,0 +1,198 @@
+"""Results at a prompt and in a notebook: a summary, tables, one picture; on light and dark pages in a browser."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import nbformat
+import numpy as np
+import pytest
+from lxml import html
+from nbclient import NotebookClient
+from nbconvert import HTMLExporter
+
+import robot_dyn as rd
+from robot_dyn.answer import Answer, Table
+
+ARM = rd.load("planar_2r")
+Q = np.array([0.3, 0.4])
+MOST_TEXT, MOST_HTML = 8000, 250_000  # characters
+
+# What makes each result, as a cell of a notebook does.
+CELLS = {
+    "compare": "rd.compare(arm, samples=5)",
+    "check": "rd.check('kinova')",
+    "advise": "rd.advise(arm, q, duration_s=0.1, integrator='rk4', step_s=1e-3)",
+    "prove": "rd.studies.prove(rd.Setup(rd.Plant(arm), q, duration_s=0.2))",
+    "certify": "rd.studies.certify(arm, samples=100, repeats=1)",
+    "cost": "rd.studies.cost(arm, q, budget_s=0.5, repeats=2)",
+    "work_precision": "rd.studies.work_precision(rd.Setup(rd.Plant(arm), q, duration_s=0.1),"
+    " methods=['rk4', 'DOP853'], peers=False, budget_s=1.0, repeats=1)",
+    "stress": "rd.studies.stress(arm, samples=100, runs=0, budget_s=4.0)",
+    "budget": "rd.budget(rd.control.quintic(q, q + 1, 1.0), arm, effort=50.0, velocity=9.0)",
+    "linearise": "rd.linearise(arm, q)",
+    "task_dynamics": "rd.control.task_dynamics(arm, q, np.ones(2), 'tip', rows=(0, 2))",
+}
+ALWAYS_DRAWN = {"compare", "advise", "prove", "certify", "cost", "work_precision", "budget"}  # with a figure
+NAMES = [pytest.param(name, id=name) for name in CELLS]
+
+
+@cache
+def made(name: str) -> Any:
+    return eval(CELLS[name], {"rd": rd, "np": np, "arm": ARM, "q": Q})
+
+
+def texts(result: Answer) -> list[str]:
+    """All lines, and all cells that hold a word or a number, of a result."""
+    blocks = list(result.blocks())
+    cells = [cell for each in blocks if isinstance(each, Table) for row in each.cells for cell in row]
+    return [each for each in [*blocks, *cells] if isinstance(each, str) and each.strip()]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_repr_of_a_result_is_its_text_and_no_arrays(name: str) -> None:
+    text = repr(made(name))
+    assert "array(" not in text and len(text) < MOST_TEXT
+    assert all(each in text for each in texts(made(name)))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_html_of_a_result_says_its_text_and_needs_nothing_else(name: str) -> None:
+    page = made(name)._repr_html_()
+    assert len(page) < MOST_HTML
+    assert not re.search(r"<script|<\?xml|(href|src)=\"(?!#)|url\((?!#)|javascript:|@import", page)
+    tree = html.fragment_fromstring(page)
+    shown = " ".join(tree.text_content().split()).replace("−", "-")
+    if name not in ("check", "linearise", "task_dynamics"):  # of a checkup a column each; numbers in four digits
+        assert not [each for each in texts(made(name)) if " ".join(each.split()).replace("−", "-") not in shown]
+    assert len(list(tree.iter("tr"))) > 1 and bool(list(tree.iter("svg"))) == bool(made(name).drawing)
+    assert made(name).drawing or name not in ALWAYS_DRAWN
+
+
+@pytest.mark.parametrize("width", [10, 30, 60, 200])
+def test_a_table_in_a_narrow_terminal_is_split_and_no_cell_is_cut(width: int) -> None:
+    """Each column stands once, beside the first one; a part that is too wide has one column more alone."""
+    whole = next(each for each in rd.info(rd.load("panda")).blocks() if isinstance(each, Table))
+    parts = list(whole.within(width))
+    assert {part.heading[0] for part in parts} == {whole.heading[0]}
+    assert [name for part in parts for name in part.heading[1:]] == list(whole.heading[1:])
+    assert [[cell for part in parts for cell in part.cells[k][1:]] for k in range(8)] == [x[1:] for x in whole.cells]
+    assert all(len(part.heading) == 2 or max(map(len, part.lines)) <= width for part in parts)
+    assert (len(parts) == 1) is (max(map(len, whole.lines)) <= width)
+
+
+def test_a_checkup_has_a_row_for_each_finding() -> None:
+    rows = [
+        [cell.text_content() for cell in row.iter("td")]
+        for row in html.fragment_fromstring(made("check")._repr_html_()).iter("tr")
+    ]
+    assert rows[1:] == [
+        [x.severity.value, x.where, "" if x.line is None else str(x.line), x.what, x.remedy]
+        for x in made("check").findings
+    ]
+
+
+def test_marks_on_a_logarithmic_axis_stand_where_the_logarithm_says() -> None:
+    shares = {each.quantity: each.share for each in made("compare").agreements if each.share > 0}
+    tree = html.fragment_fromstring(made("compare")._repr_html_())
+    at = [float(mark.get("cx")) for mark in tree.iter("circle")]
+    assert np.corrcoef(at, np.log10(list(shares.values())))[0, 1] == pytest.approx(1.0, abs=1e-5)
+
+
+def test_a_linearisation_is_the_pair_of_its_matrices() -> None:
+    A, B = pair = made("linearise")
+    assert pair[0] is A and pair.B is B and (A.shape, B.shape) == ((4, 4), (4, 2))
+    shown = [[float(x) for x in row] for row in next(x for x in pair.blocks() if isinstance(x, Table)).rows]
+    known = [x for x in np.linalg.eigvals(A) if x.imag >= 0]
+    assert {complex(*row) for row in shown} == {complex(x) for x in known}
+
+
+RUN = "rd.simulate(arm, q, duration_s=0.1, integrator='rk4', step_s=1e-3)"
+PARTS: dict[str, Callable[[Any], Any]] = {
+    "run": lambda run: run,
+    "ledger": lambda run: run.ledger,
+    "error": lambda run: run.error,
+    "agreement": lambda _: made("compare").worst,
+    "finding": lambda _: made("check").findings[0],
+    "coriolis": lambda _: ARM.coriolis,
+    "observed": lambda _: rd.rollouts(ARM, [Q, Q], duration_s=0.1, integrator="rk4", step_s=1e-3).observed,
+    "event": lambda _: rd.Event(lambda t, q, v: q[0]),
+    "payload": lambda _: rd.Payload("tip", 1.0),
+    "robot": lambda _: ARM,
+    "plant": lambda _: rd.Plant(ARM),
+}
+
+
+@pytest.mark.parametrize("name", list(PARTS))
+def test_the_repr_of_what_is_around_results_is_short(name: str) -> None:
+    text = repr(PARTS[name](rd.simulate(ARM, Q, duration_s=0.1, integrator="rk4", step_s=1e-3)))
+    assert len(text) < 800 and "array(" not in text and "0x" not in text
+
+
+def test_results_are_shown_without_ipython_and_figures_without_pyplot() -> None:
+    program = (
+        "import sys, robot_dyn as rd; arm = rd.load('pendulum'); rd.compare(arm, samples=1)._repr_html_();"
+        f" q = [0.1]; rd.plot({RUN})._repr_png_(); rd.studies.cost(arm, q, budget_s=0.1, repeats=1)._repr_html_();"
+        " print([m for m in ('IPython', 'matplotlib.pyplot') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True)
+    assert done.stdout == "[]\n"
+
+
+SETUP = "import numpy as np, robot_dyn as rd\narm, q = rd.load('planar_2r'), np.array([0.3, 0.4])"
+
+
+def executed(*cells: str) -> Any:
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(each) for each in (SETUP, *cells)])
+    return NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
+
+
+@pytest.mark.parametrize("before", ["", "%matplotlib inline", "import matplotlib.pyplot as plt"])
+def test_a_figure_that_a_cell_returns_is_one_picture(before: str) -> None:
+    (output,) = executed(before, f"rd.plot({RUN}, 'joints')").cells[-1].outputs
+    assert output.output_type == "execute_result" and set(output.data) == {"image/png", "text/plain"}
+
+
+@pytest.mark.long
+def test_a_browser_shows_every_result_on_light_and_dark_pages(tmp_path: Any, browser: Any) -> None:
+    notebook = executed(*CELLS.values(), f"rd.plot({RUN}, 'joints')")
+    for cell in notebook.cells[1:]:  # beside what is said of compiling, on stderr
+        assert [each.output_type for each in cell.outputs if each.get("name") != "stderr"] == ["execute_result"]
+    for theme in ("light", "dark"):
+        page = browser.new_page(viewport={"width": 1200, "height": 900})
+        complaints: list[str] = []
+        page.on("pageerror", lambda error, to=complaints: to.append(str(error)))
+        (tmp_path / f"{theme}.html").write_text(HTMLExporter(theme=theme).from_notebook_node(notebook)[0], "utf-8")
+        page.goto((tmp_path / f"{theme}.html").as_uri(), wait_until="domcontentloaded")
+        blocks = page.locator(".robot-dyn")
+        assert blocks.count() == len(CELLS) and not complaints
+        for k, name in enumerate(CELLS):
+            blocks.nth(k).screenshot(path=tmp_path / f"{name}_{theme}.png")
+            ink, paper, wrong = blocks.nth(k).evaluate(_LOOK)
+            assert abs(luminance(ink) - luminance(paper)) > 0.4 and not wrong, (name, theme, wrong)
+        assert page.locator("img").count() == 1
+
+
+_LOOK = """block => {
+  let paper = block;
+  const clear = each => /, 0\\)|transparent/.test(getComputedStyle(each).backgroundColor);
+  while (clear(paper) && paper.parentElement) paper = paper.parentElement;
+  const names = (select, wrong) => [...block.querySelectorAll(select)].filter(wrong).map(each => each.textContent);
+  const right = each => each.getBoundingClientRect().right;
+  const inks = [getComputedStyle(block.querySelector('td')).color, getComputedStyle(paper).backgroundColor];
+  return [...inks, [
+    ...names('td:not(.n)', each => getComputedStyle(each).textAlign != 'left'),
+    ...names('svg text', each => right(each) > right(each.closest('svg')) + 1),
+    ...names('svg', each => each.getBoundingClientRect().width < 300),
+  ]];
+}"""
+
+
+def luminance(colour: str) -> float:
+    red, green, blue = (float(x) / 255 for x in re.findall(r"[\d.]+", colour)[:3])
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

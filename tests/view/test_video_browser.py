@@ -1,0 +1,135 @@
+"""The browser that draws videos: it listens nowhere, ends with the program however that ends, and leaves no file."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.errors import VideoError
+from robot_dyn.view.video import browser as driven
+from robot_dyn.view.video import installed
+from tests.browser import chromium
+from tests.command import AT_WORK, interrupted_at_work, started
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="processes are read from /proc")
+
+# Says that it is at work when two frames are drawn, and draws no more until it is ended.
+WATCHED = """
+import time
+from robot_dyn.view.video import video
+whole = video.frames
+def frames(tab, times):
+    for k, picture in enumerate(whole(tab, times)):
+        if k == 2:
+            tell()
+            time.sleep(60)
+        yield picture
+video.frames = frames
+"""
+
+
+@pytest.fixture
+def run_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A run; temporary files have a folder of their own, of a short name: browsers put a socket there."""
+    monkeypatch.setenv("PATH", f"{Path(chromium()).parent}:/bin:/usr/bin")
+    arm = rd.load("planar_2r")
+    file = rd.save_run(rd.simulate(arm, [0.4, -0.7], duration_s=1.0, estimate_error=False), tmp_path / "run.npz")
+    with TemporaryDirectory(prefix="t") as folder:
+        monkeypatch.setenv("TMPDIR", folder)
+        yield file
+
+
+def of_browser(folder: Path) -> list[int]:
+    """Processes that have the folder in their command line, as browsers have their profile."""
+    found = []
+    for each in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if f"user-data-dir={folder}".encode() in (each / "cmdline").read_bytes():
+                found.append(int(each.name))
+    return found
+
+
+def listening() -> Iterator[str]:
+    """Sockets of this machine that listen for TCP, as the links of their descriptors name them."""
+    for table in ("tcp", "tcp6"):
+        for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+            if line.split()[3] == "0A":
+                yield f"socket:[{line.split()[9]}]"
+
+
+def sockets(process: int) -> Iterator[str]:
+    for each in Path(f"/proc/{process}/fd").iterdir():
+        with suppress(OSError):
+            yield os.readlink(each)
+
+
+def gone(folder: Path) -> bool:
+    end = time.monotonic() + 20
+    while of_browser(folder) and time.monotonic() < end:
+        time.sleep(0.05)
+    return not of_browser(folder)
+
+
+def test_ctrl_c_leaves_no_file_and_no_browser(run_file: Path) -> None:
+    temporary, video = Path(os.environ["TMPDIR"]), run_file.with_name("run.gif")
+    interrupted_at_work("replay", run_file, "--video", video, "--size", "320x240", watched=WATCHED)
+    assert not of_browser(temporary)
+    assert not list(temporary.iterdir())
+    assert list(run_file.parent.iterdir()) == [run_file]
+
+
+def test_the_browser_listens_nowhere_and_ends_with_a_program_that_is_killed(run_file: Path) -> None:
+    temporary = Path(os.environ["TMPDIR"])
+    args = ("replay", run_file, "--video", run_file.with_name("run.gif"), "--size", "320x240")
+    with started(*args, code=AT_WORK.format(WATCHED)) as process:
+        assert process.stderr is not None and process.stderr.readline() == "at work\n"
+        browsers = of_browser(temporary)
+        assert browsers
+        assert not {each for number in browsers for each in sockets(number)} & set(listening())
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        assert gone(temporary)
+
+
+def test_without_a_browser_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(installed, "_APPLICATIONS", ())
+    with pytest.raises(VideoError, match=r"Chrome, Chromium or Edge, and none is installed: .* install .*chrom"):
+        installed.installed()
+
+
+@pytest.mark.parametrize(
+    ("script", "patience", "message"),
+    [
+        ("echo no display >&2; exit 1", 20.0, "the browser has ended; it said: no display"),
+        ("sleep 60", 0.5, "the browser has not answered for 0.5 s"),
+        (r"""printf '{"id": 1, "error": {"message": "too old"}}\0' >&4; sleep 60""", 20.0, "refuses Target.*: too old"),
+    ],
+)
+def test_a_program_that_is_no_browser_is_named_and_ended(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, script: str, patience: float, message: str
+) -> None:
+    program = tmp_path / "chrome"
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o700)
+    monkeypatch.setattr(driven, "_PATIENCE_S", patience)
+    monkeypatch.setattr(driven, "_END_S", 0.2)
+    with pytest.raises(VideoError, match=f"{program}: .*{message}"), driven.browser(program):
+        pass
+    with suppress(FileNotFoundError):
+        assert not [each for each in Path("/proc").glob("[0-9]*") if str(program).encode() in _command(each)]
+
+
+def _command(process: Path) -> bytes:
+    try:
+        return (process / "cmdline").read_bytes()
+    except OSError:
+        return b""
