@@ -195,8 +195,9 @@ def cluster(given: argparse.Namespace) -> None:
             rollouts.append(sum(client.gather(futures)))
             ratio = (sum(whole) - sum(few)) / sum(rollouts) - 1
             once = sum(few) / len(few) - 4 * sum(rollouts) / len(rollouts) / more
-            print(f"{given.arm}: {more * len(whole)} chunks of {chunk}; sweep {sum(whole) - sum(few):.2f} s of CPU,",
-                  f"rd.rollouts {sum(rollouts):.2f} s: {100 * ratio:+.2f} %; once {once:.2f} s", flush=True)  # fmt: skip
+            print(f"{given.arm}: {more * len(whole)} chunks of {chunk}; sweep {sum(whole) - sum(few):.2f} s,",
+                  f"rd.rollouts {sum(rollouts):.2f} s of CPU: {100 * ratio:+.2f} %; once {once:.2f} s",
+                  flush=True)  # fmt: skip
 
 
 def plan(given: argparse.Namespace) -> None:
