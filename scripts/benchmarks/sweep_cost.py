@@ -14,7 +14,6 @@ CPU times are of the process; overhead is summed over chunks that alternate with
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import subprocess
 import sys
@@ -22,6 +21,7 @@ import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -31,6 +31,7 @@ from benchmarks.planar_scene import planar_scene
 from robot_dyn import sweeps as sw
 from robot_dyn.scene.starters import starter
 from robot_dyn.sweeps.engines.cluster import client_of
+from robot_dyn.sweeps.folder.folder import Folder
 from robot_dyn.sweeps.plan.work import Work
 from robot_dyn.sweeps.run_sweep import begun, opened
 
@@ -231,16 +232,45 @@ def resume(given: argparse.Namespace) -> None:
         )
 
 
+def without_work() -> None:
+    """In a worker: chunks are empty files."""
+
+    def written(self: Folder, chunk: int, *_: Any) -> None:
+        self.file(chunk).touch()
+
+    Work.made, Folder.write = (lambda *_: ()), written  # type: ignore[method-assign]
+
+
 def scheduler(given: argparse.Namespace) -> None:
-    """RSS of a scheduler and driver, one process, after many chunks of nearly no work."""
-    with tempfile.TemporaryDirectory() as folder, client_of("local:2x1") as client:
-        sweep = planar(folder, given.chunks)
-        before, began = rss(), time.perf_counter()
-        done = sw.run(sweep, f"{folder}/out", cluster=client, chunk=1)
-        print(json.dumps({
-            "chunks": done.folder.count, "missing": len(done.missing), "rss_before": before, "rss_after": rss(),
-            "peak": peak_rss(), "wall_s": time.perf_counter() - began,
-        }))  # fmt: skip
+    """RSS of a scheduler and of the driver, a process each, after many empty chunks."""
+    import distributed
+
+    def python(*command: str) -> subprocess.Popen[bytes]:
+        return subprocess.Popen([sys.executable, "-m", *command], stderr=subprocess.DEVNULL)
+
+    with tempfile.TemporaryDirectory() as folder:
+        known = f"{folder}/scheduler.json"
+        first = python("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
+                       "--scheduler-file", known)  # fmt: skip
+        workers = python("distributed.cli.dask_worker", "--nworkers", "2", "--nthreads", "1", "--no-dashboard",
+                         "--host", "127.0.0.1", "--scheduler-file", known)  # fmt: skip
+        try:
+            while not Path(known).exists():
+                time.sleep(0.1)
+            with distributed.Client(scheduler_file=known, set_as_default=False) as client:
+                client.wait_for_workers(2, 60)
+                client.run(without_work)
+                its, began = psutil.Process(first.pid), time.perf_counter()
+
+                def tell(done: int, runs: int) -> None:
+                    sizes = f"scheduler {its.memory_info().rss / MIB:.0f} MiB, driver {rss():.0f} MiB"
+                    print(f"{done} of {runs} chunks, {time.perf_counter() - began:.0f} s: {sizes}", flush=True)
+
+                sw.run(planar(folder, given.chunks), f"{folder}/out", cluster=client, chunk=1, on_progress=tell)
+        finally:
+            for each in (workers, first):
+                each.terminate()
+                each.wait()
 
 
 if __name__ == "__main__":
