@@ -48,7 +48,7 @@ def at(p: float) -> float:
 
 def held(scene: Path, design: str, runs: int, seed: int) -> list[bool]:
     """Whether each interval holds the closed form: the mean, quantiles, probabilities."""
-    vary: dict[str, sw.Distribution] = {
+    vary: dict[str, Any] = {
         "q0": sw.uniform(low=[LOW], high=[HIGH]),
         "mass_scale": sw.uniform(low=0.5, high=2.0),
     }
