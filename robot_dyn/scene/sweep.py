@@ -31,6 +31,8 @@ class SweepTable(Part):
     """One of "random", "sobol", "halton", "latin", "saltelli", "grid"."""
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
     """Of the design."""
+    samples: str | None = None
+    """Samples that are kept: `q`, `v` or `u` of all runs, or `samples('q', 'v', every=10, failed=True)`."""
 
 
 def sweep_table(path: str | Path) -> dict[str, Any] | None:

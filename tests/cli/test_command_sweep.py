@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+from robot_dyn import sweeps as sw
 from tests import command
 from tests.sweeps.swept import SCENE, scene
 
@@ -17,10 +18,11 @@ def test_a_scene_is_swept_into_a_folder_and_asked(tmp_path: Path) -> None:
     )
     said = command.run(
         "sweep", str(path), "-o", str(out), "--figure", "worst=peak('error')", "--runs", "96", "--design", "latin",
-        "--probability", "worst > 0.001",
+        "--probability", "worst > 0.001", "--samples", "samples('q', 'u', every=48)",
     )  # fmt: skip
     assert said.returncode == 0, said.stderr
     assert "96 finished, 0 diverged, 0 raised" in said.stdout and "probability of worst > 0.001" in said.stdout
+    assert sw.read(out).sweep.samples == sw.samples("q", "u", every=48)
     again = command.run("sweep", "run", str(out), "--json", "--probability", "failed")
     found = json.loads(again.stdout)
     promised = (
@@ -52,6 +54,7 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
         ("sweep", str(path), "-o", str(tmp_path / "o")): "how many runs",
         ("sweep", str(path), "-o", str(tmp_path / "o"), "--runs", "9", "--vary", "kp"): "--vary must be NAME=VALUE",
         ("sweep", str(path), "-o", str(tmp_path / "o"), "--runs", "9", "--vary", "kp=3"): "is not a name with numbers",
+        ("sweep", str(path), "-o", str(tmp_path / "o"), "--runs", "9", "--samples", "x"): "no samples 'x'",
         ("sweep", "stat", str(tmp_path)): "nearest: status",
         ("sweep", "status", str(tmp_path / "nothing")): "there is no such file",
     }.items():

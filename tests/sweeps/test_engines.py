@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -173,6 +175,21 @@ def test_clusters_that_cannot_be_are_refused(given: Any, said: str) -> None:
     pytest.importorskip("distributed")
     with pytest.raises(SweepError, match=said), client_of(given):
         raise AssertionError("connected")
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_local_cluster_listens_on_this_machine_alone_whatever_ports_are_taken() -> None:
+    """A scheduler in whose usual place for pages another program listens."""
+    psutil = pytest.importorskip("psutil")
+    pytest.importorskip("distributed")
+    with socket.socket() as other:
+        with suppress(OSError):
+            other.bind(("127.0.0.1", 8787))
+            other.listen()
+        with client_of("local:1x1"):
+            processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
+            ports = [port for each in processes for port in each.net_connections() if port.status == "LISTEN"]
+    assert len(ports) > 2 and {port.laddr.ip for port in ports} == {"127.0.0.1"}
 
 
 def test_addresses_of_this_machine_and_encrypted_ones_are_allowed() -> None:

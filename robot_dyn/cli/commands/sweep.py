@@ -38,6 +38,10 @@ def sweep(
         list[str] | None,
         typer.Option(metavar="NAME=FIGURE", help="What is kept of each run, as 'peak=peak(\"u\")'; repeated."),
     ] = None,
+    samples: Annotated[
+        str | None,
+        typer.Option(metavar="SAMPLES", help="Samples to keep: q, v or u of all runs, or 'samples(\"q\", every=10)'."),
+    ] = None,
     design: Annotated[str | None, typer.Option(help="random, sobol, halton, latin, saltelli or grid.")] = None,
     seed: Annotated[int | None, typer.Option(help="Of the design.")] = None,
     threads: Annotated[int | None, typer.Option(help="Of this process; all processors unless given.")] = None,
@@ -63,7 +67,8 @@ def sweep(
     if what.lower().endswith(".toml"):
         if folder is not None or output is None:
             raise SweepError("give the folder to fill with -o FOLDER")
-        stated = _stated(what, {"runs": runs, "design": design, "seed": seed}, vary or [], figure or [])
+        given = {"runs": runs, "design": design, "seed": seed, "samples": samples}
+        stated = _stated(what, given, vary or [], figure or [])
         result = _run(stated, output, options | {"chunk": chunk})
     else:
         if what not in ACTIONS:
@@ -95,11 +100,13 @@ def sweep(
 def _stated(scene: str, given: dict[str, Any], vary: list[str], figure: list[str]) -> Sweep:
     """The sweep of a scene and of options, which take the place of what its table states."""
     from robot_dyn import sweeps as sw
-    from robot_dyn.sweeps.plan.texts import assignment, distribution_of, figure_of
+    from robot_dyn.sweeps.plan.texts import assignment, distribution_of, figure_of, samples_of_text
 
     varies = [assignment("--vary", each) for each in vary]
     figures = [assignment("--figure", each) for each in figure]
     changes = {name: value for name, value in given.items() if value is not None}
+    if "samples" in changes:
+        changes["samples"] = samples_of_text(changes["samples"])
     return sw.from_scene(
         scene,
         vary={name: distribution_of(text) for name, text in varies},

@@ -76,7 +76,7 @@ def client_of(cluster: Any) -> Iterator[Any]:
         with (
             needs("dask.config", extra="cluster").set(_LOCAL),
             distributed.LocalCluster(
-                n_workers=processes, threads_per_worker=threads, host="127.0.0.1", dashboard_address=None,
+                n_workers=processes, threads_per_worker=threads, host="127.0.0.1", dashboard_address="127.0.0.1:0",
                 protocol="tcp://", memory_limit=0, processes=True, silence_logs=50,
             ) as local,
             distributed.Client(local, set_as_default=False) as client,

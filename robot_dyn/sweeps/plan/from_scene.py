@@ -8,7 +8,7 @@ from typing import Any
 from robot_dyn.errors import SweepError
 from robot_dyn.sweeps.imported import imported
 from robot_dyn.sweeps.plan.sweep import Sweep
-from robot_dyn.sweeps.plan.texts import distribution_of, figure_of
+from robot_dyn.sweeps.plan.texts import distribution_of, figure_of, samples_of_text
 
 _READER = "robot_dyn.scene.sweep:sweep_table"  # a room above, named as users' functions are
 
@@ -30,6 +30,8 @@ def from_scene(path: str | Path, **changes: Any) -> Sweep:
     stated = {"vary": vary, "figures": figures} | table
     for name in ("vary", "figures"):
         changes[name] = {**stated.pop(name), **changes.get(name, {})}
+    if "samples" in stated:
+        stated["samples"] = samples_of_text(stated["samples"])
     stated |= changes
     if "runs" not in stated:
         raise SweepError(f"{path}: how many runs? give runs=, or a table [sweep] with them")

@@ -1,4 +1,4 @@
-"""Distributions and figures as texts, "uniform(low=0, high=3)" and "peak('u')": of scenes and the command line.
+"""Distributions, figures and samples as texts, such as "uniform(low=0, high=3)": of scenes and the command line.
 
 A text is a name with literal arguments. It is parsed, never evaluated.
 """
@@ -15,6 +15,7 @@ from robot_dyn.sweeps import distributions
 from robot_dyn.sweeps.distributions import Distribution
 from robot_dyn.sweeps.plan import figures
 from robot_dyn.sweeps.plan.figures import Figure, figure
+from robot_dyn.sweeps.plan.samples import RECORDED, Samples, samples
 
 _MOST = 10_000  # characters
 _DISTRIBUTIONS: Mapping[str, Callable[..., Distribution]] = {
@@ -43,6 +44,11 @@ def figure_of(name: str, text: str, imports: bool) -> Figure:
             )
         return figure(name, text)
     return _called("figure", text, _FIGURES)
+
+
+def samples_of_text(text: str) -> Samples:
+    """The samples of a text, "q" or "samples('q', every=10)"; SweepError if it is neither."""
+    return samples(text) if text in RECORDED else _called("samples", text, {"samples": samples})
 
 
 def assignment(option: str, text: str) -> tuple[str, str]:
@@ -83,4 +89,8 @@ def _parsed(what: str, text: Any) -> tuple[str, list[Any], dict[str, Any]]:
         raise wrong from None
 
 
-_EXAMPLES = {"distribution": "uniform(low=0, high=3)", "figure": "rms_error() or peak('u')"}
+_EXAMPLES = {
+    "distribution": "uniform(low=0, high=3)",
+    "figure": "rms_error() or peak('u')",
+    "samples": "samples('q', every=10)",
+}
