@@ -21,6 +21,7 @@ from robot_dyn.integrate.tableau import ButcherTableau
 from robot_dyn.queries.units import format_duration
 from robot_dyn.result import json_text
 from robot_dyn.studies.time_budget import Budget, Limit
+from robot_dyn.studies.work_precision_diagram.diagram import nearest_the_front
 from robot_dyn.studies.work_precision_diagram.measurement import Rung, Walk, measure
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, own, recorded, whole
 from robot_dyn.studies.work_precision_diagram.past_horizon import past_horizon
@@ -117,7 +118,7 @@ def test_beyond_the_horizon_energy_and_the_way_back_judge() -> None:
     setup = replace(rubbed, plant=rd.Plant(rubbed.plant.dynamics))
     made = [
         ToleranceLadder(
-            name, "interpreted", True, order, "step", (Point(step, 1, 1, 1e-3, 0.0, 1e-6, 1, True),), "", 0.0
+            name, "interpreted", True, order, "step", (Point(step, 1, 1, 1e-3, 0.0, 1e-6, 1, True, True),), "", 0.0
         )
         for name, order, step in (("rk4", 4, 0.02), ("order_8", 8, 0.02))
     ]
@@ -144,7 +145,7 @@ def test_a_motion_without_reference_is_refused() -> None:
 def points(*errors: float, believed: bool = True, each_s: float = 1e-3) -> tuple[Point, ...]:
     """Runs that take 1, 2, 4, … times as many steps and as long."""
     return tuple(
-        Point(0.1 / 2**k, 10 * 2**k, 40 * 2**k, e, e, each_s * 2**k, 3, believed) for k, e in enumerate(errors)
+        Point(0.1 / 2**k, 10 * 2**k, 40 * 2**k, e, e, each_s * 2**k, 3, believed, True) for k, e in enumerate(errors)
     )
 
 
@@ -159,11 +160,37 @@ def of(
     return ToleranceLadder(name, engine, True, order, "step", runs, "", floor)
 
 
+@pytest.mark.parametrize(
+    ("times", "repeatable"),
+    [
+        ([1.0, 1.04, 9.0, 9.0, 9.0], True),
+        ([9.0, 9.0, 1.0, 9.0, 1.04], True),
+        ([1.0, 1.06, 1.2, 1.3, 1.4], False),
+        ([1.0, 1.0, 1.0, 1.0], False),
+        ([1.0], False),
+    ],
+)
+def test_a_time_is_repeatable_if_the_two_least_of_five_turns_agree_to_five_percent(
+    smooth: tuple[rd.Setup, Reference], times: list[float], repeatable: bool
+) -> None:
+    setup, exact = smooth
+    method = own(setup, rd.integrate.method("rk4"), "interpreted", True)
+    (point,) = Walk(method, [Rung(0.1, method.run(0.1, UNTIL_DONE), 1e-6, times)]).ladder(exact.error).points
+    assert (point.time_s, point.repeats, point.repeatable) == (min(times), len(times), repeatable)
+
+
+def test_at_most_eight_methods_are_drawn_and_these_are_nearest_to_the_front() -> None:
+    """Of twelve whose times are 1, 2, 3, … times those of the front, in any order."""
+    ladders = [of(f"m{k}", points(1e-4, 1e-8, each_s=1e-3 * (k + 1))) for k in (7, 3, 11, 0, 5, 1, 9, 2, 10, 4, 6, 8)]
+    names = [each.method for each in nearest_the_front(invented(*ladders), ladders)]
+    assert names == ["m7", "m3", "m0", "m5", "m1", "m2", "m4", "m6"]
+
+
 def test_no_run_beats_one_of_the_front_and_each_other_is_beaten() -> None:
     rng = np.random.default_rng(5)
     runs = [
         tuple(
-            Point(1.0, 9, 9, float(e), 0.0, float(t), 1, bool(e > 1e-9))
+            Point(1.0, 9, 9, float(e), 0.0, float(t), 1, bool(e > 1e-9), True)
             for e, t in 10.0 ** rng.uniform(-12, 0, (30, 2))
         )
         for _ in range(3)
@@ -320,7 +347,7 @@ def test_each_program_is_named_with_its_cheapest_method_or_with_what_ended_it() 
     more = ladder("Third RK", 2.0, 1.0), ladder("Fourth RK", 1e-8)
     assert list(programs(invented(*other, *own, *more), 1e-8)) == [
         "  robot_dyn DOP853: 2 ms", "  Fourth RK: 1 ms, 0.5 times as long", "  Other RK4: 200 ms, 100 times as long",
-        "  Third: reached by no run (late)", "  times of the loop alone, medians of runs that take turns",
+        "  Third: reached by no run (late)", "  times of the loop alone, the least of runs that take turns",
     ]  # fmt: skip
     lost = list(programs(invented(ladder("DOP853", 2.0, 1.0, engine="compiled"), *other), 1e-8))
     assert lost[:2] == ["  robot_dyn: reached by no run (late)", "  Other RK4: 200 ms"]

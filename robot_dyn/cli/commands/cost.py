@@ -31,7 +31,7 @@ def accuracy(
     output: Plot = None,
     csv: Csv = None,
     budget: Budget = 30.0,
-    repeats: Repeats = 9,
+    repeats: Repeats = 25,
     method: Annotated[
         list[str] | None, typer.Option(metavar="METHOD", help="Only this method; may be repeated; all by default.")
     ] = None,

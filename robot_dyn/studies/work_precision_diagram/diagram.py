@@ -24,6 +24,7 @@ _PEERS = {
     "Drake runge_kutta3": "P", "heyoka, Taylor": "*",
 }  # fmt: skip
 _MOST_ERROR = 3.0  # [rad] or [m]; larger errors are meaningless and not drawn
+_MOST_METHODS = 8  # in one panel
 _WIDTH, _HEIGHT = 13.0, 8.0  # [inch]
 
 
@@ -41,9 +42,11 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     )
     first = [each for each in result.ladders if each.events and (each.peer or each.engine != INTERPRETED)]
     first = first if any(not each.peer for each in first) else list(result.ladders)
+    first = nearest_the_front(result, first)
     own = [each for each in first if not each.peer]
     slow = [each for each in result.ladders if each.engine == INTERPRETED and each not in first]
-    without = [each for each in result.ladders if not each.events]
+    names = {each.method for each in first}
+    without = [each for each in result.ladders if not each.events and each.method in names]
     main = figure.add_subplot(grid[:, 0])
     _axes(main, result, colours, "time of the loop [ms]", "Error over time: lower left is better")
     _front(main, result, colours)
@@ -70,6 +73,18 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
         axes.set_ylim(result.reference.error / 10, _MOST_ERROR)
         _believed(axes, result, colours, words=False)
     return figure
+
+
+def nearest_the_front(result: WorkPrecision, ladders: list[ToleranceLadder]) -> list[ToleranceLadder]:
+    """Eight at most: those of which some run comes nearest to the time of the front at its error, in their order."""
+    front = [p for _, p in result.front]
+
+    def excess(ladder: ToleranceLadder) -> float:
+        believed = [p for p in ladder.points if p.believed]
+        return min((p.time_s / min(f.time_s for f in front if f.error <= p.error) for p in believed), default=np.inf)
+
+    chosen = sorted(ladders, key=excess)[:_MOST_METHODS]
+    return [each for each in ladders if any(each is one for one in chosen)]
 
 
 def _ms(p: Point) -> float:
@@ -113,15 +128,15 @@ def _curve(
     axes: Any, ladder: ToleranceLadder, colours: Colours, x: Callable[[Point], Any], y: Callable[[Point], float],
     size: float, dashed: bool = False,
 ) -> None:  # fmt: skip
-    """Draw the runs of a ladder, with hollow markers for those that are not believed."""
+    """Draw the runs of a ladder, with hollow markers for those without a believed error or a repeatable time."""
     colour, marker = _look(ladder, colours)
     points = [p for p in _shown(ladder) if y(p) > 0]
     style = "--" if ladder.peer else ":" if dashed else "-"
     bold = 1.9 if ladder.method in ("DOP853", "Rosenbrock") else 1.1
     xs, ys = [x(p) for p in points], [y(p) for p in points]
     axes.plot(xs, ys, style, color=colour, linewidth=size * bold)
-    for believed, face in ((True, colour), (False, colours["paper"])):
-        at = [k for k, p in enumerate(points) if p.believed is believed]
+    for measured, face in ((True, colour), (False, colours["paper"])):
+        at = [k for k, p in enumerate(points) if (p.believed and p.repeatable) is measured]
         hollow = "none" if dashed else face
         shape = {"marker": marker, "s": 30 * size**2, "color": colour, "zorder": 3, "linewidths": 0.9}
         faced = {} if marker == "x" else {"facecolors": hollow}
@@ -163,4 +178,6 @@ def _legend(figure: Any, first: list[ToleranceLadder], without: list[ToleranceLa
     handles.append(key("no run beats these (Pareto front)", colours["grid"], linewidth=9))
     if without:
         handles.append(key("dotted: the same without events", colours["ink"], linestyle=":"))
-    legend(figure, handles, colours, "measured order (nominal); hollow: not believed")
+    legend(
+        figure, handles, colours, "measured order (nominal); hollow: not believed, or a time that did not repeat to 5 %"
+    )

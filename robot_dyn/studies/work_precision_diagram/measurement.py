@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from math import isfinite
-from statistics import median
 from typing import final
 
 from robot_dyn.errors import RobotDynError
@@ -25,6 +24,7 @@ _PART = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # of the budget,
 _SHORT = 1 / 3000  # of the budget: runs that are timed again before the longer ones
 _LATE = 3  # runs of a ladder that may take longer than that
 _KEPT = {COMPILED: 0.2, INTERPRETED: 0.4, "": 0.2}  # of the budget, for repeats
+_TURNS, _AGREE = 5, 1.05  # of a time that repeats: turns, and ratio of the two least times
 _HARD = 4.0  # times that, for a run that takes longer than was foreseen
 
 
@@ -37,6 +37,15 @@ class Rung:
     run: Run
     error: float
     times: list[float]
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether its time is known: after enough turns the two least of them agree.
+
+        What else a machine does makes times longer and never shorter, so that the least one is that of the loop.
+        """
+        least = sorted(self.times)[:2]
+        return len(self.times) >= _TURNS and least[-1] <= _AGREE * least[0]
 
 
 @final
@@ -62,8 +71,8 @@ class Walk:
         of = self.method
         points = tuple(
             Point(
-                each.setting, each.run.steps, each.run.evaluations, each.error, each.run.energy, median(each.times),
-                len(each.times), isfinite(each.error) and each.error > floor,
+                each.setting, each.run.steps, each.run.evaluations, each.error, each.run.energy, min(each.times),
+                len(each.times), isfinite(each.error) and each.error > floor, each.repeatable,
             )
             for each in self.rungs
         )  # fmt: skip
@@ -73,7 +82,7 @@ class Walk:
 def measure(
     candidates: Iterable[MethodUnderTest], reference: Reference, budget: Budget, repeats: int
 ) -> tuple[list[Walk], bool]:
-    """The ladders of all candidates, each run timed so often at most, and whether Ctrl-C ended them."""
+    """The ladders of all candidates, each run timed so often, or until its time repeats, and whether Ctrl-C came."""
     walks = [Walk(each) for each in candidates]
     try:
         for each in walks:
@@ -83,6 +92,8 @@ def measure(
         for among in (short, [each for each in runs if each not in short]):  # short ones are lost in noise most easily
             for k in range(repeats - 1):
                 for walk, rung in among:
+                    if rung.repeatable:
+                        continue
                     if budget.left <= 0:
                         return walks, False
                     budget.report(f"round {k + 2}: {walk.name}")

@@ -70,7 +70,7 @@ class WorkPrecision(Result):
 
     columns: ClassVar[tuple[str, ...]] = (
         "method", "engine", "events", "by", "setting", "steps", "evaluations", "error", "energy", "time_s", "repeats",
-        "believed", "on_front",
+        "believed", "repeatable", "on_front",
     )  # fmt: skip
     robot: str
     acting: tuple[str, ...]
@@ -171,7 +171,7 @@ def work_precision(
     methods: Sequence[Any] | None = None,
     peers: bool = True,
     budget_s: float = 30.0,
-    repeats: int = 9,
+    repeats: int = 25,
     on_progress: Callable[[float, str], object] | None = None,
 ) -> WorkPrecision:
     """Error against time and evaluations of all methods for one motion.
@@ -188,7 +188,7 @@ def work_precision(
         methods: Names of `rd.integrate.method`, or methods; all of these unless given.
         peers: Whether other programs that are installed and can do the motion run too.
         budget_s: Time to spend, compiling not counted, in [s].
-        repeats: How often a run is timed at most, while the budget lasts.
+        repeats: How often a run is timed at most, while the budget lasts: less often if its time repeats (`Point`).
         on_progress: Called with the time spent, in [s], and with what is being run.
 
     Raises:
