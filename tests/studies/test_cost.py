@@ -23,6 +23,7 @@ from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.studies.costs import step_cost
 from robot_dyn.studies.costs.ab_comparison import ABComparison, Pair, Version, Way, in_turns
 from robot_dyn.studies.costs.query_cost import QueryCost
+from robot_dyn.studies.costs.text import _cells
 from robot_dyn.studies.time_budget import Budget
 
 ARM = rd.load("planar_2r")
@@ -216,6 +217,7 @@ def test_ratios_are_of_the_same_turn_and_a_difference_lost_in_them_is_not_told()
     assert pair.alternative().time_between_s == 2 * np.median(slow)
     pair.first.times = (slow + np.array([0.1, -0.1, 0.2, -0.2])).tolist()
     assert pair.alternative().time_between_s is None
+    assert list(_cells(pair.alternative()))[-1].endswith(", within noise")
 
 
 def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:

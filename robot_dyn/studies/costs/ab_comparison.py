@@ -63,6 +63,11 @@ class ABComparison:
     time_ratio_spread: float | None = None
     time_between_s: float | None = None
 
+    @property
+    def within_noise(self) -> bool:
+        """Whether both were timed, and the turns do not agree on which takes longer."""
+        return self.time_ratio is not None and self.time_between_s is None
+
     @reported
     def instructions_ratio(self) -> float:
         """Instructions of the first by those of the second; inf if that has none."""

@@ -47,26 +47,30 @@ def _caption(result: Cost) -> str:
     )
 
 
-def _parts(result: Cost) -> list[tuple[str, int, float | None]]:
-    """What a step is made of: names, instructions and times, in [s]."""
+def _parts(result: Cost) -> list[tuple[str, int, str]]:
+    """What a step is made of: names, instructions, and times as texts."""
     alternatives = [each for each in result.alternatives if each.group == "parts"]
     rows = []
     for each in alternatives:
         on, off = each.first, each.second
         if each.what == EVERYTHING:
-            rows.append(("rigid bodies", off.instructions, off.time_s))
+            rows.append(("rigid bodies", off.instructions, _time(off.time_s)))
         else:
-            rows.append((each.what, on.instructions - off.instructions, each.time_between_s))
-    return rows + ([("of several", result.shared, None)] if result.shared else [])
+            time = ", within noise" if each.within_noise else _time(each.time_between_s)
+            rows.append((each.what, on.instructions - off.instructions, time))
+    return rows + ([("of several", result.shared, "")] if result.shared else [])
 
 
-def _draw_parts(axes: Any, parts: list[tuple[str, int, float | None]], colours: Colours) -> None:
+def _time(spent: float | None) -> str:
+    return "" if spent is None else f", {'−' * (spent < 0)}{format_duration(abs(spent))}"
+
+
+def _draw_parts(axes: Any, parts: list[tuple[str, int, str]], colours: Colours) -> None:
     styled(axes, colours, "instructions", "A step of RK4, by part: with it less without it")
     whole = sum(count for _, count, _ in parts) or 1
     places = range(len(parts))
     axes.barh(places, [count for _, count, _ in parts], 2 * _BAR, color=colours["lines"][0])
-    for place, (_, count, spent) in enumerate(parts):
-        time = "" if spent is None else f", {'−' * (spent < 0)}{format_duration(abs(spent))}"
+    for place, (_, count, time) in enumerate(parts):
         said = f" {count} ({100 * count / whole:.1f} %){time}".replace("-", "−")
         axes.text(max(count, 0), place, said, va="center", fontsize=8, **ink(colours))
     _named(axes, [name for name, _, _ in parts], colours)

@@ -37,4 +37,5 @@ def _cells(each: ABComparison) -> Iterator[str]:
     yield f"{first.instructions} / {second.instructions}"
     yield f"{each.instructions_ratio:.3g}" if isfinite(each.instructions_ratio) else "—"
     yield " / ".join("—" if of.time_s is None else format_duration(of.time_s) for of in (first, second))
-    yield "—" if each.time_ratio is None else f"{each.time_ratio:.2f} ± {each.time_ratio_spread:.2f}"
+    noise = ", within noise" * each.within_noise
+    yield "—" if each.time_ratio is None else f"{each.time_ratio:.2f} ± {each.time_ratio_spread:.2f}{noise}"
