@@ -21,7 +21,7 @@ from robot_dyn.integrate.tableau import ButcherTableau
 from robot_dyn.queries.units import format_duration
 from robot_dyn.result import json_text
 from robot_dyn.studies.time_budget import Budget, Limit
-from robot_dyn.studies.work_precision_diagram.diagram import nearest_the_front
+from robot_dyn.studies.work_precision_diagram.diagram import most_precise
 from robot_dyn.studies.work_precision_diagram.measurement import Rung, Walk, measure
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, own, recorded, whole
 from robot_dyn.studies.work_precision_diagram.past_horizon import past_horizon
@@ -179,11 +179,14 @@ def test_a_time_is_repeatable_if_the_two_least_of_five_turns_agree_to_five_perce
     assert (point.time_s, point.repeats, point.repeatable) == (min(times), len(times), repeatable)
 
 
-def test_at_most_eight_methods_are_drawn_and_these_are_nearest_to_the_front() -> None:
-    """Of twelve whose times are 1, 2, 3, … times those of the front, in any order."""
+def test_at_most_eight_methods_are_drawn_the_soonest_at_six_digits_and_one_of_each_program() -> None:
+    """Of twelve whose times are 1, 2, 3, … times those of the first, in any order."""
     ladders = [of(f"m{k}", points(1e-4, 1e-8, each_s=1e-3 * (k + 1))) for k in (7, 3, 11, 0, 5, 1, 9, 2, 10, 4, 6, 8)]
-    names = [each.method for each in nearest_the_front(invented(*ladders), ladders)]
+    names = [each.method for each in most_precise(ladders)]
     assert names == ["m7", "m3", "m0", "m5", "m1", "m2", "m4", "m6"]
+    peer = of("MuJoCo RK4", points(1e-2, 1e-8, each_s=1.0), engine="")
+    names = [each.method for each in most_precise([*ladders, peer])]
+    assert names == ["m3", "m0", "m5", "m1", "m2", "m4", "m6", "MuJoCo RK4"]
 
 
 def test_no_run_beats_one_of_the_front_and_each_other_is_beaten() -> None:

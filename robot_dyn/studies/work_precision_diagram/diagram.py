@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_dyn.studies.figure import Colours, ResultError, key, legend, programs, sheet, styled
+from robot_dyn.studies.work_precision_diagram.text import program_of
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import INTERPRETED, Point, ToleranceLadder
 from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
 
@@ -24,7 +25,7 @@ _PEERS = {
     "Drake runge_kutta3": "P", "heyoka, Taylor": "*",
 }  # fmt: skip
 _MOST_ERROR = 3.0  # [rad] or [m]; larger errors are meaningless and not drawn
-_MOST_METHODS = 8  # in one panel
+_MOST_METHODS, _SIX_DIGITS = 8, 1e-6  # in one panel; [rad] or [m]
 _WIDTH, _HEIGHT = 13.0, 8.0  # [inch]
 
 
@@ -42,7 +43,7 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     )
     first = [each for each in result.ladders if each.events and (each.peer or each.engine != INTERPRETED)]
     first = first if any(not each.peer for each in first) else list(result.ladders)
-    first = nearest_the_front(result, first)
+    first = most_precise(first)
     own = [each for each in first if not each.peer]
     slow = [each for each in result.ladders if each.engine == INTERPRETED and each not in first]
     names = {each.method for each in first}
@@ -75,15 +76,16 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     return figure
 
 
-def nearest_the_front(result: WorkPrecision, ladders: list[ToleranceLadder]) -> list[ToleranceLadder]:
-    """Eight at most: those of which some run comes nearest to the time of the front at its error, in their order."""
-    front = [p for _, p in result.front]
+def most_precise(ladders: list[ToleranceLadder]) -> list[ToleranceLadder]:
+    """Eight at most: of each program the one that reaches six digits soonest, then the next ones, in their order."""
 
-    def excess(ladder: ToleranceLadder) -> float:
-        believed = [p for p in ladder.points if p.believed]
-        return min((p.time_s / min(f.time_s for f in front if f.error <= p.error) for p in believed), default=np.inf)
+    def soon(ladder: ToleranceLadder) -> float:
+        price = ladder.price(_SIX_DIGITS)
+        return np.inf if price is None else price.value
 
-    chosen = sorted(ladders, key=excess)[:_MOST_METHODS]
+    by_time = sorted(ladders, key=soon)
+    first = {program_of(each): each for each in reversed(by_time)}.values()
+    chosen = [*first, *(each for each in by_time if not any(each is one for one in first))][:_MOST_METHODS]
     return [each for each in ladders if any(each is one for one in chosen)]
 
 

@@ -25,6 +25,7 @@ _SHORT = 1 / 3000  # of the budget: runs that are timed again before the longer 
 _LATE = 3  # runs of a ladder that may take longer than that
 _KEPT = {COMPILED: 0.2, INTERPRETED: 0.4, "": 0.2}  # of the budget, for repeats
 _TURNS, _AGREE = 5, 1.05  # of a time that repeats: turns, and ratio of the two least times
+_LAST = 0.05  # of the budget, for turns of short runs after the others
 _HARD = 4.0  # times that, for a run that takes longer than was foreseen
 
 
@@ -89,15 +90,11 @@ def measure(
             _walk(each, reference, budget)
         runs = [(each, rung) for each in walks for rung in each.rungs if isfinite(rung.error)]
         short = [(each, rung) for each, rung in runs if rung.times[0] <= _SHORT * budget.seconds]
-        for among in (short, [each for each in runs if each not in short]):  # short ones are lost in noise most easily
-            for k in range(repeats - 1):
-                for walk, rung in among:
-                    if rung.repeatable:
-                        continue
-                    if budget.left <= 0:
-                        return walks, False
-                    budget.report(f"round {k + 2}: {walk.name}")
-                    _again(walk, rung, budget)
+        others = [each for each in runs if each not in short]
+        # turns of the short ones are before and after the others: a machine may be slower for some seconds
+        _turns(short, _TURNS // 2, 0.0, budget)
+        _turns(others, repeats - 1, _LAST * budget.seconds, budget)
+        _turns(short, repeats - 1 - _TURNS // 2, 0.0, budget)
     except KeyboardInterrupt:
         return walks, True
     return walks, False
@@ -139,6 +136,17 @@ def _walk(walk: Walk, reference: Reference, budget: Budget) -> None:
             walk.ended = "the error of the reference is reached"
             return
     walk.ended = "there is no finer setting"
+
+
+def _turns(runs: list[tuple[Walk, Rung]], most: int, kept: float, budget: Budget) -> None:
+    """Time runs in turns, until their times repeat, or so often, or no more of the budget is left than is kept."""
+    for k in range(most):
+        for walk, rung in runs:
+            if budget.left <= kept:
+                return
+            if not rung.repeatable:
+                budget.report(f"round {k + 2}: {walk.name}")
+                _again(walk, rung, budget)
 
 
 def _again(walk: Walk, rung: Rung, budget: Budget) -> None:

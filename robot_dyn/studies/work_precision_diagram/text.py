@@ -73,22 +73,22 @@ def programs(result: WorkPrecision, error: float) -> Iterator[str]:
     """What an error takes by the cheapest method of each program, this library first; and what was left out."""
     best: dict[str, Any] = {}
     for ladder, price in result.digits(error):
-        best.setdefault(_program(ladder), (ladder, price))
+        best.setdefault(program_of(ladder), (ladder, price))
     own = best.get(_OWN)
-    for program in dict.fromkeys([_OWN, *best, *map(_program, result.ladders)]):
+    for program in dict.fromkeys([_OWN, *best, *map(program_of, result.ladders)]):
         if program in best:
             ladder, price = best[program]
             name = f"{_OWN} {ladder.name}" if program == _OWN else ladder.name
             times = f", {float(f'{price.value / own[1].value:.2g}'):g} times as long" if own and program != _OWN else ""
             yield f"  {name}: {format_duration(price.value)}{times}{' (extrapolated)' if price.extrapolated else ''}"
         else:
-            ended = dict.fromkeys(each.ended for each in result.ladders if _program(each) == program)
+            ended = dict.fromkeys(each.ended for each in result.ladders if program_of(each) == program)
             yield f"  {program}: reached by no run ({'; '.join(ended)})"
     yield "  times of the loop alone, the least of runs that take turns"
     yield from (f"  left out: {each}" for each in result.left_out)
 
 
-def _program(ladder: ToleranceLadder) -> str:
+def program_of(ladder: ToleranceLadder) -> str:
     """The program that a ladder is of."""
     return ladder.method.split(" ")[0] if ladder.peer else _OWN
 
