@@ -189,3 +189,20 @@ def test_errors_name_the_file_and_the_remedy(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"robot-dyn\[mjcf\]"):
         rd.load(path)
+
+
+def test_warnings_of_mujoco_are_findings_and_leave_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """MuJoCo itself would write them to MUJOCO_LOG.TXT in the current directory; a handler of the user's stays."""
+    mine: list[str] = []
+    mujoco.set_mju_user_warning(mine.append)
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    try:
+        with pytest.warns(ModelWarning, match="MuJoCo warns: .*settotalmass"):
+            robot = rd.load(written(tmp_path, ARM.replace("<compiler ", '<compiler settotalmass="4" ')))
+        assert mujoco.get_mju_user_warning() == mine.append
+    finally:
+        mujoco.set_mju_user_warning(None)
+    assert robot.total_mass == pytest.approx(4, rel=1e-12)  # up to rounding
+    assert [*here.iterdir()] == [] == mine

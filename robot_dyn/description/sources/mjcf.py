@@ -83,11 +83,22 @@ def read(path: Path, without: frozenset[str] = frozenset()) -> Mjcf:
             1, or free or ball joints, that `without` does not name.
     """
     mujoco: Any = needs("mujoco", extra="mjcf")
+    model, warnings = _compiled(mujoco, path)
+    return _Reader(mujoco, model, str(path), without, warnings).read()
+
+
+def _compiled(mujoco: Any, path: Path) -> tuple[Any, list[str]]:
+    """The model of a file, and findings of what MuJoCo warns of; DescriptionError if MuJoCo refuses it."""
+    warnings: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(warnings.append)  # which otherwise go to MUJOCO_LOG.TXT in the current directory
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except Exception as error:  # ValueError of the compiler, and those of its readers of meshes
         raise DescriptionError(f"{path}: MuJoCo refuses it: {shorten(' '.join(str(error).split()), 300)}") from None
-    return _Reader(mujoco, model, str(path), without).read()
+    finally:
+        mujoco.set_mju_user_warning(before)
+    return model, [f"MuJoCo warns: {shorten(' '.join(each.split()), 300)}" for each in dict.fromkeys(warnings)]
 
 
 @dataclass
