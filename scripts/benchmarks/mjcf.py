@@ -60,8 +60,10 @@ def without_missing_meshes(file: Path, folder: Path) -> tuple[Path, int]:
     for mesh in missing:
         name = mesh.name or Path(mesh.file).stem
         for geom in [geom for geom in spec.geoms if geom.meshname == name]:
-            if not geom.parent.explicitinertial:
-                raise ValueError(f"body {geom.parent.name!r} takes its inertia from the mesh {mesh.file}, which is missing")
+            if geom.parent.name != "world" and not geom.parent.explicitinertial:
+                raise ValueError(
+                    f"body {geom.parent.name!r} takes its inertia from the mesh {mesh.file}, which is missing"
+                )
             spec.delete(geom)
         spec.delete(mesh)
     for texture in [each for each in spec.textures if each.file]:  # of colours alone
