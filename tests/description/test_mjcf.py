@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 import warnings
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ from robot_dyn.errors import DescriptionError, MissingExtraError, ModelWarning
 from robot_dyn.simulation.results.provenance import robot_of
 from tests.hostile.kinds import ARM as URDF
 
+mujoco: Any = import_module("mujoco")  # which has no types
 # joints beside the origins of their bodies, several of one body, references, moments of shapes, defaults, a follower
 ARM = """<mujoco model="arm">
   <compiler angle="radian" autolimits="true"/>
@@ -182,7 +184,7 @@ def test_errors_name_the_file_and_the_remedy(tmp_path: Path, monkeypatch: pytest
         rd.load(path)
     for wrong in ("tendon", {"tendons"}, 3):
         with pytest.raises(DescriptionError, match="without must be some of tendon, equality, free, ball"):
-            rd.load(written(tmp_path, ARM), without=wrong)
+            rd.load(written(tmp_path, ARM), without=wrong)  # pyright: ignore[reportArgumentType]
     (tmp_path / "arm.urdf").write_text(URDF, encoding="utf-8")
     with pytest.raises(DescriptionError, match="is for files of MJCF"):
         rd.load(tmp_path / "arm.urdf", without={"tendon"})

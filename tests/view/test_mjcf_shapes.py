@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import warnings
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 import trimesh
@@ -14,6 +15,7 @@ import robot_dyn as rd
 from robot_dyn.errors import ModelWarning
 from robot_dyn.view.geometry.visuals import Piece, drawing
 
+mujoco: Any = import_module("mujoco")  # which has no types
 ARM = """<mujoco model="drawn">
   <asset>
     <mesh name="turned" file="wedge.stl" refpos="0.1 0.2 0.3" refquat="0.9 0.1 0.3 0.2" scale="2 2 2"/>

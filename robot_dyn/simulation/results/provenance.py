@@ -103,7 +103,7 @@ def about_the_robot(run: Trajectory | Rollouts) -> Iterator[str]:
 
 def _description(run: Trajectory | Rollouts) -> Description:
     """The robot's file, as the run carries it; DescriptionError if there is none."""
-    description = check(run.about.get("urdf", ""), run.about.get("source", "the run's URDF"))
+    description = check(run.about.get("urdf", "").encode(), run.about.get("source", "the run's URDF"))
     of_reading = filter(None, run.about.get("findings", "").split("\n"))  # which the URDF alone does not give again
     return replace(description, findings=tuple(dict.fromkeys((*of_reading, *description.findings))))
 
