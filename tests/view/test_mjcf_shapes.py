@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio
 import pytest
 import trimesh
 
@@ -106,6 +107,16 @@ def test_a_body_shows_what_touches_nothing_where_it_has_both(path: Path) -> None
     path.write_text(ARM.replace('name="ball"', 'name="ball" contype="0" conaffinity="0"'), encoding="utf-8")
     (ball,) = drawing(rd.load(path)).pieces
     assert ball.pose[:3, 3] == pytest.approx((0.3, 0.1, 0))
+
+
+def test_other_readers_of_urdf_have_the_shapes(path: Path, tmp_path: Path) -> None:
+    """urdfdom, by Pinocchio, refuses all shapes of a link if it refuses one."""
+    robot = rd.load(path)
+    with pytest.warns(ModelWarning, match="gravity is not in the URDF"):
+        written = str(robot.to_urdf(tmp_path / "arm.urdf"))
+    model, kind = pinocchio.buildModelFromUrdf(written), pinocchio.GeometryType.VISUAL
+    shapes = pinocchio.buildGeomFromUrdf(model, written, kind, package_dirs=[str(tmp_path)])
+    assert shapes.ngeoms == len(drawing(robot).pieces)
 
 
 def test_shapes_that_urdf_does_not_have_are_told(path: Path) -> None:

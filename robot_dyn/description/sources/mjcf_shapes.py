@@ -41,7 +41,8 @@ class Shapes:
                 visual = etree.SubElement(link, "visual")
                 etree.SubElement(visual, "origin", xyz=_words(p), rpy=_words(rpy_of(R)))
                 etree.SubElement(etree.SubElement(visual, "geometry"), tag, attributes)
-                etree.SubElement(etree.SubElement(visual, "material"), "color", rgba=_words(self.color(geom)))
+                rgba = _words(self.color(geom))  # and its name, since urdfdom refuses a material without one
+                etree.SubElement(etree.SubElement(visual, "material", name=rgba), "color", rgba=rgba)
 
     def kind(self, geom: int) -> str:
         return self.of.mujoco.mjtGeom(int(self.model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
