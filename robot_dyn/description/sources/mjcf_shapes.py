@@ -45,16 +45,20 @@ class Shapes:
                 etree.SubElement(etree.SubElement(visual, "material", name=rgba), "color", rgba=rgba)
 
     def kind(self, geom: int) -> str:
+        """Its kind as MJCF writes it, such as "box"."""
         return self.of.mujoco.mjtGeom(int(self.model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
 
     def seen(self, geom: int) -> bool:
+        """Whether MuJoCo's viewer shows it, and it ends somewhere."""
         hidden = self.model.geom_group[geom] >= _GROUPS or self.kind(geom) in _NOT_DRAWN
         return not hidden and self.color(geom)[3] > 0
 
     def touches(self, geom: int) -> bool:
+        """Whether it can be in contact with another one."""
         return bool(self.model.geom_contype[geom] or self.model.geom_conaffinity[geom])
 
     def color(self, geom: int) -> np.ndarray:
+        """Red, green, blue and opacity, (4,): its own, else that of its material."""
         own, material = self.model.geom_rgba[geom], int(self.model.geom_matid[geom])
         return self.model.mat_rgba[material] if material >= 0 and np.allclose(own, _UNSTATED) else own
 
@@ -76,6 +80,7 @@ class Shapes:
             self.left_out.append(kind)
 
     def mesh(self, mesh: int, R: np.ndarray, p: np.ndarray) -> Iterator[_Placed]:
+        """The file of a mesh, in the frame of the body of a geom at R, p; nothing if URDF cannot place it."""
         model, scale = self.model, self.model.mesh_scale[mesh]
         reference = self.of.references.get(self.of.name("mesh", mesh))
         start = int(model.mesh_pathadr[mesh])
