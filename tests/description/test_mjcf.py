@@ -133,6 +133,25 @@ def test_ranges_friction_and_limits_of_actuators_are_those_of_the_file(tmp_path:
     assert robot.edits.gravity == (0.3, -0.2, -9.7)
 
 
+FLAGS = '<flag gravity="disable" equality="disable" damper="disable" frictionloss="disable"/>'
+
+
+def test_flags_of_a_file_switch_off_what_they_name(tmp_path: Path) -> None:
+    """As in MuJoCo: no gravity, no coupling of joints, no damping of joints and no dry friction."""
+    text = ARM.replace('-9.7"/>', f'-9.7">{FLAGS}</option>').replace('damping="2e-5"', "")
+    path, rng = written(tmp_path, text), np.random.default_rng(4)
+    robot = loaded(path)
+    assert robot.joint_names == ("shoulder", "twist", "slide", "left", "right")
+    assert robot.edits.gravity == (0.0, 0.0, 0.0)
+    q, v = robot.random_configuration(rng), rng.standard_normal(robot.n)
+    theirs = Theirs(path, robot, q, v)
+    ours = robot.inverse_dynamics(q, v, np.zeros(robot.n))
+    assert np.abs(ours - theirs.bias).max() <= ROUNDING * np.abs(theirs.bias).max()
+    passive = theirs.data.qfrc_passive[theirs.dofs]
+    assert not robot.damping.any() and not passive.any()
+    assert not robot.friction.any() and not theirs.data.nefc
+
+
 FREE = '<body name="ball" pos="1 0 0"><{} name="loose"/><geom size="0.1"/></body></worldbody>'
 TENDON = '<tendon><fixed name="cable"><joint joint="left" coef="1"/><joint joint="twist" coef="1"/></fixed></tendon>'
 LEFT_OUT = {

@@ -113,7 +113,7 @@ class _Reader:
             self.findings.append(
                 f"geoms of kind {kind}, of which there are {number}, are not drawn: URDF has no such shape"
             )
-        gravity = tuple(map(float, self.model.opt.gravity))
+        gravity = (0.0,) * 3 if self.of.disabled("gravity") else tuple(map(float, self.model.opt.gravity))
         return Mjcf(etree.tostring(out), self.at_joints("armature", 2), gravity, tuple(self.findings))
 
     def leave(self, what: str, where: str, why: str) -> None:
@@ -148,7 +148,8 @@ class _Reader:
     def dof(self, what: str, joint: int) -> float:
         """Armature, damping or dry friction of a joint, with those of its actuators."""
         of_joint = float(getattr(self.model, f"dof_{what}")[self.model.jnt_dofadr[joint]])
-        return of_joint + self.actuators.added(what, joint)
+        off = {"damping": ("passive", "damper"), "frictionloss": ("constraint", "frictionloss")}.get(what, ())
+        return of_joint * (not self.of.disabled(*off)) + self.actuators.added(what, joint)
 
     @property
     def actuators(self) -> Actuators:
@@ -177,7 +178,7 @@ class _Reader:
             kind, (one, other) = int(model.eq_type[index]), (int(model.eq_obj1id[index]), int(model.eq_obj2id[index]))
             name = self.of.name("equality", index)
             a0, a1, *higher = model.eq_data[index][:5].tolist()
-            if not model.eq_active0[index]:
+            if not model.eq_active0[index] or self.of.disabled("equality", "constraint"):
                 self.findings.append(f"equality {name!r}: is not active; left out")
             elif kind == int(self.mujoco.mjtEq.mjEQ_JOINT) and other >= 0 and a1 and not any(higher):
                 if self.joint(one) in self.mimics:

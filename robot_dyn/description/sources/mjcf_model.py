@@ -38,6 +38,11 @@ class Compiled:
         kinds = getattr(self.mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
         return (self.mujoco.mj_id2name(self.model, kinds, index) or "").strip() or f"{kind}_{index}"
 
+    def disabled(self, *flags: str) -> bool:
+        """Whether one of these flags of `<option>` is "disable", as far as this version of MuJoCo has it."""
+        bits = (int(getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)) for flag in flags)
+        return any(int(self.model.opt.disableflags) & bit for bit in bits)
+
     def rotation(self, quaternion: Any) -> np.ndarray:
         """The matrix (3, 3) of a quaternion (w, x, y, z)."""
         R = np.zeros(9)
