@@ -5,6 +5,7 @@ Ctrl-C ends any command with exit code 130; its handler is installed before anyt
 commands/        the commands, by topic
 groups.py        the commands as --help lists them
 app.py           the application, options that commands share, progress bars; completion.py and interrupts.py
+robots.py        how the file of a robot is read: options that commands with a robot share
 arguments.py     values of arguments; terminal.py: output, escaped
 report.py        documents and tables of comparisons and runs
 outcome.py       what studies print and write

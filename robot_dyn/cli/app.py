@@ -26,16 +26,8 @@ Name = Annotated[
     str,
     typer.Argument(
         metavar="ROBOT",
-        help="A name of `robot-dyn list`, or the path of a URDF file.",
+        help="A name of `robot-dyn list`, or the path of a URDF or MJCF file.",
         autocompletion=completion.robots,
-    ),
-]
-Lock = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="JOINT=VALUE",
-        help="Lock a joint at a value in rad or m; may be repeated.",
-        autocompletion=completion.locks,
     ),
 ]
 PackageDir = Annotated[

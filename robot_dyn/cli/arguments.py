@@ -1,38 +1,19 @@
-"""Values of arguments: robots, scenes, numbers by joint, assignments, files to write."""
+"""Values of arguments: scenes, numbers by joint, assignments, files to write."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robot_dyn.errors import ModelWarning, QueryError, RobotDynError, nearest
+from robot_dyn.errors import QueryError, RobotDynError, nearest
 from robot_dyn.files import Kind, target
 
 if TYPE_CHECKING:
     import numpy as np
 
     from robot_dyn.description.edits import Payload
-    from robot_dyn.model.robot import Robot
     from robot_dyn.simulation.setup.setup import Setup
-
-
-def load(
-    name: str,
-    lock: list[str] | None,
-    package_dirs: list[str] | None,
-    xacro: list[str] | None = None,
-    quiet: bool = False,
-) -> Robot:
-    """The robot of a name or path, with joints locked; `quiet` suppresses its warnings."""
-    import robot_dyn as rd
-
-    with warnings.catch_warnings():
-        if quiet:
-            warnings.simplefilter("ignore", ModelWarning)
-        robot = rd.load(name, package_dirs=package_dirs or (), xacro=None if xacro is None else expansion(xacro))
-    return robot.with_(lock=assignments("--lock", lock)) if lock else robot
 
 
 def expansion(xacro: list[str]) -> dict[str, str]:

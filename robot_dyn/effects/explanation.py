@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, final
 
 from robot_dyn.answer import Answer, Block
 from robot_dyn.description.catalog import abbreviated
+from robot_dyn.model.findings import reservations
 from robot_dyn.queries.units import coefficient_texts
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ class Explanation(Answer):
         method: Lines on method and start.
         machine_code: Lines on instructions.
         source: Path of the robot's file; empty if there is none.
+        findings: What of the robot is estimated, and what was assumed or left out of its file.
     """
 
     robot: str
@@ -82,6 +84,7 @@ class Explanation(Answer):
     method: tuple[str, ...] = ()
     machine_code: tuple[str, ...] = ()
     source: str = ""
+    findings: tuple[str, ...] = ()
 
     def blocks(self) -> Iterator[Block]:
         n = len(self.joints)
@@ -106,6 +109,7 @@ class Explanation(Answer):
         if self.source:
             yield ""
             yield f"the file of the robot: {abbreviated(self.source)}"
+            yield from (f"  {each}" for each in self.findings)
 
 
 def explanation(plant: Plant) -> Explanation:
@@ -126,6 +130,7 @@ def explanation(plant: Plant) -> Explanation:
         ),
         (*edits, *(_term(parts, dynamics) for parts in _by_effect(plant.effects))),
         source=robot.description.source if hasattr(robot, "description") else "",
+        findings=reservations(robot.description) if hasattr(robot, "description") else (),
     )
 
 

@@ -37,7 +37,12 @@ def findings_of(description: Description, edits: Edits, regularity: Regularity) 
     of_kinds = (finding for kind in kinds for finding in kind(robot))
     joint = None if regularity.near else regularity.joint
     singular, near = no_inertia_about_axis(robot, joint), hardly_any_inertia(regularity.near)
-    return (*description.findings, *estimated_links(description), *singular, *of_kinds, *near)
+    return (*reservations(description), *singular, *of_kinds, *near)
+
+
+def reservations(description: Description) -> tuple[str, ...]:
+    """What of a robot is estimated, and what was assumed or left out when its file was read."""
+    return (*estimated_links(description), *description.findings)
 
 
 def estimated_links(description: Description) -> Iterator[str]:

@@ -22,7 +22,7 @@ from robot_dyn.effects.actuator import stated_efforts
 from robot_dyn.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
-from robot_dyn.scene.effects import AnyEdit
+from robot_dyn.scene.effects import AnyEdit, bare
 from robot_dyn.scene.references import Reference, frame_of
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Stated, per_joint
 
@@ -52,12 +52,12 @@ class Model(Part):
     effects: list[AnyEdit] | None = None  # pyright: ignore[reportInvalidTypeForm]
     """Its gravity, lock, payload and armature, as of `[[effect]]`, in place of the scene's; those by default."""
 
-    def build(self, described: Robot, robot: Robot) -> Robot:
-        """Return the plant's robot, or the described one with this table's edits; masses scaled."""
+    def build(self, loaded: Robot, robot: Robot) -> Robot:
+        """Return the plant's robot, or that of the file with this table's edits alone; masses scaled."""
         if self.effects is not None:
-            robot = described
+            robot = bare(loaded)
             for edit in self.effects:
-                robot = edit.edit(robot)
+                robot = edit.edit(robot, loaded)
         return robot.with_(mass_scale=self.mass_scale)
 
 
@@ -158,7 +158,7 @@ class Control(Part):
         """Whether delays or blocks stand between arm and controller."""
         return bool(self.measurement_delay_periods or self.actuation_delay_periods or self.blocks)
 
-    def build(self, described: Robot, robot: Robot, q0: np.ndarray, reference: Reference) -> Controller:
+    def build(self, loaded: Robot, robot: Robot, q0: np.ndarray, reference: Reference) -> Controller:
         """Return the controller for a reference.
 
         Raises:
@@ -169,7 +169,7 @@ class Control(Part):
                 raise SceneError(f"control.{key}: has no effect on {self.kind}, only on {', '.join(kinds)}; remove it")
         if "noise_seed" in self.model_fields_set and not self._draws_noise:
             raise SceneError("control.noise_seed: has no effect without a block of kind noise; remove it")
-        controller = self._controller(described, robot, q0, reference)
+        controller = self._controller(loaded, robot, q0, reference)
         if not self.loops:
             return controller
         lines: Any = {line: [each.call(robot) for each in getattr(self, line)] for line in LINES}
@@ -178,9 +178,9 @@ class Control(Part):
             measurement_delay=self.measurement_delay_periods, actuation_delay=self.actuation_delay_periods,
         )  # fmt: skip
 
-    def _controller(self, described: Robot, robot: Robot, q0: np.ndarray, reference: Reference) -> Controller:
+    def _controller(self, loaded: Robot, robot: Robot, q0: np.ndarray, reference: Reference) -> Controller:
         """The controllers inside the loop: one or two."""
-        model, desired = self.model.build(described, robot), reference.build(robot, q0, self.frame)
+        model, desired = self.model.build(loaded, robot), reference.build(robot, q0, self.frame)
         cartesian = isinstance(desired, CartesianReference)
         if cartesian != (self.kind == "operational_space"):
             need = "line or circle" if self.kind == "operational_space" else "hold, quintic, via_points or samples"

@@ -5,8 +5,9 @@ from __future__ import annotations
 from math import inf
 from typing import Annotated, Any, ClassVar, Literal, Union
 
-from pydantic import Field
+from pydantic import Field, WrapValidator
 
+from robot_dyn.coefficients import URDF
 from robot_dyn.description.edits import STANDARD_GRAVITY, Payload
 from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
 from robot_dyn.effects.carried_payload import CarriedPayload
@@ -26,7 +27,18 @@ from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
-from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Vector3, kinds_of, per_joint
+from robot_dyn.scene.schema import (
+    NotNegative,
+    Number,
+    Part,
+    PerJoint,
+    Positive,
+    Stated,
+    Vector3,
+    kinds_of,
+    per_joint,
+    urdf_or,
+)
 
 Matrix3 = tuple[Vector3, Vector3, Vector3]
 
@@ -38,9 +50,14 @@ class Edit(Part):
     """What it does, in a line."""
     kind: Any
 
-    def edit(self, robot: Robot) -> Robot:
-        """Return the edited robot."""
+    def edit(self, robot: Robot, loaded: Robot) -> Robot:
+        """Return the edited robot; `loaded` has gravity and armature of its file."""
         raise NotImplementedError
+
+
+def bare(loaded: Robot) -> Robot:
+    """The robot without gravity and armature, which a scene names where they act."""
+    return loaded.with_(gravity=(0.0, 0.0, 0.0), armature={})
 
 
 class Acting(Part):
@@ -88,11 +105,12 @@ class Gravity(Edit):
     term = EDITED["gravity"]
 
     kind: Literal["gravity"]
-    acceleration_m_s2: Vector3 = STANDARD_GRAVITY
-    """Acceleration of free fall, in base axes."""
+    acceleration_m_s2: Annotated[Vector3, WrapValidator(urdf_or)] = STANDARD_GRAVITY
+    """Acceleration of free fall, in base axes; or "urdf", that of a file of MJCF."""
 
-    def edit(self, robot: Robot) -> Robot:
-        return robot.with_(gravity=self.acceleration_m_s2)
+    def edit(self, robot: Robot, loaded: Robot) -> Robot:
+        of_file = self.acceleration_m_s2 == URDF
+        return robot.with_(gravity=loaded.edits.gravity if of_file else self.acceleration_m_s2)
 
 
 class Lock(Edit):
@@ -104,7 +122,7 @@ class Lock(Edit):
     joints: dict[str, Number]
     """Value by joint, in rad, or m for a prismatic joint."""
 
-    def edit(self, robot: Robot) -> Robot:
+    def edit(self, robot: Robot, loaded: Robot) -> Robot:
         return robot.with_(lock=self.joints)
 
 
@@ -115,7 +133,7 @@ class Load(Edit, Body):
 
     kind: Literal["payload"]
 
-    def edit(self, robot: Robot) -> Robot:
+    def edit(self, robot: Robot, loaded: Robot) -> Robot:
         return robot.with_(payload=self.payload)
 
 
@@ -125,12 +143,19 @@ class Armature(Edit):
     term = EDITED["armature"]
 
     kind: Literal["armature"]
-    inertia_kg_m2: PerJoint
-    """Inertia by joint, of the rotor where there is a gear."""
+    inertia_kg_m2: Stated
+    """Inertia by joint, of the rotor where there is a gear; "urdf" is that of a file of MJCF, as joints feel it."""
     gear_ratio: PerJoint = 1.0
     """n: the joint feels n² times the inertia of the rotor; joints left out have 1."""
 
-    def edit(self, robot: Robot) -> Robot:
+    def edit(self, robot: Robot, loaded: Robot) -> Robot:
+        stated = dict(loaded.edits.armature)
+        if self.inertia_kg_m2 == URDF:
+            if not stated:
+                raise SceneError("inertia_kg_m2: the robot's file states no armature; give it by joint")
+            if "gear_ratio" in self.model_fields_set:
+                raise SceneError("gear_ratio: armature of a file is what joints feel, after gears; leave it out")
+            return robot.with_(armature={name: stated.get(name, 0.0) for name in robot.joint_names})
         inertia = per_joint("armature", self.inertia_kg_m2, robot)
         return robot.with_(armature=per_joint("gear_ratio", self.gear_ratio, robot, elsewhere=1.0) ** 2 * inertia)
 

@@ -13,13 +13,13 @@ import numpy as np
 from robot_dyn.coefficients import URDF
 from robot_dyn.control.digital_loop.loop import LINES, Loop
 from robot_dyn.control.digital_loop.multirate import Multirate
-from robot_dyn.effects.explanation import Explanation, Number, Term, as_they_act, explanation
+from robot_dyn.effects.explanation import Explanation, Number, Term, as_they_act, edit_terms, explanation
 from robot_dyn.effects.plant import Plant
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.scene.control import BLOCKS, Control
-from robot_dyn.scene.effects import BY_KIND, Acting
+from robot_dyn.scene.effects import BY_KIND, Acting, Edit
 from robot_dyn.scene.scene import Scene, read_both
 from robot_dyn.scene.schema import Part, kinds_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -27,6 +27,7 @@ from robot_dyn.simulation.results.provenance import edits_of_machine_code
 from robot_dyn.simulation.setup.explanation import explanation_of, model_lines, pace, span
 from robot_dyn.simulation.setup.setup import Setup
 
+OF_FILE = "the robot's file"
 _DELAYS = "measurement_delay_periods", "actuation_delay_periods"
 
 
@@ -78,10 +79,14 @@ def _absent(named: set[str]) -> tuple[str, ...]:
 
 def _terms(scene: Scene, setup: Setup) -> Iterator[Term]:
     """What a scene names, in its order."""
-    effects = iter(setup.plant.effects)
+    effects, robot = iter(setup.plant.effects), setup.plant.dynamics
+    edited = {each.kind: each.coefficients for each in edit_terms(robot.edits)}  # pyright: ignore
     for effect in scene.effect:
-        parts = list(islice(effects, len(effect.build(setup.plant.dynamics)))) if isinstance(effect, Acting) else []  # pyright: ignore
-        yield Term(effect.kind, BY_KIND[effect.kind].term, _numbers(effect), as_they_act(parts, setup.plant.dynamics))
+        parts = list(islice(effects, len(effect.build(robot)))) if isinstance(effect, Acting) else []  # pyright: ignore
+        numbers, acting = _numbers(effect), as_they_act(parts, robot)
+        if isinstance(effect, Edit) and any(each.source == OF_FILE for each in numbers):
+            acting = edited.get(effect.kind, ())
+        yield Term(effect.kind, BY_KIND[effect.kind].term, numbers, acting)
 
 
 def _control(scene: Scene, control: Control, setup: Setup) -> Iterator[str]:
@@ -169,7 +174,7 @@ def _numbers(part: Part) -> tuple[Number, ...]:
 
 def _source(part: Part, key: str) -> str:
     if getattr(part, key) == URDF:
-        return "the robot's file"
+        return OF_FILE
     return "scene" if key in part.model_fields_set else "default"
 
 

@@ -12,6 +12,7 @@ from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.scene.control import BLOCKS, KINDS, Control, Model, Slow
 from robot_dyn.scene.effects import ACTING, EDITS
+from robot_dyn.scene.loading import Loading
 from robot_dyn.scene.references import AnyReference
 from robot_dyn.scene.scene import Scene, Start
 from robot_dyn.scene.schema import Part, kinds_of
@@ -34,12 +35,14 @@ integrates, and where each number comes from. This page is written from the sche
 _UNITS = {
     "_N_m_s_per_rad2": "N m s/rad²", "_N_m_s_per_rad": "N m s/rad", "_N_m_per_rad": "N m/rad", "_rad_per_s": "rad/s",
     "_N_m_per_s": "N m/s", "_periods": "periods", "_kg_m2": "kg m²", "_m_s2": "m/s²", "_per_s": "1/s", "_N_m": "N m",
-    "_rad": "rad", "_kg": "kg", "_N": "N", "_N_s_per_m": "N s/m", "_N_per_m": "N/m", "_m": "m", "_s": "s",
+    "_rad": "rad", "_kg_per_m3": "kg/m³", "_kg": "kg", "_N": "N", "_N_s_per_m": "N s/m", "_N_per_m": "N/m", "_m": "m",
+    "_s": "s",
 }  # fmt: skip
 _UNITS_OF_KEYS = {
     "q": "rad", "v": "rad/s", "joints": "rad", "points": "rad", "kp": "N m/rad", "kd": "N m s/rad",
     "atol": "rad, rad/s",
 }  # fmt: skip
+_TABLES_BY = {"mass_kg": "link"}  # not by joint
 _LINES = {
     "position": "measured position, from the joints to the controller",
     "velocity": "measured velocity, from the joints to the controller",
@@ -56,6 +59,7 @@ def manual() -> str:
         _OPENING,
         *_section("The run", "Keys at the top of the file.", Scene),
         f"Methods with a fixed step: {methods}. Adaptive methods: {adaptive}.\n",
+        *_section("`[load]`", _text(Loading), Loading),
         *_section("`[start]`", "The state at the start.", Start),
         "## `[[effect]]`\n\nWhat acts; one table for each, with its `kind`.\n",
     ]
@@ -94,6 +98,7 @@ def _section(title: str, text: str, part: type[Part], level: int = 2) -> Iterato
 
 def _row(key: str, field: FieldInfo) -> str:
     form = _form(field)
+    form = form.replace("by joint", f"by {_TABLES_BY[key]}") if key in _TABLES_BY else form
     unit = _UNITS_OF_KEYS.get(key) or next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
     unit = "" if "text" in form else unit
     return f"| `{key}` | {_cell(form)} | {unit} | {_default(field)} | {_cell(field.description or '')} |"
@@ -124,7 +129,8 @@ def _of(annotation: Any) -> str:
     if origin is tuple and Ellipsis not in args:
         return f"list of {len(args)} {'lists' if first.startswith('list') else first + 's'}"
     if origin in (list, tuple):
-        return f"list of {'lists of numbers' if first.startswith('list') else first + 's'}"
+        several = first if first.startswith("`") else f"{first}s"
+        return f"list of {'lists of numbers' if first.startswith('list') else several}"
     ways = dict.fromkeys(map(_of, args))
     if "list of numbers" in ways:  # as `PerJoint`
         ways = ["by joint", *(way for way in ways if way.startswith("`"))]

@@ -17,10 +17,10 @@ from robot_dyn.files import Kind, read
 from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
-from robot_dyn.model.loading import load
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.control import Control
-from robot_dyn.scene.effects import BY_KIND, Acting, AnyEffect, Edit
+from robot_dyn.scene.effects import BY_KIND, Acting, AnyEffect, Edit, bare
+from robot_dyn.scene.loading import Loading
 from robot_dyn.scene.messages import located, validation_message, where
 from robot_dyn.scene.references import AnyReference, Hold, Sampled, ViaPoints
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
@@ -45,7 +45,9 @@ class Scene(Part):
     """A scene file."""
 
     robot: str
-    """Name of a robot of the catalog, or path of a URDF, relative to the folder of the scene."""
+    """Name of a robot of the catalog, or path of a URDF or MJCF, relative to the folder of the scene."""
+    load: Loading = Loading()
+    """How its file is read; as it is by default."""
     duration_s: Positive
     """Length of the run."""
     method: str = Setup.integrator
@@ -75,19 +77,20 @@ class Scene(Part):
     sweep: SweepTable | None = None
     """What varies in many runs; none by default."""
 
-    def described(self, folder: Path) -> Robot:
-        """Return the robot of its file, without gravity."""
+    def loaded(self, folder: Path) -> Robot:
+        """Return the robot of its file."""
         beside = folder / self.robot
         with placed("robot"):
-            return load(beside if os.path.isfile(beside) else self.robot).with_(gravity=(0.0, 0.0, 0.0))
+            return self.load.robot(beside if os.path.isfile(beside) else self.robot)
 
     def setup(self, folder: Path, about: dict[str, str]) -> Setup:
         """Return the setup it describes; paths are relative to `folder`."""
-        described = robot = self.described(folder)
+        loaded = self.loaded(folder)
+        robot = bare(loaded)
         for k, effect in enumerate(self.effect):
             if isinstance(effect, Edit):
                 with placed("effect", k):
-                    robot = effect.edit(robot)
+                    robot = effect.edit(robot, loaded)
         acting: list[Effect] = []
         for k, effect in enumerate(self.effect):
             if isinstance(effect, Acting | UserEffect):
@@ -99,7 +102,7 @@ class Scene(Part):
         if isinstance(reference, Sampled | ViaPoints) and reference.file is not None:
             reference = reference.model_copy(update={"file": str(folder / reference.file)})
         with placed("control"):
-            controller = None if self.control is None else self.control.build(described, robot, q0, reference)
+            controller = None if self.control is None else self.control.build(loaded, robot, q0, reference)
         step_s = self.step_s if "step_s" in self.model_fields_set else None
         return Setup(
             Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal, get_args
 
@@ -53,6 +53,11 @@ Truth = Annotated[bool, Field(strict=True)]
 Vector3 = tuple[Number, Number, Number]
 PerJoint = Number | list[Number] | dict[str, Number]  # for all joints, for each, or by name (0 elsewhere)
 Stated = PerJoint | Literal["urdf"]
+
+
+def urdf_or(value: Any, handler: Callable[[Any], Any]) -> Any:
+    """The text "urdf" as it is; anything else as the key has it, with its messages."""
+    return URDF if value == URDF else handler(value)
 
 
 def per_joint(what: str, value: Any, robot: Robot, elsewhere: float = 0.0) -> Any:

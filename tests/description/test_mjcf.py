@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 import warnings
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ from robot_dyn.errors import DescriptionError, MissingExtraError, ModelWarning
 from robot_dyn.simulation.results.provenance import robot_of
 from tests.hostile.kinds import ARM as URDF
 
+mujoco: Any = import_module("mujoco")  # which has no types
 # joints beside the origins of their bodies, several of one body, references, moments of shapes, defaults, a follower
 ARM = """<mujoco model="arm">
   <compiler angle="radian" autolimits="true"/>
@@ -131,6 +133,25 @@ def test_ranges_friction_and_limits_of_actuators_are_those_of_the_file(tmp_path:
     assert robot.edits.gravity == (0.3, -0.2, -9.7)
 
 
+FLAGS = '<flag gravity="disable" equality="disable" damper="disable" frictionloss="disable"/>'
+
+
+def test_flags_of_a_file_switch_off_what_they_name(tmp_path: Path) -> None:
+    """As in MuJoCo: no gravity, no coupling of joints, no damping of joints and no dry friction."""
+    text = ARM.replace('-9.7"/>', f'-9.7">{FLAGS}</option>').replace('damping="2e-5"', "")
+    path, rng = written(tmp_path, text), np.random.default_rng(4)
+    robot = loaded(path)
+    assert robot.joint_names == ("shoulder", "twist", "slide", "left", "right")
+    assert robot.edits.gravity == (0.0, 0.0, 0.0)
+    q, v = robot.random_configuration(rng), rng.standard_normal(robot.n)
+    theirs = Theirs(path, robot, q, v)
+    ours = robot.inverse_dynamics(q, v, np.zeros(robot.n))
+    assert np.abs(ours - theirs.bias).max() <= ROUNDING * np.abs(theirs.bias).max()
+    passive = theirs.data.qfrc_passive[theirs.dofs]
+    assert not robot.damping.any() and not passive.any()
+    assert not robot.friction.any() and not theirs.data.nefc
+
+
 FREE = '<body name="ball" pos="1 0 0"><{} name="loose"/><geom size="0.1"/></body></worldbody>'
 TENDON = '<tendon><fixed name="cable"><joint joint="left" coef="1"/><joint joint="twist" coef="1"/></fixed></tendon>'
 LEFT_OUT = {
@@ -182,10 +203,27 @@ def test_errors_name_the_file_and_the_remedy(tmp_path: Path, monkeypatch: pytest
         rd.load(path)
     for wrong in ("tendon", {"tendons"}, 3):
         with pytest.raises(DescriptionError, match="without must be some of tendon, equality, free, ball"):
-            rd.load(written(tmp_path, ARM), without=wrong)
+            rd.load(written(tmp_path, ARM), without=wrong)  # pyright: ignore[reportArgumentType]
     (tmp_path / "arm.urdf").write_text(URDF, encoding="utf-8")
     with pytest.raises(DescriptionError, match="is for files of MJCF"):
         rd.load(tmp_path / "arm.urdf", without={"tendon"})
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"robot-dyn\[mjcf\]"):
         rd.load(path)
+
+
+def test_warnings_of_mujoco_are_findings_and_leave_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """MuJoCo itself would write them to MUJOCO_LOG.TXT in the current directory; a handler of the user's stays."""
+    mine: list[str] = []
+    mujoco.set_mju_user_warning(mine.append)
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    try:
+        with pytest.warns(ModelWarning, match="MuJoCo warns: .*settotalmass"):
+            robot = rd.load(written(tmp_path, ARM.replace("<compiler ", '<compiler settotalmass="4" ')))
+        assert mujoco.get_mju_user_warning() == mine.append
+    finally:
+        mujoco.set_mju_user_warning(None)
+    assert robot.total_mass == pytest.approx(4, rel=1e-12)  # up to rounding
+    assert [*here.iterdir()] == [] == mine

@@ -8,8 +8,9 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Csv, Dark, Force, Json, Lock, PackageDir, Plot, Xacro, app, bar
+from robot_dyn.cli.app import Csv, Dark, Force, Json, Plot, app, bar
 from robot_dyn.cli.outcome import give, outputs
+from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 from robot_dyn.errors import QueryError
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ _RUNS = ".toml", ".npz"
 
 
 @app.command()
+@takes_robot
 def budget(
     what: Annotated[
         str,
@@ -75,9 +77,7 @@ def budget(
     csv: Csv = None,
     dark: Dark = False,
     force: Force = False,
-    lock: Lock = None,
-    package_dir: PackageDir = None,
-    xacro: Xacro = None,
+    options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
     """Compare what a motion asks of each motor with its limits, by cause; exit code 1 if a motor is too small.
@@ -96,8 +96,7 @@ def budget(
     of_robots = {
         "PLAN.csv": plan, "--payload": payload, "--effects": effects, "--max-payload": max_payload,
         "--fastest": fastest, "--unit": unit, "--period": period, "--time": time, "--joint": joint,
-        "--lock": lock, "--package-dir": package_dir,
-        "--xacro": xacro,
+        **options.given,
     }  # fmt: skip
     if what.lower().endswith(_RUNS):
         if given := [name for name, value in of_robots.items() if value]:
@@ -106,7 +105,7 @@ def budget(
     else:
         if plan is None:
             raise QueryError(f"{what}: give its motion as well, a CSV file with a column t [s] and one for each joint")
-        robot = arguments.load(what, lock, package_dir, xacro)
+        robot = options.load(what)
         times = time if period is None else period
         motion = rd.plan.from_samples(robot, plan, time=times, joints=_columns(joint), unit=unit)
         bodies = [arguments.payload(each) for each in payload or ()] or None

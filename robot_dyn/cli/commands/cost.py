@@ -10,8 +10,9 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Budget, Csv, Dark, Force, Json, Lock, Name, PackageDir, Plot, Repeats, Scene, app, bar
+from robot_dyn.cli.app import Budget, Csv, Dark, Force, Json, Name, Plot, Repeats, Scene, app, bar
 from robot_dyn.cli.outcome import give, outputs
+from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 from robot_dyn.cli.terminal import say, say_json
 from robot_dyn.errors import QueryError
 
@@ -19,6 +20,7 @@ _DURATION_S = 1.0
 
 
 @app.command()
+@takes_robot
 def accuracy(
     what: Annotated[
         str,
@@ -41,13 +43,12 @@ def accuracy(
     duration: Annotated[float | None, typer.Option(metavar="SECONDS", help="Of its motion; 1 by default.")] = None,
     dark: Dark = False,
     force: Force = False,
-    lock: Lock = None,
-    package_dir: PackageDir = None,
+    options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
     """Show what each digit of a motion costs in time, by method and program. Ctrl-C ends it and keeps its runs."""
     paths = outputs(rd.studies.WorkPrecision, output, csv, [what] if os.path.isfile(what) else [], force)
-    setup = _setup(what, q, v, duration, lock, package_dir)
+    setup = _setup(what, q, v, duration, options)
     with bar(budget, "starting") as spent:
         result = rd.studies.work_precision(
             setup, methods=method, peers=peers, budget_s=budget, repeats=repeats, on_progress=spent
@@ -75,6 +76,7 @@ def cost(
 
 
 @app.command()
+@takes_robot
 def certify(
     robot: Name,
     output: Plot = None,
@@ -88,13 +90,12 @@ def certify(
     tau: Annotated[str | None, typer.Option(help="Its torques, of forward dynamics; 0 by default.")] = None,
     dark: Dark = False,
     force: Force = False,
-    lock: Lock = None,
-    package_dir: PackageDir = None,
+    options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
     """Count the digits of M, C, N, inverse and forward dynamics that are true, by program and numbers, beside times."""
     paths = outputs(rd.studies.Certificate, output, csv, [robot] if os.path.isfile(robot) else [], force)
-    arm = arguments.load(robot, lock, package_dir)
+    arm = options.load(robot)
     given = {"q": q, "v": v, "a": a, "tau": tau}
     state = {key: arguments.vector(f"--{key}", x, arm.joint_names) for key, x in given.items() if x is not None}
     with bar(1.0, "starting") as done:
@@ -113,17 +114,13 @@ def advise(scene: Scene, as_json: Json = False) -> None:
         raise typer.Exit(1)
 
 
-def _setup(
-    what: str, q: str | None, v: str | None, duration: float | None, lock: list[str] | None,
-    package_dir: list[str] | None,
-) -> rd.Setup:  # fmt: skip
+def _setup(what: str, q: str | None, v: str | None, duration: float | None, options: RobotOptions) -> rd.Setup:
     """The setup of a scene file, or of the free swing of a robot."""
-    given = {"--q": q, "--v": v, "--duration": duration, "--lock": lock, "--package-dir": package_dir}
-    if setup := arguments.scene(what, given):
+    if setup := arguments.scene(what, {"--q": q, "--v": v, "--duration": duration} | options.given):
         return setup
     import numpy as np
 
-    robot = arguments.load(what, lock, package_dir)
+    robot = options.load(what)
     names = robot.joint_names
     start: Any = (
         robot.random_configuration(np.random.default_rng(0)) if q is None else arguments.vector("--q", q, names)

@@ -8,7 +8,8 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Json, Lock, Name, PackageDir, Xacro, app, progress
+from robot_dyn.cli.app import Json, Name, app, progress
+from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 from robot_dyn.cli.terminal import say, say_json
 from robot_dyn.errors import QueryError, RobotDynError
 
@@ -24,20 +25,19 @@ def list_(as_json: Json = False) -> None:
 
 
 @app.command()
+@takes_robot
 def info(
     robot: Name,
     compiled: Annotated[
         bool, typer.Option("--compiled", help="Also trace each quantity, and say which formulation is compiled.")
     ] = False,
-    lock: Lock = None,
-    package_dir: PackageDir = None,
-    xacro: Xacro = None,
+    options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
     """Show a robot: joints, limits, friction, mass, and findings on its file."""
     from robot_dyn.cli import report
 
-    loaded = arguments.load(robot, lock, package_dir, xacro, quiet=True)  # the findings are shown below
+    loaded = options.load(robot, quiet=True)  # the findings are shown below
     implementations = {"compiled": report.formulations(loaded)} if compiled else {}
     answer = rd.info(loaded)
     if as_json:
@@ -49,6 +49,7 @@ def info(
 
 
 @app.command()
+@takes_robot
 def query(
     what: Annotated[
         str,
@@ -78,9 +79,7 @@ def query(
             help="Add a body to a link, in kg and m, as tool0=5kg@0,0,0.1; may be repeated.",
         ),
     ] = None,
-    lock: Lock = None,
-    package_dir: PackageDir = None,
-    xacro: Xacro = None,
+    options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
     """Ask for M, C, N at a state, and for the torque of an acceleration or the acceleration of a torque.
@@ -92,12 +91,9 @@ def query(
 
     if a is not None and tau is not None:
         raise QueryError("give --a or --tau, not both: one follows from the other")
-    setup = arguments.scene(
-        what,
-        {"--effects": effects, "--payload": payload, "--lock": lock, "--package-dir": package_dir, "--xacro": xacro},
-    )
+    setup = arguments.scene(what, {"--effects": effects, "--payload": payload} | options.given)
     if setup is None:
-        robot = arguments.load(what, lock, package_dir, xacro)
+        robot = options.load(what)
         robot = robot.with_(payload=[arguments.payload(each) for each in payload]) if payload else robot
         plant = rd.Plant(robot, effects or ())
     else:
@@ -125,6 +121,7 @@ def _actuation(setup: rd.Setup, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 @app.command()
+@takes_robot
 def compare(
     robots: Annotated[
         list[str] | None, typer.Argument(metavar="ROBOT...", help="Names or paths.", autocompletion=completion.robots)
@@ -132,9 +129,7 @@ def compare(
     every: Annotated[bool, typer.Option("--all", help="All robots of `robot-dyn list` that load.")] = False,
     samples: Annotated[int, typer.Option(min=1, help="Random states for each robot.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the random states.")] = 0,
-    lock: Lock = None,
-    package_dir: PackageDir = None,
-    xacro: Xacro = None,
+    options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
     """Cross-check Pinocchio against the library's own Lagrangian; exit code 1 if they disagree."""
@@ -147,12 +142,7 @@ def compare(
     results, refused = [], {}
     for name in progress(rd.list_robots() if every else robots or (), "comparing"):
         try:
-            results.append(
-                (
-                    name,
-                    rd.compare(arguments.load(name, lock, package_dir, xacro, quiet=every), samples=samples, seed=seed),
-                )
-            )
+            results.append((name, rd.compare(options.load(name, quiet=every), samples=samples, seed=seed)))
         except RobotDynError as error:
             if not every:
                 raise

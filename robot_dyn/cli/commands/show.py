@@ -10,8 +10,9 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Dark, Force, Lock, Name, PackageDir, app, bar
+from robot_dyn.cli.app import Dark, Force, Name, PackageDir, app, bar
 from robot_dyn.cli.arguments import output as checked_output
+from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 from robot_dyn.cli.terminal import say
 from robot_dyn.errors import QueryError
 
@@ -29,6 +30,7 @@ Browse = Annotated[bool, typer.Option("--open", help="Open the page in your brow
 
 
 @app.command("show")
+@takes_robot
 def show_(
     robot: Name,
     q: Annotated[
@@ -39,20 +41,19 @@ def show_(
     port: Port = None,
     browse: Browse = False,
     force: Force = False,
-    lock: Lock = None,
-    package_dir: PackageDir = None,
+    options: RobotOptions = AS_STATED,
 ) -> None:
     """Show a robot in the browser, live on this machine until Ctrl-C, or as one HTML file."""
     page = _page(html, port, [robot], force)
-    loaded = arguments.load(robot, lock, package_dir)
+    loaded = options.load(robot)
     at = arguments.vector("--q", q, loaded.joint_names)
-    options = {"inertia": inertia, "package_dirs": package_dir or ()}
+    shown = rd.show(loaded, at, inertia=inertia, package_dirs=options.package_dir or ())
     if page is not None:
         with bar(what="writing the page"):
-            file = rd.show(loaded, at, **options).save(page)
+            file = shown.save(page)
         _written(file, browse)
     else:
-        _serve(rd.show(loaded, at, **options).serve(port), "robot", browse)
+        _serve(shown.serve(port), "robot", browse)
 
 
 @app.command()

@@ -9,11 +9,13 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Force, Json, Lock, Name, PackageDir, Xacro, app, bar
+from robot_dyn.cli.app import Force, Json, Name, app, bar
 from robot_dyn.cli.outcome import give
+from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 
 
 @app.command()
+@takes_robot
 def stress(
     robot: Name,
     output: Annotated[
@@ -27,9 +29,7 @@ def stress(
         float, typer.Option(metavar="SECONDS", help="Time to spend; what is not looked at by then is named.")
     ] = 90.0,
     force: Force = False,
-    lock: Lock = None,
-    package_dir: PackageDir = None,
-    xacro: Xacro = None,
+    options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
     """Look for what breaks first on an arm: worst configurations, step, gain, speed, payload; exit code 1 on failures.
@@ -41,7 +41,7 @@ def stress(
 
     inputs = [robot] if os.path.isfile(robot) else []
     paths = [arguments.output(output, JSON, ResultError, inputs, force)] if output else []
-    arm = arguments.load(robot, lock, package_dir, xacro)
+    arm = options.load(robot)
     with bar(budget, "starting") as spent:
         result = rd.studies.stress(arm, samples=samples, runs=runs, seed=seed, budget_s=budget, on_progress=spent)
     give(result, paths, as_json)

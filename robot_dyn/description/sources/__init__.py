@@ -1,6 +1,6 @@
 """Descriptions that other packages make or keep, read on request alone.
 
-mjcf, mjcf_actuators  MJCF as MuJoCo compiles it, as a URDF
-xacro                 the URDF that a file of macros expands to
-robot_descriptions    robots of the package of that name
+mjcf, mjcf_model, mjcf_actuators, mjcf_shapes  MJCF as MuJoCo compiles it, as a URDF
+xacro                                          the URDF that a file of macros expands to
+robot_descriptions                             robots of the package of that name
 """

@@ -6,11 +6,14 @@ A body with joints 1 … k of anchors p_i and axes a_i, in its own axes, stands 
 
 so several joints of a body become links without mass between them. Defaults and `inertiafromgeom` are those of the
 compiler. Damping, dry friction, ranges and limits of actuators stand in the URDF as in any other, armature and gravity
-are edits; contacts, actuators, sensors, springs and shapes are left out. [MuJoCo documentation, Computation]
+are edits, shapes are <visual> elements; contacts, actuators, sensors and springs are left out.
+
+Source: MuJoCo documentation, Computation.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,9 +27,10 @@ from robot_dyn.description.couplings import Mimic, resolve
 from robot_dyn.description.description import content
 from robot_dyn.description.edits import Changes
 from robot_dyn.description.sources.mjcf_actuators import Actuators
+from robot_dyn.description.sources.mjcf_model import Compiled, compiled
+from robot_dyn.description.sources.mjcf_shapes import Shapes
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.errors import DescriptionError, shorten, shown
-from robot_dyn.extras import needs
 from robot_dyn.spatial import rotation, rpy_of
 
 SUFFIXES = (".xml", ".mjcf")
@@ -82,34 +86,34 @@ def read(path: Path, without: frozenset[str] = frozenset()) -> Mjcf:
         DescriptionError: If MuJoCo refuses the file, or it has tendons, equalities other than of two joints and degree
             1, or free or ball joints, that `without` does not name.
     """
-    mujoco: Any = needs("mujoco", extra="mjcf")
-    try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except Exception as error:  # ValueError of the compiler, and those of its readers of meshes
-        raise DescriptionError(f"{path}: MuJoCo refuses it: {shorten(' '.join(str(error).split()), 300)}") from None
-    return _Reader(mujoco, model, str(path), without).read()
+    return _Reader(compiled(path), without).read()
 
 
 @dataclass
 class _Reader:
     """Writes the URDF of one compiled model."""
 
-    mujoco: Any
-    model: Any
-    source: str
+    of: Compiled
     without: frozenset[str]
-    findings: list[str] = field(default_factory=list)
     mimics: dict[str, Mimic] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.mujoco, self.model, self.source = self.of.mujoco, self.of.model, str(self.of.path)
+        self.findings, self.shapes = [*self.of.warnings], Shapes(self.of)
 
     def read(self) -> Mjcf:
         self.refuse_tendons()
         self.equalities()
         self.note_the_rest()
         out = etree.Element("robot", name=self.name_of_model())
-        etree.SubElement(out, "link", name=self.body(0))
+        self.shapes.draw(etree.SubElement(out, "link", name=self.body(0)), 0)
         for body in range(1, self.model.nbody):
             self.write_body(out, body)
-        gravity = tuple(map(float, self.model.opt.gravity))
+        for kind, number in Counter(self.shapes.left_out).items():
+            self.findings.append(
+                f"geoms of kind {kind}, of which there are {number}, are not drawn: URDF has no such shape"
+            )
+        gravity = (0.0,) * 3 if self.of.disabled("gravity") else tuple(map(float, self.model.opt.gravity))
         return Mjcf(etree.tostring(out), self.at_joints("armature", 2), gravity, tuple(self.findings))
 
     def leave(self, what: str, where: str, why: str) -> None:
@@ -117,9 +121,6 @@ class _Reader:
         if what not in self.without:
             raise DescriptionError(f"{self.source}: {where}: {why}; remove it, or leave it out: without={{{what!r}}}")
         self.findings.append(f"{where}: {why}; left out")
-
-    def name(self, kind: Any, prefix: str, index: int) -> str:
-        return (self.mujoco.mj_id2name(self.model, kind, index) or "").strip() or f"{prefix}_{index}"
 
     def new(self, name: str) -> str:
         """A name of what MuJoCo does not name, that no body or joint has."""
@@ -133,10 +134,10 @@ class _Reader:
         return names[: names.index(b"\0")].decode(errors="replace").strip() or "mjcf"
 
     def body(self, index: int) -> str:
-        return self.name(self.mujoco.mjtObj.mjOBJ_BODY, "body", index)
+        return self.of.name("body", index)
 
     def joint(self, index: int) -> str:
-        return self.name(self.mujoco.mjtObj.mjOBJ_JOINT, "joint", index)
+        return self.of.name("joint", index)
 
     def moves(self, joint: int) -> bool:
         return self.kind(joint) in ("hinge", "slide")
@@ -147,7 +148,8 @@ class _Reader:
     def dof(self, what: str, joint: int) -> float:
         """Armature, damping or dry friction of a joint, with those of its actuators."""
         of_joint = float(getattr(self.model, f"dof_{what}")[self.model.jnt_dofadr[joint]])
-        return of_joint + self.actuators.added(what, joint)
+        off = {"damping": ("passive", "damper"), "frictionloss": ("constraint", "frictionloss")}.get(what, ())
+        return of_joint * (not self.of.disabled(*off)) + self.actuators.added(what, joint)
 
     @property
     def actuators(self) -> Actuators:
@@ -166,20 +168,20 @@ class _Reader:
 
     def refuse_tendons(self) -> None:
         for index in range(self.model.ntendon):
-            name = self.name(self.mujoco.mjtObj.mjOBJ_TENDON, "tendon", index)
+            name = self.of.name("tendon", index)
             self.leave("tendon", f"tendon {name!r}", "tendons are not taken")
 
     def equalities(self) -> None:
         """Two joints in proportion become a mimic joint; any other equality is refused, or left out."""
-        model, joints = self.model, self.mujoco.mjtObj.mjOBJ_JOINT
+        model = self.model
         for index in range(model.neq):
             kind, (one, other) = int(model.eq_type[index]), (int(model.eq_obj1id[index]), int(model.eq_obj2id[index]))
-            name = self.name(self.mujoco.mjtObj.mjOBJ_EQUALITY, "equality", index)
+            name = self.of.name("equality", index)
             a0, a1, *higher = model.eq_data[index][:5].tolist()
-            if not model.eq_active0[index]:
+            if not model.eq_active0[index] or self.of.disabled("equality", "constraint"):
                 self.findings.append(f"equality {name!r}: is not active; left out")
             elif kind == int(self.mujoco.mjtEq.mjEQ_JOINT) and other >= 0 and a1 and not any(higher):
-                if self.name(joints, "joint", one) in self.mimics:
+                if self.joint(one) in self.mimics:
                     self.leave("equality", f"equality {name!r}", f"joint {self.joint(one)!r} follows another already")
                     continue
                 offset = a0 + self.reference(one) - a1 * self.reference(other)
@@ -209,7 +211,11 @@ class _Reader:
     def write_body(self, out: Any, body: int) -> None:
         """The joints of a body, and its link, whose frame is that of the body in MuJoCo."""
         model, name = self.model, self.body(body)
-        R, p, parent = self.rotation(model.body_quat[body]), model.body_pos[body], self.body(model.body_parentid[body])
+        R, p, parent = (
+            self.of.rotation(model.body_quat[body]),
+            model.body_pos[body],
+            self.body(model.body_parentid[body]),
+        )
         first = int(model.body_jntadr[body])
         for j in range(first, first + int(model.body_jntnum[body])):
             if not self.moves(j):
@@ -229,6 +235,7 @@ class _Reader:
         self.ends(joint, (R, p), parent, name)
         if model.body_mass[body] > 0:
             self.inertial(link, body)
+        self.shapes.draw(link, body)
 
     def write_joint(self, out: Any, j: int, pose: tuple[Any, Any], parent: str, child: str, hinge: bool) -> None:
         model, name, limited = self.model, self.joint(j), bool(self.model.jnt_limited[j])
@@ -259,11 +266,6 @@ class _Reader:
             limits = None
         return UNBOUNDED if limits is None else repr(limits[1])
 
-    def rotation(self, quaternion: Any) -> np.ndarray:
-        R = np.zeros(9)
-        self.mujoco.mju_quat2Mat(R, quaternion)
-        return R.reshape(3, 3)
-
     def ends(self, joint: Any, pose: tuple[Any, Any], parent: str, child: str) -> None:
         R, p = pose
         etree.SubElement(joint, "origin", xyz=_words(p), rpy=_words(rpy_of(R)))
@@ -271,7 +273,7 @@ class _Reader:
         etree.SubElement(joint, "child", link=child)
 
     def inertial(self, link: Any, body: int) -> None:
-        model, R = self.model, self.rotation(self.model.body_iquat[body])
+        model, R = self.model, self.of.rotation(self.model.body_iquat[body])
         inertia, element = R * model.body_inertia[body] @ R.T, etree.SubElement(link, "inertial")
         etree.SubElement(element, "origin", xyz=_words(model.body_ipos[body]), rpy="0 0 0")
         etree.SubElement(element, "mass", value=repr(float(model.body_mass[body])))

@@ -1,14 +1,17 @@
 """The origin of a run: the texts from which its robot is built again, wherever the file is read.
 
-A run file carries the URDF, the edits, the scene and the versions, so that a replay needs nothing else but meshes.
-These are found from the path of the URDF, which a file holds in a form that reveals nothing about the machine.
+A run file carries the URDF, findings on its file, the edits, the scene and the versions, so that a replay needs nothing
+else but meshes. These are found from the path of the URDF, which a file holds in a form that reveals nothing about the
+machine.
 """
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,9 +19,10 @@ from typing import TYPE_CHECKING, Any
 from robot_dyn.codegen.store.keys import version_of
 from robot_dyn.codegen.trace.right_angles import written_out
 from robot_dyn.description import catalog
-from robot_dyn.description.description import check
+from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Payload
-from robot_dyn.errors import DescriptionError, QueryError
+from robot_dyn.errors import DescriptionError, QueryError, shorten
+from robot_dyn.model.findings import reservations
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.setup.settings import settings_of
 
@@ -26,6 +30,8 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.results.trajectory import Trajectory
     from robot_dyn.simulation.rollouts.result import Rollouts
     from robot_dyn.simulation.setup.setup import Setup
+
+_LISTED = 4  # findings in a summary
 
 
 def origin(dynamics: Any) -> dict[str, str]:
@@ -36,6 +42,8 @@ def origin(dynamics: Any) -> dict[str, str]:
         urdf = robot.description.text.decode(errors="replace")
         texts |= {"robot": robot.name, "source": robot.description.source}
         texts |= {"urdf": urdf, "edits": robot.edits.as_json()}
+        if robot.description.findings:
+            texts["findings"] = "\n".join(robot.description.findings)
     return texts
 
 
@@ -84,10 +92,26 @@ def portable(source: str, folder: Path) -> str:
     return path.name
 
 
+def about_the_robot(run: Trajectory | Rollouts) -> Iterator[str]:
+    """What was estimated of a run's robot, and what was assumed or left out of its file: the first, and how many."""
+    with suppress(DescriptionError):
+        found = reservations(_description(run))
+        yield from (f"robot: {shorten(each, 200)}" for each in found[:_LISTED])
+        if more := found[_LISTED:]:
+            yield f"robot: {len(more)} more findings on its file; rd.info lists them"
+
+
+def _description(run: Trajectory | Rollouts) -> Description:
+    """The robot's file, as the run carries it; DescriptionError if there is none."""
+    description = check(run.about.get("urdf", "").encode(), run.about.get("source", "the run's URDF"))
+    of_reading = filter(None, run.about.get("findings", "").split("\n"))  # which the URDF alone does not give again
+    return replace(description, findings=tuple(dict.fromkeys((*of_reading, *description.findings))))
+
+
 def joint_types(run: Trajectory | Rollouts) -> tuple[str | None, ...]:
     """Types of the joints of a run, as of `Robot.joint_types`; None for each of a run without a URDF."""
     try:
-        kinds = check(run.about.get("urdf", ""), "the run's URDF").joint_kinds
+        kinds = _description(run).joint_kinds
     except DescriptionError:
         kinds = {}
     return tuple(kinds.get(name) for name in run.joint_names)
@@ -108,7 +132,7 @@ def robot_of(run: Trajectory) -> Robot:
     about = run.about
     if "urdf" not in about:
         raise QueryError("the run carries no URDF, so there is no robot to show; simulate one that rd.load gives")
-    robot = Robot(check(about["urdf"].encode(), about.get("source", "the run's URDF")))
+    robot = Robot(_description(run))
     try:
         robot = _edited(robot, json.loads(about["edits"]))
     except (KeyError, TypeError, ValueError):

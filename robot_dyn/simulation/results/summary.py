@@ -11,7 +11,7 @@ from robot_dyn.queries.units import units
 from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.observation.remarks import lines as lines_of
 from robot_dyn.simulation.results.ledger import largest
-from robot_dyn.simulation.results.provenance import joint_types
+from robot_dyn.simulation.results.provenance import about_the_robot, joint_types
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 
@@ -34,6 +34,7 @@ def summary(run: Trajectory) -> str:
         *([f"right angles, in machine code: {run.about['right_angles']}"] if "right_angles" in run.about else []),
         f"energy ledger: {residual}" + _after(run.leak) if ledger.known else "energy ledger: was not recorded",
         f"error of q [{unit}]: {run.error or _not_estimated(run)}",
+        *about_the_robot(run),
     ]
     lines += [] if run.accuracy is None else [f"accuracy: {run.accuracy}"]
     lines += ["between samples: not observed"] if run.extremes is None else []

@@ -15,6 +15,7 @@ from robot_dyn.simulation.columns import attributes, by_heading, data_frame, dat
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.observation.remarks import lines as lines_of
+from robot_dyn.simulation.results.provenance import about_the_robot
 from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
 from robot_dyn.simulation.rollouts.overview import Overview, of_some, overview
@@ -221,6 +222,7 @@ class Rollouts(Value):
         """Number of runs, how many ended early and why, remarks, tracking error, and the run to look at first."""
         count = "1 run" if len(self) == 1 else f"{len(self)} runs"
         lines = [f"{count} of {len(self.t)} samples to t = {self.t[-1]:g} s; {self._early()}"]
+        lines += about_the_robot(self)
         if self.uncut:
             levels = ", ".join(self.uncut)
             lines.append(f"cuts=False: no step ends at {levels}, and a run that passes one is not that of simulate")

@@ -7,7 +7,7 @@ collision shape of the link, otherwise the ellipsoid of its inertia.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar, final
@@ -236,6 +236,8 @@ class _Artist:
             parts, complaints = self._read(path, scale, self._turned)
         except MeshError as error:
             raise MeshError(f"mesh {shown(address)}: {error}") from None
+        if element.get("materials") == "ignored":  # of MJCF, whose geoms state the colour
+            return tuple(replace(part, rgba=None, image=None) for part in parts)
         self.notes += [f"mesh {shown(address)}: {complaint}; drawn without it" for complaint in complaints]
         return parts
 

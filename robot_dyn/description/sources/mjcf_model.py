@@ -1,0 +1,81 @@
+"""A file of MJCF as MuJoCo compiles it, and what MuJoCo warns of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.errors import DescriptionError, shorten
+from robot_dyn.extras import needs
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Compiled:
+    """A compiled file.
+
+    Attributes:
+        mujoco: The module.
+        model: The `MjModel`.
+        path: The file.
+        references: `refpos` and `refquat` of each mesh by name, which the model does not keep.
+        warnings: What MuJoCo warns of, in sentences.
+    """
+
+    mujoco: Any
+    model: Any
+    path: Path
+    references: dict[str, tuple[Any, Any]]
+    warnings: tuple[str, ...]
+
+    def name(self, kind: str, index: int) -> str:
+        """The name of a body, joint, mesh …; body_3 if it has none."""
+        kinds = getattr(self.mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        return (self.mujoco.mj_id2name(self.model, kinds, index) or "").strip() or f"{kind}_{index}"
+
+    def disabled(self, *flags: str) -> bool:
+        """Whether one of these flags of `<option>` is "disable", as far as this version of MuJoCo has it."""
+        bits = (int(getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)) for flag in flags)
+        return any(int(self.model.opt.disableflags) & bit for bit in bits)
+
+    def rotation(self, quaternion: Any) -> np.ndarray:
+        """The matrix (3, 3) of a quaternion (w, x, y, z)."""
+        R = np.zeros(9)
+        self.mujoco.mju_quat2Mat(R, quaternion / np.linalg.norm(quaternion))
+        return R.reshape(3, 3)
+
+
+def compiled(path: Path) -> Compiled:
+    """The model of a file.
+
+    Raises:
+        MissingExtraError: If MuJoCo is not installed.
+        DescriptionError: If MuJoCo refuses the file.
+    """
+    mujoco: Any = needs("mujoco", extra="mjcf")
+    with _heard(mujoco) as heard:
+        try:
+            model = mujoco.MjModel.from_xml_path(str(path))
+            meshes = mujoco.MjSpec.from_file(str(path)).meshes if model.nmesh else ()
+        except Exception as error:  # ValueError of the compiler, and those of its readers of meshes
+            raise DescriptionError(f"{path}: MuJoCo refuses it: {shorten(' '.join(str(error).split()), 300)}") from None
+    references = {each.name or Path(each.file).stem: (each.refpos.copy(), each.refquat.copy()) for each in meshes}
+    sentences = (f"MuJoCo warns: {shorten(' '.join(each.split()), 300)}" for each in dict.fromkeys(heard))
+    return Compiled(mujoco, model, path, references, tuple(sentences))
+
+
+@contextmanager
+def _heard(mujoco: Any) -> Iterator[list[str]]:
+    """Warnings of MuJoCo, which otherwise go to a file MUJOCO_LOG.TXT in the current directory."""
+    warnings: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(warnings.append)
+    try:
+        yield warnings
+    finally:
+        mujoco.set_mju_user_warning(before)

@@ -1,0 +1,78 @@
+"""Options of a robot on the command line: the same for every command that takes one, and those of `rd.load`."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.cli.robots import RobotOptions
+from tests.command import refusal, run
+from tests.scene.test_scene_loading import MJCF, URDF
+
+pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
+TAKING = {
+    "query": ("info", "query", "compare"), "cost": ("accuracy", "certify"), "budget": ("budget",),
+    "stress": ("stress",), "show": ("show_",),
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "rig.urdf").write_text(URDF, encoding="utf-8")
+    (tmp_path / "rig.xml").write_text(MJCF, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(("topic", "name"), [(topic, name) for topic, names in TAKING.items() for name in names])
+def test_every_command_that_takes_a_robot_has_all_options(topic: str, name: str) -> None:
+    command = getattr(import_module(f"robot_dyn.cli.commands.{topic}"), name)
+    parameters = inspect.signature(command).parameters
+    assert {*RobotOptions.__dataclass_fields__} <= {*parameters}
+    assert "options" not in parameters
+
+
+def test_masses_give_inertias_from_shapes_and_are_told() -> None:
+    by_link = ["--mass", "one=2", "--mass", "two=3"]
+    for given, options in (
+        (["--total-mass", "7"], {"total_mass": 7.0}),
+        (["--density", "900"], {"density": 900.0}),
+        (by_link, {"mass": {"one": 2.0, "two": 3.0}}),
+    ):
+        done = run("query", "rig.urdf", "--q", "0.3,-0.7", "--json", *given)
+        theirs = rd.load("rig.urdf", inertia="from_shapes", **options)  # pyright: ignore[reportArgumentType]
+        M = np.array(rd.Plant(theirs).M([0.3, -0.7]))
+        assert done.returncode == 0 and "estimated from shapes, not measured" in done.stderr
+        assert np.array_equal(json.loads(done.stdout)["M"], M)
+    told = run("info", "rig.urdf", *by_link).stdout
+    assert "estimated: one: collision box" in told and "finding: links 'one', 'two'" in told
+
+
+def test_what_is_left_out_of_mjcf_is_told() -> None:
+    assert "tendon 'cable': tendons are not taken; left out" in run("info", "rig.xml", "--without", "tendon").stdout
+    done = run("show", "rig.xml", "--without", "tendon, equality", "--html", "rig.html")
+    assert done.returncode == 0 and "left out" in done.stderr
+    assert "tendon 'cable'" in refusal(["info", "rig.xml"])
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["info", "rig.xml", "--without", "cable"], "without must be some of tendon, equality, free, ball"),
+        (["info", "rig.urdf", "--without", "tendon"], "is for files of MJCF"),
+        (["info", "rig.xml", "--without", "tendon", "--total-mass", "3"], "MuJoCo takes those"),
+        (["query", "rig.urdf", "--mass", "one"], "--mass must be LINK=VALUE"),
+        (["query", "rig.urdf", "--mass", "one=1", "--mass", "one=2"], "--mass names a link twice"),
+        (["query", "rig.urdf", "--total-mass", "3", "--density", "3"], "contradict each other"),
+        (["query", "scene.toml", "--density", "3"], "--density: is for a robot; a scene states its own"),
+        (["query", "scene.toml", "--without", "tendon"], "--without: is for a robot"),
+    ],
+)
+def test_mistakes_are_named(given: list[str], message: str) -> None:
+    assert message in refusal(given)
