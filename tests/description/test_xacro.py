@@ -53,6 +53,13 @@ def test_expanded_file_has_the_dynamics_of_the_file_written_out(arm: Path) -> No
         assert np.array_equal(robot.inverse_dynamics(Q, V, A), heavy.inverse_dynamics(Q, V, A))
 
 
+def test_file_that_only_defines_macros_is_told_from_a_robot_without_name(tmp_path: Path) -> None:
+    file = tmp_path / "macros.xacro"
+    file.write_text(f'<robot {NAMESPACE}><xacro:macro name="base"><link name="base"/></xacro:macro></robot>')
+    with pytest.raises(DescriptionError, match="add one link at least, or give the file that calls the macros of this"):
+        rd.load(file, xacro={})
+
+
 def test_nothing_is_expanded_unless_it_is_asked_for(arm: Path) -> None:
     with pytest.raises(DescriptionError, match=r"is a xacro file; expand the file: xacro=\{\} of load, --xacro"):
         rd.load(arm)
