@@ -90,10 +90,10 @@ def test_arguments_are_texts_numbers_or_booleans_by_name(wrong: object, arm: Pat
 
 
 BODIES = {
-    '<xacro:include filename="$(find nowhere)/a.xacro"/>': "no package 'nowhere'; tried in .*package_dirs",
+    '<xacro:include filename="$(find nowhere)/a.xacro"/>': r"no package 'nowhere'; tried in .*; name the folder that holds 'nowhere' in package_dirs",
     '<xacro:include filename="nowhere.xacro"/>': "No such file",
     '<link name="${lenght}"/>': "name 'lenght' is not defined",
-    '<link name="$(arg side)"/>': "Undefined substitution argument side",
+    '<link name="$(arg side)"/>': r"Undefined substitution argument side .*; give it a value: xacro=\{'side': …\}",
     '<link name="${().__class__}"/>': "invalid name",
     "<xacro:gripper/>": "unknown macro name",
     "<link>": "mismatched tag",
@@ -104,7 +104,8 @@ BODIES = {
 
 @pytest.mark.parametrize("body", BODIES)
 def test_what_xacro_refuses_is_said_by_file_and_reason(body: str, tmp_path: Path) -> None:
-    (file := tmp_path / "arm.xacro").write_text(f'<robot name="a" {NAMESPACE}>{body}</robot>')
+    (folder := tmp_path.joinpath(*"abcdefghijklmnopqrst")).mkdir(parents=True)  # a list of places hides no remedy
+    (file := folder / "arm.xacro").write_text(f'<robot name="a" {NAMESPACE}>{body}</robot>')
     with pytest.raises(DescriptionError, match=BODIES[body]) as refusal:
         rd.load(file, xacro={})
     assert str(refusal.value).startswith(f"{file}: ")
