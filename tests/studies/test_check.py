@@ -179,6 +179,19 @@ def test_a_collision_shape_that_is_a_part_of_the_link_is_judged_with_the_visual(
     assert {each.kind for each in made.findings} == kinds
 
 
+@pytest.mark.parametrize(("z", "severity"), [(0.59, None), (0.61, Severity.ERROR)])
+def test_a_centre_of_mass_farther_than_twice_the_longest_link_is_an_error(z: float, severity: Severity | None) -> None:
+    """The longest distance between joints is 0.3 m, of the elbow; that of the base is of no equation: a warning."""
+    old = '<origin xyz="0.0 0.0 0.06" rpy="0 0 0"/>'
+    text = SOUND.replace(old, old.replace("0.06", str(z)), 1)
+    found = [each for each in checked(text.encode(), "rig.urdf").findings if each.kind == "origin_far"]
+    assert [(each.where, each.severity) for each in found] == ([("link 'hand'", severity)] if severity else [])
+    old = '<origin xyz="0.0 0.0 0.05" rpy="0 0 0"/>'
+    text = SOUND.replace(old, old.replace("0.05", str(z)), 1)
+    found = [each.severity for each in checked(text.encode(), "rig.urdf").findings if each.kind == "origin_far"]
+    assert found == ([Severity.WARNING] if severity else [])
+
+
 def test_numbers_on_which_no_equation_depends_are_no_errors() -> None:
     """A frame of 1e-8 kg with moments of no body, and the mass of the base, which is fixed to the world."""
     moments = " ".join(f'{key}="1e-8"' for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
