@@ -101,7 +101,7 @@ def inertias_beyond_reach(robot: Structure) -> Iterator[str]:
 
 
 def centres_beyond_reach(robot: Structure) -> Iterator[str]:
-    """Moving links with |c| > 2 L, L as above: a centre of mass in another frame, or in another unit."""
+    """Moving links with |c| > 2 L and 0.3 m, L as above: a centre of mass in another frame, or in another unit."""
     for name, link in robot.links.items():
         if name not in robot.base and link.mass >= LIGHTEST and (distance := robot.beyond_reach(link.com)):
             yield (

@@ -2,8 +2,8 @@
 
     |xyz| > 100 times the median distance between a joint that moves and the link before it
 
-A centre of mass of an arm of several joints is out of proportion, too, beyond twice the longest of these distances:
-an error, since M is then wrong by a factor.
+A centre of mass of an arm of several joints is out of proportion, too, beyond twice the longest of these distances
+and 0.3 m, as of a tool: an error, since M is then wrong by a factor.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.description.structure import BEYOND, SEVERAL
+from robot_dyn.description.structure import BEYOND, SEVERAL, TOOL
 from robot_dyn.studies.doctor.document import Document, parsed
 from robot_dyn.studies.doctor.finding import Finding, Severity
 
@@ -33,7 +33,7 @@ def far_origins(document: Document) -> Iterator[Finding]:
         if length > _FAR * median:
             yield _finding(document, origin, length, median)
     longest = max((length for *_, length in lengths if length <= _FAR * median), default=median)
-    most = min(_FAR * median, BEYOND * longest) if len(typical) >= SEVERAL else _FAR * median
+    most = min(_FAR * median, max(BEYOND * longest, TOOL)) if len(typical) >= SEVERAL else _FAR * median
     for inertial in document.root.iterfind("link/inertial"):
         if (origin := inertial.find("origin")) is not None:
             length = _length(origin)
