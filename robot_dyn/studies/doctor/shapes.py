@@ -204,7 +204,7 @@ def outside(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[
     stated = structure(robot.description, robot.edits)
     for name, shape in of.items():
         link, (low, high) = stated.links[name], (shape.points.min(axis=0), shape.points.max(axis=0))
-        room = 0.1 * (high - low) + 0.01
+        room = 0.1 * float(np.max(high - low)) + 0.01  # [m]: of a thin flange, the rest is hidden in its neighbour
         away = float(np.linalg.norm(np.maximum(low - room - link.com, 0) + np.maximum(link.com - high - room, 0)))
         light = shape.unit is not None and link.mass < _LIGHT * shape.unit.mass  # hardly a mass, of which `_mass` tells
         if link.mass > 0 and away > 0 and not light:
@@ -212,7 +212,7 @@ def outside(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[
             xyz = inertial.find("origin").get("xyz", "0 0 0") if inertial.find("origin") is not None else "0 0 0"
             yield document.finding(
                 Severity.NOTE if name in stated.base else Severity.WARNING, "com_outside", inertial,
-                f'its centre of mass "{" ".join(xyz.split())}" m lies {away + float(room.min()):.2g} m outside its'
+                f'its centre of mass "{" ".join(xyz.split())}" m lies {away + room:.2g} m outside its'
                 " shape",
                 "correct the origin of its <inertial>: it is that of the centre of mass in the frame of the link",
             )  # fmt: skip
