@@ -43,14 +43,16 @@ def checked_robot(robot: etree._Element, source: str) -> tuple[etree._Element, t
     if robot.tag != "robot":
         check.refuse(f"line {robot.sourceline}", other_format(robot.tag))
     check.no_macros(robot)
+    if robot.find("link") is None:  # a file of macros expands to nothing, and most have no name either
+        check.refuse(
+            "robot", "holds no <link>; add one link at least, or give the file that calls the macros of this one"
+        )
     out = etree.Element("robot", name=check.name(robot, "robot"))
     for tag, most in (("joint", MAX_JOINTS), ("link", MAX_JOINTS + 1)):
         count = len(robot.findall(tag))
         if count > most:
             check.refuse("robot", f"has {count} {tag}s; at most {most} are taken: split it")
     links = [check.link(link, out) for link in robot.iterfind("link")]
-    if not links:
-        check.refuse("robot", "holds no <link>; add one link at least")
     check.distinct("link", links)
     names = frozenset(links)
     joints = [check.joint(joint, out, names) for joint in robot.iterfind("joint")]

@@ -30,8 +30,9 @@ _LISTED = 6  # names in a finding
 def findings_of(description: Description, edits: Edits, regularity: Regularity) -> tuple[str, ...]:
     """Findings about a description, then about the robot with its edits: location, problem and remedy."""
     kinds = (
-        massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, inertias_beyond_reach, long_lengths,
-        large_ratios, welded_base, zero_limits, equal_limits, impossible_inertias_of_the_base,
+        massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, inertias_beyond_reach,
+        centres_beyond_reach, long_lengths, large_ratios, welded_base, zero_limits, equal_limits,
+        impossible_inertias_of_the_base,
     )  # fmt: skip
     robot = structure(description, edits)
     of_kinds = (finding for kind in kinds for finding in kind(robot))
@@ -101,6 +102,17 @@ def inertias_beyond_reach(robot: Structure) -> Iterator[str]:
                 f"link {name!r}: its inertia is that of {link.mass:g} kg at {radius:.3g} m and more from the centre of"
                 f" mass, and no joint of the robot is more than {robot.longest_link:.3g} m from the one before; correct"
                 " the inertia, or its unit"
+            )
+
+
+def centres_beyond_reach(robot: Structure) -> Iterator[str]:
+    """Moving links with |c| > 2 L and 0.3 m, L as above: a centre of mass in another frame, or in another unit."""
+    for name, link in robot.links.items():
+        if name not in robot.base and link.mass >= LIGHTEST and (distance := robot.beyond_reach(link.com)):
+            yield (
+                f"link {name!r}: its centre of mass lies {distance:.3g} m from the origin of the link, and no joint of"
+                f" the robot is more than {robot.longest_link:.3g} m from the one before; give it in the frame of the"
+                " link, in metres"
             )
 
 

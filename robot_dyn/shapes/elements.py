@@ -46,9 +46,18 @@ def shape(element: Any) -> Any:
     return found
 
 
+def is_empty(primitive: Any) -> bool:
+    """Whether a length of a box, cylinder or sphere is 0; MeshError if one is not a number."""
+    return 0.0 in _lengths(primitive)
+
+
+def _lengths(primitive: Any) -> tuple[float, ...]:
+    return tuple(x for key, count in LENGTHS[primitive.tag].items() for x in numbers(primitive, key, count))
+
+
 def lengths(primitive: Any) -> tuple[float, ...]:
     """The lengths of a box, cylinder or sphere, in [m]; MeshError if one is not positive."""
-    found = tuple(x for key, count in LENGTHS[primitive.tag].items() for x in numbers(primitive, key, count))
+    found = _lengths(primitive)
     if min(found) < SMALLEST:
         raise MeshError(f"<{primitive.tag}> has a length that is not positive, or below {SMALLEST:g} m; correct it")
     return found

@@ -76,38 +76,50 @@ def with_estimates(description: Description, masses: Masses, package_dirs: Itera
     Raises:
         QueryError: If a mass is of an unknown link, or of one that has a mass; if the total is used up; if a body that
             moves is left without mass.
-        DescriptionError: If the shape of such a link cannot be read.
+        DescriptionError: If the shape of such a link cannot be read and the link moves; a link of the base, on which
+            no equation depends, is left out with a finding.
     """
-    found, left_out = estimates(description, shapes_of_lacking(description, package_dirs), masses)
+    shapes, unread = shapes_of_lacking(description, package_dirs)
+    found, left_out = estimates(description, shapes, masses, unread)
     return replace(marked(description, found), findings=tuple(dict.fromkeys((*description.findings, *left_out))))
 
 
-def shapes_of_lacking(description: Description, package_dirs: Iterable[str | Path] = ()) -> dict[str, LinkShape]:
-    """Shapes of the links without mass or without moments; DescriptionError if one that is stated cannot be read."""
-    links = structure(description, Edits()).links
-    lacking = [name for name, link in links.items() if not any(link.moments)]
+def shapes_of_lacking(
+    description: Description, package_dirs: Iterable[str | Path] = ()
+) -> tuple[dict[str, LinkShape], dict[str, str]]:
+    """Shapes of the links without mass or without moments, and why that of a link of the base cannot be read.
+
+    Raises:
+        DescriptionError: If that of a link that moves cannot be read.
+    """
+    stated = structure(description, Edits())
+    lacking = [name for name, link in stated.links.items() if not any(link.moments)]
     shapes, failed = link_shapes(description, lacking, tuple(package_dirs))
     for name, why in failed.items():
-        raise DescriptionError(f"{description.source}: link {name!r}: its inertia cannot be estimated: {why}")
-    return shapes
+        if name not in stated.base:
+            raise DescriptionError(f"{description.source}: link {name!r}: its inertia cannot be estimated: {why}")
+    return shapes, failed
 
 
 def estimates(
-    description: Description, shapes: Mapping[str, LinkShape], masses: Masses
+    description: Description, shapes: Mapping[str, LinkShape], masses: Masses, unread: Mapping[str, str]
 ) -> tuple[tuple[Estimate, ...], tuple[str, ...]]:
-    """The estimates of links with these shapes, and what is said of those that get none; QueryError as above."""
+    """The estimates of links with these shapes, and what is said of those that get none; QueryError as above.
+
+    A mass that is given for a link whose shape is unread is a part of the total, and of no equation.
+    """
     stated = structure(description, Edits())
     measured = {name: link.mass for name, link in stated.links.items() if link.mass}
     masses.check_links(stated.links, measured)
     for name in masses.of:
-        if name not in shapes:
+        if name not in shapes and name not in unread:
             raise QueryError(f"mass: link {name!r} has no <collision> or <visual> to estimate moments from; add one")
     without = {name: shape for name, shape in shapes.items() if name not in measured}
     known = masses.shared(without, sum(measured.values()))
-    found = [_new(name, shapes[name], *known[name]) for name in known]
+    found = [_new(name, shapes[name], *known[name]) for name in known if name in shapes]
     found += [_moments(name, stated.links[name], shapes[name]) for name in shapes if name in measured]
     _refuse_massless(stated, {each.link for each in found}, without)
-    return tuple(found), tuple(_left_out(without, known))
+    return tuple(found), (*_left_out(without, known), *_unread(unread, masses, measured))
 
 
 def marked(description: Description, found: Iterable[Estimate]) -> Description:
@@ -142,6 +154,14 @@ def _left_out(without: Mapping[str, LinkShape], known: Mapping[str, Any]) -> Ite
     for name in without:
         if name not in known:
             yield f"link {name!r}: has a shape and no <inertial>, and no mass was given for it; it has none"
+
+
+def _unread(unread: Mapping[str, str], masses: Masses, measured: Mapping[str, float]) -> Iterator[str]:
+    for name, why in unread.items():
+        no_share = masses.total is not None and name not in masses.of and name not in measured
+        share = ", nor a share of the total mass, so that the other links are too heavy" if no_share else ""
+        remedy = f", or give mass={{{name!r}: …}}" if no_share else ""
+        yield f"link {name!r}: its shape is not read, and it has no estimate{share}; {why}{remedy}"
 
 
 def _refuse_massless(stated: Structure, found: set[str], without: Mapping[str, LinkShape]) -> None:

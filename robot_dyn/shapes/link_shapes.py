@@ -138,6 +138,9 @@ def _renumbered(parts: Iterable[meshes.Part]) -> Iterator[np.ndarray]:
 
 
 def _of_primitive(shape: Any) -> _Bodies:
+    """The bodies of a primitive; none of one that stands for a frame, with a length of 0."""
+    if elements.is_empty(shape):
+        return _Bodies(None, None, None, True)
     lengths = elements.lengths(shape)
     solid = primitives.solid(shape.tag, lengths)
     return _Bodies(solid, solid, primitives.shell(shape.tag, lengths), True)

@@ -163,7 +163,7 @@ def judged(maker: str, name: str, robot: rd.Robot, package_dirs: tuple[Path, ...
     """The errors of the estimates of one arm, of its links that have a mass and a shape."""
     true = stated(robot.description)
     bare = check(_INERTIAL.sub(b"", robot.description.text), robot.description.source)
-    shapes = {link: shape for link, shape in shapes_of_lacking(bare, package_dirs).items() if link in true}
+    shapes = {link: shape for link, shape in shapes_of_lacking(bare, package_dirs)[0].items() if link in true}
     arm = rd.Robot(_kept(robot.description, shapes.keys()))
     total = sum(true[link].mass for link in shapes)
     of_each = Masses({link: true[link].mass for link in shapes})
@@ -172,7 +172,7 @@ def judged(maker: str, name: str, robot: rd.Robot, package_dirs: tuple[Path, ...
     moving = [link for link in shapes if link not in base and true[link].mass > least]
     errors = {}
     for what, masses in known:
-        found = {each.link: each for each in estimates(bare, shapes, masses)[0]}
+        found = {each.link: each for each in estimates(bare, shapes, masses, {})[0]}
         errors[what] = _of_links([(true[link], found[link].body) for link in moving], _length(robot.description))
         errors[what] |= _of_arm(arm, rd.Robot(marked(bare, found.values())))
     return Judged(maker, name, len(moving), errors)

@@ -18,7 +18,7 @@ REFUSED = {
     "alex_psyonic_hands": "mimics 'index_q1', which is not defined",
     "hector": "no joint moves",
     "iris_simple": "no joint moves",
-    "ur3_empty": "has no name",
+    "ur3_empty": "holds no <link>",
 }
 
 

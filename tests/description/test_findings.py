@@ -84,6 +84,18 @@ def test_an_inertia_is_beyond_reach_from_ten_times_the_longest_distance_between_
     assert findings(text, tmp_path, inertias={"upper": np.eye(3) * 0.01}) == ()
 
 
+@pytest.mark.parametrize(("factor", "joints", "found"), [(1.999, 3, False), (2.001, 3, True), (5.0, 2, False)])
+def test_a_centre_of_mass_is_beyond_reach_from_twice_the_longest_distance_on_arms_of_three_joints(
+    tmp_path: Path, factor: float, joints: int, found: bool
+) -> None:
+    """L = 0.7 m of the file; a pendulum of two joints may have a weight anywhere."""
+    hand = f'<link name="hand">{BODY}</link>' + joint("wrist", "fore", "hand") if joints == 3 else ""
+    text = inside(hand).replace('<origin xyz="0 0 0.1" rpy', f'<origin xyz="0 0 {0.7 * factor}" rpy')
+    told = findings(text, tmp_path)
+    assert len(told) == found
+    assert not found or told[0].startswith("link 'upper': its centre of mass lies 1.4 m from the origin of the link")
+
+
 @pytest.mark.parametrize(("offset", "warns"), [(0.009, False), (0.011, True)])
 def test_the_joints_of_a_gimbal_do_not_tell_its_size(tmp_path: Path, offset: float, warns: bool) -> None:
     """Of 1 kg with ½ tr I = 0.015 kg m² some is 0.12 m away: more than 10 times 11 mm, but nothing of a gimbal."""

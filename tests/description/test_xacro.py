@@ -53,6 +53,13 @@ def test_expanded_file_has_the_dynamics_of_the_file_written_out(arm: Path) -> No
         assert np.array_equal(robot.inverse_dynamics(Q, V, A), heavy.inverse_dynamics(Q, V, A))
 
 
+def test_file_that_only_defines_macros_is_told_from_a_robot_without_name(tmp_path: Path) -> None:
+    file = tmp_path / "macros.xacro"
+    file.write_text(f'<robot {NAMESPACE}><xacro:macro name="base"><link name="base"/></xacro:macro></robot>')
+    with pytest.raises(DescriptionError, match="add one link at least, or give the file that calls the macros of this"):
+        rd.load(file, xacro={})
+
+
 def test_nothing_is_expanded_unless_it_is_asked_for(arm: Path) -> None:
     with pytest.raises(DescriptionError, match=r"is a xacro file; expand the file: xacro=\{\} of load, --xacro"):
         rd.load(arm)
@@ -83,10 +90,10 @@ def test_arguments_are_texts_numbers_or_booleans_by_name(wrong: object, arm: Pat
 
 
 BODIES = {
-    '<xacro:include filename="$(find nowhere)/a.xacro"/>': "no package 'nowhere'; tried in .*package_dirs",
+    '<xacro:include filename="$(find nowhere)/a.xacro"/>': "no package 'nowhere'; tried in .*; name the folder that",
     '<xacro:include filename="nowhere.xacro"/>': "No such file",
     '<link name="${lenght}"/>': "name 'lenght' is not defined",
-    '<link name="$(arg side)"/>': "Undefined substitution argument side",
+    '<link name="$(arg side)"/>': r"Undefined substitution argument side .*; give it a value: xacro=\{'side': …\}",
     '<link name="${().__class__}"/>': "invalid name",
     "<xacro:gripper/>": "unknown macro name",
     "<link>": "mismatched tag",
@@ -97,7 +104,8 @@ BODIES = {
 
 @pytest.mark.parametrize("body", BODIES)
 def test_what_xacro_refuses_is_said_by_file_and_reason(body: str, tmp_path: Path) -> None:
-    (file := tmp_path / "arm.xacro").write_text(f'<robot name="a" {NAMESPACE}>{body}</robot>')
+    (folder := tmp_path.joinpath(*"abcdefghijklmnopqrst")).mkdir(parents=True)  # a list of places hides no remedy
+    (file := folder / "arm.xacro").write_text(f'<robot name="a" {NAMESPACE}>{body}</robot>')
     with pytest.raises(DescriptionError, match=BODIES[body]) as refusal:
         rd.load(file, xacro={})
     assert str(refusal.value).startswith(f"{file}: ")

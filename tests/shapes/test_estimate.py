@@ -221,6 +221,38 @@ def test_a_shape_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
         estimated(arm(tmp_path, "", ROD), mass={"link1": 1.0})
 
 
+def test_a_base_whose_shape_cannot_be_read_keeps_no_arm_out(tmp_path: Path) -> None:
+    """No equation depends on it, but shares of a total do, unless its mass is given."""
+    path = arm(tmp_path, BOX, ROD)
+    whole = path.read_text()
+    path.write_text(whole.replace(BALL, MESH.format("missing.stl", "1 1 1")))
+    light, heavy = estimated(path, total_mass=18.0, mass={"base": 4.0}), estimated(path, total_mass=18.0)
+    assert light.total_mass == pytest.approx(14.0)
+    assert heavy.total_mass == pytest.approx(18.0)
+    (said,) = (each for each in heavy.findings if "'base'" in each)
+    assert "nor a share of the total mass, so that the other links are too heavy" in said
+    assert "missing.stl" in said
+    assert "mass={'base': …}" in said
+    (said,) = (each for each in light.findings if "'base'" in each)
+    assert "share" not in said
+    q = np.array([0.3, -0.8])
+    np.testing.assert_allclose(heavy.M(q), 18 / 14 * light.M(q), rtol=1e-12)
+    path.write_text(whole)
+    np.testing.assert_allclose(light.M(q), estimated(path, total_mass=18.0, mass={"base": 4.0}).M(q), rtol=1e-12)
+
+
+def test_a_shape_of_length_0_has_no_volume(tmp_path: Path) -> None:
+    """Such boxes and spheres stand for a frame: the body has the shape of its other elements."""
+    empty = '<collision><geometry><box size="0 0 0"/></geometry></collision>'
+    frame = '<visual><geometry><sphere radius="0"/></geometry></visual>'
+    assert np.array_equal(
+        estimated(arm(tmp_path, BOX + empty), density=900).M(np.zeros(1)),
+        estimated(arm(tmp_path, BOX), density=900).M(np.zeros(1)),
+    )
+    robot = estimated(arm(tmp_path, BOX, frame), density=900)
+    assert any("link 'link2' moves but has no mass" in each for each in robot.findings)
+
+
 def test_masses_are_refused_where_nothing_is_estimated(tmp_path: Path) -> None:
     path = arm(tmp_path, BOX)
     with pytest.raises(rd.RobotDynError, match=r"are for inertia='from_shapes'"):

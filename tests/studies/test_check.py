@@ -158,6 +158,54 @@ def test_an_inertia_is_an_error_from_three_times_what_its_shape_allows(ratio: fl
     assert [each.severity for each in made.findings] == ([] if severity is None else [severity])
 
 
+SMALL, WHOLE = '<box size="0.02 0.02 0.02"/>', '<box size="0.05 0.07 0.12"/>'
+
+
+@pytest.mark.parametrize(
+    ("visual", "kinds"),
+    [
+        ("", {"com_outside", "mass_density"}),
+        (f'<visual><origin xyz="0 0 0.06"/><geometry>{WHOLE}</geometry></visual>', set()),
+        (f'<visual><origin xyz="0 0 0.3"/><geometry>{SMALL}</geometry></visual>', {"com_outside", "mass_density"}),
+        ('<visual><geometry><box size="50 70 120"/></geometry></visual>', {"com_outside", "mass_density"}),
+    ],
+    ids=["none", "the whole link", "as far away", "in millimetres"],
+)
+def test_a_collision_shape_that_is_a_part_of_the_link_is_judged_with_the_visual(visual: str, kinds: set[str]) -> None:
+    """The collision box is one of 2 cm beside the centre of mass: by it alone the mass is too dense."""
+    start = SOUND.index("<collision>", SOUND.index('<link name="hand"'))
+    part = f'<collision><origin xyz="0 0 0.12"/><geometry>{SMALL}</geometry></collision>{visual}'
+    made = checked((SOUND[:start] + part + SOUND[SOUND.index("</link>", start) :]).encode(), "rig.urdf")
+    assert {each.kind for each in made.findings} == kinds
+
+
+@pytest.mark.parametrize(("z", "severity"), [(0.59, None), (0.61, Severity.ERROR)])
+def test_a_centre_of_mass_farther_than_twice_the_longest_link_is_an_error(z: float, severity: Severity | None) -> None:
+    """The longest distance between joints is 0.3 m, of the elbow; that of the base is of no equation: a warning."""
+    old = '<origin xyz="0.0 0.0 0.06" rpy="0 0 0"/>'
+    text = SOUND.replace(old, old.replace("0.06", str(z)), 1)
+    found = [each for each in checked(text.encode(), "rig.urdf").findings if each.kind == "origin_far"]
+    assert [(each.where, each.severity) for each in found] == ([("link 'hand'", severity)] if severity else [])
+    old = '<origin xyz="0.0 0.0 0.05" rpy="0 0 0"/>'
+    text = SOUND.replace(old, old.replace("0.05", str(z)), 1)
+    found = [each.severity for each in checked(text.encode(), "rig.urdf").findings if each.kind == "origin_far"]
+    assert found == ([Severity.WARNING] if severity else [])
+
+
+def test_numbers_on_which_no_equation_depends_are_no_errors() -> None:
+    """A frame of 1e-8 kg with moments of no body, and the mass of the base, which is fixed to the world."""
+    moments = " ".join(f'{key}="1e-8"' for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    frame = f'<link name="frame"><inertial><mass value="1e-8"/><inertia {moments}/></inertial></link>'
+    frame += '<joint name="f" type="fixed"><parent link="hand"/><child link="frame"/></joint></robot>'
+    made = checked(SOUND.replace("</robot>", frame).encode(), "rig.urdf")
+    assert {each.severity for each in made.findings if each.kind == "inertia_impossible"} == {Severity.WARNING}
+    assert made.ok
+    heavy = frame.replace('"1e-8"', '"0.01"')
+    assert not checked(SOUND.replace("</robot>", heavy).encode(), "rig.urdf").ok
+    (found,) = checked(SOUND.replace('<mass value="4.0"/>', '<mass value="4e5"/>').encode(), "rig.urdf").findings
+    assert (found.kind, found.severity) == ("mass_density", Severity.NOTE)
+
+
 def test_a_joint_that_cannot_hold_the_arm_is_an_error_of_the_limit_just_below_the_torque_of_gravity() -> None:
     """The elbow carries 1.2 kg at 0.12 m and 0.4 kg at 0.24 + 0.06 m, turned by 0.3 rad: m g r cos 0.3."""
     load = 9.80665 * (1.2 * 0.12 + 0.4 * (0.24 + 0.06)) * np.cos(0.3)

@@ -8,6 +8,7 @@ since xacro keeps its state in its module and writes to stderr. The result is re
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping
@@ -22,6 +23,7 @@ from robot_dyn.errors import DescriptionError, RobotDynError, nearest, shorten, 
 
 SECONDS = 60  # of an expansion
 MEMORY = 2 << 30  # bytes
+_UNDEFINED = re.compile(r"Undefined substitution argument (\w+)")
 
 _CHILD = """
 import json, sys
@@ -65,7 +67,7 @@ def expand(path: Path, arguments: Mapping[str, Any], package_dirs: Iterable[str 
         last = shorten((child.stderr.splitlines() or ["no memory or no time left"])[-1], 200)
         raise DescriptionError(f"{path}: the expansion ended without a result ({last}); simplify its macros") from None
     if "error" in result:
-        raise DescriptionError(f"{path}: xacro refuses it: {shorten(result['error'], 400)}; correct the file")
+        raise DescriptionError(f"{path}: xacro refuses it: {shorten(result['error'], 400)}; {result['remedy']}")
     for name in result["unknown"]:
         raise DescriptionError(f"{path}: xacro has no argument {name!r} in it; {nearest(name, result['known'])}")
     return result["text"].encode(), [f"xacro: {shorten(line, 200)}" for line in dict.fromkeys(warnings)]
@@ -113,19 +115,24 @@ def answer() -> None:
         text = document.toxml()
     except Exception as error:  # xacro and the expressions of the file raise anything
         file = (xacro.filestack or [path])[-1]
-        print(json.dumps({"error": f"{_why(error)} (in {file})"}))
+        why, remedy = _why(error)
+        print(json.dumps({"error": f"{why} (in {file})", "remedy": remedy}))
         return
     unknown = sorted(set(order["arguments"]) - arguments.used)
     print(json.dumps({"text": text, "unknown": unknown, "known": sorted(arguments.used - set(unknown))}))
 
 
-def _why(error: BaseException) -> str:
-    """What xacro says; what `_serve_packages` says, where that is the cause."""
+def _why(error: BaseException) -> tuple[str, str]:
+    """What xacro says and the remedy; what `_serve_packages` says, where that is the cause."""
     cause = error
     while isinstance(cause := getattr(cause, "exc", None), BaseException):
         if isinstance(cause, RobotDynError):
-            return str(cause)
-    return " ".join(str(error).split()) or type(error).__name__
+            why, _, remedy = str(cause).rpartition("; ")
+            return why, remedy
+    why = " ".join(str(error).split()) or type(error).__name__
+    if undefined := _UNDEFINED.search(why):
+        return why, f"give it a value: xacro={{'{undefined[1]}': …}} of load, --xacro {undefined[1]}=…"
+    return why, "correct the file"
 
 
 def _serve_packages(path: Path, package_dirs: list[str]) -> None:

@@ -156,7 +156,7 @@ def checked(
             document = _rewritten(document, made)
             robot = Robot(description.check(document.text, source))
         found += masses.masses(document, robot)
-        later = [*shapes.misfits(document, robot, of), *shapes.outside(document, robot, of)]
+        later = shapes.doubtful(document, robot, of, package_dirs)
         found += later
         found += masses.beyond_reach(document, robot, found)
         found += gravity_load.weak_joints(document, robot, found)

@@ -30,8 +30,8 @@ def missing_inertials(
     """
     found = dict[str, Estimate]()
     if masses is not None:
-        shapes = shapes_of_lacking(description, package_dirs)
-        found = {each.link: each for each in estimates(description, shapes, masses)[0]}
+        shapes, unread = shapes_of_lacking(description, package_dirs)
+        found = {each.link: each for each in estimates(description, shapes, masses, unread)[0]}
     for name, shape in of.items():
         if name not in found and shape.unit is not None and document.named("link", name).find("inertial") is None:
             yield _finding(

@@ -21,6 +21,7 @@ from robot_dyn.studies.doctor.finding import Finding, Severity
 _QUOTED = r"""(?:'[^']*'|"[^"]*")"""  # a name, which may hold colons and semicolons
 _SENTENCE = re.compile(rf"((?:link|joint)s? {_QUOTED}(?:, {_QUOTED})*)(?:: | )(.*?); (.*)", re.DOTALL)
 _NOTHING = 1e-9  # of the largest moment
+_LOST = 1e-6  # of the heaviest link, and of the largest moment
 _RATIO = 1e4  # of the masses of two bodies of an arm: of a base of 100 kg to a finger of 10 g
 _KINDS = (
     (Severity.ERROR, "inertia_impossible", doctor.impossible_inertias),
@@ -56,9 +57,23 @@ def _in_words(robot: Robot, stated: Structure) -> Iterator[Finding]:
     """The findings that `load` has as well."""
     for text in doctor.no_inertia_about_axis(stated, robot.joint_without_inertia):
         yield _of_words(Severity.ERROR, "inertia_missing", text)
+    idle = _negligible(stated)
     for severity, kind, find in _KINDS:
         for text in find(stated):
-            yield _of_words(severity, kind, text)
+            found = _of_words(severity, kind, text)
+            mild = severity is Severity.ERROR and found.where in idle
+            yield replace(found, severity=Severity.WARNING) if mild else found
+
+
+def _negligible(stated: Structure) -> set[str]:
+    """Links of which mass and moments are lost beside those of others, such as 1e-8 of a frame: M is right."""
+    heaviest = max((link.mass for link in stated.links.values()), default=0.0)
+    largest = max((float(np.trace(link.inertia)) for link in stated.links.values()), default=0.0)
+    return {
+        f"link {name!r}"
+        for name, link in stated.links.items()
+        if link.mass <= _LOST * heaviest and np.abs(link.inertia).max() <= _LOST * largest
+    }
 
 
 def _of_words(severity: Severity, kind: str, text: str) -> Finding:

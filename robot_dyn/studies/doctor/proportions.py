@@ -2,7 +2,8 @@
 
     |xyz| > 100 times the median distance between a joint that moves and the link before it
 
-A centre of mass of an arm of several joints is out of proportion, too, beyond the sum of all distances: its reach.
+A centre of mass of an arm of several joints is out of proportion, too, beyond twice the longest of these distances
+and 0.3 m, as of a tool: an error, since M is then wrong by a factor.
 """
 
 from __future__ import annotations
@@ -12,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.description.structure import BEYOND, SEVERAL, TOOL
 from robot_dyn.studies.doctor.document import Document, parsed
 from robot_dyn.studies.doctor.finding import Finding, Severity
 
 _FAR = 100.0
-_SEVERAL = 3
 _MOVING = ("revolute", "continuous", "prismatic")
 
 
@@ -31,13 +32,33 @@ def far_origins(document: Document) -> Iterator[Finding]:
     for _, origin, length in lengths:
         if length > _FAR * median:
             yield _finding(document, origin, length, median)
-    reach = sum(length for *_, length in lengths if length <= _FAR * median)
-    most = min(_FAR * median, reach) if len(typical) >= _SEVERAL else _FAR * median
+    longest = max((length for *_, length in lengths if length <= _FAR * median), default=median)
+    most = min(_FAR * median, max(BEYOND * longest, TOOL)) if len(typical) >= SEVERAL else _FAR * median
     for inertial in document.root.iterfind("link/inertial"):
         if (origin := inertial.find("origin")) is not None:
             length = _length(origin)
             if length > most:
-                yield _finding(document, origin, length, median)
+                counts = parsed(_mass(inertial)) > 0 and _moves(document, inertial.getparent())
+                yield _finding(document, origin, length, median, Severity.ERROR if counts else Severity.WARNING)
+
+
+def _mass(inertial: Any) -> str | None:
+    mass = inertial.find("mass")
+    return None if mass is None else mass.get("value")
+
+
+def _moves(document: Document, link: Any) -> bool:
+    """Whether a joint that moves carries a link."""
+    above = {(each.find("child").get("link") or "").strip(): each for each in document.root.iterfind("joint[child]")}
+    name, seen = (link.get("name") or "").strip(), set[str]()
+    while name in above and name not in seen:
+        seen.add(name)
+        joint = above[name]
+        if joint.get("type") in _MOVING:
+            return True
+        parent = joint.find("parent")
+        name = "" if parent is None else (parent.get("link") or "").strip()
+    return False
 
 
 def _length(origin: Any) -> float:
@@ -47,10 +68,12 @@ def _length(origin: Any) -> float:
     return length if np.isfinite(length) else 0.0
 
 
-def _finding(document: Document, origin: Any, length: float, median: float) -> Finding:
+def _finding(
+    document: Document, origin: Any, length: float, median: float, severity: Severity = Severity.WARNING
+) -> Finding:
     what = "centre of mass" if origin.getparent().tag == "inertial" else "origin"
     return document.finding(
-        Severity.WARNING, "origin_far", origin,
+        severity, "origin_far", origin,
         f'its {what}, xyz "{" ".join(origin.get("xyz").split())}", lies {length:.3g} m away, on a robot whose links'
         f" are {median:.3g} m long at the median",
         "correct it, or its unit: metres",

@@ -28,6 +28,7 @@ _CONCENTRATED = 0.15  # of the inertia of a uniform body: of 20 arms of the cata
 _UNITS = {1e3: "g m²", 1e4: "kg cm²", 1e6: "kg mm²", 1e7: "g cm²", 1e9: "g mm²"}
 _WITHIN = 4.0  # a factor on either side, by which the inertia of a link is off that of a uniform body
 _LONG, _LEAST_LONG = 10.0, 10.0  # times the length of the arm, and [m], that a shape is: millimetres
+_SIZE = "shape_in_mm"
 _GRAVE = 3.0  # of ½ tr I to m d², from which M is wrong by a factor: below, makers round
 
 
@@ -49,6 +50,36 @@ def shapes(robot: Robot, package_dirs: Iterable[str | Path]) -> tuple[dict[str, 
     """The shape of each link that has one, and what cannot be read."""
     pieces, notes = solids(robot, package_dirs)
     return {name: _shape(of) for name, of in pieces.items() if of}, notes
+
+
+def doubtful(
+    document: Document, robot: Robot, of: dict[str, Shape], package_dirs: Iterable[str | Path]
+) -> list[Finding]:
+    """What is wrong with masses, inertias and centres of mass by the collision shape of a link, and by its visual too.
+
+    A collision shape may be a part of the link alone: what the visual explains is not reported.
+    """
+    found = _by_shape(document, robot, of)
+    doubted = {name for name in of if any(each.where == f"link {name!r}" for each in found)}
+    pieces, _ = solids(robot, package_dirs, ("visual",), doubted)
+    again = _by_shape(document, robot, {name: _shape(drawn) for name, drawn in pieces.items() if drawn})
+    by_visual = {(each.kind, each.where): each for each in again}
+    told = {f"link {name!r}" for name, drawn in pieces.items() if drawn}
+    told -= {each.where for each in again + found if each.kind == _SIZE}  # in another unit: it explains nothing
+    kept = [each for each in found if each.where not in told]
+    for where in sorted(told):
+        both = [each for each in found if each.where == where and (each.kind, where) in by_visual]
+        kept += [_milder(each, by_visual[each.kind, where]) for each in both] or [x for x in again if x.where == where]
+    return kept
+
+
+def _by_shape(document: Document, robot: Robot, of: dict[str, Shape]) -> list[Finding]:
+    return [*misfits(document, robot, of), *outside(document, robot, of)]
+
+
+def _milder(one: Finding, other: Finding) -> Finding:
+    order = [*Severity]
+    return max(one, other, key=lambda each: order.index(each.severity))
 
 
 def _shape(pieces: tuple[Piece, ...]) -> Shape:
@@ -84,10 +115,9 @@ def misfits(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[
         if link.mass <= 0:
             continue
         inertial = element.find("inertial")
-        if (found := _mass(name, link, shape, inertial)) is not None:
-            yield found
-            continue  # of which the inertia is doubtful as well
-        if (found := _inertia(name, link, shape, inertial) or _small(name, link, shape, inertial)) is not None:
+        found = _mass(name, link, shape, inertial)  # if it is doubtful, the inertia is as well
+        found = found or _inertia(name, link, shape, inertial) or _small(name, link, shape, inertial)
+        if found is not None:
             yield replace(found, severity=Severity.NOTE) if name in stated.base else found
 
 
@@ -104,7 +134,7 @@ def _oversized(document: Document, name: str, element: Any, size: float, reach: 
         if mesh.get("scale", "1 1 1").split() in (["1", "1", "1"], ["1.0", "1.0", "1.0"])
     )
     return Finding(
-        Severity.WARNING, "shape_in_mm", f"link {name!r}",
+        Severity.WARNING, _SIZE, f"link {name!r}",
         f"its shape is {size:.3g} m long, on a robot of {reach:.3g} m: millimetres are suspected",
         'scale its mesh, scale="0.001 0.001 0.001"', element.sourceline, changes, True,
     )  # fmt: skip
@@ -171,17 +201,18 @@ def _scaled(text: str, power: int) -> str:
 
 def outside(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
     """Centres of mass beyond the box around the shapes of their link."""
-    links = structure(robot.description, robot.edits).links
+    stated = structure(robot.description, robot.edits)
     for name, shape in of.items():
-        link, (low, high) = links[name], (shape.points.min(axis=0), shape.points.max(axis=0))
-        room = 0.1 * (high - low) + 0.01
+        link, (low, high) = stated.links[name], (shape.points.min(axis=0), shape.points.max(axis=0))
+        room = 0.1 * float(np.max(high - low)) + 0.01  # [m]: of a thin flange, the rest is hidden in its neighbour
         away = float(np.linalg.norm(np.maximum(low - room - link.com, 0) + np.maximum(link.com - high - room, 0)))
-        if link.mass > 0 and away > 0:
+        light = shape.unit is not None and link.mass < _LIGHT * shape.unit.mass  # hardly a mass, of which `_mass` tells
+        if link.mass > 0 and away > 0 and not light:
             inertial = document.named("link", name).find("inertial")
-            stated = inertial.find("origin").get("xyz", "0 0 0") if inertial.find("origin") is not None else "0 0 0"
+            xyz = inertial.find("origin").get("xyz", "0 0 0") if inertial.find("origin") is not None else "0 0 0"
             yield document.finding(
-                Severity.WARNING, "com_outside", inertial,
-                f'its centre of mass "{" ".join(stated.split())}" m lies {away + float(room.min()):.2g} m outside its'
+                Severity.NOTE if name in stated.base else Severity.WARNING, "com_outside", inertial,
+                f'its centre of mass "{" ".join(xyz.split())}" m lies {away + room:.2g} m outside its'
                 " shape",
                 "correct the origin of its <inertial>: it is that of the centre of mass in the frame of the link",
             )  # fmt: skip

@@ -6,7 +6,7 @@ collision shape of the link, otherwise the ellipsoid of its inertia.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -100,11 +100,19 @@ def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: b
 
 
 def solids(
-    robot: Robot, package_dirs: Iterable[str | Path] = ()
-) -> tuple[dict[str, tuple[Piece, ...]], tuple[str, ...]]:
-    """The collision shapes of each link, or its visuals where it has none that can be read; and what cannot."""
+    robot: Robot, package_dirs: Iterable[str | Path] = (), kinds: tuple[str, ...] = ("collision", "visual"),
+    links: Container[str] | None = None,
+) -> tuple[dict[str, tuple[Piece, ...]], tuple[str, ...]]:  # fmt: skip
+    """The shapes of each link of the first kind of which one can be read; and what cannot.
+
+    Args:
+        robot: The robot.
+        package_dirs: As of `drawing`.
+        kinds: The elements, in this order.
+        links: Names of links; all of them if not given.
+    """
     artist = _Artist(robot, package_dirs)
-    found = artist.upright(artist.link_solids)
+    found = artist.upright(lambda: artist.link_solids(kinds, links))
     return found, tuple(dict.fromkeys(artist.notes))
 
 
@@ -162,11 +170,11 @@ class _Artist:
                 there += off_centre(mesh, pose @ turn, com)
         return there < 0.6 * here
 
-    def link_solids(self) -> dict[str, tuple[Piece, ...]]:
-        """The collision shapes of each link, or its visuals where it has none that can be read."""
+    def link_solids(self, kinds: tuple[str, ...], links: Container[str] | None) -> dict[str, tuple[Piece, ...]]:
+        """The shapes of links of the first kind of which one can be read."""
         found: dict[str, tuple[Piece, ...]] = {}
         for name, link in self.links():
-            for kind in ("collision", "visual"):
+            for kind in kinds if links is None or name in links else ():
                 if not found.get(name):
                     pieces, failed = self.shapes(name, link, kind)
                     found[name] = tuple(pieces)
