@@ -54,7 +54,7 @@ def test_the_page_counts_the_figures_of_the_rows_and_its_picture_has_a_mark_for_
 
 
 def test_the_documentation_states_the_law_of_each_family() -> None:
-    text = (ROOT / "docs" / "hard_cases.md").read_text()
+    text = (ROOT / "docs" / "studies" / "hard_cases.md").read_text()
     for name, family in FAMILIES.items():
         assert f"## {family.TITLE}\n\n{cleandoc(family.__doc__)}\n" in text, name
 
