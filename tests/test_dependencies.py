@@ -112,3 +112,10 @@ def test_the_source_distribution_holds_the_whole_tree() -> None:
     tree = {name for name in tree if not name.endswith(".egg-info") and name not in ("__pycache__", "PKG-INFO")}
     included = set(PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"])
     assert tree - {"pyproject.toml"} == included  # which is always in it
+
+
+def test_the_page_says_what_each_is_for() -> None:
+    page = (ROOT / "docs" / "developers" / "dependencies.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([\w, -]+) \| ", page, flags=re.MULTILINE)
+    listed = {normal(name) for row in rows for name in row.split(", ")} - {"package"}
+    assert listed == DECLARED | EXTRA
