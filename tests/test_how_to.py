@@ -47,7 +47,7 @@ def test_versions_that_pages_name_are_those_of_the_lock() -> None:
     """What a page says was tried, was; rerun-sdk is tried where it is installed, and is not locked."""
     lock = (ROOT / "requirements-dev.lock").read_text(encoding="utf-8")
     text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
-    named = re.findall(r"\b([A-Za-z][\w-]*) (\d+\.\d+\.\d+)\b", text)
+    named = re.findall(r"\b([A-Za-z][\w-]*) (\d+\.\d+\.\d+)\b(?!\.\d)", text)
     assert len(named) >= 5
     stale = [f"{name} {version}" for name, version in named if f"\n{name.lower()}=={version} " not in lock]
     assert [each for each in stale if not each.startswith("rerun-sdk ")] == []

@@ -79,7 +79,7 @@ def untimed(commands: list[str]) -> list[str]:
 def run_commands(commands: list[str], start: Callable[..., str], folder: Path) -> None:
     """One after the other in one folder, as they are read; `> file` keeps what is printed."""
     for command in commands:
-        line, _, file = command.partition(" > ")
+        line, file = re.match(r"(.*?)(?: > ([\w.]+))?$", command).groups()
         printed = start(*shlex.split(line))
         assert printed
         if file:

@@ -3,6 +3,7 @@
     PYTHONPATH=scripts python -m benchmarks.sweep_cost memory --runs 1000000
     PYTHONPATH=scripts python -m benchmarks.sweep_cost samples --runs 340000
     PYTHONPATH=scripts python -m benchmarks.sweep_cost overhead --arm panda --seconds 60
+    PYTHONPATH=scripts python -m benchmarks.sweep_cost cluster --arm panda --seconds 60
     PYTHONPATH=scripts python -m benchmarks.sweep_cost plan
     PYTHONPATH=scripts python -m benchmarks.sweep_cost resume
     PYTHONPATH=scripts python -m benchmarks.sweep_cost scheduler --chunks 20000
@@ -13,7 +14,6 @@ CPU times are of the process; overhead is summed over chunks that alternate with
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import subprocess
 import sys
@@ -21,6 +21,7 @@ import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -29,19 +30,21 @@ import robot_dyn as rd
 from benchmarks.planar_scene import planar_scene
 from robot_dyn import sweeps as sw
 from robot_dyn.scene.starters import starter
+from robot_dyn.sweeps.engines.cluster import client_of
+from robot_dyn.sweeps.folder.folder import Folder
 from robot_dyn.sweeps.plan.work import Work
-from robot_dyn.sweeps.run_sweep import begun
+from robot_dyn.sweeps.run_sweep import begun, opened
 
 MIB = 2**20
 RESUME = """
 import time
 from robot_dyn import sweeps as sw
 from robot_dyn.sweeps.plan.work import Work
-began, cpu, plain, first = time.perf_counter(), time.process_time(), Work.rows, []
-def rows(self, *given):
+began, cpu, plain, first = time.perf_counter(), time.process_time(), Work.made, []
+def made(self, *given):
     first.append(time.perf_counter() - began)
     return plain(self, *given)
-Work.rows = rows
+Work.made = made
 done = sw.read({out!r})
 sw.run(done.sweep, {out!r}, threads=2)
 print(f"{{done.folder.count}} chunks: the work begins {{first[0]:.2f}} s after the import of the room;"
@@ -111,6 +114,12 @@ def samples(given: argparse.Namespace) -> None:
               f" {(last == done.table('end')['end']).all()}; peak RSS {peak_rss():.0f} MiB", flush=True)  # fmt: skip
 
 
+def rollouts_of(setup: rd.Setup, values: dict[str, np.ndarray], work: Work) -> None:
+    """What a user would call for the runs of a chunk."""
+    params = {name: x[:, 0] if x.shape[1] == 1 else x for name, x in values.items() if name != "q0"}
+    rd.rollouts(setup, values.get("q0"), params=params, record=work.record, threads=1)
+
+
 def overhead(given: argparse.Namespace) -> None:
     """CPU time of chunks, written, over that of rd.rollouts of the same runs and values."""
     with tempfile.TemporaryDirectory() as folder:
@@ -128,8 +137,7 @@ def overhead(given: argparse.Namespace) -> None:
             values = plan.values(start, stop)
 
             def rollouts(values: dict[str, np.ndarray] = values) -> None:
-                params = {name: x[:, 0] if x.shape[1] == 1 else x for name, x in values.items() if name != "q0"}
-                rd.rollouts(setup, values.get("q0"), params=params, record=work.record, threads=1)
+                rollouts_of(setup, values, work)
 
             turns = {"sweep": sweep, "rollouts": rollouts}
             for name in sorted(turns, reverse=bool(chunk % 2)):
@@ -146,6 +154,51 @@ def overhead(given: argparse.Namespace) -> None:
         ratio = spent["sweep"] / spent["rollouts"] - 1
         print(f"{given.arm}: chunks of {known.chunk}, {chunk} of them; sweep {spent['sweep']:.2f} s of CPU,"
               f" rd.rollouts {spent['rollouts']:.2f} s: {100 * ratio:+.2f} %")  # fmt: skip
+
+
+def rollouts_in_a_worker(folder: str, start: int, stop: int) -> float:
+    """CPU time of a worker for rd.rollouts of the runs of a chunk, the folder of which it has opened before."""
+    work = opened(Path(folder))[1]
+    values, setup = work.sweep.values(start, stop), replace(work.sweep.setup, estimate_error=False)
+    began = time.process_time()
+    rollouts_of(setup, values, work)
+    return time.process_time() - began
+
+
+def cluster(given: argparse.Namespace) -> None:
+    """CPU time of workers, scheduler and driver for a chunk, over that of rd.rollouts of its runs in the same workers.
+
+    That of a chunk is the difference between a sweep of many chunks and one of four, so that what each worker does
+    once, the setup and its kernels, is told apart.
+    """
+    many = panda if given.arm == "panda" else planar
+    with tempfile.TemporaryDirectory() as folder, client_of("local:2x1") as client:
+        chunk = begun(many(folder, 10**7), Path(folder) / "pilot").chunk
+        workers = [psutil.Process(pid) for pid in client.run(os.getpid).values()]
+
+        def spent() -> float:
+            times = [each.cpu_times() for each in workers]
+            return time.process_time() + sum(each.user + each.system for each in times)
+
+        def swept(chunks: int) -> float:
+            with tempfile.TemporaryDirectory(dir=folder) as out:
+                began = spent()
+                sw.run(many(folder, chunks * chunk), f"{out}/out", cluster=client, chunk=chunk)
+                return spent() - began
+
+        swept(4)  # compiles
+        few, whole, rollouts, more = [], [], [], 16
+        while sum(whole) < given.seconds:
+            few.append(swept(4))
+            whole.append(swept(4 + more))
+            tasks = [(f"{folder}/pilot", k * chunk, (k + 1) * chunk) for k in range(4, 4 + more)]
+            futures = [client.submit(rollouts_in_a_worker, *task, pure=False) for task in tasks]
+            rollouts.append(sum(client.gather(futures)))
+            ratio = (sum(whole) - sum(few)) / sum(rollouts) - 1
+            once = sum(few) / len(few) - 4 * sum(rollouts) / len(rollouts) / more
+            print(f"{given.arm}: {more * len(whole)} chunks of {chunk}; sweep {sum(whole) - sum(few):.2f} s,",
+                  f"rd.rollouts {sum(rollouts):.2f} s of CPU: {100 * ratio:+.2f} %; once {once:.2f} s",
+                  flush=True)  # fmt: skip
 
 
 def plan(given: argparse.Namespace) -> None:
@@ -179,32 +232,50 @@ def resume(given: argparse.Namespace) -> None:
         )
 
 
+def without_work() -> None:
+    """In a worker: chunks are empty files."""
+
+    def written(self: Folder, chunk: int, *_: Any) -> None:
+        self.file(chunk).touch()
+
+    Work.made, Folder.write = (lambda *_: ()), written  # type: ignore[method-assign]
+
+
 def scheduler(given: argparse.Namespace) -> None:
-    """RSS of a scheduler, in a process of its own, after many chunks of nearly no work."""
+    """RSS of a scheduler and of the driver, a process each, after many empty chunks."""
     import distributed
 
+    def python(*command: str) -> subprocess.Popen[bytes]:
+        return subprocess.Popen([sys.executable, "-m", *command], stderr=subprocess.DEVNULL)
+
     with tempfile.TemporaryDirectory() as folder:
-        sweep = planar(folder, given.chunks)
-        with (
-            distributed.LocalCluster(
-                n_workers=2,
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address=None,  # pyright: ignore[reportArgumentType]  for none
-            ) as local,
-            distributed.Client(local, set_as_default=False) as client,
-        ):
-            before, began = rss(), time.perf_counter()
-            done = sw.run(sweep, f"{folder}/out", cluster=client, chunk=1)
-            print(json.dumps({
-                "chunks": done.folder.count, "missing": len(done.missing), "rss_before": before, "rss_after": rss(),
-                "peak": peak_rss(), "wall_s": time.perf_counter() - began,
-            }))  # fmt: skip
+        known = f"{folder}/scheduler.json"
+        first = python("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
+                       "--scheduler-file", known)  # fmt: skip
+        workers = python("distributed.cli.dask_worker", "--nworkers", "2", "--nthreads", "1", "--no-dashboard",
+                         "--host", "127.0.0.1", "--scheduler-file", known)  # fmt: skip
+        try:
+            while not Path(known).exists():
+                time.sleep(0.1)
+            with distributed.Client(scheduler_file=known, set_as_default=False) as client:
+                client.wait_for_workers(2, 60)
+                client.run(without_work)
+                its, began = psutil.Process(first.pid), time.perf_counter()
+
+                def tell(done: int, runs: int) -> None:
+                    sizes = f"scheduler {its.memory_info().rss / MIB:.0f} MiB, driver {rss():.0f} MiB"
+                    print(f"{done} of {runs} chunks, {time.perf_counter() - began:.0f} s: {sizes}", flush=True)
+
+                sw.run(planar(folder, given.chunks), f"{folder}/out", cluster=client, chunk=1, on_progress=tell)
+        finally:
+            for each in (workers, first):
+                each.terminate()
+                each.wait()
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    commands = {each.__name__: each for each in (memory, samples, overhead, plan, resume, scheduler)}
+    commands = {each.__name__: each for each in (memory, samples, overhead, cluster, plan, resume, scheduler)}
     parser.add_argument("what", choices=commands)
     parser.add_argument("--runs", type=int, default=1_000_000)
     parser.add_argument("--arm", choices=("panda", "planar"), default="panda")

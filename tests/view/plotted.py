@@ -33,7 +33,7 @@ def cart_pole():
 
 def cells(figure, symbol: str) -> list:
     """The axes whose y axis begins with that symbol."""
-    return [axes for axes in figure.axes if axes.get_ylabel().startswith(f"{symbol} ")]
+    return [axes for axes in figure.axes if axes.get_ylabel().startswith(f"{symbol} [")]
 
 
 def lines(axes, label: str) -> list:

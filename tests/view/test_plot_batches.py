@@ -64,7 +64,7 @@ def test_the_fan_of_tracking_is_of_the_error_of_each_run(runs) -> None:
     for i, axes in enumerate(plot(runs, "tracking").axes):
         drawn = lines(axes, "median")[0].get_ydata()
         np.testing.assert_allclose(drawn, np.median(off[:, :, i], axis=0), rtol=0, atol=1e-15)
-        assert axes.get_ylabel() == "error [rad]"
+        assert axes.get_ylabel() == "q − q_d [rad]"
 
 
 def test_runs_that_diverged_are_drawn_and_counted_in_each_part(some_lost) -> None:

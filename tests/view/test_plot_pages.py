@@ -38,7 +38,7 @@ def test_the_overview_is_the_runs(run) -> None:
     figure, n = plot(run), len(run.joint_names)
     columns = [figure.axes[k : 4 * n : 4] for k in range(4)]
     for column, values, symbol in zip(
-        columns, (run.q, run.v, run.u, run.deviation), ("q", "v", "u", "error"), strict=True
+        columns, (run.q, run.v, run.u, run.deviation), ("q", "v", "u", "q − q_d"), strict=True
     ):
         for axes, expected in zip(column, values.T, strict=True):
             np.testing.assert_array_equal(axes.lines[0].get_xydata(), np.column_stack([run.t, expected]))
@@ -59,7 +59,7 @@ def test_what_a_run_lacks_has_no_axes(run) -> None:
     """A swing without control, reference or estimate: q, v, the ledger. That u is 0 is said."""
     cart = replace(cart_pole(), error=None)
     figure = plot(cart)
-    assert not cells(figure, "error") and not cells(figure, "u") and "u is 0 throughout" in headings(figure)
+    assert not cells(figure, "q − q_d") and not cells(figure, "u") and "u is 0 throughout" in headings(figure)
     assert not any("Estimated" in axes.get_title(loc="left") for axes in figure.axes)
     assert "u is 0" not in headings(plot(run))
     unknown = plot(replace(cart, u=np.full_like(cart.u, np.nan)))  # not recorded, which is not 0
@@ -68,7 +68,7 @@ def test_what_a_run_lacks_has_no_axes(run) -> None:
 
 def test_a_frame_that_follows_has_its_own_row(run) -> None:
     figure = plot(replace(run, desired=None, deviation=run.deviation[:, :3]))
-    titles = [axes.get_title(loc="left") for axes in cells(figure, "error")]
+    titles = [axes.get_title(loc="left") for axes in cells(figure, "p − p_d")]
     assert titles == ["frame, x", "frame, y", "frame, z"]
 
 

@@ -104,7 +104,7 @@ def test_tracking_is_the_deviation_with_its_rms(run, cart) -> None:
     assert any(f"rms {run.tracking_error:.2e} rad" in text.get_text() for text in figure.texts)
     frame = plot(replace(run, desired=None, deviation=run.deviation[:, :3]), "tracking")
     assert [axes.get_title(loc="left") for axes in frame.axes] == ["frame, x", "frame, y", "frame, z"]
-    assert {axes.get_ylabel() for axes in frame.axes} == {"error [m]"}
+    assert {axes.get_ylabel() for axes in frame.axes} == {"p − p_d [m]"}
     with pytest.raises(PlotError, match="no reference"):
         plot(cart, "tracking")
 

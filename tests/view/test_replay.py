@@ -289,7 +289,7 @@ def test_the_price_of_a_run_stands_beside_its_plots(browser, tmp_path) -> None:
         assert view.complaints == []
         head, *table = view.ask(rows)
         told = {line[0]: line[1:] for line in table}
-        assert head == ["", "method DOP853", "method rk4"]
+        assert head == ["", "method DOP853, …", "method rk4, …"]
         assert told["method"] == [run.statistics.method, "rk4, step 0.01 s"]
         assert told["steps"] == [str(run.statistics.steps), "30"]
         assert told["evaluations"] == [str(run.statistics.evaluations), "120"]

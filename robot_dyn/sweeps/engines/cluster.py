@@ -30,6 +30,12 @@ _WINDOW = 3  # tasks a thread of a worker
 _ATTEMPTS = 20  # rounds without a new file, after which a chunk is held to end its worker
 _WAIT_S = 60.0  # for the first worker
 _LOOK_S = 0.5
+# what a process of Dask does beside its tasks, a profile and a look at itself each 20 ms, is 4 % of two processors
+_LOCAL = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+}
 
 
 @final
@@ -68,6 +74,7 @@ def client_of(cluster: Any) -> Iterator[Any]:
     elif isinstance(cluster, str) and cluster.startswith("local:"):
         processes, threads = _local(cluster)
         with (
+            needs("dask.config", extra="cluster").set(_LOCAL),
             distributed.LocalCluster(
                 n_workers=processes, threads_per_worker=threads, host="127.0.0.1", dashboard_address=None,
                 protocol="tcp://", memory_limit=0, processes=True, silence_logs=50,

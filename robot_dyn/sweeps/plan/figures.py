@@ -10,6 +10,7 @@ import typing
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import reduce
 from typing import Any, ClassVar
 
 import numpy as np
@@ -68,9 +69,10 @@ class RmsError(Figure):
 
     def of(self, runs: Runs) -> np.ndarray:
         deviation = _chosen(_deviation(runs, self.name), self.joint, runs)
-        squares = np.where(runs.known[..., None], deviation, 0.0) ** 2
-        count = runs.known.sum(axis=1) * deviation.shape[2]
-        return np.sqrt(np.add.accumulate(squares.reshape(len(runs), -1), axis=1)[:, -1] / count)
+        total = np.zeros((len(runs), deviation.shape[2]))
+        for known, x in zip(runs.known.T, deviation.swapaxes(0, 1), strict=True):
+            total += x * x if known.all() else np.where(known[:, None], x, 0.0) ** 2
+        return np.sqrt(reduce(np.add, total.T) / (runs.known.sum(axis=1) * deviation.shape[2]))
 
 
 @typing.final

@@ -90,7 +90,7 @@ class Runs:
         setup, runs = self._rollouts.setup, self._rollouts
         if setup is None or setup.controller is None or self.q is None:
             return None
-        q = np.where(self.known[..., None], self.q, 0.0)
+        q = self.q if self.known.all() else np.where(self.known[..., None], self.q, 0.0)
         if not self._references_vary:
             return tracking_of(setup, self.t, q).deviation
         each = [tracking_of(runs.setup_of(i), self.t, q[i]).deviation for i in range(len(self))]

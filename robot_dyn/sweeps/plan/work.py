@@ -24,7 +24,7 @@ from robot_dyn.sweeps.folder.samples import check_times
 from robot_dyn.sweeps.plan.runs import Runs, taken
 from robot_dyn.sweeps.plan.sweep import STARTS, Sweep, samples_of_run
 
-_PART_BYTES = 2**25  # that the runs of a part record, so that memory does not grow with the chunk
+_PART_BYTES = 2**23  # that the runs of a part record; memory does not grow with the chunk, and allocators reuse blocks
 Look = Callable[[float], object]
 
 
