@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-long stress check lock clean
+.PHONY: demo test test-long stress check docs sbom lock clean
 
 demo: .venv/installed
 	$(BIN)/robot-dyn demo --force
@@ -32,6 +32,17 @@ check: .venv/installed
 	$(BIN)/pyright
 	$(BIN)/lint-imports --no-cache
 
+# the site, in build/docs/README.html: a warning, a link that leads nowhere or a cell that raises is an error
+docs: .venv/installed
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+
+# what a wheel brings along, with versions and licences: a bill of materials in CycloneDX
+sbom: .venv/installed
+	rm -rf build/sbom && $(PYTHON) -m venv build/sbom
+	build/sbom/bin/python -m pip install --quiet --constraint requirements-dev.lock .
+	$(BIN)/cyclonedx-py environment --pyproject pyproject.toml --output-file build/sbom.json build/sbom/bin/python
+	rm -rf build/sbom
+
 # versions that pass, written anew: those of a fresh environment with the latest of everything
 lock:
 	rm -rf .venv requirements-dev.lock
@@ -43,7 +54,8 @@ lock:
 .venv/installed: pyproject.toml requirements-dev.lock
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --editable . --group dev --constraint requirements-dev.lock
+	$(BIN)/python -m pip install --quiet --editable . --group dev --group docs --group release \
+		--constraint requirements-dev.lock
 	touch $@
 
 clean:

@@ -99,7 +99,7 @@ class Answer:
         raise NotImplementedError
 
     def to_json(self) -> str:
-        """The JSON document of docs/json.md."""
+        """The JSON document of docs/reference/json.md."""
         from robot_dyn.result import json_text  # late: the command line writes lines without NumPy
 
         return json_text(self)

@@ -1,4 +1,4 @@
-"""True digits of M, C, N, inverse and forward dynamics of many robots: the tables of docs/accuracy.md.
+"""True digits of M, C, N, inverse and forward dynamics of many robots: the tables of docs/studies/certify.md.
 
 Each is `rd.studies.certify`. With --keep FILE the results are stored there, a line of JSON each,
 and a later call continues.

@@ -1,6 +1,6 @@
 """What each effect, the control and each algorithm cost on Panda under computed torque: counted, timed, and drawn.
 
-It is `rd.studies.cost`; table and figure are those of docs/accuracy_and_time.md.
+It is `rd.studies.cost`; table and figure are those of docs/studies/cost.md.
 """
 
 from __future__ import annotations

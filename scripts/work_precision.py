@@ -1,6 +1,6 @@
 """Error against time: a pendulum, a double pendulum, UR5, Panda-7, a stiff scene, and one with stops.
 
-Each is `rd.studies.work_precision`; the diagrams are those of docs/accuracy_and_time.md.
+Each is `rd.studies.work_precision`; the diagrams are those of docs/studies/work_precision.md.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ def imported(folder: str) -> dict[str, str]:
             if isinstance(node, ast.ImportFrom) and not node.level and node.module:
                 names = [node.module]
             found |= {name.partition(".")[0]: str(path.relative_to(ROOT)) for name in names}
-    own = {"robot_dyn", "tests", "benchmarks", *(path.stem for path in (ROOT / folder).iterdir())}
+    own = {"robot_dyn", "tests", "benchmarks", "site_parts", *(path.stem for path in (ROOT / folder).iterdir())}
     return {name: path for name, path in found.items() if name not in own | set(sys.stdlib_module_names)}
 
 
@@ -43,12 +43,17 @@ def normal(name: str) -> str:
 
 DECLARED = names(PROJECT["project"]["dependencies"])
 EXTRA = names([each for group in PROJECT["project"]["optional-dependencies"].values() for each in group])
-DEVELOPMENT = names(PROJECT["dependency-groups"]["dev"])
+GROUPS = PROJECT["dependency-groups"]
+DEVELOPMENT = names(GROUPS["dev"])
 
 
 @pytest.mark.parametrize(
     ("folder", "allowed"),
-    [("robot_dyn", DECLARED | EXTRA), *((each, DECLARED | EXTRA | DEVELOPMENT) for each in ("tests", "scripts"))],
+    [
+        ("robot_dyn", DECLARED | EXTRA),
+        *((each, DECLARED | EXTRA | DEVELOPMENT) for each in ("tests", "scripts")),
+        ("docs", DECLARED | names(GROUPS["docs"])),
+    ],
 )
 def test_what_is_imported_is_declared(folder: str, allowed: set[str]) -> None:
     """Every module comes from a distribution that pyproject.toml names, not from one that another brings along."""
@@ -93,7 +98,9 @@ def test_the_lock_holds_what_is_declared() -> None:
     for each in locked.values():
         (version,) = each.specifier
         assert version.operator == "==" and each.url is None and str(each.marker) == 'python_version == "3.11"'
-    for asked in map(Requirement, [*PROJECT["project"]["dependencies"], *PROJECT["dependency-groups"]["dev"]]):
+    for asked in map(
+        Requirement, [*PROJECT["project"]["dependencies"], *(each for group in GROUPS.values() for each in group)]
+    ):
         (version,) = locked[normal(asked.name)].specifier
         assert asked.specifier.contains(version.version), asked
 
@@ -105,3 +112,10 @@ def test_the_source_distribution_holds_the_whole_tree() -> None:
     tree = {name for name in tree if not name.endswith(".egg-info") and name not in ("__pycache__", "PKG-INFO")}
     included = set(PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"])
     assert tree - {"pyproject.toml"} == included  # which is always in it
+
+
+def test_the_page_says_what_each_is_for() -> None:
+    page = (ROOT / "docs" / "developers" / "dependencies.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([\w, -]+) \| ", page, flags=re.MULTILINE)
+    listed = {normal(name) for row in rows for name in row.split(", ")} - {"package"}
+    assert listed == DECLARED | EXTRA

@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
-INDEX = DOCS / "decisions" / "README.md"
+INDEX = DOCS / "developers" / "decisions" / "README.md"
 RECORDS = [path for path in PAGES if path.parent == INDEX.parent and path != INDEX]
 MOST_WORDS = 300
 CODE = re.compile(r"^```.*?^```$|`[^`\n]*`", flags=re.MULTILINE | re.DOTALL)
@@ -50,7 +50,7 @@ def test_the_index_lists_each_record_once_by_its_title() -> None:
 
 def test_files_that_are_named_exist() -> None:
     """`lagrange/tree.py` is a file of the package, or of the repository."""
-    pages = [DOCS / "architecture.md", *RECORDS]
+    pages = [DOCS / "developers" / "architecture.md", *RECORDS]
     names = [
         (page, each)
         for page in pages

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "notation.md"
+PAGE = ROOT / "docs" / "start" / "notation.md"
 LETTER = re.compile(r"[\u0370-\u03ff\u2110-\u2138\U0001d400-\U0001d7ff]")
 COMPETING = re.compile(r"\b(?:tau_cmd|u_cmd|tau_c|qdot|q_dot|qddot|q_ddot|ddq|qdd|Gamma|Upsilon)\b|Υ|\\tau|\\Upsilon")
 EQUATION = re.compile(r"C(?:\(q, v\))? v \+ N(?:\([^)]*\))? = ([^\W\d]\w*)")
-OF_OTHERS = {"docs/notation.md"}  # what books write
+OF_OTHERS = {"docs/start/notation.md"}  # what books write
 TAU = ("τ", "Y", "Q", "ID", "Σ")  # Y θ of the regressor; Q of coordinates that are no joints; computed otherwise
 
 
@@ -64,6 +64,6 @@ def test_these_tests_can_fail(text: str, fails: bool) -> None:
     assert bool(unlisted(text) or COMPETING.search(text) or ends) is fails
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/architecture.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/developers/architecture.md"])
 def test_the_page_is_linked(page: str) -> None:
     assert "notation.md)" in (ROOT / page).read_text(encoding="utf-8")

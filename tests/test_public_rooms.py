@@ -44,8 +44,8 @@ def test_no_public_name_is_that_of_a_module(name: str) -> None:
 
 
 def test_names_of_every_day_are_few_and_each_has_a_reason() -> None:
-    """The count and the table of docs/decisions/names.md."""
-    text = (Path(__file__).parents[1] / "docs/decisions/names.md").read_text(encoding="utf-8")
+    """The count and the table of docs/developers/decisions/names.md."""
+    text = (Path(__file__).parents[1] / "docs/developers/decisions/names.md").read_text(encoding="utf-8")
     reasons = [re.findall(r"`(\w+)`", line.split("|")[1]) for line in text.splitlines() if line.startswith("| `")]
     assert sorted(name for names in reasons for name in names) == rd.__all__
     assert len(rd.__all__) <= 45

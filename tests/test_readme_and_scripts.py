@@ -52,7 +52,7 @@ def test_python_of_the_readme_prints_what_it_says(capsys, tmp_path: Path, monkey
 
 
 def test_python_of_the_page_on_extending_prints_what_it_says(capsys) -> None:
-    assert check_prints(ROOT / "docs" / "extending.md", capsys) > 8
+    assert check_prints(ROOT / "docs" / "developers" / "extending.md", capsys) > 8
 
 
 def test_no_block_of_the_readme_says_no_more_than_true() -> None:

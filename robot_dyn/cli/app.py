@@ -49,7 +49,7 @@ Budget = Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, c
 Repeats = Annotated[int, typer.Option(min=1, help="How often each is timed at most, while the budget lasts.")]
 Scene = Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file; `robot-dyn scene` prints some.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/json.md.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/reference/json.md.")]
 
 
 def _version(asked: bool) -> None:

@@ -1,4 +1,4 @@
-"""Reports on robots, comparisons and runs: documents for --json (docs/json.md), and the same as tables of text."""
+"""Reports on robots, comparisons and runs: documents for --json (docs/reference/json.md), and tables of text."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@
                        Multirate: two rates
     to write one       Controller, Stateless, Block, Reference: base classes
 
-docs/extending.md writes a controller step by step; robot_dyn/control/README.md lists its files.
+docs/developers/extending.md writes a controller step by step; robot_dyn/control/README.md lists its files.
 """
 
 from robot_dyn.public import public_names

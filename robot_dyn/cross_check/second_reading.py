@@ -115,7 +115,7 @@ def _or_identity(origin: np.ndarray | None) -> np.ndarray:
 
 
 def _limits(joint: Any) -> np.ndarray:
-    """Lower, upper, effort and velocity limits; docs/findings.md lists the stated limits that are ignored."""
+    """Lower, upper, effort and velocity limits; docs/reference/findings.md lists the stated limits that are ignored."""
     lower, upper, *rates = (
         joint.limit and getattr(joint.limit, key) for key in ("lower", "upper", "effort", "velocity")
     )

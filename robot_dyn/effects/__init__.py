@@ -9,7 +9,7 @@
                        coefficient, Threshold: what an effect declares; Dynamics: what it is called with
     about them         Plant, EquationOfMotion, Force, Hold, Interval, Mode
 
-docs/extending.md writes an effect step by step; robot_dyn/effects/README.md lists its files.
+docs/developers/extending.md writes an effect step by step; robot_dyn/effects/README.md lists its files.
 """
 
 from robot_dyn.public import public_names

@@ -9,7 +9,7 @@
                        Integrator, PlainMethod: base classes; Stepper, System, RightSide
     what they return   Solution, Status; IntegrationError
 
-docs/extending.md adds a method step by step; robot_dyn/integrate/README.md lists its files.
+docs/developers/extending.md adds a method step by step; robot_dyn/integrate/README.md lists its files.
 """
 
 from robot_dyn.public import public_names

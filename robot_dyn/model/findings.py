@@ -1,7 +1,7 @@
 """Findings about a robot description that loads: each doubtful item and its remedy, in one sentence.
 
 `urdf.py` rejects what is meaningless; a finding reports what is valid but probably unintended. Criteria and
-reasons are in docs/findings.md. Each function yields the findings of one kind.
+reasons are in docs/reference/findings.md. Each function yields the findings of one kind.
 """
 
 from __future__ import annotations

@@ -161,7 +161,7 @@ class Robot(Dynamics, Parametrised):
 
     @cached_property
     def findings(self) -> tuple[str, ...]:
-        """What is doubtful in the description and its edits, each with its remedy; see docs/findings.md."""
+        """What is doubtful in the description and its edits, each with its remedy; see docs/reference/findings.md."""
         return findings_of(self.description, self.edits, self._evaluation.regularity)
 
     def random_configuration(self, rng: np.random.Generator) -> ndarray:

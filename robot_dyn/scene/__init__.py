@@ -6,6 +6,6 @@ sweep.py         the table [sweep]
 declared.py      tables whose keys are the coefficients that classes declare; user_effects.py those of the caller
 schema.py        rules for every table: types of values, units, no unknown key
 messages.py, lines.py    error messages, with the line of the key
-explain.py       what a scene integrates, term by term; manual.py writes docs/scenes.md
+explain.py       what a scene integrates, term by term; manual.py writes docs/reference/scenes.md
 starters/        scenes to start from
 """

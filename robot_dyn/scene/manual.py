@@ -1,4 +1,4 @@
-"""The manual of scene files, written from their schema: `python -m robot_dyn.scene.manual > docs/scenes.md`."""
+"""The manual of scene files, from their schema: `python -m robot_dyn.scene.manual > docs/reference/scenes.md`."""
 
 from __future__ import annotations
 

@@ -23,7 +23,8 @@ from robot_dyn.errors import DescriptionError, QueryError
 from robot_dyn.shapes.link_shapes import LinkShape, link_shapes
 from robot_dyn.shapes.masses import Masses
 
-_HOLLOW = 200.0  # [kg/m³] of the hull, below which a link is a thin housing; see docs/decisions/estimated-inertias.md
+# [kg/m³] of the hull, below which a link is a thin housing; see docs/developers/decisions/estimated-inertias.md
+_HOLLOW = 200.0
 _MOMENTS = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 
 

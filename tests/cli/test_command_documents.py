@@ -1,4 +1,4 @@
-"""The documents of --json have exactly the keys that docs/json.md promises."""
+"""The documents of --json have exactly the keys that docs/reference/json.md promises."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import robot_dyn as rd
 from robot_dyn.scene.starters import starter
 from tests.command import ROOT, document
 
-PROMISE = (ROOT / "docs" / "json.md").read_text(encoding="utf-8")
+PROMISE = (ROOT / "docs" / "reference" / "json.md").read_text(encoding="utf-8")
 
 
 def promised(command: str) -> dict[str, str]:

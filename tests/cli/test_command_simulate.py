@@ -16,7 +16,7 @@ from robot_dyn.scene.starters import starter, starters
 from tests.command import interrupted_at_work, refusal
 
 COMMAND = [sys.executable, "-c", "from robot_dyn.cli import main; main()"]
-DOCUMENT = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "reference" / "json.md").read_text(encoding="utf-8")
 
 
 def run(*arguments: object) -> subprocess.CompletedProcess[str]:

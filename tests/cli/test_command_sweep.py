@@ -26,7 +26,7 @@ def test_a_scene_is_swept_into_a_folder_and_asked(tmp_path: Path) -> None:
     again = command.run("sweep", "run", str(out), "--json", "--probability", "failed")
     found = json.loads(again.stdout)
     promised = (
-        (command.ROOT / "docs" / "json.md")
+        (command.ROOT / "docs" / "reference" / "json.md")
         .read_text(encoding="utf-8")
         .split("## `robot-dyn sweep SCENE")[1]
         .split("\n## ")[0]

@@ -1,4 +1,4 @@
-"""The report of hard cases: every figure as a page and as JSON, and the page that docs/ keeps of them."""
+"""The report of hard cases: every figure as a page and as JSON, and the counts of which docs/ keeps a copy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from tests.hard.families import FAMILIES
 from tests.hard.figure import save
 
 PICTURE = "pictures/hard_cases.png"
-VERDICTS = "holds", "said", "SILENT"
+VERDICTS = "holds", "said", "silent"
+MOST_SAID = 100  # characters of what was said, of which the counts keep the three most frequent
 
 
 @final
@@ -60,9 +61,9 @@ def write(result: Result, folder: Path) -> None:
 
 
 def summarise(folder: Path) -> None:
-    """Write the page and the picture of all figures in a folder, in the form that docs/ keeps."""
+    """Write counts and picture of all figures in a folder, in the form that docs/ keeps."""
     known = json.loads((folder / "figures.json").read_text())
-    (folder / "hard_cases.md").write_text(page(known))
+    (folder / "hard_cases.json").write_text(json.dumps(counts(known), indent=1, ensure_ascii=False) + "\n")
     save({FAMILIES[name].TITLE: each for name, each in rows(known).items()}, folder / PICTURE)
 
 
@@ -70,40 +71,27 @@ def rows(known: dict) -> dict[str, list[Row]]:
     return {name: [_row(each) for case in of.values() for each in case["rows"]] for name, of in known.items()}
 
 
-def page(known: dict) -> str:
-    """The page of families: the law of each, and how its figures are spread."""
-    return "\n".join(_families(known)) + "\n"
+def counts(known: dict) -> dict:
+    """What docs/data/hard_cases.json holds: environments, and for each family how its figures are spread."""
+    environments = {tuple(case["environment"].items()) for of in known.values() for case in of.values()}
+    return {
+        "environment": [dict(each) for each in sorted(environments)],
+        "families": [_counts(name, [row for row in those if row.ours], known) for name, those in rows(known).items()],
+    }
 
 
-def _families(known: dict) -> Iterator[str]:
-    figures = {name: [row for row in those if row.ours] for name, those in rows(known).items()}
-    count = Counter(row.verdict for those in figures.values() for row in those)
-    yield "# Hard cases"
-    yield ""
-    yield (
-        "Each figure is held to what is allowed, by the law of its family below. A figure that does not hold and was"
-        " said to be so (a refusal, a finding, the verdict of a run) counts as *said*; one without a word as *silent*."
-        " `make stress` runs all cases and writes every figure to `build/hard_cases/`."
-    )
-    yield ""
-    yield (
-        f"{count.total()} figures of robot_dyn: {count['holds']} hold, {count['said']} said,"
-        f" **{count['SILENT']} silent**."
-        f" {'; '.join(sorted({_environment(case) for of in known.values() for case in of.values()}))}."
-    )
-    yield ""
-    yield "| family | cases | figures | hold | said | silent | largest found / allowed of those that hold |"
-    yield "|" + " --- |" * 7
-    for name, those in figures.items():
-        number = Counter(row.verdict for row in those)
-        ratios = [row.found / row.allowed for row in those if row.holds and row.allowed > 0]
-        cells = [FAMILIES[name].TITLE, len(known[name]), len(those), *(number[each] for each in VERDICTS)]
-        yield "| " + " | ".join(map(str, [*cells, _number(max(ratios, default=0.0))])) + " |"
-    yield ""
-    yield f"![Found over allowed, for each figure of each family]({PICTURE})"
-    for name in known:
-        yield ""
-        yield from _law(name)
+def _counts(name: str, figures: list[Row], known: dict) -> dict:
+    number = Counter(row.verdict.lower() for row in figures)
+    ratios = [row.found / row.allowed for row in figures if row.holds and row.allowed > 0]
+    words = Counter(_plain(row.said)[:MOST_SAID] for row in figures if row.verdict == "said")
+    return {
+        "title": FAMILIES[name].TITLE,
+        "cases": len(known[name]),
+        "figures": len(figures),
+        **{verdict: number[verdict] for verdict in VERDICTS},
+        "worst": float(f"{max(ratios, default=0.0):.3g}"),
+        "words": [text for text, _ in words.most_common(3)],
+    }
 
 
 def _law(name: str) -> Iterator[str]:
@@ -128,10 +116,6 @@ def _every_figure(known: dict) -> Iterator[str]:
 def _not_run(name: str, family: dict) -> str:
     missing = [case.name for case in FAMILIES[name].CASES if case.name not in family]
     return f" Not run: {'; '.join(missing)}." if missing else ""
-
-
-def _environment(case: dict) -> str:
-    return ", ".join(f"{name} {value}" for name, value in case["environment"].items())
 
 
 def _table(rows: Sequence[Row]) -> Iterator[str]:

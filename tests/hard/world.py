@@ -134,7 +134,7 @@ def left_out(seed: int) -> Iterator[Row]:
     """Arms of the catalog that are not in ARMS."""
     there = []
     for name in rd.list_robots():
-        with suppress(RobotDynError):  # what is refused is in docs/findings.md
+        with suppress(RobotDynError):  # what is refused is in docs/reference/findings.md
             there += [name] * (rd.load(name).n <= MOST_JOINTS)
     yield Row("the catalog", "arms that are left out", float(len(set(there) - set(ARMS))), 0.0)
 

@@ -1,6 +1,7 @@
 """Rosenbrock's runs of stiff scenes against an engine that shares nothing with them: CVODES (BDF), as CasADi has it.
 
-The equations of the planar arm are written by hand, as in docs/extending.md. [Hindmarsh et al., SUNDIALS, 2005]
+The equations of the planar arm are written by hand, as in docs/developers/extending.md.
+[Hindmarsh et al., SUNDIALS, 2005]
 """
 
 from __future__ import annotations

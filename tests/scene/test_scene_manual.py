@@ -1,4 +1,4 @@
-"""docs/scenes.md is written from the schema; gains of a scene are stated, or follow from ω and ζ."""
+"""docs/reference/scenes.md is written from the schema; gains of a scene are stated, or follow from ω and ζ."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robot_dyn.scene.manual import manual
 from robot_dyn.scene.schema import Part
 from robot_dyn.scene.starters import starter, starters
 
-PAGE = Path(__file__).parents[2] / "docs" / "scenes.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenes.md"
 PARTS = [
     each
     for module in (scene, control, effects, references)
@@ -25,7 +25,7 @@ PARTS = [
 
 
 def test_the_page_is_that_of_the_schema() -> None:
-    """Write it again by python -m robot_dyn.scene.manual > docs/scenes.md."""
+    """Write it again by python -m robot_dyn.scene.manual > docs/reference/scenes.md."""
     assert PAGE.read_text(encoding="utf-8") == manual()
 
 

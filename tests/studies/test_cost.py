@@ -169,7 +169,7 @@ def test_the_page_has_the_counts_of_today(tmp_path) -> None:
     scene.write_text(starter("panda_computed_torque"), encoding="utf-8")
     pairs = step_cost.pairs_of_parts(rd.read_scene(scene))
     counted = {each.what: f"{each.first.instructions} / {each.second.instructions}" for each in pairs}
-    page = (Path(__file__).parents[2] / "docs" / "accuracy_and_time.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "studies" / "cost.md").read_text(encoding="utf-8")
     told = re.findall(r"^\|[^|]*\| (\w+) \| on / off \| (\d+ / \d+) \|", page, flags=re.MULTILINE)
     assert dict(told) == counted
 

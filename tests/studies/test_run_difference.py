@@ -162,7 +162,7 @@ def test_files_name_their_runs_and_old_files_say_what_is_not_known(tmp_path: Pat
 
 
 def test_the_command_writes_its_figure_and_its_document(tmp_path: Path) -> None:
-    """JSON has the keys that docs/json.md promises; the exit code is 0 though the runs differ."""
+    """JSON has the keys that docs/reference/json.md promises; the exit code is 0 though the runs differ."""
     for name, mass in (("a", 1.0), ("b", 2.0)):
         rd.save_run(coasting(loaded(mass)), tmp_path / name)
     paths = (tmp_path / "a.npz", tmp_path / "b.npz")

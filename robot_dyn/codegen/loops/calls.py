@@ -48,7 +48,9 @@ def called(f: Function, node: ast.Call) -> Value:
         try:
             return handler(f, node, *given)
         except TypeError as error:
-            raise f.refused(node, f"the call {ast.unparse(node)} ({error})", "see docs/extending.md") from None
+            raise f.refused(
+                node, f"the call {ast.unparse(node)} ({error})", "see docs/developers/extending.md"
+            ) from None
     if isinstance(of, FunctionType):
         return _translated(f, node, of, given)
     known = "plain functions, abs, min, max, len, float, int, np.sqrt, np.sign, np.spacing, np.nextafter, math.frexp"

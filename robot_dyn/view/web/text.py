@@ -1,7 +1,8 @@
 """The HTML text of a page: one file that contains the viewer, the plots, the slider and all data.
 
 The viewer's script, most of the text, stands in it compressed; the page inflates it, and the browser runs it only if
-the content policy has the digest of what came out.
+the content policy has the digest of what came out. Pages of one folder may share it: then it stands, compressed, in a
+file beside them that puts it into the page, and the digest is asked for all the same.
 """
 
 from __future__ import annotations
@@ -30,24 +31,36 @@ _SCRIPTS = (
 _PANEL = re.compile(r'\}\("(\.dg ul\{(?:[^"\\]|\\.)*)"\)')  # the style that meshcat's panel, dat.gui, gives itself
 
 
-def page_text(document: Mapping[str, Any]) -> str:
-    """The HTML text of a document: title, outcome, notes, duration, scene, plots, and commands unless it is `live`."""
+def page_text(document: Mapping[str, Any], *, viewer: str = "") -> str:
+    """The HTML text of a document: title, outcome, notes, duration, scene, plots, and commands unless it is `live`.
+
+    Args:
+        document: Of `document` or `still`.
+        viewer: Name of a file beside the page with the text of `shared_viewer`; the viewer is in the page if empty.
+    """
     web = Path(__file__).parent
-    meshcat = _read(_meshcat() / "viewer" / "dist" / "main.min.js")
+    meshcat = _viewer()
     scripts = {
         "uplot": _inline(_read(web / "uplot" / "uPlot.iife.min.js")),
         "script": _inline("\n".join(_read(web / name) for name in _SCRIPTS)),
     }
     styles = {"uplot_style": _read(web / "uplot" / "uPlot.min.css"), "style": _read(web / "replay.css")}
-    policy = _POLICY.format(_hashes([meshcat, *scripts.values()]), _hashes([*styles.values(), *_own_styles(meshcat)]))
+    allowed = ("'self' " if viewer else "") + _hashes([meshcat, *scripts.values()])
+    policy = _POLICY.format(allowed, _hashes([*styles.values(), *_own_styles(meshcat)]))
     return Template(_read(web / "replay.html")).substitute(
         policy=policy + (_LIVE if document["live"] else ""),
         title=html.escape(document["title"]),
         data=json.dumps(as_text(document)),
-        meshcat=packed(meshcat.encode()),
+        meshcat="" if viewer else packed(meshcat.encode()),
+        shared=f'<script src="{html.escape(viewer)}"></script>' if viewer else "",
         **scripts,
         **styles,
     )
+
+
+def shared_viewer() -> str:
+    """The text of the script that several pages share: it puts the viewer, compressed, into the page."""
+    return f'document.getElementById("meshcat").textContent = "{packed(_viewer().encode())}";\n'
 
 
 def _hashes(texts: Iterable[str]) -> str:
@@ -61,6 +74,10 @@ def _own_styles(meshcat: str) -> Iterator[str]:
     yield ""
     for text in _PANEL.findall(meshcat):
         yield json.loads(f'"{text}"')
+
+
+def _viewer() -> str:
+    return _read(_meshcat() / "viewer" / "dist" / "main.min.js")
 
 
 def _meshcat() -> Path:

@@ -1,0 +1,55 @@
+"""The reference of the command line, read from the commands themselves."""
+
+from __future__ import annotations
+
+import pkgutil
+import re
+from importlib import import_module
+from typing import Any
+
+from typer.main import get_command
+
+from robot_dyn.cli import commands as topics
+from robot_dyn.cli.app import app
+from robot_dyn.cli.groups import GROUPS
+
+TAG = re.compile(r"\[/?[a-z][a-z ]*\]")  # of rich
+
+
+def page(_: str) -> str:
+    """A section for each command, in the groups of `robot-dyn --help`."""
+    for topic in pkgutil.iter_modules(topics.__path__):
+        import_module(f"{topics.__name__}.{topic.name}")
+    known: Any = get_command(app)
+    parts = []
+    for group, names in GROUPS.items():
+        parts += [f"## {group}", *(_section(name, known.commands[name]) for name in names)]
+    return "\n\n".join(parts)
+
+
+def _section(name: str, command: Any) -> str:
+    rows = [_row(each) for each in command.params if each.name not in ("help", "json") and not each.hidden]
+    table = "\n".join(["| | meaning | default |", "|---|---|---|", *rows]) if rows else ""
+    return f"### robot-dyn {name}\n\n{_plain(command.help or '')}\n\n{table}\n"
+
+
+def _row(parameter: Any) -> str:
+    names = parameter.opts + parameter.secondary_opts
+    if parameter.param_type_name == "argument":
+        names = [parameter.metavar or parameter.name.upper()]
+    elif parameter.metavar:
+        names = [*names[:-1], f"{names[-1]} {parameter.metavar}"]
+    default = parameter.default
+    told = "required" if parameter.required else "" if default in (None, False, (), []) else f"`{default}`"
+    return f"| {', '.join(f'`{each}`' for each in names)} | {_cell(parameter.help or '')} | {told} |"
+
+
+def _cell(text: str) -> str:
+    return _plain(" ".join(text.split())).replace("|", "\\|")
+
+
+def _plain(text: str) -> str:
+    """Help text as Markdown; code in backticks stays code."""
+    parts = TAG.sub("", text).split("`")
+    parts[::2] = [re.sub(r"([*_<\[\]])", r"\\\1", part) for part in parts[::2]]
+    return "`".join(parts)
