@@ -160,6 +160,17 @@ def of(
     return ToleranceLadder(name, engine, True, order, "step", runs, "", floor)
 
 
+def test_a_ladder_ends_where_steps_would_no_longer_end_at_events() -> None:
+    """A run of more than 200 000 fixed steps passes its events within steps: its error is of another method."""
+    stops = rd.effects.joint_stops(-1.0, 1.0, 1e3, 10.0)
+    setup = recorded(rd.Setup(rd.Plant(rd.load("pendulum"), stops), [0.4], [3.0]), 1.0)
+    finest = {}
+    for events in (True, False):
+        method = own(setup, rd.integrate.method("rk4"), "compiled", events)
+        finest[events] = list(islice(method.settings(), 25))[-1]
+    assert 1e5 < 1.0 / finest[True] <= 2e5 < 1.0 / finest[False]
+
+
 @pytest.mark.parametrize(
     ("times", "repeatable"),
     [

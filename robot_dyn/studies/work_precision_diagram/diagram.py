@@ -165,8 +165,8 @@ def _believed(axes: Any, result: WorkPrecision, colours: Colours, words: bool) -
     axes.axhline(error, color=colours["ink"], linewidth=0.9, linestyle=(0, (6, 3)))
     axes.axhspan(axes.get_ylim()[0], error, color=colours["veil"], zorder=0.5)
     if words:
-        at = {"xy": (0.995, error), "xycoords": ("axes fraction", "data"), "ha": "right", "va": "top", "fontsize": 8}
-        axes.annotate(f"error of the reference, {error:.0e}: not believed below ", **at, color=colours["ink"])
+        at = {"xy": (0.005, error), "xycoords": ("axes fraction", "data"), "ha": "left", "va": "top", "fontsize": 8}
+        axes.annotate(f" error of the reference, {error:.0e}: not believed below", **at, color=colours["ink"])
 
 
 def _legend(figure: Any, first: list[ToleranceLadder], without: list[ToleranceLadder], colours: Colours) -> None:

@@ -131,6 +131,11 @@ def common(t: np.ndarray, of: np.ndarray) -> np.ndarray:
     return np.where(np.abs(of[place] - t) <= _ON_TIME * of[-1], place, -1)
 
 
+def switches(setup: Setup) -> bool:
+    """Whether effects have thresholds at which steps end."""
+    return any(effect.thresholds(setup.plant.dynamics.n) for effect in setup.plant.effects)
+
+
 def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnderTest:
     """A method of this library, or one with the same interface.
 
@@ -153,12 +158,14 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnde
 
         return MethodUnderTest(made.name, engine, events, order, "tolerance", tolerances, tight, warm)
 
+    cut = events and switches(setup)
+
     def steps() -> Iterator[float]:
         before = 0
         for step in step_ladder(setup.record_period_s, made.order):
             changed = replace(setup, integrator=made, step_s=step)
-            count, most = changed.steps, MOST_CUT if changed.finds_events else _MOST_STEPS
-            if count > most:
+            count = changed.steps
+            if count > (MOST_CUT if cut else _MOST_STEPS):  # of more steps none ends at an event
                 return
             if count > before:  # a step longer than a tick or segment is cut to its length
                 yield step

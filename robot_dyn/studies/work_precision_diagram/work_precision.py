@@ -27,7 +27,7 @@ from robot_dyn.studies.environment import environment
 from robot_dyn.studies.result import Result
 from robot_dyn.studies.time_budget import Budget
 from robot_dyn.studies.work_precision_diagram.measurement import measure
-from robot_dyn.studies.work_precision_diagram.method_under_test import own, recorded, whole
+from robot_dyn.studies.work_precision_diagram.method_under_test import own, recorded, switches, whole
 from robot_dyn.studies.work_precision_diagram.past_horizon import PastHorizon, past_horizon
 from robot_dyn.studies.work_precision_diagram.peers import found
 from robot_dyn.studies.work_precision_diagram.reference_run import Reference, reference
@@ -225,11 +225,6 @@ def work_precision(
         getattr(dynamics, "name", type(dynamics).__name__), acting(setup), units("q", types), requested, exact, ladders,
         tuple(left_out), environment(), budget.seconds, budget.spent, interrupted, later,
     )  # fmt: skip
-
-
-def switches(setup: Setup) -> bool:
-    """Whether effects have thresholds at which steps end."""
-    return any(effect.thresholds(setup.plant.dynamics.n) for effect in setup.plant.effects)
 
 
 def _engines(setup: Setup) -> tuple[Setup, tuple[str, ...], list[str]]:
