@@ -18,7 +18,7 @@ from robot_dyn.description.edits import Edits
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _FAR = 10.0  # times the longest distance between joints
 BEYOND, TOOL, SEVERAL = 2.0, 0.3, 3  # times that distance, and [m], for centres of mass; joints that move
-_GIMBAL = 0.01  # [m], below which that distance does not tell the size of a robot
+GIMBAL = 0.01  # [m], below which that distance does not tell the size of a robot
 Triple = tuple[float, ...]
 
 
@@ -120,16 +120,16 @@ class Structure:
         """
         reach = _FAR * self.longest_link
         half = float(np.trace(inertia)) / 2
-        far = self.longest_link >= _GIMBAL and mass > 0 and half > mass * reach**2
+        far = self.longest_link >= GIMBAL and mass > 0 and half > mass * reach**2
         return (half / mass) ** 0.5 if far else None
 
     def beyond_reach(self, place: np.ndarray | tuple[float, ...]) -> float | None:
         """The distance of a point from the origin of its link, in [m], if it is beyond twice `longest_link` and a tool.
 
-        None on robots of one or two joints that move, whose links may be as long as they like.
+        None on robots of one or two joints that move, whose links may be as long as they like, and of a gimbal.
         """
         distance = float(np.linalg.norm(place))
-        far = distance > max(BEYOND * self.longest_link, TOOL)
+        far = distance > max(BEYOND * self.longest_link, TOOL) and self.longest_link >= GIMBAL
         return distance if far and len(self.moving) >= SEVERAL else None
 
     def _body(self, first: str) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.description.structure import BEYOND, SEVERAL, TOOL
+from robot_dyn.description.structure import BEYOND, GIMBAL, SEVERAL, TOOL
 from robot_dyn.studies.doctor.document import Document, parsed
 from robot_dyn.studies.doctor.finding import Finding, Severity
 
@@ -38,7 +38,7 @@ def far_origins(document: Document) -> Iterator[Finding]:
         if (origin := inertial.find("origin")) is not None:
             length = _length(origin)
             if length > most:
-                counts = parsed(_mass(inertial)) > 0 and _moves(document, inertial.getparent())
+                counts = longest >= GIMBAL and parsed(_mass(inertial)) > 0 and _moves(document, inertial.getparent())
                 yield _finding(document, origin, length, median, Severity.ERROR if counts else Severity.WARNING)
 
 
