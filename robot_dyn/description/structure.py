@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import hypot
 from typing import Any, final
 
 import numpy as np
@@ -111,7 +112,7 @@ class Structure:
     @cached_property
     def longest_link(self) -> float:
         """The longest distance between the origins of neighbouring joints, in [m]."""
-        return max((float(np.linalg.norm(joint.xyz)) for joint in self.joints.values()), default=0.0)
+        return max((hypot(*map(float, joint.xyz)) for joint in self.joints.values()), default=0.0)
 
     def radius_beyond_reach(self, mass: float, inertia: np.ndarray) -> float | None:
         """√(½ tr I / m), the least distance at which some of a mass is, if it is beyond 10 times `longest_link`.
@@ -128,7 +129,7 @@ class Structure:
 
         None on robots of one or two joints that move, whose links may be as long as they like, and of a gimbal.
         """
-        distance = float(np.linalg.norm(place))
+        distance = hypot(*map(float, place))
         far = distance > max(BEYOND * self.longest_link, TOOL) and self.longest_link >= GIMBAL
         return distance if far and len(self.moving) >= SEVERAL else None
 
