@@ -9,6 +9,7 @@ and 0.3 m, as of a tool: an error, since M is then wrong by a factor.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,7 @@ def _moves(document: Document, link: Any) -> bool:
 def _length(origin: Any) -> float:
     """|xyz| in [m]; 0 where it is not three numbers."""
     values = [parsed(word) for word in (origin.get("xyz") or "").split()]
-    length = float(np.linalg.norm(values)) if len(values) == 3 else 0.0
+    length = hypot(*values) if len(values) == 3 else 0.0
     return length if np.isfinite(length) else 0.0
 
 

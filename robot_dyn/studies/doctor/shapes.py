@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from math import hypot
 from pathlib import Path
 from typing import Any, final
 
@@ -121,9 +122,15 @@ def misfits(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[
             yield replace(found, severity=Severity.NOTE) if name in stated.base else found
 
 
+def _farthest(points: np.ndarray) -> float:
+    """The largest distance of points (k, 3) from the origin, whose squares may overflow."""
+    scale = float(np.abs(points).max()) or 1.0
+    return scale * float(np.linalg.norm(points / scale, axis=1).max())
+
+
 def _reach(robot: Robot) -> float:
     """The sum of the distances between joints, in [m]; 1 m if they coincide."""
-    total = sum(float(np.linalg.norm(joint.xyz)) for joint in structure(robot.description, robot.edits).joints.values())
+    total = sum(hypot(*map(float, joint.xyz)) for joint in structure(robot.description, robot.edits).joints.values())
     return total or 1.0
 
 
@@ -158,8 +165,8 @@ def _mass(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding |
 
 def _inertia(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding | None:
     Ixx, _, _, Iyy, _, Izz = link.moments
-    half, far = (Ixx + Iyy + Izz) / 2, float(np.linalg.norm(shape.points - np.array(link.com), axis=1).max())
-    most = link.mass * far**2
+    half, far = (Ixx + Iyy + Izz) / 2, _farthest(shape.points - np.array(link.com))
+    most = link.mass * far * far
     if half <= _SLACK * most:
         return None
     changes, suspected = (), ""
@@ -205,7 +212,7 @@ def outside(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[
     for name, shape in of.items():
         link, (low, high) = stated.links[name], (shape.points.min(axis=0), shape.points.max(axis=0))
         room = 0.1 * float(np.max(high - low)) + 0.01  # [m]: of a thin flange, the rest is hidden in its neighbour
-        away = float(np.linalg.norm(np.maximum(low - room - link.com, 0) + np.maximum(link.com - high - room, 0)))
+        away = hypot(*(np.maximum(low - room - link.com, 0) + np.maximum(link.com - high - room, 0)).tolist())
         light = shape.unit is not None and link.mass < _LIGHT * shape.unit.mass  # hardly a mass, of which `_mass` tells
         if link.mass > 0 and away > 0 and not light:
             inertial = document.named("link", name).find("inertial")
