@@ -110,16 +110,20 @@ class Answer:
     def _repr_html_(self) -> str:
         from robot_dyn import display
 
-        parts, (first, *rest) = [], self.blocks()
-        rest = [first, *rest] if self.title else rest
-        for of_text, blocks in groupby(rest, lambda each: isinstance(each, str)):
-            if of_text:
-                parts.append(display.text("\n".join(line for each in blocks for line in _lines(each)).strip("\n")))
-            else:
-                parts += [
-                    display.table(each.heading, each.rows, each.right) for each in blocks if isinstance(each, Table)
-                ]
+        first, *rest = self.blocks()
+        parts = html_of([first, *rest] if self.title else rest)
         return display.page(self.title or "".join(_lines(first)), *parts, self.drawing)
+
+
+def html_of(blocks: Iterable[Block]) -> Iterator[str]:
+    """Texts and tables as parts of a page."""
+    from robot_dyn import display
+
+    for of_text, some in groupby(blocks, lambda each: isinstance(each, str)):
+        if of_text:
+            yield display.text("\n".join(line for each in some for line in _lines(each)).strip("\n"))
+        else:
+            yield from (display.table(each.heading, each.rows, each.right) for each in some if isinstance(each, Table))
 
 
 def _lines(block: Block) -> Iterable[str]:

@@ -56,7 +56,7 @@ class Expression:
         self.text, self._tokens, self._at, self._depth = text, _tokens(text), 0, 0
         self._tree = self._or()
         if self._at < len(self._tokens):
-            raise self._wrong("ends, or goes on with | or &,")
+            raise self._wrong("ends, or goes on with | or &,", self._remedy())
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -102,7 +102,10 @@ class Expression:
         left = self._value()
         for operator in _COMPARE:
             if self._next(operator):
-                return (operator, left, self._value())
+                right = self._value()
+                if left[0] == right[0] == "number":
+                    raise SweepError(f"{self.text}: compares two numbers; one of them must be the name of a column")
+                return (operator, left, right)
         if left[0] == "number":
             raise self._wrong("compares the number with <, <=, >, >=, == or !=")
         return left
@@ -119,9 +122,18 @@ class Expression:
         self._at += found
         return found
 
-    def _wrong(self, expected: str) -> SweepError:
+    def _remedy(self) -> str:
+        """For what stands where an event could end."""
+        kind, value, _ = self._tokens[self._at]
+        if value in _COMPARE:
+            return "; 0.1 < x < 0.2 is x > 0.1 & x < 0.2"
+        if value == "(":
+            return "; functions are not known: a figure may compute what is to be compared"
+        return "; a name of several words stands in quotes, and units are left out" if kind == "name" else ""
+
+    def _wrong(self, expected: str, remedy: str = "") -> SweepError:
         place = self._tokens[self._at][2] if self._at < len(self._tokens) else len(self.text)
-        return SweepError(f"{self.text[:place]}⟨here⟩{self.text[place:]}: is not an event; one {expected} here")
+        return SweepError(f"{self.text[:place]}⟨here⟩{self.text[place:]}: is not an event; one {expected} here{remedy}")
 
 
 def _tokens(text: str) -> list[tuple[str, str, int]]:
@@ -134,6 +146,7 @@ def _tokens(text: str) -> list[tuple[str, str, int]]:
             place = at + len(text[at:]) - len(text[at:].lstrip())
             raise SweepError(
                 f"{text[:place]}⟨here⟩{text[place:]}: {text[place]!r} is neither name, number nor comparison"
+                f" (<, <=, >, >=, ==, !=)"
             )
         kind = str(match.lastgroup)
         value, at = match[kind], match.end()

@@ -93,19 +93,24 @@ def half_width_of_share(events: np.ndarray, groups: Groups, level: float) -> flo
     return student(level, R - 1) * sqrt(squares / (R - 1) / R)
 
 
-def jackknife(estimate: Callable[[np.ndarray], np.ndarray], groups: Groups, level: float) -> tuple[np.ndarray, ...]:
+def jackknife(
+    estimate: Callable[[np.ndarray], np.ndarray], groups: Groups, level: float, unbiased: bool = False
+) -> tuple[np.ndarray, ...]:
     """An estimate from all runs, and the ends of its interval from those without one group each.
 
     s² = (R − 1)/R Σ (θ_(r) − mean θ_(r))², with Student's t of R − 1 degrees of freedom. Of ratios such as indices the
-    bias is that of all runs, not of a sixteenth of them.
+    bias is that of all runs, not of a sixteenth of them. Of it (R − 1)(mean θ_(r) − θ) goes as 1/R.
 
     Args:
         estimate: θ of the runs for which a mask is true.
         groups: R groups.
         level: Of the interval.
+        unbiased: Whether that bias is subtracted.
     """
     theta = estimate(np.ones(len(groups.of), bool))
     without = np.array([estimate(groups.of != r) for r in range(groups.count)])
     s = np.sqrt((groups.count - 1) * without.var(axis=0))
     half = student(level, groups.count - 1) * s
+    if unbiased:
+        theta = theta - (groups.count - 1) * (without.mean(axis=0) - theta)
     return theta, theta - half, theta + half

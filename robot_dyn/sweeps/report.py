@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from robot_dyn.answer import html_of
 from robot_dyn.display import page, side_by_side, table, text
 from robot_dyn.errors import SweepError
 from robot_dyn.files import Kind, save, target
@@ -41,7 +42,7 @@ def report(result: SweepResult) -> str:
     """The page."""
     x, columns = result.table("outcome", "reason", *result.sweep.columns, *result.sweep.figures), result.sweep.columns
     failed = x["outcome"] != OUTCOMES[0]
-    parts = [text("\n".join(repr(result).splitlines()))]
+    parts = [*html_of(result.blocks())]
     parts += ["<h2>Failures</h2>", text(repr(result.probability("failed")))]
     if failed.any():
         some = np.flatnonzero(failed)[:_WORST].tolist()
@@ -83,6 +84,10 @@ def _of_figure(result: SweepResult, name: str, x: np.ndarray) -> Iterator[str]:
     worst = [(i, float(x[i]), _repeat(result, i)) for i in result.worst(name, min(_WORST, len(x)), given="finished")]
     yield side_by_side([*([_histogram(name, finite)] if len(finite) else []), f"<div>{''.join(parts)}</div>"])
     yield table(("worst runs that finished", name, "repeat it by"), worst)
+    try:
+        yield from html_of(result.sensitivity(name, given="finished").blocks())
+    except SweepError as none:  # of a grid, or of a figure that is the same in all runs
+        yield text(f"no sensitivity: {none}")
 
 
 def _repeat(result: SweepResult, run: int) -> str:
@@ -92,8 +97,11 @@ def _repeat(result: SweepResult, run: int) -> str:
 
 def _histogram(name: str, x: np.ndarray) -> str:
     figure, axes = _figure(4.6, 2.6)
-    low, high = np.quantile(x, (0.0, 0.999))
-    axes.hist(x, _BINS, range=(low, high if high > low else low + 1.0), color=PAGE["lines"][1])
+    low, most, high = np.quantile(x, (0.0, 0.999, 1.0))
+    high = most if high - most > most - low else high  # few values that are far off leave no room for the others
+    bins = min(max(round(2 * len(x) ** (1 / 3)), 5), _BINS)
+    axes.hist(x, bins, range=(low, high if high > low else low + 1.0), color=PAGE["lines"][1])
+    axes.yaxis.get_major_locator().set_params(integer=True)
     beyond = int((x > high).sum())
     styled(axes, PAGE, name, f"{len(x)} runs that finished" + (f", {beyond} beyond the right end" if beyond else ""))
     axes.set_ylabel("runs", fontsize=8.5, **ink(PAGE))

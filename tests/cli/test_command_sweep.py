@@ -34,7 +34,7 @@ def test_a_scene_is_swept_into_a_folder_and_asked(tmp_path: Path) -> None:
     assert set(re.findall(r"^\| `(\w+)` \|", promised, re.MULTILINE)) == found.keys()
     assert found["status"] == {"runs": 96, "chunks": 2, "missing": 0}
     assert found["specification"]["design"] == "latin" and found["probabilities"]["failed"]["estimate"] == 0.0
-    assert "SHA-256" in command.run("sweep", "verify", str(out)).stderr
+    assert "SHA-256" in command.run("sweep", "verify", str(out)).stdout
     assert command.run("sweep", "export", str(out), "-o", str(tmp_path / "rows.csv")).returncode == 0
     assert len((tmp_path / "rows.csv").read_text().splitlines()) == 97
 

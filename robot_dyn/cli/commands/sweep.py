@@ -63,6 +63,7 @@ def sweep(
     """
     from robot_dyn import sweeps as sw
 
+    verified: list[str] = []
     options: dict[str, Any] = {"threads": threads, "cluster": cluster, "share": share}
     if what.lower().endswith(".toml"):
         if folder is not None or output is None:
@@ -81,9 +82,8 @@ def sweep(
         if what == "run":
             result = _run(result.sweep, folder, options)
         elif what == "verify":
-            to_stderr(f"all rows: SHA-256 {result.verify()}")
-            for name, count in result.processors.items():
-                to_stderr(f"{count} chunks by {name}")
+            verified = [f"all rows: SHA-256 {result.verify()}"]
+            verified += [f"{count} chunks by {name}" for name, count in result.processors.items()]
         elif what in ("report", "export"):
             path = Path(output or f"{folder.rstrip('/')}.{'html' if what == 'report' else 'csv'}")
             written = result.save_report(path) if what == "report" else result.export(path)
@@ -92,7 +92,7 @@ def sweep(
     if as_json:
         say_json(result, probabilities=dict(zip(probability or (), answers, strict=False)))
     else:
-        say(result, *answers)
+        say(result, *verified, *answers)
     if result.status["missing"] and what != "status" and share is None:
         raise typer.Exit(130)
 

@@ -99,10 +99,10 @@ def check_count(design: str, runs: int, allowed: str, count: int, above: int) ->
 def check_multiple(design: str, runs: int, of: int, why: str) -> None:
     """Raise SweepError unless `runs` is a multiple of a number, and at least two times it."""
     count = max(runs // of, 2) * of
-    check_count(design, runs, f"a multiple of {of} ({why})", count, count + of)
+    check_count(design, runs, f"a multiple of {of}, {2 * of} at least ({why})", count, count + of)
 
 
 def check_power(design: str, runs: int, of: int, why: str) -> None:
     """Raise SweepError unless `runs` is a number times a power of two, at least two times it."""
     count = of << max((runs // of).bit_length() - 1, 1)
-    check_count(design, runs, f"{of} times a power of two ({why})", count, 2 * count)
+    check_count(design, runs, f"{of} times a power of two, {2 * of} at least ({why})", count, 2 * count)

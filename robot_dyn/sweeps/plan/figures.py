@@ -174,12 +174,12 @@ class UserFigure(Figure):
 
 
 def rms_error(joint: str | None = None) -> RmsError:
-    """Root mean square of q − q_d over samples and joints, or of one joint."""
+    """Root mean square of q − q_d over the samples, which are a `record_period_s` apart, and the joints, or of one."""
     return RmsError(joint)
 
 
 def peak(of_what: str, joint: str | None = None) -> Peak:
-    """Largest absolute value of "q", "v", "u" or "error" over the run and the joints, or of one joint."""
+    """Largest absolute value of "q", "v" or "u" over all steps, or of "error" over the samples; of one joint or all."""
     return Peak(of_what, joint)
 
 
