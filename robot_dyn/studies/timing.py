@@ -1,11 +1,22 @@
-"""Median times of calls that take turns, so that changes of the machine's speed affect all of them."""
+"""Times of calls that take turns, so that changes of the machine's speed affect all of them."""
 
 from __future__ import annotations
 
 import timeit
-from collections.abc import Callable, Mapping
-from statistics import median
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
+
+TURNS = 5
+_AGREE = 1.05  # ratio of the two least times
+
+
+def repeatable(times: Sequence[float]) -> bool:
+    """Whether a time is known: after at least five turns the two least ones agree to 5 %.
+
+    What else a machine does makes times longer and never shorter, so that the least one is that of the call.
+    """
+    least = sorted(times)[:2]
+    return len(times) >= TURNS and least[-1] <= _AGREE * least[0]
 
 
 def seconds(call: Callable[[], object], at_least: float, clock: Callable[[], float] = perf_counter) -> float:
@@ -16,12 +27,12 @@ def seconds(call: Callable[[], object], at_least: float, clock: Callable[[], flo
     return taken / number
 
 
-def in_turns(calls: Mapping[str, Callable[[], object]], repeats: int, at_least: float) -> dict[str, float]:
-    """Median time of each call in [s], over so many turns; the first call of each is not counted."""
+def in_turns(calls: Mapping[str, Callable[[], object]], repeats: int, at_least: float) -> dict[str, list[float]]:
+    """Times of each call in [s], over so many turns; the first call of each is not counted."""
     times: dict[str, list[float]] = {name: [] for name in calls}
     for call in calls.values():
         call()
     for _ in range(repeats):
         for name, call in calls.items():
             times[name].append(seconds(call, at_least))
-    return {name: median(samples) for name, samples in times.items()}
+    return times

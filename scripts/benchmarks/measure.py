@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
+from statistics import median
 from time import perf_counter
 from timeit import timeit
 from typing import Any, final
@@ -53,7 +54,7 @@ class Effort:
 
 def alternate(calls: Mapping[str, Callable[[], object]], effort: Effort) -> dict[str, float]:
     """Median time of each call in µs; the calls take turns."""
-    return {name: 1e6 * time for name, time in in_turns(calls, effort.repeats, effort.at_least).items()}
+    return {name: 1e6 * median(times) for name, times in in_turns(calls, effort.repeats, effort.at_least).items()}
 
 
 def lowest(calls: Mapping[str, Callable[[], object]], effort: Effort, number: int = 100) -> dict[str, float]:

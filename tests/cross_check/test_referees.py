@@ -16,7 +16,7 @@ import robot_dyn as rd
 from robot_dyn.errors import RobotDynError
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import diagonal_scale, floored, mass_norm, scaled, solved_tolerance
-from robot_dyn.studies.work_precision_diagram.peers.free_motion import PeerError
+from robot_dyn.studies.work_precision_diagram.peers.arm_motion import PeerError
 from tests.hard.other_engines import installed
 from tests.long import robots
 

@@ -13,8 +13,8 @@ import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
-from robot_dyn.studies.work_precision_diagram.peers.free_motion import PeerError, bare_urdf
-from robot_dyn.studies.work_precision_diagram.peers.mujoco import mujoco_model
+from robot_dyn.studies.work_precision_diagram.peers.arm_motion import PeerError, bare_urdf
+from robot_dyn.studies.work_precision_diagram.peers.mujoco_model import mujoco_model
 
 
 class MuJoCo:
@@ -22,7 +22,7 @@ class MuJoCo:
 
     def __init__(self, robot: rd.Robot) -> None:
         self.module: Any = import_module("mujoco")
-        self.model = mujoco_model(self.module, robot, bare=True, ordered=False)
+        self.model = mujoco_model(self.module, robot, bare=True)
         self.data = self.module.MjData(self.model)
         self.at = [self.model.joint(name).dofadr[0] for name in robot.joint_names]
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.studies.work_precision_diagram.peers.free_motion import PeerError
+from robot_dyn.studies.work_precision_diagram.peers.arm_motion import PeerError
 from tests.hard.case import OURS, Case, Row
 from tests.hard.chains import planar, text
 from tests.hard.other_engines import Drake, MuJoCo, PyBullet, installed

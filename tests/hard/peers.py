@@ -19,7 +19,7 @@ import numpy as np
 import robot_dyn as rd
 from robot_dyn.errors import RobotDynError
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, M
-from robot_dyn.studies.work_precision_diagram.peers.free_motion import PeerError
+from robot_dyn.studies.work_precision_diagram.peers.arm_motion import PeerError
 from tests.hard.case import OURS, Case, Row
 from tests.hard.chains import CHAINS, LONG
 from tests.hard.conditioning import SOLVED, SUMS, errors, states

@@ -29,8 +29,9 @@ class Held:
         random: Digits at the worst random state.
         searched: Digits at the worst state found.
         samples: Number of random states; 1 for balls, whose digits are proven.
-        time_s: Median time of one query from Python, in [s].
-        repeats: Number of times it was timed.
+        time_s: Least time of one query from Python over the turns, in [s].
+        repeats: Number of turns.
+        repeatable: Whether there were at least five, the two least times of which differ by no more than 5 %.
         state: The worst state, q, v, a, tau by name.
     """
 
@@ -43,6 +44,7 @@ class Held:
     samples: int
     time_s: float = nan
     repeats: int = 0
+    repeatable: bool = False
     state: dict[str, list[float]] = field(default_factory=dict, hash=False, repr=False)
 
 
@@ -92,6 +94,7 @@ class Certificate(Result):
 
     columns: ClassVar[tuple[str, ...]] = (
         "quantity", "implementation", "given", "typical", "samples", "random", "searched", "time_s", "repeats",
+        "repeatable",
     )  # fmt: skip
     robot: str
     joints: tuple[str, ...]

@@ -35,7 +35,8 @@ def draw(result: Certificate, theme: str = "light") -> Figure:
         axes.axhline(result.decimals[quantity], color=colours["ink"], linewidth=0.9, linestyle=(0, (6, 3)))
     handles = [key(lines(name), hue, marker="o", linewidth=3) for name, hue in hues.items()]
     handles.append(key(DECIMALS, colours["ink"], linestyle="--"))
-    legend(figure, handles, colours)
+    hollow = not all(each.repeatable for each in result.digits)
+    legend(figure, handles, colours, "hollow: a time that did not repeat to 5 %" if hollow else "")
     return figure
 
 
@@ -54,6 +55,7 @@ def _mark(axes: Any, each: Held, colour: str, colours: Colours) -> None:
     t = 1e6 * each.time_s
     axes.plot([t, t], [each.searched, each.typical], color=colour, linewidth=3, solid_capstyle="butt")
     axes.plot([t], [each.random], marker="_", color=colour, markersize=11, markeredgewidth=1.5)
-    axes.plot([t], [each.searched], marker="o", color=colour, markersize=5)
+    face = colour if each.repeatable else colours["paper"]
+    axes.plot([t], [each.searched], marker="o", color=colour, markersize=5, markerfacecolor=face)
     if each.given is not None:
         axes.plot([t], [each.given], marker="x", color=colours["ink"], markersize=6)

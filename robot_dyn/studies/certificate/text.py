@@ -39,7 +39,7 @@ def certificate_tables(result: Certificate) -> Iterator[Block]:
             "machine code writes right angles out in full, and is judged by these; of the file as it stands that"
             f" leaves {min(result.right_angles.values()):.1f} digits"
         )
-    yield "times of one query from Python, medians of calls that take turns; no more than 20 digits are counted"
+    yield "times of one query from Python, the least of calls that take turns; no more than 20 digits are counted"
 
 
 def _digit_rows(result: Certificate, given: bool) -> Iterator[list[str]]:

@@ -1,12 +1,13 @@
 """Comparison of two versions of a computation, or of a part on and off: instructions counted, times in turns.
 
-ratio = first / second, of times in each turn, so that changes of the machine's speed affect both
+ratio = first / second, of the least times; what separates them is judged in each turn, in which the speed of the
+machine is that of both
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import final
 
 import numpy as np
@@ -14,8 +15,9 @@ import numpy as np
 from robot_dyn.errors import RobotDynError
 from robot_dyn.result import reported
 from robot_dyn.studies.time_budget import Budget
+from robot_dyn.studies.timing import repeatable
 
-_QUARTILES = (25, 50, 75)
+_QUARTILES = (25, 75)
 
 
 @final
@@ -26,16 +28,16 @@ class Version:
     Attributes:
         name: What sets it apart, such as "on".
         instructions: Of its program, exact.
-        time_s: Median of its times of the processor, in [s]; None if it was not timed.
-        spread_s: Half of the interquartile range of its times, in [s]; likewise.
-        repeats: Number of times it was timed.
+        time_s: Least of its times of the processor, in [s]; None if it was not timed.
+        repeats: Number of turns.
+        repeatable: Whether there were at least five, the two least times of which differ by no more than 5 %.
     """
 
     name: str
     instructions: int
     time_s: float | None
-    spread_s: float | None
     repeats: int
+    repeatable: bool
 
 
 @final
@@ -48,10 +50,10 @@ class ABComparison:
         what: What differs.
         per: What instructions and time are of.
         first, second: The two.
-        time_ratio: Time of the first by that of the second, the median over the turns; None if one was not timed.
-        time_ratio_spread: Half of the interquartile range of that; likewise.
-        time_between_s: Time of the first less that of the second, in [s], the median over the turns; None if the middle
-            half of the turns do not agree on its sign.
+        time_ratio: Time of the first by that of the second; None if one was not timed.
+        time_ratio_spread: Half of the interquartile range of the ratios in each turn; likewise.
+        time_between_s: Time of the first less that of the second, in [s]; None if the middle half of the turns do not
+            agree with its sign.
     """
 
     group: str
@@ -98,8 +100,10 @@ class Way:
 
     def version(self) -> Version:
         """What was found."""
-        time, spread = _middle(self.times_s)
-        return Version(self.name, self.factor * self.instructions, time, spread, len(self.times))
+        times = self.times_s.tolist()
+        return Version(
+            self.name, self.factor * self.instructions, min(times, default=None), len(times), repeatable(times)
+        )
 
     def named(self, name: str, factor: int = 1) -> Way:
         """The same under another name, and so many of it; its times are shared."""
@@ -121,19 +125,16 @@ class Pair:
         """What was found."""
         turns = min(len(self.first.times), len(self.second.times))
         first, second = self.first.times_s[:turns], self.second.times_s[:turns]
-        low, between, high = np.percentile(first - second, _QUARTILES).tolist() if turns else (0.0, 0.0, 0.0)
-        return ABComparison(
-            self.group, self.what, self.per, self.first.version(), self.second.version(), *_middle(first / second),
-            between if low * high > 0 else None,
+        found = ABComparison(self.group, self.what, self.per, self.first.version(), self.second.version())
+        if not turns:
+            return found
+        low, high = np.percentile(first - second, _QUARTILES)
+        narrow, wide = np.percentile(first / second, _QUARTILES)
+        between = float(first.min() - second.min())
+        return replace(
+            found, time_ratio=float(first.min() / second.min()), time_ratio_spread=float(wide - narrow) / 2,
+            time_between_s=between if low * between > 0 < high * between else None,
         )  # fmt: skip
-
-
-def _middle(values: np.ndarray) -> tuple[float | None, float | None]:
-    """Median of some values, and half of their interquartile range; None without any."""
-    if not len(values):
-        return None, None
-    low, middle, high = np.percentile(values, _QUARTILES).tolist()
-    return middle, (high - low) / 2
 
 
 def in_turns(pairs: Iterable[Pair], budget: Budget, repeats: int) -> list[str]:

@@ -41,9 +41,11 @@ def draw(result: Cost, theme: str = "light") -> Figure:
 
 
 def _caption(result: Cost) -> str:
+    versions = [of for each in result.alternatives for of in (each.first, each.second) if of.time_s is not None]
+    hollow = "" if all(each.repeatable for each in versions) else " Hollow: a time that did not repeat to 5 %."
     return (
-        f"{result.robot}: {', '.join(result.acting) or 'no effects'}. Times of the processor: medians over turns."
-        f" {programs(result.environment, 'llvmlite', 'casadi')}."
+        f"{result.robot}: {', '.join(result.acting) or 'no effects'}. Times of the processor: the least over turns."
+        f"{hollow} {programs(result.environment, 'llvmlite', 'casadi')}."
     )
 
 
@@ -91,7 +93,8 @@ def _draw_ratios(axes: Any, others: list[ABComparison], colours: Colours) -> Non
             x, y = pair[k], place + (k - 0.5) * _BAR
             if x is None or not 0 < x < float("inf"):
                 continue
-            axes.barh(y, x - 1, _BAR, left=1, color=colour)
+            hollow = k and not (others[place].first.repeatable and others[place].second.repeatable)
+            axes.barh(y, x - 1, _BAR, left=1, edgecolor=colour, facecolor="none" if hollow else colour)
             axes.text(max(x, 1.0), y, f" {x:.2g}", va="center", fontsize=8, **ink(colours))
     axes.axvline(1, color=colours["ink"], linewidth=0.9)
     _named(axes, [f"{each.what}:\n{each.first.name} / {each.second.name}" for each in others], colours)

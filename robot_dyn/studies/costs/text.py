@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from robot_dyn.answer import Block, Table
 from robot_dyn.queries.units import format_duration
-from robot_dyn.studies.costs.ab_comparison import ABComparison
+from robot_dyn.studies.costs.ab_comparison import ABComparison, Version
 
 if TYPE_CHECKING:
     from robot_dyn.studies.costs.cost import Cost
@@ -19,8 +19,8 @@ def cost_tables(result: Cost) -> Iterator[Block]:
     yield f"{result.robot}: {', '.join(result.acting) or 'no effects'}"
     headings = ("per", "what", "first / second", "instructions", "ratio", "time", "ratio")
     yield Table(headings, tuple(map(tuple, cost_rows(result))), right=headings[3:])
-    yield "instructions are exact; times of the processor, in machine code on one thread, and their ratios are medians"
-    yield "over turns; ± half of the interquartile range"
+    yield "instructions are exact; times of the processor, in machine code on one thread, are the least over turns;"
+    yield "± half of the interquartile range of the ratios in a turn; ~ a time that did not repeat to 5 %"
 
 
 def cost_rows(result: Cost) -> Iterator[list[str]]:
@@ -36,6 +36,10 @@ def _cells(each: ABComparison) -> Iterator[str]:
     yield f"{first.name} / {second.name}"
     yield f"{first.instructions} / {second.instructions}"
     yield f"{each.instructions_ratio:.3g}" if isfinite(each.instructions_ratio) else "—"
-    yield " / ".join("—" if of.time_s is None else format_duration(of.time_s) for of in (first, second))
+    yield " / ".join(map(_time, (first, second)))
     noise = ", within noise" * each.within_noise
     yield "—" if each.time_ratio is None else f"{each.time_ratio:.2f} ± {each.time_ratio_spread:.2f}{noise}"
+
+
+def _time(of: Version) -> str:
+    return "—" if of.time_s is None else f"{'~' * (not of.repeatable)}{format_duration(of.time_s)}"

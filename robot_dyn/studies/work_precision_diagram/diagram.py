@@ -21,8 +21,8 @@ _LOOK = {  # theme colour and marker, by family: explicit, Gauss, stiff, adaptiv
     "gauss_6": (2, "h"), "rosenbrock_5": (3, "s"), "sdirk_3": (3, "^"), "linearly_implicit_euler": (3, "v"),
 }  # fmt: skip
 _PEERS = {
-    "SciPy DOP853 + pin.aba": "x", "MuJoCo RK4": "D", "MuJoCo Euler": "^", "MuJoCo implicitfast": "v",
-    "Drake runge_kutta3": "P", "heyoka, Taylor": "*",
+    "SciPy DOP853 + pin.aba": "x", "SciPy Radau + pin.aba": "+", "SciPy LSODA + pin.aba": "1", "MuJoCo RK4": "D",
+    "MuJoCo Euler": "^", "MuJoCo implicitfast": "v", "Drake runge_kutta3": "P", "heyoka, Taylor": "*",
 }  # fmt: skip
 _MOST_ERROR = 3.0  # [rad] or [m]; larger errors are meaningless and not drawn
 _MOST_METHODS, _SIX_DIGITS = 8, 1e-6  # in one panel; [rad] or [m]
@@ -41,13 +41,13 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     grid = figure.add_gridspec(
         3, 2, width_ratios=(2.1, 1), left=0.065, right=0.985, top=0.845, bottom=0.195, hspace=0.62, wspace=0.17
     )
-    first = [each for each in result.ladders if each.events and (each.peer or each.engine != INTERPRETED)]
+    first = [each for each in result.ladders if each.peer or (each.events and each.engine != INTERPRETED)]
     first = first if any(not each.peer for each in first) else list(result.ladders)
     first = most_precise(first)
     own = [each for each in first if not each.peer]
     slow = [each for each in result.ladders if each.engine == INTERPRETED and each not in first]
     names = {each.method for each in first}
-    without = [each for each in result.ladders if not each.events and each.method in names]
+    without = [each for each in result.ladders if not each.events and not each.peer and each.method in names]
     main = figure.add_subplot(grid[:, 0])
     _axes(main, result, colours, "time of the loop [ms]", "Error over time: lower left is better")
     _front(main, result, colours)
@@ -141,7 +141,7 @@ def _curve(
         at = [k for k, p in enumerate(points) if (p.believed and p.repeatable) is measured]
         hollow = "none" if dashed else face
         shape = {"marker": marker, "s": 30 * size**2, "color": colour, "zorder": 3, "linewidths": 0.9}
-        faced = {} if marker == "x" else {"facecolors": hollow}
+        faced = {} if marker in "x+1" else {"facecolors": hollow}
         axes.scatter([xs[k] for k in at], [ys[k] for k in at], **shape, **faced)
 
 
@@ -175,7 +175,7 @@ def _legend(figure: Any, first: list[ToleranceLadder], without: list[ToleranceLa
         colour, marker = _look(each, colours)
         order = "" if each.order is None else f"{each.order}"
         seen = f"{each.measured_order:.1f}" if each.measured_order is not None else "–"
-        label = f"{each.method}: order {seen} ({order})" if order else each.method
+        label = f"{each.name}: order {seen} ({order})" if order else each.name
         handles.append(key(label, colour, marker=marker, markersize=5, linestyle="--" if each.peer else "-"))
     handles.append(key("no run beats these (Pareto front)", colours["grid"], linewidth=9))
     if without:

@@ -10,6 +10,7 @@ from typing import final
 
 from robot_dyn.errors import RobotDynError
 from robot_dyn.studies.time_budget import Budget, Limit, OvertimeError
+from robot_dyn.studies.timing import TURNS, repeatable
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run
 from robot_dyn.studies.work_precision_diagram.reference_run import Reference
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import (
@@ -24,7 +25,6 @@ _PART = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # of the budget,
 _SHORT = 1 / 3000  # of the budget: runs that are timed again before the longer ones
 _LATE = 3  # runs of a ladder that may take longer than that
 _KEPT = {COMPILED: 0.2, INTERPRETED: 0.4, "": 0.2}  # of the budget, for repeats
-_TURNS, _AGREE = 5, 1.05  # of a time that repeats: turns, and ratio of the two least times
 _LAST = 0.05  # of the budget, for turns of short runs after the others
 _HARD = 4.0  # times that, for a run that takes longer than was foreseen
 
@@ -41,12 +41,8 @@ class Rung:
 
     @property
     def repeatable(self) -> bool:
-        """Whether its time is known: after enough turns the two least of them agree.
-
-        What else a machine does makes times longer and never shorter, so that the least one is that of the loop.
-        """
-        least = sorted(self.times)[:2]
-        return len(self.times) >= _TURNS and least[-1] <= _AGREE * least[0]
+        """Whether its time is known."""
+        return repeatable(self.times)
 
 
 @final
@@ -92,9 +88,9 @@ def measure(
         short = [(each, rung) for each, rung in runs if rung.times[0] <= _SHORT * budget.seconds]
         others = [each for each in runs if each not in short]
         # turns of the short ones are before and after the others: a machine may be slower for some seconds
-        _turns(short, _TURNS // 2, 0.0, budget)
+        _turns(short, TURNS // 2, 0.0, budget)
         _turns(others, repeats - 1, _LAST * budget.seconds, budget)
-        _turns(short, repeats - 1 - _TURNS // 2, 0.0, budget)
+        _turns(short, repeats - 1 - TURNS // 2, 0.0, budget)
     except KeyboardInterrupt:
         return walks, True
     return walks, False

@@ -11,10 +11,10 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.studies.time_budget import Limit
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run, tolerances
-from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError, bare_urdf
+from robot_dyn.studies.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError, bare_urdf
 
 
-def methods_under_test(motion: FreeMotion) -> list[MethodUnderTest]:
+def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
     """Its default method at growing accuracy."""
     framework, parsing, tree, analysis, mathematics = (
         import_module(f"pydrake.{name}")
@@ -51,7 +51,7 @@ def methods_under_test(motion: FreeMotion) -> list[MethodUnderTest]:
         at(free, q, v)
         return (plant.CalcBiasTerm(free) - plant.CalcGravityGeneralizedForces(free))[places]
 
-    motion.check(mass_matrix, bias)
+    motion.check(mass_matrix, bias, motion.torque)
 
     def run(accuracy: float, limit: Limit) -> Run:
         simulator: Any = analysis.Simulator(diagram)

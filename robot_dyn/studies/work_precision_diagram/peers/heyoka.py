@@ -14,13 +14,13 @@ from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.studies.time_budget import Limit
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run
-from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError
+from robot_dyn.studies.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError
 from robot_dyn.studies.work_precision_diagram.tolerance_ladder import COMPILED
 
 _TOLERANCES = (1e-6, 1e-10, 1e-14)  # each is compiled by itself, which takes many seconds
 
 
-def methods_under_test(motion: FreeMotion) -> list[MethodUnderTest]:
+def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
     """Its Taylor method."""
     hy: Any = import_module("heyoka")
     setup, n = motion.setup, motion.robot.n

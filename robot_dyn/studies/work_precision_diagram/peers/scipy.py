@@ -1,43 +1,105 @@
-"""SciPy's DOP853 with Pinocchio's articulated-body algorithm, the usual combination in Python."""
+"""SciPy's methods with Pinocchio's articulated-body algorithm, the usual combination in Python."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from importlib import import_module
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
 from robot_dyn.studies.time_budget import Limit
 from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run, tolerances
-from robot_dyn.studies.work_precision_diagram.peers.free_motion import FreeMotion, PeerError
+from robot_dyn.studies.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError
 
 _LEAST = 3e-14  # rtol; SciPy's own lower bound is 100 eps
+_FREE = {"DOP853": 8}  # with their orders
+_DAMPED = {"DOP853": 8, "Radau": 5, "LSODA": None}  # damped motion may be stiff
 
 
-def methods_under_test(motion: FreeMotion) -> list[MethodUnderTest]:
-    """DOP853 from `solve_ivp`."""
+def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
+    """Methods of `solve_ivp`."""
+    pin: Any = import_module("pinocchio")
+
+    robot = motion.robot
+    if not robot.couplings.trivial:
+        raise PeerError("pin.aba knows no coupled joints")
+    model: Any = robot.model
+    data, zero = model.createData(), np.zeros(robot.n)
+
+    def mass_matrix(q: np.ndarray) -> np.ndarray:
+        upper = np.triu(pin.crba(model, data, q))
+        return upper + np.triu(upper, 1).T
+
+    motion.check(mass_matrix, lambda q, v: pin.rnea(model, data, q, v, zero), _torque(motion))
+    return [_method(motion, name, order) for name, order in (_FREE if motion.free else _DAMPED).items()]
+
+
+def _method(motion: ArmMotion, name: str, order: int | None) -> MethodUnderTest:
     pin: Any = import_module("pinocchio")
     from scipy.integrate import solve_ivp
 
-    robot, setup = motion.robot, motion.setup
-    if not robot.couplings.trivial:
-        raise PeerError("pin.aba knows no coupled joints")
-    n, zero, times = robot.n, np.zeros(robot.n), motion.times
-    model: Any = robot.model
+    setup, n, times, torque = motion.setup, motion.robot.n, motion.times, _torque(motion)
+    model: Any = motion.robot.model
     data, start = model.createData(), np.concatenate([setup.q0, setup.v0])
 
     def run(rtol: float, limit: Limit) -> Run:
         def rate(t: float, y: np.ndarray) -> np.ndarray:
             limit(t)
-            return np.concatenate([y[n:], pin.aba(model, data, y[:n], y[n:], zero)])
+            q, v = y[:n], y[n:]
+            return np.concatenate([v, pin.aba(model, data, q, v, torque(t, q, v))])
 
+        accuracy: Any = {"rtol": max(rtol, _LEAST), "atol": 1e-2 * rtol}
+        q, v, evaluations = *np.full((2, len(times), n), np.nan), None
         began = perf_counter()
-        found: Any = solve_ivp(
-            rate, (0.0, times[-1]), start, "DOP853", t_eval=times, rtol=max(rtol, _LEAST), atol=1e-2 * rtol
-        )
-        spent = perf_counter() - began
-        y = found.y if found.status == 0 else np.full((2 * n, len(times)), np.nan)
-        return motion.run(y[:n].T, y[n:].T, None, found.nfev, spent)
+        # warnings are of steps that it then refuses; a ValueError of Radau, whose iteration overflowed
+        with np.errstate(all="ignore"), suppress(ValueError):
+            found: Any = solve_ivp(rate, (0.0, times[-1]), start, name, t_eval=times, **accuracy)
+            evaluations = found.nfev
+            if found.status == 0:
+                q, v = found.y[:n].T, found.y[n:].T
+        return motion.run(q, v, None, evaluations, perf_counter() - began)
 
-    return [MethodUnderTest("SciPy DOP853 + pin.aba", "", True, 8, "tolerance", tolerances, run)]
+    return MethodUnderTest(f"SciPy {name} + pin.aba", "", motion.events, order, "tolerance", tolerances, run)
+
+
+def _torque(motion: ArmMotion) -> Callable[[float, np.ndarray, np.ndarray], np.ndarray]:
+    """τ(t, q, v): that of the joints, and of lines by Pinocchio's Jacobians of their points."""
+    if not motion.lines:
+        return motion.torque
+    pin: Any = import_module("pinocchio")
+    model: Any = motion.robot.model
+    data, skew, axes = model.createData(), pin.skew, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    lines = [(each, *_ends(motion, model, each)) for each in motion.lines]
+
+    def point(frame: int | None, at: np.ndarray) -> tuple[np.ndarray, Any]:
+        if frame is None:
+            return at, 0.0
+        J, placement = pin.getFrameJacobian(model, data, frame, axes), data.oMf[frame]
+        return placement.act(at), J[:3] - skew(placement.rotation @ at) @ J[3:]
+
+    def torque(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        total = motion.torque(t, q, v)
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        for each, one, other in lines:
+            (p, J), (p_other, J_other) = point(*one), point(*other)
+            length = np.sqrt((p - p_other) @ (p - p_other))
+            slope = ((p - p_other) / length) @ (J - J_other)
+            spring = isinstance(each, LineSpring)
+            force = each.stiffness * (length - each.length) if spring else each.damping * (slope @ v)
+            total = total - slope * force
+        return total
+
+    return torque
+
+
+def _ends(motion: ArmMotion, model: Any, line: LineSpring | LineDamper) -> Iterator[tuple[int | None, np.ndarray]]:
+    """Frame and point of both ends; None for the world, in which the base of the arm rests."""
+    for frame, at in (line.frame, line.point), (line.other_frame, line.other_point):
+        if frame is not None and not model.existFrame(frame):
+            raise PeerError(f"Pinocchio has no frame {frame!r}")
+        yield None if frame is None else model.getFrameId(frame), np.asarray(at)
