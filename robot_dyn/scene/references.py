@@ -110,8 +110,8 @@ class Sampled(Reference):
     """Heading of the column of each joint, or its name in the log, where they are not the names of the joints."""
     unit: Literal["rad", "deg"] | None = None
     """Of angles whose heading states none."""
-    ends: Literal["rest", "measured"] = "rest"
-    """Whether the motion is at rest at both ends, or moves there as the samples do."""
+    ends: Literal["rest", "measured"] | None = None
+    """Whether the motion is at rest at both ends, or moves as the samples do; by default at rest, an error if they move."""
     start_s: Number | None = None
     """Time of the first sample; as in the file by default."""
     topic: str | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +66,8 @@ def test_the_error_that_is_said_is_that_of_the_samples_left_out() -> None:
 
 def test_arrays_tables_frames_and_files_in_any_unit_are_one_motion(tmp_path: Path) -> None:
     pandas = pytest.importorskip("pandas")
-    expected = rd.plan.from_samples(ARM, SMOOTH, time=T).reference.coefficients
+    read = partial(rd.plan.from_samples, ARM, ends="rest")
+    expected = read(SMOOTH, time=T).reference.coefficients
     shuffled = {"time [ms]": 1000 * T} | {
         f"{name} [deg]": np.degrees(SMOOTH[:, NAMES.index(name)]) for name in sorted(NAMES)
     }
@@ -73,18 +75,18 @@ def test_arrays_tables_frames_and_files_in_any_unit_are_one_motion(tmp_path: Pat
     pandas.DataFrame(shuffled).to_csv(path, index=False)
     mapped = {"t": T, "gripper": T} | {f"J{i}": SMOOTH[:, i] for i in range(6)}
     for plan in (
-        rd.plan.from_samples(ARM, shuffled),
-        rd.plan.from_samples(ARM, pandas.DataFrame(shuffled)),
-        rd.plan.from_samples(ARM, path),
-        rd.plan.from_samples(ARM, table(SMOOTH), unit="rad"),
-        rd.plan.from_samples(ARM, table(np.degrees(SMOOTH)), unit="deg"),
-        rd.plan.from_samples(ARM, SMOOTH, time=T[1]),
-        rd.plan.from_samples(ARM, mapped, joints={name: f"J{i}" for i, name in enumerate(NAMES)}),
+        read( shuffled),
+        read( pandas.DataFrame(shuffled)),
+        read( path),
+        read( table(SMOOTH), unit="rad"),
+        read( table(np.degrees(SMOOTH)), unit="deg"),
+        read( SMOOTH, time=T[1]),
+        read( mapped, joints={name: f"J{i}" for i, name in enumerate(NAMES)}),
     ):
         scale = 40.0 ** np.arange(6)[:, None]  # of rounding in a coefficient of tʲ
         np.testing.assert_allclose(plan.reference.coefficients / scale, expected / scale, atol=1e-12)
     stamps = pandas.DataFrame({"t": pandas.to_datetime(1.7e9 + T, unit="s")} | table(SMOOTH) | {"t": T})
-    assert rd.plan.from_samples(ARM, stamps, start_s=3.0).reference.start == 3.0
+    assert read( stamps, start_s=3.0).reference.start == 3.0
 
 
 def test_the_table_of_a_run_is_read_back(tmp_path: Path) -> None:
@@ -95,6 +97,36 @@ def test_the_table_of_a_run_is_read_back(tmp_path: Path) -> None:
     for mine, its in zip(plan.reference.at(run.t), (run.q, run.v, run.a), strict=True):
         np.testing.assert_allclose(mine, its, atol=1e-9)
     assert np.abs(rd.plan.from_samples(arm, tmp_path / "run.csv", ends="rest").reference.at(0.0)[1]).max() < 1e-10
+
+
+def test_samples_that_move_at_an_end_need_a_word() -> None:
+    """A stop within one step would take a torque that the motion does not need."""
+    with pytest.raises(PlanError, match=r"moves at .* rad/s at the start: say whether .*ends='measured'.*ends='rest'"):
+        rd.plan.from_samples(ARM, table(SMOOTH))
+    with pytest.raises(PlanError, match=r"at the end: say whether"):
+        rd.plan.from_samples(ARM, {"t": T[:41]} | {name: x[:41] for name, x in table(REST).items() if name != "t"})
+    assert rd.plan.from_samples(ARM, REST[::20], time=T[::20]).duration == 2.0  # way points are few
+
+
+@pytest.mark.parametrize("deviation", [1e-3, 1e-4])
+def test_noise_is_told_with_its_deviation_and_the_acceleration_it_makes(deviation: float) -> None:
+    """Of 81 samples the deviation of fourth differences is known to some 10 %; second ones have √6 σ / h²."""
+    rng = np.random.default_rng(3)
+    noisy = REST + deviation * rng.normal(size=REST.shape)
+    (found,) = [x for x in rd.plan.from_samples(ARM, noisy, time=T, ends="rest").findings if "noise" in x]
+    said = re.search(r"noise or rounding of (\S+) rad makes accelerations of (\S+) rad/s²", found)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(deviation, rel=0.5)
+    assert float(said[2]) == pytest.approx(np.sqrt(6) * deviation / T[1] ** 2, rel=0.35)
+
+
+def test_rounding_of_a_log_is_told_and_a_smooth_one_is_not_called_noisy() -> None:
+    """0.1° every 25 ms is an acceleration of √6 · 0.1° / √12 / h² = 2 rad/s², of some 3 here."""
+    degrees = np.degrees(REST)
+    found = rd.plan.from_samples(ARM, np.round(degrees, 1), time=T, unit="deg").findings
+    assert any(re.search(r"noise or rounding of 0\.000[456] rad", each) for each in found)
+    for q in (REST, SMOOTH):
+        assert not rd.plan.from_samples(ARM, q, time=T, ends="measured").findings
 
 
 def changed(row: int, joint: int, x: float) -> np.ndarray:
@@ -128,7 +160,11 @@ def changed(row: int, joint: int, x: float) -> np.ndarray:
         (table(REST) | {"t": 1.7e9 + T}, {}, "first sample is at 1700000000 s, and runs begin at 0 s; start_s=0"),
         (table(REST) | {"t": 1000 * T + 0.5}, {}, "no joint reaches 1 % of its speed in 2000 s, .*are the times in ms"),
         (table(REST) | {"t": T + (T > 1)}, {}, r"1 gap in time, the longest of 1\.025 s from 1 s"),
-        (table(SMOOTH), {}, r"moves at .* rad/s at the start, where the motion is at rest; ends='measured'"),
+        (
+            table(SMOOTH),
+            {"ends": "rest"},
+            r"moves at .* rad/s at the start, where the motion is at rest; ends='measured'",
+        ),
         (
             {name: x for name, x in table(REST).items() if name != "elbow_joint"},
             {"q0": np.full(6, 0.2)},

@@ -115,7 +115,7 @@ def test_a_log_of_rd_export_is_read_back(tmp_path: Path) -> None:
     path = rd.export(run, tmp_path / "run.mcap")
     assert run.desired is not None
     for topic, q in (("/joint_states", run.q), ("/desired/joint_states", run.desired)):
-        plan = rd.plan.from_samples(ARM, path, topic=topic)
+        plan = rd.plan.from_samples(ARM, path, topic=topic, ends="rest")
         np.testing.assert_allclose(plan.reference.at(plan.reference.breaks)[0], q, atol=1e-14)
         np.testing.assert_allclose(plan.reference.breaks, run.t, atol=1e-9)
 

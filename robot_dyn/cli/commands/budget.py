@@ -69,6 +69,10 @@ def budget(
     time: Annotated[
         str | None, typer.Option(metavar="COLUMN", help="Heading of the times in the plan, unless it is t or time.")
     ] = None,
+    ends: Annotated[
+        str | None,
+        typer.Option(help="rest or measured: whether the plan stops at its ends, or is cut from a longer motion."),
+    ] = None,
     joint: Annotated[
         list[str] | None,
         typer.Option(metavar="JOINT=COLUMN", help="Heading of a joint in the plan, for each; others are left out."),
@@ -96,6 +100,7 @@ def budget(
     of_robots = {
         "PLAN.csv": plan, "--payload": payload, "--effects": effects, "--max-payload": max_payload,
         "--fastest": fastest, "--unit": unit, "--period": period, "--time": time, "--joint": joint,
+        "--ends": ends,
         **options.given,
     }  # fmt: skip
     if what.lower().endswith(_RUNS):
@@ -107,7 +112,7 @@ def budget(
             raise QueryError(f"{what}: give its motion as well, a CSV file with a column t [s] and one for each joint")
         robot = options.load(what)
         times = time if period is None else period
-        motion = rd.plan.from_samples(robot, plan, time=times, joints=_columns(joint), unit=unit)
+        motion = rd.plan.from_samples(robot, plan, time=times, joints=_columns(joint), unit=unit, ends=ends)
         bodies = [arguments.payload(each) for each in payload or ()] or None
         with bar(what="asking for the torque"):
             found = rd.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)

@@ -24,7 +24,9 @@ _WHOLE = 1e-6  # from whole numbers
 _MOVES = 1e-6  # [rad] or [m]
 _LATE_S, _LATE = 1000.0, 10  # a later start, by so many durations, is that of a clock
 _ROUNDING = 1e-9  # of a limit that a sample may pass
-DENSE = 16  # samples from which ends at rest, and an error, can be judged
+DENSE = 16  # samples from which ends at rest, noise, and an error, can be judged
+_AT_REST = 0.05  # of the largest speed of a joint
+_EVEN, _NOISY = 1.5, 0.1  # ratio of steps that are even; part of the rms acceleration that noise may be
 
 
 def refuse_other_units(arm: Robot, table: Columns) -> None:
@@ -61,8 +63,11 @@ def findings(arm: Robot, table: Columns, reference: PiecewisePolynomial, ends: s
             )
         if not jumps and not outside:
             yield from _between(arm, i, within.least[i], within.at_least[i], within.greatest[i], within.at_greatest[i])
-    if ends == "rest" and len(table.t) >= DENSE:
-        yield from _moving_ends(arm, speed)
+    yield from _noise(arm, table)
+    if ends == "rest":
+        yield from (
+            f"{what}, where the motion is at rest; ends='measured' moves as they do" for what in _ends(arm, table)
+        )
 
 
 def _limit(arm: Robot) -> np.ndarray:
@@ -165,11 +170,45 @@ def _between(arm: Robot, i: int, least: float, at_least: float, greatest: float,
             yield f"{at}, between samples within its limits {limits}; give more samples there"
 
 
-def _moving_ends(arm: Robot, speed: np.ndarray) -> Iterator[str]:
+def refuse_moving_ends(arm: Robot, table: Columns) -> None:
+    """Raise PlanError if joints move at the ends of dense samples: a stop within one step takes torques of its own."""
+    for what in _ends(arm, table):
+        raise PlanError(
+            f"{what}: say whether the samples are cut from a longer motion, ends='measured', or the motion stops there,"
+            " ends='rest'; --ends on the command line"
+        )
+
+
+def _ends(arm: Robot, table: Columns) -> Iterator[str]:
+    """Of dense samples the joint that moves fastest at the start, and at the end, unless all are nearly at rest."""
+    if len(table.t) < DENSE:
+        return
+    speed = np.diff(table.q, axis=0) / np.diff(table.t)[:, None]
     for where, k in (("start", 0), ("end", -1)):
         i = int(np.abs(speed[k]).argmax())
-        if abs(speed[k, i]) > 0.05 * np.abs(speed[:, i]).max():
-            yield (
-                f"{arm.joint_names[i]} moves at {abs(speed[k, i]):.3g} {of_joint('rad/s', arm.joint_types[i])} at"
-                f" the {where}, where the motion is at rest; ends='measured' moves as the samples do"
-            )
+        if abs(speed[k, i]) > _AT_REST * np.abs(speed[:, i]).max():
+            unit = of_joint("rad/s", arm.joint_types[i])
+            yield f"by its samples {arm.joint_names[i]} moves at {abs(speed[k, i]):.3g} {unit} at the {where}"
+
+
+def _noise(arm: Robot, table: Columns) -> Iterator[str]:
+    """The joint whose acceleration noise or rounding determines most.
+
+    Independent errors of deviation σ have fourth differences of variance 70 σ² and second ones of 6 σ², while those of
+    a smooth motion vanish with the step as its fourth power and its square.
+    """
+    dt = np.diff(table.t)
+    if len(table.t) < DENSE or dt.max() > _EVEN * dt.min():
+        return
+    fourth, second = (np.sqrt((np.diff(table.q, r, axis=0) ** 2).mean(axis=0)) for r in (4, 2))
+    noise, step = fourth / np.sqrt(70), float(np.median(dt))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        part = np.nan_to_num(np.minimum(np.sqrt(6) * noise / second, 1.0))
+    i = int(part.argmax())
+    if part[i] > _NOISY:
+        unit = of_joint("rad", arm.joint_types[i])
+        yield (
+            f"{arm.joint_names[i]}: noise or rounding of {noise[i]:.1g} {unit} makes accelerations of"
+            f" {np.sqrt(6) * noise[i] / step**2:.2g} {unit}/s², {part[i]:.0%} of those of the samples, and torques with"
+            " them; smooth the samples first, as scipy.signal.savgol_filter does"
+        )

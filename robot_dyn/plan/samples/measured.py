@@ -12,7 +12,7 @@ from robot_dyn.errors import PlanError
 from robot_dyn.model.robot import Robot
 from robot_dyn.plan.plan import Plan
 from robot_dyn.plan.samples.columns import columns
-from robot_dyn.plan.samples.findings import DENSE, findings, refuse_other_units
+from robot_dyn.plan.samples.findings import DENSE, findings, refuse_moving_ends, refuse_other_units
 from robot_dyn.queries.units import of_joint
 from robot_dyn.validate import choice, instance, number
 
@@ -24,7 +24,7 @@ def from_samples(
     time: Any = None,
     joints: Any = None,
     unit: str | None = None,
-    ends: str = "rest",
+    ends: str | None = None,
     q0: Any = None,
     start_s: float | None = None,
     topic: str | None = None,
@@ -33,7 +33,7 @@ def from_samples(
 
     It passes through every sample: noise is not smoothed. How far it may be off between them is said by the spline
     through every second sample, which misses the others by so much. What is doubtful is found and said: gaps in time,
-    steps faster than the velocity limits, whole turns, positions beyond the limits, ends that are not at rest.
+    steps faster than the velocity limits, whole turns, positions beyond the limits, noise, ends that are not at rest.
 
     Args:
         arm: The robot.
@@ -49,21 +49,26 @@ def from_samples(
             columns are left out.
         unit: "rad" or "deg" of angles whose heading states none; "rad" by default, unless they look like degrees.
         ends: "rest", with neither velocity nor acceleration at both ends; or "measured", as the samples have it: with
-            the velocities and accelerations of a run's table where it has them, else not-a-knot.
+            the velocities and accelerations of a run's table where it has them, else not-a-knot. By default "rest",
+            an error if 16 samples or more move there.
         q0: Where joints without a column rest, (n,), in [rad] or [m]; by default each needs one.
         start_s: Time of the first sample, in [s]; as given by default.
         topic: Of a log; by default its only one of joint states, or "/joint_states".
 
     Raises:
         PlanError: If a column is missing or unknown, times do not increase, or angles look like degrees, or times like
-            ms, and no unit is given.
+            ms, and no unit is given; if joints move at the ends, and `ends` is not given.
         MissingExtraError: Of a log, without mcap and mcap-ros2-support.
     """
     instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=PlanError)
-    choice("ends", ends, ("rest", "measured"), error=PlanError)
+    if ends is not None:
+        choice("ends", ends, ("rest", "measured"), error=PlanError)
     table = columns(arm, source, time, joints, unit, q0, topic)
     t, q = table.t, table.q
     refuse_other_units(arm, table)
+    if ends is None:
+        refuse_moving_ends(arm, table)
+        ends = "rest"
     if start_s is not None:
         t = t - t[0] + number("start_s", start_s, error=PlanError)
     at_rest = ends == "rest"
