@@ -41,11 +41,16 @@ def _row(parameter: Any) -> str:
         names = [*names[:-1], f"{names[-1]} {parameter.metavar}"]
     default = parameter.default
     told = "required" if parameter.required else "" if default in (None, False, (), []) else f"`{default}`"
-    return f"| {', '.join(f'`{each}`' for each in names)} | {_cell(parameter.help or '')} | {told} |"
+    return f"| {_escaped(', '.join(f'`{each}`' for each in names))} | {_cell(parameter.help or '')} | {told} |"
 
 
 def _cell(text: str) -> str:
-    return _plain(" ".join(text.split())).replace("|", "\\|")
+    return _escaped(_plain(" ".join(text.split())))
+
+
+def _escaped(text: str) -> str:
+    """For a cell of a table, where a bar ends it."""
+    return text.replace("|", "\\|")
 
 
 def _plain(text: str) -> str:

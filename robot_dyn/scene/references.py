@@ -111,7 +111,7 @@ class Sampled(Reference):
     unit: Literal["rad", "deg"] | None = None
     """Of angles whose heading states none."""
     ends: Literal["rest", "measured"] | None = None
-    """Whether the motion is at rest at both ends, or moves as the samples do; by default at rest, an error if they move."""
+    """Whether it is at rest at both ends, or moves as the samples do; at rest by default, an error if they move."""
     start_s: Number | None = None
     """Time of the first sample; as in the file by default."""
     topic: str | None = None

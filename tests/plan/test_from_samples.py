@@ -75,18 +75,18 @@ def test_arrays_tables_frames_and_files_in_any_unit_are_one_motion(tmp_path: Pat
     pandas.DataFrame(shuffled).to_csv(path, index=False)
     mapped = {"t": T, "gripper": T} | {f"J{i}": SMOOTH[:, i] for i in range(6)}
     for plan in (
-        read( shuffled),
-        read( pandas.DataFrame(shuffled)),
-        read( path),
-        read( table(SMOOTH), unit="rad"),
-        read( table(np.degrees(SMOOTH)), unit="deg"),
-        read( SMOOTH, time=T[1]),
-        read( mapped, joints={name: f"J{i}" for i, name in enumerate(NAMES)}),
+        read(shuffled),
+        read(pandas.DataFrame(shuffled)),
+        read(path),
+        read(table(SMOOTH), unit="rad"),
+        read(table(np.degrees(SMOOTH)), unit="deg"),
+        read(SMOOTH, time=T[1]),
+        read(mapped, joints={name: f"J{i}" for i, name in enumerate(NAMES)}),
     ):
         scale = 40.0 ** np.arange(6)[:, None]  # of rounding in a coefficient of tʲ
         np.testing.assert_allclose(plan.reference.coefficients / scale, expected / scale, atol=1e-12)
     stamps = pandas.DataFrame({"t": pandas.to_datetime(1.7e9 + T, unit="s")} | table(SMOOTH) | {"t": T})
-    assert read( stamps, start_s=3.0).reference.start == 3.0
+    assert read(stamps, start_s=3.0).reference.start == 3.0
 
 
 def test_the_table_of_a_run_is_read_back(tmp_path: Path) -> None:

@@ -281,7 +281,7 @@ def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.M
     Path("arm.urdf").write_text(BROKEN["misspelt origin"].change(SOUND), encoding="utf-8")
     told = run("check", "arm.urdf")
     assert told.returncode == 1
-    assert "error: joint 'elbow' (line" in told.stdout
+    assert "error: unknown_element: joint 'elbow' (line" in told.stdout
     assert "<orgin> is not of URDF, and is passed over; <origin> is meant; correct it [--fix]" in told.stdout
     fixed = run("check", "arm.urdf", "--fix", "--json")
     (document,) = json.loads(fixed.stdout)["files"]
@@ -324,3 +324,44 @@ def test_what_was_not_checked_is_said() -> None:
     repaired = checked(BROKEN["decimal comma"].change(SOUND).encode(), "rig.urdf")
     assert not repaired.loads
     assert unread not in repaired.sentence
+
+
+def chain(masses: list[float], edges: list[float], moments: float = 1.0) -> str:
+    """Cubes in a row, each turned by a joint against the one before."""
+    cubes = "".join(
+        f'<link name="l{k}"><inertial><mass value="{m}"/>'
+        f'<inertia ixx="{i}" iyy="{i}" izz="{i}" ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><box size="{a} {a} {a}"/></geometry></collision></link>'
+        for k, (m, a) in enumerate(zip(masses, edges, strict=True))
+        for i in [moments * m * a * a / 6]
+    )
+    joints = "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="{"base" if not k else f"l{k - 1}"}"/><child link="l{k}"/>'
+        '<origin xyz="0 0.2 0"/><axis xyz="0 0 1"/></joint>'
+        for k in range(len(masses))
+    )
+    return f'<robot name="cubes"><link name="base"/>{cubes}{joints}</robot>'
+
+
+@pytest.mark.parametrize(("scatter", "found"), [(0.004, True), (0.05, False)])
+def test_masses_of_one_density_are_told(scatter: float, found: bool) -> None:
+    """Cubes at 1000 kg/m³, each off by up to so much."""
+    edges = [0.1, 0.12, 0.09, 0.11, 0.08]
+    masses = [1000 * a**3 * (1 + scatter * (-1) ** k * (1 + k / 8)) for k, a in enumerate(edges)]
+    kinds = {each.kind: each for each in checked(chain(masses, edges).encode(), "cubes.urdf").findings}
+    assert ("density_uniform" in kinds) is found
+    if found:
+        assert "5 of 5 links weigh" in kinds["density_uniform"].what
+
+
+def test_masses_of_equal_links_are_no_sign_of_one_material() -> None:
+    """Five equal cubes, as the links of a chain, tell nothing."""
+    made = checked(chain([1.3] * 5, [0.1] * 5).encode(), "cubes.urdf")
+    assert "density_uniform" not in {each.kind for each in made.findings}
+
+
+def test_an_arm_of_points_with_shapes_is_a_warning_and_a_single_one_is_a_note() -> None:
+    masses, edges = [1.0, 1.5, 0.9], [0.1, 0.12, 0.09]
+    points = [x for x in checked(chain(masses, edges, 0.0).encode(), "cubes.urdf").findings if x.kind == "inertia_zero"]
+    assert [x.severity for x in points] == [Severity.WARNING] * 3 and "all its moments are 0" in points[0].what
+    (alone,) = [x for x in checked(chain([1.0], [0.1], 0.0).encode(), "cube.urdf").findings if x.kind == "inertia_zero"]
+    assert alone.severity is Severity.NOTE

@@ -155,7 +155,7 @@ def checked(
             repairs += made
             document = _rewritten(document, made)
             robot = Robot(description.check(document.text, source))
-        found += masses.masses(document, robot)
+        found += [*masses.masses(document, robot), *shapes.of_one_density(document, robot, of)]
         later = shapes.doubtful(document, robot, of, package_dirs)
         found += later
         found += masses.beyond_reach(document, robot, found)
@@ -163,6 +163,9 @@ def checked(
         if made := [each for each in later if each.changes and (units or not each.supposed)]:
             repairs += made
             document = _rewritten(document, made)
+        assumed = {_assumed(text).what for text in (*document.assumed, *robot.description.findings)}
+        gone = [each for each in found if each.kind == "format" and each.what not in assumed] if estimated else []
+        repairs += gone
     loads = refusal is None and not any(each.kind == "refused" for each in found)
     return Checkup(
         source, loads, _gravest_first(found), document.text if repairs or declared else None,

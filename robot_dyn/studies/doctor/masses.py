@@ -89,22 +89,35 @@ def _massless(document: Document, robot: Robot, stated: Structure) -> Iterator[F
     for text in doctor.massless_bodies(stated):
         found = _of_words(Severity.WARNING, "mass_missing", text)
         links = next((links for links in stated.bodies.values() if found.where == f"link {links[0]!r}"), ())
-        drawn = any(document.named("link", name).find(f"{tag}/geometry") is not None
-                    for name in links for tag in ("visual", "collision"))  # fmt: skip
+        drawn = any(_has_shape(document, name) for name in links)
         singular = robot.joint_without_inertia is not None
         yield replace(found, severity=Severity.ERROR) if drawn or singular or not links else found
 
 
 def _rods_and_points(document: Document, stated: Structure) -> Iterator[Finding]:
-    """Links that move with mass and a principal moment of 0, which other programs refuse."""
-    for name, link in stated.links.items():
-        least, _, most = np.linalg.eigvalsh(link.inertia)
-        if link.mass > 0 and abs(least) <= _NOTHING * most and name not in stated.base:
+    """Links that move with mass and a principal moment of 0, refused elsewhere; a warning if most have none."""
+    moving = {name: link for name, link in stated.links.items() if link.mass > 0 and name not in stated.base}
+    moments = {name: np.linalg.eigvalsh(link.inertia) for name, link in moving.items()}
+    points = [name for name, (_, _, most) in moments.items() if most == 0 and _has_shape(document, name)]
+    for name, (least, _, most) in moments.items():
+        if name in points and len(points) >= max(2, len(moving) / 2):
+            yield document.finding(
+                Severity.WARNING, "inertia_zero", document.named("link", name),
+                f"all its moments are 0, as of a point of {moving[name].mass:g} kg, and it has a shape",
+                "give it moments: those of a link without <inertia> are estimated, --fix with --density",
+            )  # fmt: skip
+        elif abs(least) <= _NOTHING * most:
             yield document.finding(
                 Severity.NOTE, "inertia_zero", document.named("link", name),
-                f"its least principal moment is 0, as of a rod or a point of {link.mass:g} kg; MuJoCo refuses that",
+                f"its least principal moment is 0, as of a rod or a point of {moving[name].mass:g} kg; MuJoCo refuses"
+                " that",
                 "give it the moments of a body with some width",
             )  # fmt: skip
+
+
+def _has_shape(document: Document, name: str) -> bool:
+    link = document.named("link", name)
+    return any(link.find(f"{tag}/geometry") is not None for tag in ("visual", "collision"))
 
 
 def _merged(document: Document, robot: Robot, stated: Structure) -> Iterator[Finding]:

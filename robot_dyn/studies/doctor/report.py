@@ -18,10 +18,10 @@ def grouped(findings: Iterable[Finding]) -> Iterator[tuple[Finding, ...]]:
 
 
 def sentence(findings: tuple[Finding, ...]) -> str:
-    """Findings of one kind in one line: a single one as it is; of several the places, and what the first says."""
+    """Findings of one kind in one line: a single one after its kind; of several the places, and what the first says."""
     first = findings[0]
     if len(findings) == 1:
-        return f"{first.severity.value}: {first}"
+        return f"{first.severity.value}: {first.kind}: {first}"
     places = list(dict.fromkeys(each.place for each in findings))
     more = ", …" if len(places) > _PLACES else ""
     listed = ", ".join(places[:_PLACES])

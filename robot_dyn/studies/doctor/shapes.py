@@ -30,6 +30,7 @@ _UNITS = {1e3: "g m²", 1e4: "kg cm²", 1e6: "kg mm²", 1e7: "g cm²", 1e9: "g m
 _WITHIN = 4.0  # a factor on either side, by which the inertia of a link is off that of a uniform body
 _LONG, _LEAST_LONG = 10.0, 10.0  # times the length of the arm, and [m], that a shape is: millimetres
 _SIZE = "shape_in_mm"
+_MATERIAL, _MOST, _FEWEST = 0.01, 0.6, 4  # of the median density; part of the links; of different mass, at least
 _GRAVE = 3.0  # of ½ tr I to m d², from which M is wrong by a factor: below, makers round
 
 
@@ -120,6 +121,26 @@ def misfits(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[
         found = found or _inertia(name, link, shape, inertial) or _small(name, link, shape, inertial)
         if found is not None:
             yield replace(found, severity=Severity.NOTE) if name in stated.base else found
+
+
+def of_one_density(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
+    """A note if the masses of nearly all links are their volumes times one density, as programs of CAD write them."""
+    links = structure(robot.description, robot.edits).links
+    known = {name: links[name].mass for name in of if links[name].mass > 0 and name not in robot.description.estimated}
+    density = {name: mass / unit.mass for name, mass in known.items() if (unit := of[name].unit) is not None}
+    if len(density) < _FEWEST:
+        return
+    median = float(np.median([*density.values()]))
+    alike = [name for name, x in density.items() if abs(x / median - 1) <= _MATERIAL]
+    different = len({links[name].mass for name in alike})
+    if different >= _FEWEST and different >= _MOST * len({links[name].mass for name in known}):
+        total = sum(link.mass for link in links.values())
+        yield document.finding(
+            Severity.NOTE, "density_uniform", document.root,
+            f"{len(alike)} of {len(known)} links weigh {median:.4g} kg/m³ of their shapes, to 1 %, {total:.4g} kg in"
+            " all: computed from one material, as an arm with motors and gears hardly is",
+            "compare the total with the data sheet; Robot.with_(mass_scale=…) scales all masses",
+        )  # fmt: skip
 
 
 def _farthest(points: np.ndarray) -> float:
