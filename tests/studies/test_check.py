@@ -326,13 +326,17 @@ def test_what_was_not_checked_is_said() -> None:
     assert unread not in repaired.sentence
 
 
+def inertial(mass: float, moment: float) -> str:
+    moments = " ".join(f'{key}="{moment}"' for key in ("ixx", "iyy", "izz"))
+    return f'<inertial><mass value="{mass}"/><inertia {moments} ixy="0" ixz="0" iyz="0"/></inertial>'
+
+
 def chain(masses: list[float], edges: list[float], moments: float = 1.0) -> str:
     """Cubes in a row, each turned by a joint against the one before."""
     cubes = "".join(
-        f'<link name="l{k}"><inertial><mass value="{m}"/>'
-        f'<inertia ixx="{i}" iyy="{i}" izz="{i}" ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><box size="{a} {a} {a}"/></geometry></collision></link>'
+        f'<link name="l{k}">{inertial(m, moments * m * a * a / 6)}'
+        f'<collision><geometry><box size="{a} {a} {a}"/></geometry></collision></link>'
         for k, (m, a) in enumerate(zip(masses, edges, strict=True))
-        for i in [moments * m * a * a / 6]
     )
     joints = "".join(
         f'<joint name="j{k}" type="continuous"><parent link="{"base" if not k else f"l{k - 1}"}"/><child link="l{k}"/>'
