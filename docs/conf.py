@@ -29,7 +29,16 @@ copyright = f"2026, {author}"  # noqa: A001
 with (ROOT / "pyproject.toml").open("rb") as file:
     version = release = tomllib.load(file)["project"]["version"]
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "site_parts"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.intersphinx", "sphinx.ext.napoleon", "site_parts"]
+# names of other packages link to their pages, by inventories that are kept here: the site is built without a network
+intersphinx_mapping = {
+    name: (address, str(DOCS / "data" / "inventories" / f"{name}.inv"))
+    for name, address in {
+        "python": "https://docs.python.org/3",
+        "numpy": "https://numpy.org/doc/stable",
+        "scipy": "https://docs.scipy.org/doc/scipy/reference",
+    }.items()
+}
 root_doc = "README"
 include_patterns = ["**.md"]
 
@@ -37,6 +46,7 @@ html_theme = "furo"
 html_title = "robot_dyn"
 html_static_path = ["static"]
 html_css_files, html_js_files = ["site.css"], ["site.js"]
+smartquotes_action = "q"  # dashes are those of options
 html_copy_source = html_show_sourcelink = False
 pygments_style, pygments_dark_style = "a11y-high-contrast-light", "a11y-high-contrast-dark"
 

@@ -94,7 +94,7 @@ class InverseKinematics(Answer, Value):
             return
         others = len(self.solutions) - 1
         more = f"; {self.redundancy} directions are free" if self.redundancy else ""
-        yield f"{others or 'no'} other solutions from {self.starts} starts{more}"
+        yield f"{others or 'no'} other solution{'s' * (others != 1)} from {self.starts} starts{more}"
 
 
 def inverse_kinematics(

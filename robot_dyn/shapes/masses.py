@@ -80,6 +80,6 @@ class Masses:
                 known = self.total - left
                 raise QueryError(f"total_mass of {self.total:g} kg leaves nothing: {known:g} kg are known; correct it")
             volume = sum(shape.hull.mass for shape in others.values())
-            origin = f"its share, by volume, of a total of {self.total:g} kg"
+            origin = f"its share, by volume, of a total of {self.total:g} kg: {left / volume:.4g} kg/m³ of its hull"
             found |= {link: (left * shape.hull.mass / volume, origin) for link, shape in others.items()}
         return found

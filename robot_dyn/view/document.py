@@ -249,8 +249,8 @@ def _shown(
     worst = int(keys.error.argmax())
     joint = stage.linkage.bodies[worst]
     thinning = (
-        f"drawn at {len(keys.t)} of the {keys.samples} samples; between these, joint positions are interpolated, with"
-        f" an error of at most {keys.error[worst]:.1e} {'rad' if joint.revolute else 'm'} ({joint.joint})"
+        f"drawn by {len(keys.t)} keyframes of {keys.samples} samples, between which joint positions are linear: at the"
+        f" samples off by at most {keys.error[worst]:.1e} {'rad' if joint.revolute else 'm'} ({joint.joint})"
     )
     some = f"the first {_MOST_EVENTS} of {len(run.events)} events are marked on the plots"
     notes = (thinning, some) if len(run.events) > _MOST_EVENTS else (thinning,)

@@ -85,7 +85,7 @@ def overlays(stage: Stage, run: Trajectory, reach: float, frame: str | None = No
     stage.link_path(frame)  # raises if there is none
     paths = _paths(found, stage, run, reach, frame)
     what = "the line is the path of a frame, the yellow ball the centre of mass of what moves"
-    found.notes.append(f"{what}; they are off by at most {1e3 * _off(com, *paths):.1g} mm")
+    found.notes.append(f"{what}; at the samples they are off by at most {1e3 * _off(com, *paths):.1g} mm")
     if run.at_stop is not None:
         _stops(found, stage, run, reach)
     return found

@@ -145,7 +145,7 @@ def _of_plan(motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, given:
     demand = of_motion(reference, plant)
     assert demand.cells is not None
     found = joint_budgets(demand, limits, continuous, static_friction(plant), breakaway(demand.cells, plant))
-    findings = (*(() if plan is None else plan.findings), *_outside(reference, robot))
+    findings = (*robot.findings, *(() if plan is None else plan.findings), *_outside(reference, robot))
     what = f"{'motion' if plan is None else plan.method}, {demand.duration:.6g} s"
     if any(isinstance(each, EffortLimit) for each in plant.effects):
         findings += ("peak torques are never above the EffortLimit of the plant; leave it out for those of the motors",)
