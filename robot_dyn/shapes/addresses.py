@@ -50,7 +50,9 @@ def find_file(
             if remarks is not None and remark not in remarks:
                 remarks.append(remark)
             return (folder / inside).resolve()
-    raise MeshError(f"no file for {shown(address)}; name the folder of the package in package_dirs or ROS_PACKAGE_PATH")
+    raise MeshError(
+        f"no file for {shown(address)}; name the folder of its package: package_dirs, --package-dir, ROS_PACKAGE_PATH"
+    )
 
 
 def _above(inside: str, source: Path) -> Path | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +13,7 @@ import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import Force, Json, PackageDir, Xacro, app, progress
 from robot_dyn.cli.terminal import say, say_json, to_stderr
+from robot_dyn.description.packages import package_folders
 from robot_dyn.errors import QueryError, RobotDynError
 from robot_dyn.files import Kind, save
 
@@ -116,6 +118,18 @@ def _lines(file: str, checkup: Checkup, written: str | None, every: bool) -> Ite
     if written:
         mended = [each for each in checkup.findings if not any(each is still for still in checkup.left)]
         yield f"  written to {written}: repaired {counted(mended)}; left {counted(checkup.left) or 'nothing'}"
+        if folders := _of_packages(Path(file), checkup.repaired or b""):
+            yield f"  its meshes are found with {' '.join(f'--package-dir {folder}' for folder in folders)}"
+
+
+def _of_packages(file: Path, text: bytes) -> list[Path]:
+    """The folders in which a file finds packages of meshes by its place, which a file elsewhere does not find."""
+    if file.absolute().parent == Path.cwd():
+        return []
+    names = sorted(set(re.findall(rb'filename="package://([^/"]+)/', text)))
+    found = (package_folders(name.decode(errors="replace"), file) for name in names)
+    of = (next((folder for folder in each if folder.is_dir()), None) for each in found)
+    return list(dict.fromkeys(folder.parent for folder in of if folder is not None))
 
 
 def _repairable(findings: Iterable[Finding], written: str | None) -> str:

@@ -235,8 +235,9 @@ def _reported(text: str, found: Iterable[Finding]) -> bool:
 
 
 def _of_mesh(note: str) -> Finding:
-    where, _, what = note.partition(": ")
-    return Finding(Severity.WARNING, "shape_missing", where, what, "correct its address, or name its folder")
+    where, _, said = note.partition(": ")
+    what, _, remedy = said.partition("; ")
+    return Finding(Severity.WARNING, "shape_missing", where, what, remedy or "correct its address, or name its folder")
 
 
 def _rewritten(document: Document, findings: Iterable[Finding]) -> Document:
