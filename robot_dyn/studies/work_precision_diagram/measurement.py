@@ -87,10 +87,12 @@ def measure(
         runs = [(each, rung) for each in walks for rung in each.rungs if isfinite(rung.error)]
         short = [(each, rung) for each, rung in runs if rung.times[0] <= _SHORT * budget.seconds]
         others = [each for each in runs if each not in short]
+        slow = [(each, rung) for each, rung in others if each.method.engine == INTERPRETED]
         # turns of the short ones are before and after the others: a machine may be slower for some seconds
         _turns(short, TURNS // 2, 0.0, budget)
-        _turns(others, repeats - 1, _LAST * budget.seconds, budget)
+        _turns([each for each in others if each not in slow], repeats - 1, _LAST * budget.seconds, budget)
         _turns(short, repeats - 1 - TURNS // 2, 0.0, budget)
+        _turns(slow, repeats - 1, 0.0, budget)
     except KeyboardInterrupt:
         return walks, True
     return walks, False
