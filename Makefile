@@ -34,7 +34,7 @@ check: .venv/installed
 
 # the site, in build/docs/README.html: a warning, a link that leads nowhere or a cell that raises is an error
 docs: .venv/installed
-	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+	$(BIN)/python -m sphinx -W --keep-going -q -b html -d build/docs_trees docs build/docs
 
 # what a wheel brings along, with versions and licences: a bill of materials in CycloneDX
 sbom: .venv/installed

@@ -6,12 +6,19 @@ import json
 import os
 import re
 import sys
+from pathlib import Path
 from typing import Any
 
 from robot_dyn.answer import Answer, Table
 from robot_dyn.errors import RobotDynError, escaped
 
 _MOST = 4000  # characters of a message
+
+
+def size_of(file: Path) -> str:
+    """Size of a file in bytes, kB or MB, as text."""
+    size = file.stat().st_size
+    return f"{size} bytes" if size < 1e4 else f"{size / 1e3:.0f} kB" if size < 1e6 else f"{size / 1e6:.1f} MB"
 
 
 class OutputError(RobotDynError):

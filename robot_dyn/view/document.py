@@ -26,7 +26,7 @@ from robot_dyn.view import commands
 from robot_dyn.view.causes import causes, resolution
 from robot_dyn.view.geometry.coarse import look_of
 from robot_dyn.view.geometry.visuals import Drawing, Piece
-from robot_dyn.view.keyframes import Keyframes, keyframes
+from robot_dyn.view.keyframes import CHORD, TOLERANCE, Keyframes, Motion, keyframes, motion_of
 from robot_dyn.view.overlays import GHOST, Overlays, arrows, overlays
 from robot_dyn.view.page import ReplayError
 from robot_dyn.view.rests import lanes
@@ -50,6 +50,7 @@ class Shown:
         prefix: Before its notes where there are several runs.
         run: The part of it that can be drawn.
         stage: Where its robot stands.
+        motion: With what lies between its samples.
         keys: Keyframes of its joints.
         drawing: The look of its robot.
         problems: What is drawn otherwise than the files describe.
@@ -60,6 +61,7 @@ class Shown:
     prefix: str
     run: Trajectory
     stage: Stage
+    motion: Motion
     keys: Keyframes
     drawing: Drawing
     problems: tuple[str, ...]
@@ -196,7 +198,7 @@ def still(
 
 def _overlays(shown: Shown, radius: float, frame: str | None, ghost: bool) -> Overlays:
     traced = frame if frame in shown.stage.linkage.links else None  # a ghost may be another robot
-    return overlays(shown.stage, shown.run, radius, traced, ghost)
+    return overlays(shown.stage, shown.run, shown.motion, radius, traced, ghost)
 
 
 def _paths(shown: list[Shown], layers: list[Overlays]) -> dict[str, Any]:
@@ -242,21 +244,25 @@ def _shown(
     stage = Stage("run" if number == 0 else f"ghost {number}", robot)
     if unknown := run.wrenches.keys() - stage.linkage.links.keys():
         raise QueryError(f"the run has a wrench on {min(unknown)!r}, which is not a link of its robot; simulate again")
-    keys = keyframes(run.t, stage.linkage.couplings.position(run.q))
+    motion = motion_of(run)
+    keys = keyframes(motion.t, stage.linkage.couplings.position(motion.q))
     problems = []
     if len(run.t) < whole:
         problems.append(f"the last {whole - len(run.t)} samples are not shown: not finite, or beyond {_FAR:g}")
     worst = int(keys.error.argmax())
     joint = stage.linkage.bodies[worst]
     thinning = (
-        f"drawn by {len(keys.t)} keyframes of {keys.samples} samples, between which joint positions are linear: at the"
-        f" samples off by at most {keys.error[worst]:.1e} {'rad' if joint.revolute else 'm'} ({joint.joint})"
+        f"{len(run.t)} samples, between which joint positions follow q, v and a, are drawn by {len(keys.t)} keyframes:"
+        f" off by at most {keys.error[worst] + CHORD:.1e} {'rad' if joint.revolute else 'm'} ({joint.joint})"
     )
+    if (doubt := float(motion.open.max())) > TOLERANCE:
+        unsure = run.joint_names[int(motion.open.argmax())]
+        thinning += f"; samples are so far apart that these positions are known to {doubt:.1g} only ({unsure})"
     some = f"the first {_MOST_EVENTS} of {len(run.events)} events are marked on the plots"
     notes = (thinning, some) if len(run.events) > _MOST_EVENTS else (thinning,)
     name = names[number] if len(names) > 1 else robot.name
     drawn = look(robot, dirs, inertia=inertia)
-    return Shown(name, "" if len(names) == 1 else f"{name}: ", run, stage, keys, drawn, tuple(problems), notes)
+    return Shown(name, "" if len(names) == 1 else f"{name}: ", run, stage, motion, keys, drawn, tuple(problems), notes)
 
 
 def _drawable(run: Trajectory) -> Trajectory:

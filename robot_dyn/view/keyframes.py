@@ -1,19 +1,41 @@
-"""Keyframes: the samples between which a straight line replaces a run, |q(t) − q_line(t)| ≤ tolerance at every sample.
+"""Keyframes: times between which a straight line replaces a run, |q(t) − q_line(t)| ≤ tolerance.
 
-A joint's turn is interpolated about its own axis, so a line in q is what the viewer draws between keyframes.
-[Ramer 1972; Douglas, Peucker 1973]
+Between samples a run is Hermite's polynomial of q, v and a. A joint's turn is interpolated about its own axis, so a
+line in q is what the viewer draws between keyframes. [Ramer 1972; Douglas, Peucker 1973]
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
+from robot_dyn.control.reference import hermite, polynomial
+from robot_dyn.simulation.results.trajectory import Trajectory
+
 TOLERANCE = 5e-4  # [rad] or [m]; half a millimetre at a reach of one metre, below a pixel of the screen
+CHORD = TOLERANCE / 10  # what lines between the times of a `Motion` may be off
 _LARGEST_TURN = pi / 2  # between keyframes; from π on a viewer would take the shorter way round
+_MOST_PARTS = 64  # of the time between two samples
+_LOOKS = (0.25, 0.5, 0.75)  # parts of that time at which the polynomial is compared with others
+_CHUNK = 20_000  # samples that are joined at a time
+
+
+class Motion(NamedTuple):
+    """A run and what lies between its samples.
+
+    Attributes:
+        t: Times, (k,), in [s].
+        q: Positions, (k, n).
+        open: How far the polynomials of q and v are from those of q, v and a, for each joint, (n,): where samples are
+            too far apart to tell what lies between.
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    open: np.ndarray
 
 
 @final
@@ -32,6 +54,36 @@ class Keyframes:
     q: np.ndarray
     samples: int
     error: np.ndarray
+
+
+def motion_of(run: Trajectory) -> Motion:
+    """The samples of a run, and as many times between them as straight lines need."""
+    data = [run.q, run.v] + ([run.a] if np.isfinite(run.a).all() else [])
+    columns = np.stack(data, axis=1)
+    times, points, left = [], [], [np.zeros(run.q.shape[1])]
+    for i in range(0, len(run.t) - 1, _CHUNK):
+        h = np.diff(run.t[i : i + _CHUNK + 1])
+        ends = np.concatenate([columns[i : i + len(h)], columns[i + 1 : i + 1 + len(h)]], axis=1)[h > 0]
+        t, q, off = _between(run.t[i : i + len(h)][h > 0], h[h > 0], ends)
+        times, points, left = [*times, t], [*points, q], [*left, off]
+    return Motion(np.concatenate([*times, run.t[-1:]]), np.concatenate([*points, run.q[-1:]]), np.max(left, axis=0))
+
+
+def _between(t: np.ndarray, h: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times and positions from samples at t up to the next ones after h, from derivatives at both ends, (k, 2m, n)."""
+    m = ends.shape[1] // 2
+    c, q0, q1 = hermite(h, ends), ends[:, 0], ends[:, m]
+    lower = hermite(h, ends[:, [0, 1, 3, 4]]) if m == 3 else np.stack([q0, (q1 - q0) / h[:, None]], axis=1)
+    off, away = np.zeros(q0.shape[1]), np.zeros(len(h))
+    for part in _LOOKS:
+        s = (part * h)[:, None]
+        q = polynomial(c, s)[0]
+        off = np.maximum(off, np.abs(q - polynomial(lower, s)[0]).max(axis=0, initial=0.0))
+        away = np.maximum(away, np.abs(q - (q0 + part * (q1 - q0))).max(axis=1, initial=0.0))
+    parts = np.clip(np.ceil(np.sqrt(away / CHORD)), 1, _MOST_PARTS).astype(int)  # a chord errs as 1/parts²
+    of = np.repeat(np.arange(len(h)), parts)
+    s = h[of] * (np.arange(len(of)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[of]
+    return t[of] + s, polynomial(c[of], s[:, None])[0], off
 
 
 def keyframes(t: np.ndarray, q: np.ndarray, tolerance: float = TOLERANCE) -> Keyframes:

@@ -18,7 +18,7 @@ from robot_dyn.spatial import first_moment
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
 from robot_dyn.view.geometry.shapes import arrow, cylinder, sphere
-from robot_dyn.view.keyframes import Keyframes, corners, keyframes
+from robot_dyn.view.keyframes import Keyframes, Motion, corners, keyframes
 from robot_dyn.view.stage import Stage, placement, plain
 
 Rgba = tuple[float, float, float, float]
@@ -66,42 +66,45 @@ class Overlays:
             self.tracks[path] = list(tracks)
 
 
-def overlays(stage: Stage, run: Trajectory, reach: float, frame: str | None = None, ghost: bool = False) -> Overlays:
+def overlays(
+    stage: Stage, run: Trajectory, motion: Motion, reach: float, frame: str | None = None, ghost: bool = False
+) -> Overlays:
     """What a run recorded: centre of mass, paths of frames, joints at their stops.
 
     Args:
         stage: Where the robot stands.
         run: Its samples.
+        motion: What lies between them.
         reach: Radius of what is seen, in [m].
         frame: Link whose path is shown at first; the one under control, or the tip, if not given.
         ghost: Whether it is drawn transparent.
     """
     found = Overlays(ghost)
-    com = keyframes(run.t, _over(stage, run.q, lambda at: centre_of_mass(stage, at)), _PART * reach)
+    com = keyframes(motion.t, _over(stage, motion.q, lambda at: centre_of_mass(stage, at)), _PART * reach)
     place = commands.track("position", "vector", com.t, com.q)
     found.add(f"{stage.root}/centre of mass", sphere(0.02 * reach), _COM, place)
 
     frame = frame or run.about.get("frame") or stage.tip
     stage.link_path(frame)  # raises if there is none
-    paths = _paths(found, stage, run, reach, frame)
+    paths = _paths(found, stage, motion, reach, frame)
     what = "the line is the path of a frame, the yellow ball the centre of mass of what moves"
-    found.notes.append(f"{what}; at the samples they are off by at most {1e3 * _off(com, *paths):.1g} mm")
+    found.notes.append(f"{what}; they are off by at most {1e3 * _off(com, *paths):.1g} mm")
     if run.at_stop is not None:
         _stops(found, stage, run, reach)
     return found
 
 
-def _paths(found: Overlays, stage: Stage, run: Trajectory, reach: float, first: str) -> list[Keyframes]:
+def _paths(found: Overlays, stage: Stage, motion: Motion, reach: float, first: str) -> list[Keyframes]:
     """Add the paths of a frame and of the other links that move, those next to the tip first."""
     links, moving = stage.linkage.links, [name for name, (body, _, _) in stage.linkage.links.items() if body != BASE]
     found.frames = tuple(dict.fromkeys([first, *reversed(moving)]))[:_MOST_PATHS]
     poses = [links[name][:2] for name in found.frames]
-    points = _over(stage, run.q, lambda at: np.stack([_origin(at, body, pose) for body, pose in poses], axis=1))
-    paths = [keyframes(run.t, points[:, i], _PART * reach) for i in range(len(poses))]
+    points = _over(stage, motion.q, lambda at: np.stack([_origin(at, body, pose) for body, pose in poses], axis=1))
+    paths = [keyframes(motion.t, points[:, i], _PART * reach) for i in range(len(poses))]
     look = commands.material(found.colour(_TRACE), line=True)
-    for name, path in zip(found.frames, paths, strict=True):
+    for name, drawn in zip(found.frames, paths, strict=True):
         place = f"{stage.root}/paths/{plain(name)}"
-        found.commands.append(commands.set_object(place, commands.polyline(path.q), look, kind="Line"))
+        found.commands.append(commands.set_object(place, commands.polyline(drawn.q), look, kind="Line"))
         if name != first:
             found.commands.append(commands.set_property(place, "visible", False))
     return paths

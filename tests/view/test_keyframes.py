@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_dyn.view.keyframes import TOLERANCE, keyframes
+import robot_dyn as rd
+from robot_dyn.view.keyframes import CHORD, TOLERANCE, keyframes, motion_of
 from robot_dyn.view.series import thinned
 
 
@@ -35,6 +39,31 @@ def test_no_joint_turns_half_a_circle_between_keyframes(seed: int, size: float) 
     keys = keyframes(*wander(seed, 50, 3, size))
     assert np.abs(np.diff(keys.q, axis=0)).max() <= np.pi / 2 + 1e-9
     assert (np.diff(keys.t) > 0).all()
+
+
+@pytest.mark.parametrize(("period", "worse"), [(0.01, 1.5), (0.05, 10.0)])
+def test_keyframes_follow_the_motion_between_samples_as_far_as_is_said(period: float, worse: float) -> None:
+    """A fast swing, held to the same run with a sample each ms: lines between the samples alone would be far off."""
+    arm = rd.load("planar_2r")
+    swing = rd.Setup(rd.Plant(arm), [0.4, 0.9], [3.0, -5.0], duration_s=1.0, estimate_error=False)
+    dense, run = (rd.simulate(swing, record_period_s=p, integrator="order_8", step_s=1e-3) for p in (1e-3, period))
+    motion = motion_of(run)
+    keys = keyframes(motion.t, motion.q)
+    drawn = np.stack([np.interp(dense.t, keys.t, column) for column in keys.q.T], axis=1)
+    off = np.abs(drawn - dense.q).max(axis=0)
+    slack = np.abs(dense.v).max() * 2.0**-23  # of times in single precision
+    assert (off <= keys.error + CHORD + motion.open + slack).all()
+    lines = np.stack([np.interp(dense.t, run.t, column) for column in run.q.T], axis=1)
+    assert np.abs(lines - dense.q).max() > worse * off.max()
+
+
+def test_samples_of_a_polynomial_of_degree_three_leave_nothing_open() -> None:
+    t = np.array([0.0, 0.4, 1.0])
+    q, v, a = t**3 - t, 3 * t**2 - 1, 6 * t
+    run = SimpleNamespace(t=t, q=q[:, None], v=v[:, None], a=a[:, None])
+    motion = motion_of(run)  # pyright: ignore[reportArgumentType]
+    np.testing.assert_allclose(motion.q[:, 0], motion.t**3 - motion.t, atol=1e-14)
+    assert motion.open.max() < 1e-14 and len(motion.t) > 20
 
 
 def test_a_straight_run_needs_two_keyframes() -> None:

@@ -9,7 +9,7 @@ import typer
 import robot_dyn as rd
 from robot_dyn.cli import arguments
 from robot_dyn.cli.app import Force, app, bar
-from robot_dyn.cli.terminal import say
+from robot_dyn.cli.terminal import say, size_of
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.results.trajectory import Trajectory
@@ -33,7 +33,7 @@ def export(
     path = arguments.output(output, kinds(loaded), RunFileError, [run], force)
     with bar(what="writing"):
         file = rd.export(loaded, path)
-    say(f"written: {file} ({file.stat().st_size / 1e6:.1f} MB)")
+    say(f"written: {file} ({size_of(file)})")
 
 
 def _loaded(path: str) -> Trajectory | Rollouts:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,7 +13,7 @@ from robot_dyn.cli import arguments
 from robot_dyn.cli.app import Dark, Force, Name, PackageDir, app, bar
 from robot_dyn.cli.arguments import output as checked_output
 from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
-from robot_dyn.cli.terminal import say
+from robot_dyn.cli.terminal import say, size_of
 from robot_dyn.errors import QueryError
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ Video = Annotated[
     typer.Option(metavar="OUT.mp4", help="Write an .mp4 or .gif, drawn by an installed Chrome, Chromium or Edge."),
 ]
 Inertia = Annotated[bool, typer.Option("--inertia", help="Draw each link's equivalent inertia box.")]
+Meshes = Annotated[str, typer.Option(help="full, the triangles of their files, or coarse, for a smaller page.")]
 Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Where to listen; a free one by default.")]
 Browse = Annotated[bool, typer.Option("--open", help="Open the page in your browser.")]
 
@@ -38,6 +39,7 @@ def show_(
     ] = None,
     html: Html = None,
     inertia: Inertia = False,
+    meshes: Meshes = "full",
     port: Port = None,
     browse: Browse = False,
     force: Force = False,
@@ -47,7 +49,8 @@ def show_(
     page = _page(html, port, [robot], force)
     loaded = options.load(robot)
     at = arguments.vector("--q", q, loaded.joint_names)
-    shown = rd.show(loaded, at, inertia=inertia, package_dirs=options.package_dir or ())
+    look: Any = {"inertia": inertia, "meshes": meshes, "package_dirs": options.package_dir or ()}
+    shown = rd.show(loaded, at, **look)
     if page is not None:
         with bar(what="writing the page"):
             file = shown.save(page)
@@ -72,6 +75,7 @@ def replay(
         str | None, typer.Option(metavar="LINK", help="Link whose path is drawn; the tip by default.")
     ] = None,
     inertia: Inertia = False,
+    meshes: Meshes = "full",
     port: Port = None,
     browse: Browse = False,
     force: Force = False,
@@ -81,7 +85,7 @@ def replay(
     page = _page(html, port, runs, force)
     film = _film(video, html, port, runs, force, size)
     trajectories = [rd.load_run(path) for path in runs]
-    options = {"frame": frame, "inertia": inertia, "package_dirs": package_dir or ()}
+    options: Any = {"frame": frame, "inertia": inertia, "meshes": meshes, "package_dirs": package_dir or ()}
     if film is not None:
         path, pixels = film
         with bar(1.0, what="starting the browser", at_the_end="writing") as advance:
@@ -162,7 +166,7 @@ def _serve(server: Server, what: str, browse: bool) -> None:
 
 
 def _written(file: Path, browse: bool) -> None:
-    say(f"written: {file} ({file.stat().st_size / 1e6:.1f} MB)")
+    say(f"written: {file} ({size_of(file)})")
     _open(file.absolute().as_uri(), browse)
 
 

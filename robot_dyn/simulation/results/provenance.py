@@ -72,7 +72,10 @@ def unpacked(about: dict[str, str], file: Path) -> dict[str, str]:
     path = Path(about["source"])
     with suppress(RuntimeError):  # no such home
         path = path.expanduser()
-    return about | {"source": os.path.normpath(folder.absolute() / path)}
+    beside = folder.absolute() / path
+    if len(path.parts) == 1 and not beside.exists():  # the name alone of a file elsewhere
+        return about
+    return about | {"source": os.path.normpath(beside)}
 
 
 def portable(source: str, folder: Path) -> str:

@@ -89,13 +89,16 @@ def span(reference: Reference) -> str:
 
 def _method(setup: Setup) -> Iterator[str]:
     method: Any = setup.integrator
-    name, used = method.name, {}
+    name: str = method.name
+    used: dict[str, Any] = {}
     if setup.accuracy is not None:
         name = f"chosen for an error of q of at most {setup.accuracy:g}"
     elif method.controls_error:
         used = {"rtol": method.rtol, "atol": method.atol}
     else:
         used = {"step_s": setup.nominal_step_s}
+        if (taken := setup.taken_step_s) < setup.nominal_step_s * (1 - 1e-9):
+            used["step_s"] = f"{setup.nominal_step_s}, {taken:.6g} at most: steps end at samples, ticks and switches"
     yield f"method: {name}, {setup.duration_s:g} s"
     used |= {key: getattr(setup, key) for key in ("record_period_s", "estimate_error", "engine")}
     yield from (f"  {key} = {value}" for key, value in used.items())

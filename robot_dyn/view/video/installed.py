@@ -40,6 +40,6 @@ def installed(path: str | Path | None = None) -> Path:
         how = _HOW.get(sys.platform, "apt-get install chromium")
         raise VideoError(
             f"a video is drawn by Chrome, Chromium or Edge, and none is installed: {how}; if it has another name, give"
-            " its path as `browser`"
+            " its path by save_video(…, browser=…)"
         )
     return Path(found)

@@ -81,6 +81,10 @@ async function main() {
 }
 
 main().catch((error) => {
-  element("outcome").textContent = `This page cannot be shown: ${error.message}. It must be as it was written, and needs a browser of 2023 or later.`;
+  const said = error.message.replace(/\.+$/, "");
+  const remedy = /webgl/i.test(said)
+    ? "The robot is drawn by WebGL, which this browser has not, or has switched off."
+    : "It must be as it was written, and needs a browser of 2023 or later.";
+  element("outcome").textContent = `This page cannot be shown: ${said}. ${remedy}`;
   throw error;
 });
