@@ -139,9 +139,8 @@ def _curve(
     axes.plot(xs, ys, style, color=colour, linewidth=size * bold)
     for measured, face in ((True, colour), (False, colours["paper"])):
         at = [k for k, p in enumerate(points) if (p.believed and p.repeatable) is measured]
-        hollow = "none" if dashed else face
         shape = {"marker": marker, "s": 30 * size**2, "color": colour, "zorder": 3, "linewidths": 0.9}
-        faced = {} if marker in "x+1" else {"facecolors": hollow}
+        faced = {} if marker in "x+1" else {"facecolors": face}
         axes.scatter([xs[k] for k in at], [ys[k] for k in at], **shape, **faced)
 
 

@@ -45,6 +45,7 @@ from robot_dyn.validate import function, instance, integer, number, truth
 _FIRST = ("DOP853", "rk4", "order_8", "explicit_euler", "Rosenbrock", "gauss_6", "gauss_4", "midpoint")
 _MOST_REPEATS, _MOST_DIGITS = 1000, 20
 _USUAL_DIGITS = 6  # digits, of the sentence
+_ENOUGH = 5  # methods of a sentence: with so many, none that is extrapolated is named
 _ALWAYS_NAMED = ("rk4", "rk4 (without events)", "explicit_euler")
 
 
@@ -152,6 +153,8 @@ class WorkPrecision(Result):
             if program not in programs and named:  # of each program its best method
                 chosen.append((ladder, price))
                 programs.add(program)
+        if sum(not price.extrapolated for _, price in chosen) >= _ENOUGH:
+            chosen = [each for each in chosen if not each[1].extrapolated]
         parts = [
             f"{ladder.name} would take {format_duration(price.value)} (extrapolated)"
             if price.extrapolated
