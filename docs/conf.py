@@ -46,7 +46,6 @@ html_theme = "furo"
 html_title = "robot_dyn"
 html_static_path = ["static"]
 html_css_files, html_js_files = ["site.css"], ["site.js"]
-smartquotes_action = "q"  # dashes are those of options
 html_copy_source = html_show_sourcelink = False
 pygments_style, pygments_dark_style = "a11y-high-contrast-light", "a11y-high-contrast-dark"
 

@@ -52,7 +52,7 @@ def table(heading: Sequence[str], rows: Iterable[Sequence[Any]], right: Collecti
     head = "".join(f"<th{' class=n' * (k in numbers)}>{escape(each)}</th>" for k, each in enumerate(heading))
     body = "".join(f"<tr>{''.join(_cell(x, k in ends) for k, x in enumerate(row))}</tr>" for row in rows)
     whole = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-    return whole if len(rows) <= _MOST_ROWS else f'<div class="l">{whole}</div>'
+    return whole if len(rows) <= _MOST_ROWS else f'<div class="l" tabindex="0">{whole}</div>'
 
 
 def _cell(value: Any, right: bool) -> str:

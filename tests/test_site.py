@@ -14,7 +14,14 @@ from tests.view.test_page_access import AXE, screens
 
 SITE = Path(__file__).parents[1] / "build" / "docs"
 PAGES = ["README", "how_to/simulate_an_arm", "reference/api/integrate", "gallery/README"]
-MORE = ["start/ten_minutes", "explanation/which_method", "studies/hard_cases", "reference/api/effects"]
+MORE = [
+    "notebooks/4_your_own_controller",
+    "reference/commands",
+    "start/ten_minutes",
+    "explanation/which_method",
+    "studies/hard_cases",
+    "reference/api/effects",
+]
 REPLAYS = sorted((SITE / "gallery" / "pages").glob("*.html"))
 MOST_BYTES = 15e6  # of the gallery
 

@@ -14,6 +14,7 @@ from robot_dyn.cli.app import app
 from robot_dyn.cli.groups import GROUPS
 
 TAG = re.compile(r"\[/?[a-z][a-z ]*\]")  # of rich
+OPTION = re.compile(r"(?<![\w`-])(--?[a-z][a-z-]*)(?![\w`])")
 
 
 def page(_: str) -> str:
@@ -54,7 +55,7 @@ def _escaped(text: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Help text as Markdown; code in backticks stays code."""
-    parts = TAG.sub("", text).split("`")
+    """Help text as Markdown; options, and what is in backticks, are code."""
+    parts = OPTION.sub(r"`\1`", TAG.sub("", text)).split("`")
     parts[::2] = [re.sub(r"([*_<\[\]])", r"\\\1", part) for part in parts[::2]]
     return "`".join(parts)

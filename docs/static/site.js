@@ -2,5 +2,5 @@
 "use strict";
 
 addEventListener("DOMContentLoaded", () => {
-  for (const box of document.querySelectorAll("pre, .table-wrapper, .robot-dyn")) box.tabIndex = 0;
+  for (const box of document.querySelectorAll("pre, .table-wrapper, .math-wrapper, .robot-dyn")) box.tabIndex = 0;
 });
