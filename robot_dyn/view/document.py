@@ -26,7 +26,7 @@ from robot_dyn.view import commands
 from robot_dyn.view.causes import causes, resolution
 from robot_dyn.view.geometry.coarse import look_of
 from robot_dyn.view.geometry.visuals import Drawing, Piece
-from robot_dyn.view.keyframes import CHORD, TOLERANCE, Keyframes, Motion, keyframes, motion_of
+from robot_dyn.view.keyframes import Keyframes, Motion, keyframes, motion_of, stated_error
 from robot_dyn.view.overlays import GHOST, Overlays, arrows, overlays
 from robot_dyn.view.page import ReplayError
 from robot_dyn.view.rests import lanes
@@ -249,15 +249,8 @@ def _shown(
     problems = []
     if len(run.t) < whole:
         problems.append(f"the last {whole - len(run.t)} samples are not shown: not finite, or beyond {_FAR:g}")
-    worst = int(keys.error.argmax())
-    joint = stage.linkage.bodies[worst]
-    thinning = (
-        f"{len(run.t)} samples, between which joint positions follow q, v and a, are drawn by {len(keys.t)} keyframes:"
-        f" off by at most {keys.error[worst] + CHORD:.1e} {'rad' if joint.revolute else 'm'} ({joint.joint})"
-    )
-    if (doubt := float(motion.open.max())) > TOLERANCE:
-        unsure = run.joint_names[int(motion.open.argmax())]
-        thinning += f"; samples are so far apart that these positions are known to {doubt:.1g} only ({unsure})"
+    joints = {joint.joint: "rad" if joint.revolute else "m" for joint in stage.linkage.bodies}
+    thinning = stated_error(run, motion, keys, joints)
     some = f"the first {_MOST_EVENTS} of {len(run.events)} events are marked on the plots"
     notes = (thinning, some) if len(run.events) > _MOST_EVENTS else (thinning,)
     name = names[number] if len(names) > 1 else robot.name

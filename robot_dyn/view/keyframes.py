@@ -6,6 +6,7 @@ line in q is what the viewer draws between keyframes. [Ramer 1972; Douglas, Peuc
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
 from typing import NamedTuple, final
@@ -95,6 +96,20 @@ def keyframes(t: np.ndarray, q: np.ndarray, tolerance: float = TOLERANCE) -> Key
     drawn, positions = drawn[apart], positions[apart]
     error = np.array([np.abs(q[:, i] - np.interp(t, drawn, positions[:, i])).max() for i in range(q.shape[1])])
     return Keyframes(drawn, positions, len(t), error)
+
+
+def stated_error(run: Trajectory, motion: Motion, keys: Keyframes, units: Mapping[str, str]) -> str:
+    """How far keyframes are off the motion, and that from what is recorded; units of the joints by name."""
+    worst = int(keys.error.argmax())
+    name, unit = list(units.items())[worst]
+    text = (
+        f"{len(run.t)} samples, between which joint positions follow q, v and a, are drawn by {len(keys.t)} keyframes:"
+        f" off by at most {keys.error[worst] + CHORD:.1e} {unit} ({name})"
+    )
+    if (doubt := float(motion.open.max())) > TOLERANCE:
+        unsure = run.joint_names[int(motion.open.argmax())]
+        text += f"; samples are so far apart that these positions are known to {doubt:.1g} only ({unsure})"
+    return text
 
 
 def corners(t: np.ndarray, q: np.ndarray, tolerance: float) -> np.ndarray:

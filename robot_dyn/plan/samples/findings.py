@@ -27,6 +27,7 @@ _ROUNDING = 1e-9  # of a limit that a sample may pass
 DENSE = 16  # samples from which ends at rest, noise, and an error, can be judged
 _AT_REST = 0.05  # of the largest speed of a joint
 _EVEN, _NOISY = 1.5, 0.1  # ratio of steps that are even; part of the rms acceleration that noise may be
+_ROUNDED = 1e-12  # [rad] or [m]: float64, and no sensor
 
 
 def refuse_other_units(arm: Robot, table: Columns) -> None:
@@ -204,6 +205,7 @@ def _noise(arm: Robot, table: Columns) -> Iterator[str]:
     noise, step = fourth / np.sqrt(70), float(np.median(dt))
     with np.errstate(invalid="ignore", divide="ignore"):
         part = np.nan_to_num(np.minimum(np.sqrt(6) * noise / second, 1.0))
+    part[noise < _ROUNDED] = 0.0  # of joints that rest
     i = int(part.argmax())
     if part[i] > _NOISY:
         unit = of_joint("rad", arm.joint_types[i])
