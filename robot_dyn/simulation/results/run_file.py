@@ -77,11 +77,8 @@ class Format(Generic[Run]):
         """Read what `write` wrote; errors as of `load_run`."""
         path = file_path(path, RunFileError)
         max_bytes = integer("max_bytes", max_bytes, most=2**63 - 1, error=RunFileError)
-        writes = (
-            "rd.save_rollouts"
-            if self.name == ROLLOUTS_FORMAT
-            else f"robot-dyn simulate … -o {Path(path).with_suffix('.npz')}"
-        )
+        named = Path(path).with_suffix(".npz") if Path(path).name else "run.npz"
+        writes = "rd.save_rollouts" if self.name == ROLLOUTS_FORMAT else f"robot-dyn simulate … -o {named}"
         with reading(path, RunFileError, f"write one with {writes}") as stream:
             try:
                 archive = Archive(stream)
