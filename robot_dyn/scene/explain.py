@@ -24,7 +24,7 @@ from robot_dyn.scene.scene import Scene, read_both
 from robot_dyn.scene.schema import Part, kinds_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
-from robot_dyn.simulation.setup.explanation import explanation_of, model_lines, pace, span
+from robot_dyn.simulation.setup.explanation import explanation_of, model_lines, pace, shortened, span
 from robot_dyn.simulation.setup.setup import Setup
 
 OF_FILE = "the robot's file"
@@ -62,7 +62,7 @@ def of_scene(scene: Scene, setup: Setup) -> Explanation:
         absent=_absent({effect.kind for effect in scene.effect}),
         absent_of_control=() if control is None else tuple(_ideal(control)),
         control=() if control is None else tuple(_control(scene, control, setup)),
-        method=tuple(_method(scene)),
+        method=tuple(_method(scene, setup)),
     )
 
 
@@ -103,13 +103,14 @@ def _control(scene: Scene, control: Control, setup: Setup) -> Iterator[str]:
     yield from _lines(scene.reference, "  ")
 
 
-def _method(scene: Scene) -> Iterator[str]:
+def _method(scene: Scene, setup: Setup) -> Iterator[str]:
     method, used = scene.method, ("rtol", "atol") if scene.method in ADAPTIVE else ("step_s",)
     if scene.accuracy is not None:
         method, used = f"chosen for an error of q of at most {scene.accuracy:g}", ("accuracy",)
     yield f"method: {method}, {scene.duration_s:g} s"
     for key in (*used, "record_period_s", "estimate_error", "engine"):
-        yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)})"
+        taken = shortened(setup) if key == "step_s" else ""
+        yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)}){taken}"
     yield "start:"
     yield from _lines(scene.start, "  ")
 

@@ -53,7 +53,7 @@ class Scene(Part):
     method: str = Setup.integrator
     """Integrator."""
     step_s: Positive = STEP_S
-    """Step of a method with a fixed step."""
+    """Step of a method with a fixed step; shorter where samples, ticks and switches require it."""
     rtol: Positive = Adaptive.rtol
     """Relative tolerance of an adaptive method."""
     atol: Positive = Adaptive.atol

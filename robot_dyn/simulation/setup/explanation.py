@@ -87,6 +87,14 @@ def span(reference: Reference) -> str:
     return f"{start:g} to {end:g} s, {end - start:g} s long" if end > start else "constant"
 
 
+def shortened(setup: Setup) -> str:
+    """The longest step that a method of fixed step takes, if that is not its own; else empty."""
+    taken = setup.taken_step_s
+    if taken >= setup.nominal_step_s * (1 - 1e-9):
+        return ""
+    return f", in fact {taken:.6g} at most: steps end at samples, ticks and switches"
+
+
 def _method(setup: Setup) -> Iterator[str]:
     method: Any = setup.integrator
     name: str = method.name
@@ -96,9 +104,7 @@ def _method(setup: Setup) -> Iterator[str]:
     elif method.controls_error:
         used = {"rtol": method.rtol, "atol": method.atol}
     else:
-        used = {"step_s": setup.nominal_step_s}
-        if (taken := setup.taken_step_s) < setup.nominal_step_s * (1 - 1e-9):
-            used["step_s"] = f"{setup.nominal_step_s}, {taken:.6g} at most: steps end at samples, ticks and switches"
+        used = {"step_s": f"{setup.nominal_step_s}{shortened(setup)}"}
     yield f"method: {name}, {setup.duration_s:g} s"
     used |= {key: getattr(setup, key) for key in ("record_period_s", "estimate_error", "engine")}
     yield from (f"  {key} = {value}" for key, value in used.items())
