@@ -120,7 +120,7 @@ class Adaptive:
             "max_step_s": number("max_step_s", self.max_step_s, above=0, infinite=True),
         }
         if not LEAST_RTOL < values["rtol"] < 1:
-            raise QueryError(f"rtol must be between {LEAST_RTOL:.2g} and 1, got {self.rtol!r}")
+            raise QueryError(f"rtol must be between {LEAST_RTOL:.3g} and 1, got {self.rtol!r}")
         for name, value in values.items():
             object.__setattr__(self, name, value)
 

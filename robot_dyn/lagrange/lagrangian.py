@@ -48,7 +48,7 @@ from robot_dyn.validate import shaped
 @final
 @dataclass(frozen=True)
 class Lagrangian(Dynamics, Parametrised):
-    """The dynamics of a robot by the Lagrangian; shares neither parser nor algorithm with Pinocchio.
+    """The dynamics of a robot by the Lagrangian, independent of Pinocchio after the checks of the file.
 
     Attributes:
         robot: The robot; its file, edits and order of joints are used, none of its numbers.

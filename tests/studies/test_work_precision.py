@@ -414,7 +414,7 @@ def test_each_program_is_named_with_its_cheapest_method_or_with_what_ended_it() 
     more = ladder("Third RK", 2.0, 1.0), ladder("Fourth RK", 1e-8)
     assert list(programs(invented(*other, *own, *more), 1e-8)) == [
         "  robot_dyn DOP853: 2 ms", "  Fourth RK: 1 ms, 0.5 times as long", "  Other RK4: 200 ms, 100 times as long",
-        "  Third: reached by no run (late)", "  times of the loop alone, the least of runs that take turns",
+        "  Third: reached by no run (late)", "  times of prepared runs, the least of runs that take turns",
     ]  # fmt: skip
     lost = list(programs(invented(ladder("DOP853", 2.0, 1.0, engine="compiled"), *other), 1e-8))
     assert lost[:2] == ["  robot_dyn: reached by no run (late)", "  Other RK4: 200 ms"]

@@ -48,8 +48,8 @@ class Setup(Value, Caching):
         step_s: Fixed step, 1 ms unless given; shortened where samples, ticks, switches and the end require it. It is
             not to be given for a method that chooses its steps.
         record_period_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
-        estimate_error: Whether companion runs estimate the error, which cost about as much as the run; five times as
-            much where only shorter steps can show it.
+        estimate_error: Whether companion runs estimate the error, which cost one to two times as much as the run; five
+            times where only shorter steps can show it.
         about: Texts stored with the run.
         engine: "interpreted"; "compiled", the run in machine code, right angles of the file written out in
             full; or "auto", which compiles where that is worthwhile, and uses machine code that exists already.

@@ -46,7 +46,7 @@ def prove(
     Args:
         setup: Plant, start, and optionally a continuous controller.
         until_s: End time, in [s]; by default the duration of the setup.
-        bits: Precision of the balls, from 40 to 4096; the radius of q is about 2^-(0.7 bits) times its growth.
+        bits: Precision of the balls, from 40 to 4096; more bits give smaller radii and shorter steps.
         q0: Initial q, (n,), in place of that of the setup: numbers, or strings for exact decimals.
         v0: Initial velocity, likewise.
         width_q: The start may be anywhere within this distance of each q, in [rad] or [m], not negative.

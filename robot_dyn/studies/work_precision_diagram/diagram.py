@@ -49,7 +49,7 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     names = {each.method for each in first}
     without = [each for each in result.ladders if not each.events and not each.peer and each.method in names]
     main = figure.add_subplot(grid[:, 0])
-    _axes(main, result, colours, "time of the loop [ms]", "Error over time: lower left is better")
+    _axes(main, result, colours, "time of the run [ms]", "Error over time: lower left is better")
     _front(main, result, colours)
     for each in first + without:
         _curve(main, each, colours, _ms, _error, 1.0 if each.events else 0.9, dashed=not each.events)

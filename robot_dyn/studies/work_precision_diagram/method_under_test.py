@@ -1,6 +1,6 @@
 """Methods under test in a work-precision diagram, each with its ladder of settings.
 
-Preparation is not timed: the time of a run is that of its loop alone.
+Preparation is not timed: the time of a run is that of its loop, and of what it records.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ def work_precision_tables(result: WorkPrecision) -> Iterator[Block]:
     columns = [digits for digits in _DIGITS if 10.0**-digits >= of.error]
     headings = ("method", "order", "measured", *(f"{digits} digits" for digits in columns), "least error", "in")
     yield Table(headings, tuple(map(tuple, _ladder_rows(result, columns))), right=headings[1:])
-    yield "times of the loop alone, the least of runs that take turns; * the least; ( ) extrapolated by the order"
+    yield "times of prepared runs, the least of runs that take turns; * the least; ( ) extrapolated by the order"
     if result.past_horizon:
         yield from _past_horizon(result)
 
@@ -84,7 +84,7 @@ def programs(result: WorkPrecision, error: float) -> Iterator[str]:
         else:
             ended = dict.fromkeys(each.ended for each in result.ladders if program_of(each) == program)
             yield f"  {program}: reached by no run ({'; '.join(ended)})"
-    yield "  times of the loop alone, the least of runs that take turns"
+    yield "  times of prepared runs, the least of runs that take turns"
     yield from (f"  left out: {each}" for each in result.left_out)
 
 

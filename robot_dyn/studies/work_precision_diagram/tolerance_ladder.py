@@ -34,7 +34,7 @@ class Point:
         error: Largest |q − q_ref| over joints and records, in [rad] or [m]; inf if the run diverged.
         energy: Largest residual of the energy ledger at the records, as a fraction of the energy exchanged; nan if
             unknown.
-        time_s: Least time of the loop alone over the turns, in [s].
+        time_s: Least time of the prepared run over the turns, in [s].
         repeats: Number of turns.
         believed: Whether the error is above that of the reference.
         repeatable: Whether there were at least five turns, the two least times of which differ by no more than 5 %.
