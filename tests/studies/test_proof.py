@@ -187,7 +187,7 @@ def test_a_polynomial_need_not_be_right() -> None:
         start = steps.State(Fraction(0), *centre, box([arb(0)] * 4))
         inverse = Inverse.of(tape.mass(start.q))
         p = taylor(tape, arb(0), *centre, inverse, 10)
-        weights, rate = steps._weights(tape, arb(0), p, inverse)
+        weights, _, rate = steps._weights(tape, arb(0), p, inverse, float(h), [arb(0)] * 4, 1e-16)
         for spoilt in (0.0, 1e-9, 1e-6, 1e-3):
             c = [list(each) for each in p.q]
             c[1][2] = (c[1][2] + arb(spoilt)).mid()
@@ -317,14 +317,19 @@ def test_balls_are_kept_exactly() -> None:
             assert exact(Fraction(3, 2**60)) * 2**60 == 3
 
 
-def test_a_box_of_starts_holds_the_motion_from_its_corners() -> None:
+@pytest.mark.parametrize(
+    ("q0", "v0"),
+    [(GENERAL_Q[:2], GENERAL_V[:2]), (["0", "0"], ["0", "0"])],
+    ids=["general", "level and at rest, where the Jacobian is 0"],
+)
+def test_a_box_of_starts_holds_the_motion_from_its_corners(q0: list[str], v0: list[str]) -> None:
     robot, wide, h = arm("planar_2r"), 1e-4, 0.1
-    made = proof(robot, h, width_q=wide, width_v=wide)
+    made = proof(robot, h, q0=q0, v0=v0, width_q=wide, width_v=wide)
     assert made.proven and wide < made.radius_q.max() < 3 * wide
     plant = rd.Plant(rd.Lagrangian(robot, rd.studies.Ball(BITS)))
     reach = 0.0
     for signs in ((1, 1, 1, 1), (1, -1, 1, -1), (-1, 1, -1, 1), (-1, -1, 1, 1)):
-        start = np.array([*map(float, GENERAL_Q[:2]), *map(float, GENERAL_V[:2])]) + 0.999 * wide * np.array(signs)
+        start = np.array([*map(float, q0), *map(float, v0)]) + 0.999 * wide * np.array(signs)
         q, v, _ = motion(plant, start[:2].tolist(), start[2:].tolist(), h, 1, 10)
         assert made.contains(h, q, v)
         reach = max(reach, *(abs(float(x - y.mid())) for x, y in zip(q, made.at(h)[0], strict=True)))
@@ -501,7 +506,11 @@ def test_random_starts_are_proven_to_twelve_digits(name: str, count: int) -> Non
     assert not failed
 
 
-@pytest.mark.long
-def test_a_small_box_of_a_six_axis_arm() -> None:
-    made = proof(arm("ur5"), 0.1, 100, width_q=1e-6)
-    assert made.proven and 1e-6 < made.radius_q.max() < 1e-5
+@pytest.mark.parametrize(
+    "start",
+    [{}, {"q0": [str(np.pi / 2)] * 6, "v0": ["0"] * 6}],
+    ids=["general", "at rest at right angles, where parts of the Jacobian are 0"],
+)
+def test_a_small_box_of_a_six_axis_arm(start: dict[str, Any]) -> None:
+    made = proof(arm("ur5"), 0.05, 100, width_q=1e-6, **start)
+    assert made.proven and 1e-6 < made.radius_q.max() < 2e-6

@@ -32,8 +32,9 @@ _LONGEST_S = 1.0
 _OFF, _SHARE = 30.0, 1e-4  # h |d| at most: of the tolerance, and of the errors at the start
 _SHORTER, _TRIES = Fraction(3, 4), 24
 _LONGER = 1.2  # than the step before
-_GROWTH = 0.6  # h L that is tried
-_SWEEPS = 30  # of power iteration
+_GROWTH, _LEAST_GROWTH = 0.6, 0.1  # h L that is tried, and at least
+_LARGER = 1.25  # σ than the spectral radius
+_LIGHTEST = 1e-12  # weight
 
 
 @final
@@ -103,8 +104,9 @@ def proven_step(tape: Tape, start: State, end: Fraction, how: Effort, before: Fr
     try:
         inverse = Inverse.of(tape.mass(start.q))
         p = taylor(tape, time, start.q, start.v, inverse, how.order)
-        weights, rate = _weights(tape, time, p, inverse)
-        h = _to_grid(start.t, end, _first(p, rate, how, before))
+        longest = _longest(p, how, before)
+        weights, growth, rate = _weights(tape, time, p, inverse, longest, start.error.bounds, how.tolerance)
+        h = _to_grid(start.t, end, Fraction(min(longest, _GROWTH / growth)))
     except ValueError:
         raise NotProvenError("M may be singular") from None
     for attempt in range(_TRIES):
@@ -142,35 +144,41 @@ def _step(
     return Step(start, step, p, around, end)
 
 
-def _weights(tape: Tape, time: Ball, p: Polynomial, inverse: Inverse) -> tuple[list[Ball], float]:
-    """Exact weights in which the logarithmic norm at the start is about the least, and it: Perron's vector of |J|."""
+def _weights(
+    tape: Tape, time: Ball, p: Polynomial, inverse: Inverse, h: float, errors: Sequence[Ball], tolerance: float
+) -> tuple[list[Ball], float, float]:
+    """Exact weights w = e + A w / σ, the logarithmic norm L ≤ σ at the start, and σ, A = [0 1; |J|], σ = 1.25 ρ(A).
+
+    A box of the shape w holds the errors e of the start, and what grows of them. At some states parts of J are 0, such
+    as those of a level arm at rest, but not in a tube around them: a σ below 0.1 / h wins nothing.
+    """
     n = tape.n
     (J,) = jacobian(tape, inverse, (time, *p.at(arb(0))))
     A = np.zeros((2 * n, 2 * n))
     A[:n, n:] = np.eye(n)
     A[n:] = [[abs(float(J[i, j].mid())) for j in range(2 * n)] for i in range(n)]
-    x = np.ones(2 * n)
-    shift = max(float(np.sqrt(np.abs(A[n:, :n]).max())), float(A[n:, n:].max()), 1e-3)
-    with np.errstate(over="ignore", invalid="ignore"):  # the Jacobian may be beyond a float64
-        for _ in range(_SWEEPS):
-            x = A @ x + shift * x
-            x = np.maximum(x / x.max(), 1e-9)
-    if not np.isfinite(x).all():
-        raise NotProvenError("the Jacobian is not finite")
+    e = np.array([float(x) for x in errors]) + tolerance
+    try:
+        with np.errstate(over="raise", invalid="raise"):  # the Jacobian may be beyond a float64
+            A[n:, :n] += np.eye(n) * (_LEAST_GROWTH / max(h, 1 / _GRID)) ** 2
+            sigma = _LARGER * float(np.abs(np.linalg.eigvals(A)).max())
+            e[n:] = np.maximum(e[n:], sigma * e[:n])  # no narrower: those of q make them
+            x = np.linalg.solve(sigma * np.eye(2 * n) - A, e)
+            x = np.maximum(x / x.max(), _LIGHTEST)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        raise NotProvenError("the Jacobian is not finite") from None
     w = [arb(float(each)) for each in x]
-    return w, float(logarithmic_norm(J, w))
+    return w, float(logarithmic_norm(J, w)), sigma
 
 
-def _first(p: Polynomial, rate: float, how: Effort, before: Fraction | None) -> Fraction:
-    """The step that is tried first: by the last coefficients, by the growth of errors, and by the step before."""
+def _longest(p: Polynomial, how: Effort, before: Fraction | None) -> float:
+    """The longest step that is tried: by the last coefficients, and by the step before."""
     found = [_LONGEST_S] if before is None else [_LONGER * float(before)]
     for k in (how.order, how.order + 1):
         size = max(float(abs(each[k])) for each in p.v)
         if size > 0:
             found.append(0.9 * (how.tolerance / size) ** (1 / k))
-    if rate > 0:
-        found.append(_GROWTH / rate)
-    return Fraction(min(found))
+    return min(found)
 
 
 def _to_grid(t: Fraction, end: Fraction, h: Fraction) -> Fraction:

@@ -62,7 +62,7 @@ def tube(
         of: Defect of the polynomial.
         start: Bounds of |e| at the start, (2n,).
         weights: w, exact and positive, (2n,).
-        rate: Approximate μ at the start.
+        rate: σ at the start, by which |J| w ≤ σ w.
 
     Raises:
         NotProvenError: If the motion may leave the tube.
