@@ -27,6 +27,7 @@ _PEERS = {
 _MOST_ERROR = 3.0  # [rad] or [m]; larger errors are meaningless and not drawn
 _MOST_METHODS, _SIX_DIGITS = 8, 1e-6  # in one panel; [rad] or [m]
 _WIDTH, _HEIGHT = 13.0, 8.0  # [inch]
+_DASHED = (0, (6, 3))  # of a line
 
 
 def draw(result: WorkPrecision, theme: str = "light") -> Figure:
@@ -55,7 +56,7 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
         _curve(main, each, colours, _ms, _error, 1.0 if each.events else 0.9, dashed=not each.events)
     times = [_ms(p) for each in first + without for p in _shown(each)]
     main.set(xlim=(min(times) / 1.5, max(times) * 1.5), ylim=(result.reference.error / 10, _MOST_ERROR))
-    _believed(main, result, colours, words=True)
+    _believed(main, result, colours)
     _legend(figure, first, without, colours)
     small = [figure.add_subplot(grid[k, 1]) for k in range(3)]
     _axes(small[0], result, colours, "evaluations of the equation of motion", "Error over evaluations")
@@ -72,7 +73,7 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
         _curve(small[2], each, colours, _ms if slow else _steps, _error, 0.6)
     for axes in (small[0], small[2]):
         axes.set_ylim(result.reference.error / 10, _MOST_ERROR)
-        _believed(axes, result, colours, words=False)
+        _believed(axes, result, colours)
     return figure
 
 
@@ -158,14 +159,11 @@ def _front(axes: Any, result: WorkPrecision, colours: Colours) -> None:
         axes.plot(x, y, color=colours["grid"], linewidth=9, solid_capstyle="round", solid_joinstyle="round", zorder=0.8)
 
 
-def _believed(axes: Any, result: WorkPrecision, colours: Colours, words: bool) -> None:
+def _believed(axes: Any, result: WorkPrecision, colours: Colours) -> None:
     """Draw the error of the reference as a line, and shade the range below it."""
     error = result.reference.error
-    axes.axhline(error, color=colours["ink"], linewidth=0.9, linestyle=(0, (6, 3)))
+    axes.axhline(error, color=colours["ink"], linestyle=_DASHED, linewidth=0.9)
     axes.axhspan(axes.get_ylim()[0], error, color=colours["veil"], zorder=0.5)
-    if words:
-        at = {"xy": (0.005, error), "xycoords": ("axes fraction", "data"), "ha": "left", "va": "top", "fontsize": 8}
-        axes.annotate(f" error of the reference, {error:.0e}: not believed below", **at, color=colours["ink"])
 
 
 def _legend(figure: Any, first: list[ToleranceLadder], without: list[ToleranceLadder], colours: Colours) -> None:
@@ -177,6 +175,7 @@ def _legend(figure: Any, first: list[ToleranceLadder], without: list[ToleranceLa
         label = f"{each.name}: order {seen} ({order})" if order else each.name
         handles.append(key(label, colour, marker=marker, markersize=5, linestyle="--" if each.peer else "-"))
     handles.append(key("no run beats these (Pareto front)", colours["grid"], linewidth=9))
+    handles.append(key("error of the reference: not believed below", colours["ink"], linestyle=_DASHED, linewidth=0.9))
     if without:
         handles.append(key("dotted: the same without events", colours["ink"], linestyle=":"))
     legend(
