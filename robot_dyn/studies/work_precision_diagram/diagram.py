@@ -110,7 +110,7 @@ def _caption(result: WorkPrecision) -> str:
         f"{result.robot}: {', '.join(result.acting) or 'no effects'}; {of.horizon_s:g} s{cut}.  Error: largest"
         f" |q − q_ref| over joints and {of.records} records, in {result.unit}.\n"
         f"Reference: {of.methods[0]}, {of.error:.0e} {result.unit} from {of.methods[1]}: no error below that is"
-        f" believed.  {programs(result.environment, 'mujoco', 'drake', 'heyoka')}."
+        f" believed.  {programs(result.environment, 'scipy', 'mujoco', 'drake', 'heyoka')}."
     )
 
 
