@@ -20,6 +20,7 @@ from tests.long import long
 from tests.loops import growth
 
 BLOCK = rd.Robot.from_text(RAIL)  # 1 kg
+IMPLICIT = "linearly_implicit_euler", "gauss_2", "sdirk_3", "rosenbrock_5"
 OSCILLATOR = np.array([[0.0, 1.0], [-400.0, 0.0]])  # ω = 20/s
 
 
@@ -50,6 +51,16 @@ def test_an_oscillation_bounds_some_methods_only() -> None:
         assert longest_step(rd.integrate.method("explicit_euler"), J, 1) * 20 == pytest.approx(
             2 * ratio, rel=2e-3, abs=2.1e-6
         )
+
+
+def test_a_method_may_let_grow_faster_what_grows() -> None:
+    """Twice as fast at most: 1 / (1 − z) does up to z = 3 h = 0.797, the others beyond 1, where their stages are found.
+
+    Implicit Euler and the implicit midpoint rule let it grow faster with every step.
+    """
+    of = {name: 3 * longest_step(rd.integrate.method(name), np.diag([-3.0, 3.0]), 1) for name in IMPLICIT}
+    assert of.pop("linearly_implicit_euler") == pytest.approx(0.79681213, rel=2e-3)
+    assert min(of.values()) > 1.0
 
 
 @pytest.mark.parametrize("ki", [*long([0.0]), 900.0])
