@@ -19,7 +19,7 @@ from robot_dyn.effects.plant import Plant, carrying
 from robot_dyn.effects.set_valued import SetValued
 from robot_dyn.errors import EffectError, QueryError, RobotDynError
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.queries.units import unit, without_rounding
+from robot_dyn.queries.units import joint_types_of, unit, without_rounding
 from robot_dyn.validate import rows
 from robot_dyn.values import Value, read_only
 
@@ -116,7 +116,7 @@ def by_cause(
     # M a of the recursion, not of the matrix: an algorithm of order n, with nothing of order n² to store
     of_bodies = (dynamics.inverse_dynamics(q, 0 * v, a, errors="nan") - N, dynamics.coriolis_torque(q, v, errors="nan"))
     torques = dict(zip(OF_BODIES, (*of_bodies, N), strict=True)) | {name: 0.0 - x for name, x in exerted.items()}
-    kinds = getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * dynamics.n)
+    kinds = joint_types_of(dynamics)
     return Causes(dynamics.joint_names, kinds, t, tau, torques)
 
 

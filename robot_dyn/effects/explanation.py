@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, final
 from robot_dyn.answer import Answer, Block
 from robot_dyn.description.catalog import abbreviated
 from robot_dyn.model.findings import reservations
-from robot_dyn.queries.units import coefficient_texts
+from robot_dyn.queries.units import coefficient_texts, joint_types_of
 
 if TYPE_CHECKING:
     from robot_dyn.effects.effect import Effect
@@ -163,7 +163,7 @@ def term_of(parts: Iterable[Any]) -> str:
 
 def as_they_act(parts: Iterable[Any], dynamics: Any, signal: str = "signal") -> tuple[str, ...]:
     """Coefficients of the parts of an effect or a controller, with units; `signal` as of `coefficient_texts`."""
-    types = getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * dynamics.n)
+    types = joint_types_of(dynamics)
     texts = {name: text for each in parts for name, text in coefficient_texts(each, types, signal).items()}
     return tuple(texts.values())
 

@@ -36,6 +36,11 @@ def coefficient_unit(known: Coefficient, joint_types: Iterable[str | None]) -> s
     return " or ".join(dict.fromkeys(of_joint(known.unit, each) for each in kinds))
 
 
+def joint_types_of(dynamics: Any) -> tuple[str | None, ...]:
+    """Those of the robot that a dynamics is of; None of each where it has none."""
+    return getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * dynamics.n)
+
+
 def units(quantity: str, joint_types: Iterable[str | None]) -> str:
     """The units of a vector over joints, such as "rad or m": each once."""
     of_joints = dict.fromkeys(unit(quantity, each) for each in joint_types)

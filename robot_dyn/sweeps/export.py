@@ -21,14 +21,16 @@ def export(sweep: Sweep, folder: Folder, path: str | Path) -> Path:
     """Write the rows of a complete folder to a .csv or .parquet file; SweepError if it cannot be written."""
     path = target(path, (_CSV, _PARQUET), SweepError)
     write = _parquet if path.suffix.lower() == ".parquet" else _csv
-    return save(path, lambda stream: write(_tables(folder), stream), SweepError)
+    return save(path, lambda stream: write(_tables(sweep, folder), stream), SweepError)
 
 
-def _tables(folder: Folder) -> Iterator[Mapping[str, np.ndarray]]:
+def _tables(sweep: Sweep, folder: Folder) -> Iterator[Mapping[str, np.ndarray]]:
+    """Of each chunk, with units in the headings."""
     for rows in read_all(folder):
         run = {"run": np.arange(rows.start, rows.start + len(rows))}
         ends = {"outcome": np.array(OUTCOMES)[rows.outcome], "ended": rows.ended, "reason": rows.reason}
-        yield run | rows.varied | rows.figures | ends
+        table = run | rows.varied | rows.figures | ends
+        yield {sweep.heading(name): column for name, column in table.items()}
 
 
 def _csv(tables: Iterator[Mapping[str, np.ndarray]], stream: BinaryIO) -> None:

@@ -53,7 +53,10 @@ class SweepResult(Answer):
         return self.folder.missing()
 
     def table(self, *names: str) -> dict[str, np.ndarray]:
-        """Columns of all runs, (N,) by name: "run", what varies, figures, "outcome", "ended" in [s], "reason"."""
+        """Columns of all runs, (N,) by name: "run", what varies, figures, "outcome", "ended", "reason".
+
+        Their units are in `units`, and in the headings of `export`.
+        """
         self._check_complete()
         known = ("run", *self.sweep.columns, *self.sweep.figures, "outcome", "ended", "reason")
         names = names or known
@@ -201,6 +204,11 @@ class SweepResult(Answer):
     def specification(self) -> dict[str, Any]:
         """As the folder states it."""
         return specification(self.sweep).data
+
+    @reported
+    def units(self) -> dict[str, str]:
+        """Of each column that has one."""
+        return self.sweep.units
 
     @reported
     def outcomes(self) -> dict[str, int] | None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+import robot_dyn as rd
 from robot_dyn import sweeps as sw
 from robot_dyn.errors import SweepError
 from robot_dyn.sweeps.plan.work import Work
@@ -108,25 +109,21 @@ def test_a_csv_holds_the_table_to_the_bit(done: sw.SweepResult, tmp_path: Path) 
         rows = list(csv.DictReader(file))
     table = done.table()
     assert len(rows) == 400 and list(rows[0]) == [
-        "run",
-        *done.sweep.columns,
-        "error",
-        "peak",
-        "end",
-        *list(rows[0])[-3:],
+        *("run", "viscous_friction.damping [N m s/rad]", "q0[0] [rad]", "q0[1] [rad]", "mass_scale", "kd [N m s/rad]"),
+        *("error [rad]", "peak [rad/s]", "end [rad]", "outcome", "ended [s]", "reason"),
     ]
-    for name, x in table.items():
+    for heading, x in zip(rows[0], table.values(), strict=True):
         if x.dtype.kind == "f":
-            np.testing.assert_array_equal([float(row[name]) for row in rows], x)
+            np.testing.assert_array_equal([float(row[heading]) for row in rows], x)
         else:
-            assert [row[name] for row in rows] == [str(each) for each in x]
+            assert [row[heading] for row in rows] == [str(each) for each in x]
 
 
 def test_the_report_has_each_figure_and_the_lines_that_repeat_runs(done: sw.SweepResult, tmp_path: Path) -> None:
     text = done.save_report(tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<script" not in text and "default-src 'none'" in text
     for name in done.sweep.figures:
-        assert f"<h2>{name}</h2>" in text
+        assert f"<h2>{name} [{done.units[name]}]</h2>" in text
     assert f".run({done.worst('error', 1, given='finished')[0]})" in text
     assert text.count("<svg") == 1 + len(done.sweep.figures)
 
@@ -282,3 +279,15 @@ def test_a_scene_states_a_sweep_as_data(tmp_path: Path) -> None:
         path.write_text(SCENE + table.replace("\"peak('error')\"", text))
         with pytest.raises(SweepError, match=said):
             sw.from_scene(path)
+
+
+def test_units_of_figures_are_those_of_their_joints_and_of_a_frame() -> None:
+    cart = rd.Setup(rd.Plant(rd.load("cart_pole")), [0.0, 0.1], duration_s=0.1)
+    first, second = cart.plant.dynamics.joint_names
+    assert [sw.peak("u").unit(cart), sw.peak("u", first).unit(cart), sw.final("v", second).unit(cart)] == [
+        "N or N m", "N", "rad/s"
+    ]  # fmt: skip
+    arm = rd.load("ur5")
+    path = rd.control.circle([0.4, 0.2, 0.3], 0.05, [0.0, 0.0, 1.0], 2.0)
+    follows = rd.control.OperationalSpace(arm, "tool0", path, 100.0, 20.0)
+    assert sw.rms_error().unit(rd.Setup(rd.Plant(arm), np.full(6, 0.3), duration_s=0.1, controller=follows)) == "m"

@@ -14,7 +14,7 @@ from robot_dyn.control.digital_loop.block import SIGNAL
 from robot_dyn.control.digital_loop.loop import SIGNALS
 from robot_dyn.effects.plant import Plant
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.queries.units import coefficient_unit
+from robot_dyn.queries.units import coefficient_unit, joint_types_of
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.values import Value, read_only
 
@@ -78,7 +78,7 @@ def sweepable(what: Setup | Plant | Dynamics) -> Sweepable:
 
 
 def _swept(known: Any, dynamics: Any) -> SweptParameter:
-    types = getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * dynamics.n)
+    types = joint_types_of(dynamics)
     of_joints, size = known.declared.of_joints, known.value.size
     signal = SIGNALS.get(known.name.partition(".")[0], SIGNAL)
     unit = coefficient_unit(replace(known.declared, unit=known.declared.unit.replace(SIGNAL, signal)), types)

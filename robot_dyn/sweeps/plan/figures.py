@@ -15,7 +15,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.errors import SweepError, nearest, shown
+from robot_dyn.queries.units import joint_types_of, units
+from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.sweeps.imported import digest_of, imported, path_of
 from robot_dyn.sweeps.plan.runs import Runs
 from robot_dyn.validate import choice
@@ -38,6 +41,10 @@ class Figure(Value, ABC):
     @abstractmethod
     def record(self) -> tuple[str, ...]:
         """What it needs recorded, of "q", "v", "u", "energy", "work"."""
+
+    @abstractmethod
+    def unit(self, setup: Setup) -> str:
+        """That of the numbers, empty where it is not known."""
 
     @abstractmethod
     def of(self, runs: Runs) -> np.ndarray:
@@ -67,6 +74,9 @@ class RmsError(Figure):
     def record(self) -> tuple[str, ...]:
         return ("q",)
 
+    def unit(self, setup: Setup) -> str:
+        return _unit("error", self.joint, setup)
+
     def of(self, runs: Runs) -> np.ndarray:
         deviation = _chosen(_deviation(runs, self.name), self.joint, runs)
         total = np.zeros((len(runs), deviation.shape[2]))
@@ -91,6 +101,9 @@ class Peak(Figure):
     @property
     def record(self) -> tuple[str, ...]:
         return ("q",) if self.of_what == "error" else ()
+
+    def unit(self, setup: Setup) -> str:
+        return _unit(self.of_what, self.joint, setup)
 
     def of(self, runs: Runs) -> np.ndarray:
         if self.of_what == "error":
@@ -117,6 +130,9 @@ class Final(Figure):
     def record(self) -> tuple[str, ...]:
         return ("q",) if self.of_what in ("q", "error") else ("q", self.of_what)
 
+    def unit(self, setup: Setup) -> str:
+        return _unit(self.of_what, self.joint, setup)
+
     def of(self, runs: Runs) -> np.ndarray:
         last = runs.known.sum(axis=1) - 1
         if self.of_what == "error":
@@ -134,8 +150,8 @@ class Final(Figure):
 class UserFigure(Figure):
     """A function f(run) → float of a `Run`, by import path.
 
-    Its attributes, if it has them: `record`, names of what is to be recorded, ("q", "v") otherwise; `batch`, a function
-    of `Runs` that gives the same numbers (B,) of many at once, to the bit.
+    Its attributes, if it has them: `record`, names of what is to be recorded, ("q", "v") otherwise; `unit`, a text;
+    `batch`, a function of `Runs` that gives the same numbers (B,) of many at once, to the bit.
     """
 
     name: ClassVar[str] = "function"
@@ -145,6 +161,9 @@ class UserFigure(Figure):
     def record(self) -> tuple[str, ...]:
         needed = getattr(imported(self.path), "record", ("q", "v"))
         return tuple(choice(f"record of {self.path}", each, _RECORDS, error=SweepError) for each in needed)
+
+    def unit(self, setup: Setup) -> str:
+        return str(getattr(imported(self.path), "unit", ""))
 
     def of(self, runs: Runs) -> np.ndarray:
         function = imported(self.path)
@@ -222,6 +241,15 @@ def from_dict(stored: Mapping[str, Any]) -> Figure:
 def _check_joint(name: str, joint: Any) -> None:
     if joint is not None and not isinstance(joint, str):
         raise SweepError(f"{name}: joint must be the name of one, got {shown(joint)}")
+
+
+def _unit(of_what: str, joint: str | None, setup: Setup) -> str:
+    """That of q, v, u or the error of a joint, or of all; of a frame that follows a path "m"."""
+    if of_what == "error" and setup.controller is not None and isinstance(setup.controller.desired, CartesianReference):
+        return "m"
+    dynamics = setup.plant.dynamics
+    of_joint = dict(zip(dynamics.joint_names, joint_types_of(dynamics), strict=True))
+    return units("q" if of_what == "error" else of_what, of_joint.values() if joint is None else [of_joint.get(joint)])
 
 
 def _number(path: str, value: Any) -> float:

@@ -12,6 +12,8 @@ import numpy as np
 
 from robot_dyn.answer import Answer, Block, Table
 from robot_dyn.errors import QueryError, RobotDynError, SweepError, shown
+from robot_dyn.queries.units import joint_types_of, unit
+from robot_dyn.simulation.rollouts.sweepable import sweepable
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.sweeps.designs import Design, design
 from robot_dyn.sweeps.distributions import Distribution, distribution
@@ -102,6 +104,20 @@ class Sweep(Answer, Value, Caching):
             for k in range(each.shape[0] if each.shape else 1)
         )
 
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """Of each column that has one: of what varies, of figures, and of "ended"."""
+        types = joint_types_of(self.setup.plant.dynamics)
+        of = {each.name: each.unit for each in sweepable(self.setup).parameters}
+        of |= {f"{name}[{k}]": unit(name[0], kind) for name in STARTS for k, kind in enumerate(types)}
+        varied = {name: of.get(name, of.get(name.rpartition("[")[0], "")) for name in self.columns}
+        figures = {name: each.unit(self.setup) for name, each in self.figures.items()}
+        return {name: each for name, each in (varied | figures | {"ended": "s"}).items() if each}
+
+    def heading(self, column: str) -> str:
+        """Its name with its unit, as "torque [N m]"."""
+        return f"{column} [{self.units[column]}]" if column in self.units else column
+
     @property
     def dimensions(self) -> tuple[str, ...]:
         """Names of the columns of the design, in their order."""
@@ -150,10 +166,17 @@ class Sweep(Answer, Value, Caching):
         design = self.design if isinstance(self.design, str) else "a table"
         size = f"{self.bytes_expected / 2**20:.3g} MiB"
         yield f"{self.runs} runs of {Path(self.scene).name}, design {design}, seed {self.seed}; on disk {size}"
-        rows = ((name, _text(each.to_dict())) for name, each in self.vary.items())
+        rows = ((self._varies(name), _text(each.to_dict())) for name, each in self.vary.items())
         yield Table(("varies", "distribution"), tuple(rows), wrap=True)
         if self.figures:
-            yield Table(("figure", "computed by"), tuple((k, _text(x.to_dict())) for k, x in self.figures.items()))
+            rows = ((self.heading(name), _text(each.to_dict())) for name, each in self.figures.items())
+            yield Table(("figure", "computed by"), tuple(rows))
+
+    def _varies(self, name: str) -> str:
+        """A name in `vary` with its unit, each once where those of the numbers of an array differ."""
+        columns = [each for each in self.columns if each == name or each.rpartition("[")[0] == name]
+        of = dict.fromkeys(self.units[each] for each in columns if each in self.units)
+        return f"{name} [{' or '.join(of)}]" if of else name
 
 
 def samples_of_run(setup: Setup) -> int:
