@@ -23,6 +23,7 @@ from robot_dyn.studies.work_precision_diagram.tolerance_ladder import (
 
 _PART = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # of the budget, for one run
 _SHORT = 1 / 3000  # of the budget: runs that are timed again before the longer ones
+_BRIEF_S, _OFTEN = 1e-3, 20  # runs that take less have so many turns: after five, some are 10 % off
 _LATE = 3  # runs of a ladder that may take longer than that
 _KEPT = {COMPILED: 0.2, INTERPRETED: 0.4, "": 0.2}  # of the budget, for repeats
 _LAST = 0.05  # of the budget, for turns of short runs after the others
@@ -43,6 +44,11 @@ class Rung:
     def repeatable(self) -> bool:
         """Whether its time is known."""
         return repeatable(self.times)
+
+    @property
+    def settled(self) -> bool:
+        """Whether more turns would not change it."""
+        return self.repeatable and (len(self.times) >= _OFTEN or self.times[0] >= _BRIEF_S)
 
 
 @final
@@ -137,12 +143,12 @@ def _walk(walk: Walk, reference: Reference, budget: Budget) -> None:
 
 
 def _turns(runs: list[tuple[Walk, Rung]], most: int, kept: float, budget: Budget) -> None:
-    """Time runs in turns, until their times repeat, or so often, or no more of the budget is left than is kept."""
+    """Time runs in turns, until their times are settled, or so often, or no more of the budget is left than is kept."""
     for k in range(most):
         for walk, rung in runs:
             if budget.left <= kept:
                 return
-            if not rung.repeatable:
+            if not rung.settled:
                 budget.report(f"round {k + 2}: {walk.name}")
                 _again(walk, rung, budget)
 
