@@ -46,8 +46,9 @@ def _of_root(link: re.Match[str]) -> str:
 
 
 def contents(text: str) -> str:
-    """A hidden table of contents: the pages below that a page links to, in its order."""
-    pages = dict.fromkeys(re.findall(r"\]\((?!\.\.)([\w/-]+)\.md\)", text))
+    """A hidden table of contents: the pages below that the lists and tables of a page link to, in its order."""
+    rows = "\n".join(line for line in text.splitlines() if re.match(r"\||- |\d+\. ", line))
+    pages = dict.fromkeys(re.findall(r"\]\((?!\.\.)([\w/-]+)\.md\)", rows))
     return "\n".join(["```{toctree}", ":hidden:", "", *pages, "```"])
 
 
