@@ -12,7 +12,7 @@ from robot_dyn.errors import SweepError
 from robot_dyn.extras import needs
 from robot_dyn.files import Kind, save, target
 from robot_dyn.sweeps.folder.folder import Folder, read_all
-from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep
+from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep, heading
 
 _CSV, _PARQUET = Kind("a table", ".csv"), Kind("a table", ".parquet", b"PAR1")
 
@@ -30,7 +30,7 @@ def _tables(sweep: Sweep, folder: Folder) -> Iterator[Mapping[str, np.ndarray]]:
         run = {"run": np.arange(rows.start, rows.start + len(rows))}
         ends = {"outcome": np.array(OUTCOMES)[rows.outcome], "ended": rows.ended, "reason": rows.reason}
         table = run | rows.varied | rows.figures | ends
-        yield {sweep.heading(name): column for name, column in table.items()}
+        yield {heading(sweep, name): column for name, column in table.items()}
 
 
 def _csv(tables: Iterator[Mapping[str, np.ndarray]], stream: BinaryIO) -> None:

@@ -14,7 +14,7 @@ from robot_dyn.display import page, side_by_side, table, text
 from robot_dyn.errors import SweepError
 from robot_dyn.files import Kind, save, target
 from robot_dyn.studies.figure import PAGE, ink, inline, styled
-from robot_dyn.sweeps.plan.sweep import OUTCOMES
+from robot_dyn.sweeps.plan.sweep import OUTCOMES, heading
 
 if TYPE_CHECKING:
     from robot_dyn.sweeps.result import SweepResult
@@ -51,7 +51,7 @@ def report(result: SweepResult) -> str:
     if failed.any() and len(columns) > 1:
         pair = strongest(failed, np.column_stack([x[name] for name in columns]))
         names = tuple(columns[k] for k in pair)
-        headings = tuple(map(result.sweep.heading, names))
+        headings = tuple(heading(result.sweep, each) for each in names)
         shown = f"Share of runs that failed over {names[0]} and {names[1]}, the two that it depends on most"
         parts.append(f"<p>{escape(shown)}; cells without runs are empty, each cross is a run that failed.</p>")
         parts.append(_failure_map(headings, [x[name] for name in names], failed))
@@ -76,16 +76,16 @@ def strongest(failed: np.ndarray, x: np.ndarray) -> tuple[int, int]:
 
 def _of_figure(result: SweepResult, name: str, x: np.ndarray) -> Iterator[str]:
     """Distribution, quantiles and worst runs of a figure."""
-    heading = result.sweep.heading(name)
-    yield f"<h2>{escape(heading)}</h2>"
+    title = heading(result.sweep, name)
+    yield f"<h2>{escape(title)}</h2>"
     finite = x[np.isfinite(x)]
     quantiles = result.quantiles(name, _PROBABILITIES)
     rows = [(each.statistic, each.estimate, each.low, each.high) for each in quantiles]
     level = f"{100 * quantiles[0].level:g} % interval from"
     parts = [table(("", "estimate", level, "to"), rows), text(f"{quantiles[0].n} runs, {quantiles[0].failed} failed")]
     worst = [(i, float(x[i]), _repeat(result, i)) for i in result.worst(name, min(_WORST, len(x)), given="finished")]
-    yield side_by_side([*([_histogram(heading, finite)] if len(finite) else []), f"<div>{''.join(parts)}</div>"])
-    yield table(("worst runs that finished", heading, "repeat it by"), worst)
+    yield side_by_side([*([_histogram(title, finite)] if len(finite) else []), f"<div>{''.join(parts)}</div>"])
+    yield table(("worst runs that finished", title, "repeat it by"), worst)
     try:
         yield from html_of(result.sensitivity(name, given="finished").blocks())
     except SweepError as none:  # of a grid, or of a figure that is the same in all runs

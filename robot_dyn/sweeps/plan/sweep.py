@@ -114,10 +114,6 @@ class Sweep(Answer, Value, Caching):
         figures = {name: each.unit(self.setup) for name, each in self.figures.items()}
         return {name: each for name, each in (varied | figures | {"ended": "s"}).items() if each}
 
-    def heading(self, column: str) -> str:
-        """Its name with its unit, as "torque [N m]"."""
-        return f"{column} [{self.units[column]}]" if column in self.units else column
-
     @property
     def dimensions(self) -> tuple[str, ...]:
         """Names of the columns of the design, in their order."""
@@ -169,7 +165,7 @@ class Sweep(Answer, Value, Caching):
         rows = ((self._varies(name), _text(each.to_dict())) for name, each in self.vary.items())
         yield Table(("varies", "distribution"), tuple(rows), wrap=True)
         if self.figures:
-            rows = ((self.heading(name), _text(each.to_dict())) for name, each in self.figures.items())
+            rows = ((heading(self, name), _text(each.to_dict())) for name, each in self.figures.items())
             yield Table(("figure", "computed by"), tuple(rows))
 
     def _varies(self, name: str) -> str:
@@ -177,6 +173,11 @@ class Sweep(Answer, Value, Caching):
         columns = [each for each in self.columns if each == name or each.rpartition("[")[0] == name]
         of = dict.fromkeys(self.units[each] for each in columns if each in self.units)
         return f"{name} [{' or '.join(of)}]" if of else name
+
+
+def heading(sweep: Sweep, column: str) -> str:
+    """The name of a column with its unit, as "torque [N m]"."""
+    return f"{column} [{sweep.units[column]}]" if column in sweep.units else column
 
 
 def samples_of_run(setup: Setup) -> int:
