@@ -129,8 +129,8 @@ class Advice(Answer):
             return f"step {self.step_s:.3g} s: stable, as every step of {self.method} is here"
         if self.step_s <= limit:
             return f"step {self.step_s:.3g} s: stable; {self.method} is up to {limit:.3g} s"
-        others = [name for name, h in self.limits.items() if h >= self.step_s]
-        other = f", or integrator={others[0]!r}" if others else ""
+        best = max(self.limits, key=lambda name: (self.limits[name], method(name).order))
+        other = f", or integrator={best!r}" if self.limits[best] >= self.step_s else ""
         return (
             f"step {self.step_s:.3g} s: unstable; {self.method} is stable up to {limit:.3g} s: take"
             f" step_s={below(limit)}{other}"

@@ -392,3 +392,51 @@ def test_auto_has_machine_code_for_other_coefficients_and_none_for_another_struc
     other = rd.Plant(ARM.with_(mass_scale=1.07), [rd.effects.Spring(5.0)])
     engine = rd.simulate(replace(base, plant=other)).statistics.engine
     assert engine == "interpreted (short: compiling is not worthwhile)"
+
+
+class _Stiff:
+    """PD with gravity compensation of a UR5, light wrists under gains of a thousand."""
+
+    arm = rd.load("ur5")
+    start = np.array([0.0, -1.2, 1.5, -0.3, 0.5, 0.0])
+    plan = rd.control.quintic(start, start + np.array([1.0, 0.6, -0.7, -0.6, 0.5, 0.6]), duration_s=1.5)
+    kp, kd = np.array([900.0, 900.0, 600.0, 100.0, 100.0, 50.0]), np.array([150.0, 150.0, 90.0, 15.0, 12.0, 4.0])
+
+
+def test_a_smooth_function_that_declares_nothing_is_not_said_to_act_between_steps() -> None:
+    """Between steps its torque is looked at where the joints are, not on straight lines between the ends."""
+
+    def follows(t, q, v):
+        q_d, v_d, _ = _Stiff.plan.at(t)
+        return _Stiff.kp * (q_d - q) + _Stiff.kd * (v_d - v) + _Stiff.arm.N(q)
+
+    def without_velocity(t, q, v):
+        return _Stiff.kp * (_Stiff.plan.at(t)[0] - q) - _Stiff.kd * v + _Stiff.arm.N(q)
+
+    for law in (follows, without_velocity):
+        run = rd.simulate(_Stiff.arm, _Stiff.start, duration_s=1.2, controller=law, record_period_s=0.01)
+        assert "acts between steps" not in str(run.error) and run.error.final < 1e-9
+
+
+def test_models_of_ones_own_controller_have_the_right_angles_of_the_machine_code() -> None:
+    """Where control and gravity cancel, 5e-12 rad of the file would show."""
+
+    @dataclass(frozen=True, eq=False)
+    class Law(rd.control.Stateless):
+        plan: rd.control.PiecewisePolynomial
+        model: rd.Robot
+        n, thresholds = 6, lambda self: ()
+
+        def torque(self, t, q, v, z):
+            q_d, v_d, _ = self.plan.at(t)
+            return _Stiff.kp * (q_d - q) + _Stiff.kd * (v_d - v) + self.model.N(q)
+
+    options = {"duration_s": 0.5, "record_period_s": 0.01, "engine": "compiled", "estimate_error": False}
+    run = rd.simulate(_Stiff.arm, _Stiff.start, controller=Law(_Stiff.plan, _Stiff.arm), **options)
+    same = rd.simulate(
+        _Stiff.arm,
+        _Stiff.start,
+        controller=rd.control.PDGravity(_Stiff.arm, _Stiff.plan, _Stiff.kp, _Stiff.kd),
+        **options,
+    )
+    assert run.statistics.engine == "compiled" and np.abs(run.q - same.q).max() < 1e-12

@@ -69,6 +69,7 @@ def test_rollouts_take_the_same() -> None:
     [
         (lambda: rd.simulate(ARM, Q, duration=1.0), r"simulate: no option 'duration'; nearest: duration_s"),
         (lambda: rd.rollouts(ARM, Q, duration=1.0), r"rollouts: no option 'duration'; nearest: duration_s"),
+        (lambda: rd.simulate(ARM, Q, rtol=1e-12), r"no option 'rtol'; .* integrator=rd.integrate.Adaptive\(rtol=…\)"),
         (lambda: rd.simulate(ARM, plant=PLANT, q0=Q), "simulate: no option 'plant'"),
         (lambda: rd.simulate(ARM, duration_s=1.0), r"simulate: give q0, the position at the start, \(2,\)"),
         (lambda: rd.rollouts(ARM, integrator="rk4"), r"rollouts: give q0, the position at the start, \(2,\)"),

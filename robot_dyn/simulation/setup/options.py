@@ -60,7 +60,11 @@ def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, 
         return what if what.is_value else copy(what)  # parts may have changed since: nothing cached is used
     known = {each.name for each in fields(Setup)} if isinstance(what, Setup) else {"q0", "v0", *Options.__annotations__}
     for name in options.keys() - known:
-        raise QueryError(f"{caller}: no option {name!r}; {nearest(name, known)}")
+        if name in ("rtol", "atol"):  # a key of scenes, and in texts
+            remedy = f"it is of the method: integrator=rd.integrate.Adaptive({name}=…)"
+        else:
+            remedy = nearest(name, known)
+        raise QueryError(f"{caller}: no option {name!r}; {remedy}")
     if "integrator" in options and (method := as_method(options["integrator"])).controls_error:
         if "step_s" in options:
             raise QueryError(no_step(method.name))

@@ -109,7 +109,8 @@ class Setup(Value, Caching):
         """That an accuracy is one, and that nothing else chooses method or tolerance."""
         object.__setattr__(self, "accuracy", least_accuracy(self.accuracy, self.plant.dynamics))
         if self.integrator != Adaptive(AUTO):
-            raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {self.integrator}")
+            name = self.integrator.name
+            raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {name!r}")
         if not self.estimate_error:
             raise QueryError("accuracy: is held to the error estimate; leave out estimate_error=False")
 
