@@ -1,4 +1,4 @@
-"""2R planar arm of two uniform bars: B(q) a + C(q, v) + G(q) = τ from K and V, against its closed form.
+"""2R planar arm of two uniform bars: M(q) a + C(q, v) v + N(q) = τ from K and V, against its closed form.
 
 Run: python examples/textbook/planar_2r.py
 """
@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from robot_dyn.description.solids import box
 from robot_dyn.lagrange.euler_lagrange import euler_lagrange
 
-m1, m2, l1, l2, g = 2.0, 1.5, 1.0, 0.8, 9.81  # the arm of urdf/planar_2r, in [kg], [m] and [m / s²]
+m1, m2, l1, l2, g = 2.0, 1.5, 1.0, 0.8, 9.80665  # the arm of urdf/planar_2r, in [kg], [m] and [m / s²]
 r1, r2 = l1 / 2, l2 / 2  # where the centres of mass are
 I1, I2 = box(m1, l1, 0.05, 0.05).inertia[2, 2], box(m2, l2, 0.05, 0.05).inertia[2, 2]
 
