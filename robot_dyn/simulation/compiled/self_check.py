@@ -85,7 +85,8 @@ def check(compiled: CompiledStateEquation, setup: Setup) -> None:
         MachineError: If they differ by more than rounding.
     """
     checked, changeable = compiled.functions.checked, compiled.functions.changeable
-    compiled = replace(compiled, equation=_with_models_in_full(compiled.equation))
+    if (equation := _with_models_in_full(compiled.equation)) is not compiled.equation:
+        compiled = replace(compiled, equation=equation)
     states = next(iter(checked.values()), None)
     if states is None:
         states = _states_of_run(setup) if changeable else _random_states(setup, compiled.equation.size)
