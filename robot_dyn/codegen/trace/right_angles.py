@@ -7,12 +7,14 @@ turns a frame by less than 1e-9 rad, and halves the kernel. Masses, inertias and
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
+from robot_dyn.coefficients import with_values
 from robot_dyn.description.description import Description
 from robot_dyn.model.robot import Robot
 
@@ -45,6 +47,13 @@ def completed(robot: Robot) -> tuple[Robot, tuple[RightAngle, ...]]:
     """The robot with right angles written out in full, and what was changed."""
     description, changes = _written_out(robot.description)
     return (Robot(description, robot.edits) if changes else robot), changes
+
+
+def models_in_full(controller: Any, full: Callable[[Robot], Robot]) -> Any:
+    """A controller whose models have their right angles written out by `full`; itself if none changes."""
+    models = {} if controller is None else controller.models
+    made = {name: full(model) for name, model in models.items() if isinstance(model, Robot)}
+    return with_values(controller, {name: robot for name, robot in made.items() if robot is not models[name]})
 
 
 def robot_of(dynamics: Any) -> Robot | None:

@@ -15,10 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import with_values
+from robot_dyn.codegen.trace.right_angles import models_in_full
 from robot_dyn.errors import RobotDynError, because
 from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
-from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.compiled.functions import STEP, States
 from robot_dyn.simulation.compiled.programs import robot_to_compile
@@ -85,8 +84,9 @@ def check(compiled: CompiledStateEquation, setup: Setup) -> None:
         MachineError: If they differ by more than rounding.
     """
     checked, changeable = compiled.functions.checked, compiled.functions.changeable
-    if (equation := _with_models_in_full(compiled.equation)) is not compiled.equation:
-        compiled = replace(compiled, equation=equation)
+    controller = models_in_full(compiled.equation.controller, robot_to_compile)  # as they are traced
+    if controller is not compiled.equation.controller:
+        compiled = replace(compiled, equation=replace(compiled.equation, controller=controller))
     states = next(iter(checked.values()), None)
     if states is None:
         states = _states_of_run(setup) if changeable else _random_states(setup, compiled.equation.size)
@@ -94,14 +94,6 @@ def check(compiled: CompiledStateEquation, setup: Setup) -> None:
     elif changeable:
         _compare(compiled, setup, _some(states))
     checked[compiled.loop] = states
-
-
-def _with_models_in_full(equation: StateEquation) -> StateEquation:
-    """The equation whose controller has models with their right angles written out, as they are traced."""
-    models = {} if equation.controller is None else equation.controller.models
-    full = {name: robot_to_compile(model) for name, model in models.items() if isinstance(model, Robot)}
-    changed = {name: robot for name, robot in full.items() if robot is not models[name]}
-    return replace(equation, controller=with_values(equation.controller, changed)) if changed else equation
 
 
 def _compare(compiled: CompiledStateEquation, setup: Setup, states: States) -> None:

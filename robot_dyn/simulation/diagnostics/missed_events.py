@@ -16,7 +16,7 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Force
 from robot_dyn.errors import RobotDynError, call
 from robot_dyn.simulation.dynamics.declarations import named
-from robot_dyn.simulation.dynamics.smoothness import LOOKS, extremes
+from robot_dyn.simulation.dynamics.smoothness import LOOKS, cubics, extremes
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.run.recording import Path, Recording
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS
@@ -134,7 +134,6 @@ def _code(equation: StateEquation, part: Any, path: Path, q: np.ndarray, v: np.n
     except RobotDynError:
         return None  # the run itself reports what is wrong
     around = np.abs(np.diff(ends, axis=0))
-    around = np.stack([around, np.roll(around, 1, axis=0), np.roll(around, -1, axis=0)]).max(axis=0)  # a peak is flat
     for k in np.flatnonzero((jump > _STANDS_OUT * around + 1e-9).any(axis=1)).tolist():
         if _displacement(equation, path, path.y[:, :n], k * every, jump[k]) > error:
             why = f"{named(part)} acts between steps after t = {t[k]:g} s and not at their ends"
@@ -147,10 +146,9 @@ def _between(t: np.ndarray, q: np.ndarray, v: np.ndarray, s: np.ndarray) -> tupl
 
     Straight lines would be off by h² a / 8, which a stiff controller answers.
     """
-    h, far = np.diff(t)[:, None], np.diff(q, axis=0)
-    square, cube = 3 * far - h * (2 * v[:-1] + v[1:]), h * (v[:-1] + v[1:]) - 2 * far
-    rate = np.divide(2 * square * s + 3 * cube * s**2, h, out=np.zeros_like(far), where=h > 0)
-    return q[:-1] + h * v[:-1] * s + square * s**2 + cube * s**3, v[:-1] + rate
+    (a, b, c), h = cubics(t, q, v), np.diff(t)[:, None]
+    rate = np.divide(s * (2 * b + 3 * s * a), h, out=np.zeros_like(a), where=h > 0)
+    return q[:-1] + s * (c + s * (b + s * a)), v[:-1] + rate
 
 
 def _states_of(equation: StateEquation, part: Any) -> slice | None:

@@ -88,8 +88,8 @@ def _reversed(setup: Setup, path: Path, v: np.ndarray) -> Iterator[Kink]:
         yield _first(path.t, happens, f"{effect.name} reverses within a few steps")
 
 
-def extremes(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least and largest q of each joint on each interval between times t, by the cubic through q and v at its ends.
+def cubics(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """a, b and c of the cubic q₀ + c s + b s² + a s³ through q and v at the ends of each interval, s from 0 to 1.
 
     Args:
         t: (k,), in [s].
@@ -97,11 +97,15 @@ def extremes(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, n
         v: (k, n).
 
     Returns:
-        Two arrays of shape (k − 1, n).
+        Three arrays of shape (k − 1, n).
     """
-    h = np.diff(t)[:, None]
-    rise = np.diff(q, axis=0)
-    a, b, c = h * (v[:-1] + v[1:]) - 2 * rise, 3 * rise - h * (2 * v[:-1] + v[1:]), h * v[:-1]
+    h, rise = np.diff(t)[:, None], np.diff(q, axis=0)
+    return h * (v[:-1] + v[1:]) - 2 * rise, 3 * rise - h * (2 * v[:-1] + v[1:]), h * v[:-1]
+
+
+def extremes(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest q of each joint on each interval of `cubics`, two arrays of shape (k − 1, n)."""
+    a, b, c = cubics(t, q, v)
     low, high = np.minimum(q[:-1], q[1:]), np.maximum(q[:-1], q[1:])
     with np.errstate(all="ignore"):
         root = np.sqrt(b * b - 3 * a * c)

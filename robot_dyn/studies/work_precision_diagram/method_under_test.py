@@ -14,8 +14,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.codegen.trace.right_angles import completed
-from robot_dyn.coefficients import with_values
+from robot_dyn.codegen.trace.right_angles import completed, models_in_full
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
@@ -90,14 +89,11 @@ def whole(setup: Setup) -> Setup:
 
     Both engines then run the same equations.
     """
-    controller: Any = setup.controller
-    models = {} if controller is None else controller.models
-    described = {name: completed(model)[0] for name, model in models.items() if isinstance(model, Robot)}
-    changed = {name: model for name, model in described.items() if model is not models[name]}
+    controller = models_in_full(setup.controller, lambda model: completed(model)[0])
     dynamics: Any = setup.plant.dynamics
     robot = completed(dynamics)[0] if isinstance(dynamics, Robot) else dynamics
     plant = setup.plant if robot is dynamics else Plant(robot, setup.plant.effects)
-    return replace(setup, plant=plant, controller=with_values(controller, changed))
+    return replace(setup, plant=plant, controller=controller)
 
 
 def recorded(setup: Setup, duration_s: float) -> Setup:
