@@ -27,14 +27,14 @@ from robot_dyn.result import UNREPORTED, reported
 from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest, jacobian
 from robot_dyn.simulation.dynamics.sampled_loop import linearised, remedy
 from robot_dyn.simulation.dynamics.stability import (
+    LARGEST,
     Stability,
     after,
     below,
+    excess_rate,
     longest_step,
     periods,
-    radius,
     shown,
-    step_map,
     worst,
 )
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -64,7 +64,7 @@ class Advice(Answer):
         step_s: Its longest step, in [s]; 0 if it chooses its steps.
         fastest: The fastest motion along a pilot run, with joint and source.
         at: When it was met, in [s].
-        limits: Longest stable step of each method of fixed step, in [s]; inf where every step is stable.
+        limits: Longest stable step of the setup's method and each other of fixed step, in [s]; inf where every step is.
         period_s: Period of the sampled control, in [s]; 0 without.
         longest_period_s: The period up to which the loop is stable, in [s]; 0 if it is stable at
             none, inf if at every one, or without sampled control.
@@ -129,7 +129,7 @@ class Advice(Answer):
             return f"step {self.step_s:.3g} s: stable, as every step of {self.method} is here"
         if self.step_s <= limit:
             return f"step {self.step_s:.3g} s: stable; {self.method} is up to {limit:.3g} s"
-        best = max(self.limits, key=lambda name: (self.limits[name], method(name).order))
+        best = max(FIXED_STEP, key=lambda name: (min(self.limits[name], 2 * self.step_s), method(name).order))
         other = f", or integrator={best!r}" if self.limits[best] >= self.step_s else ""
         return (
             f"step {self.step_s:.3g} s: unstable; {self.method} is stable up to {limit:.3g} s: take"
@@ -202,11 +202,12 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
     motion, at, states = _fastest(loop, states_of(setup, loop))
     matrices = [_between_ticks(plant, loop, t, y) if period else jacobian(loop, t, y, None) for t, y in states]
     n, own = plant.dynamics.n, setup.integrator
-    limits = {name: min(longest_step(method(name), J, n) for J in matrices) for name in FIXED_STEP}
+    methods = {name: method(name) for name in FIXED_STEP} | ({} if own.controls_error else {own.name: own})
+    limits = {name: min(longest_step(each, J, n) for J in matrices) for name, each in methods.items()}
     step = 0.0 if own.controls_error else setup.taken_step_s
     loops = [linearised(plant, setup.controller, t, _own(loop, y)) for t, y in states if period]
     factors = [after(each.factor(period), periods(duration, period)) for each in loops]
-    factors += [after(_excess(own, J, n, step), setup.steps) for J in matrices if step]
+    factors += [exp(min(max(0.0, excess_rate(own, J, n)(step)) * duration, LARGEST)) for J in matrices if step]
     return Advice(
         own.name, step, motion, at, limits, period,
         min((each.longest_period(period) for each in loops), default=inf),
@@ -215,11 +216,6 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
         max((each.grows_anyway() for each in loops), default=0.0),
         max(1.0, *factors, 1.0),
     )  # fmt: skip
-
-
-def _excess(method: Any, J: Array, n: int, h: float) -> float:
-    """The factor by which a step h of a method lets deviations grow beyond the motion itself."""
-    return radius(step_map(method, J, n), h) / exp(h * max(0.0, float(np.linalg.eigvals(J).real.max())))
 
 
 def at_rest(setup: Setup, loop: StateEquation) -> list[State]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from fractions import Fraction
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,28 @@ def test_a_method_may_let_grow_faster_what_grows() -> None:
     of = {name: 3 * longest_step(rd.integrate.method(name), np.diag([-3.0, 3.0]), 1) for name in IMPLICIT}
     assert of.pop("linearly_implicit_euler") == pytest.approx(0.79681213, rel=2e-3)
     assert min(of.values()) > 1.0
+
+
+def test_what_grows_excuses_no_other_motion() -> None:
+    """An oscillation beside an upright link has the limits that it has alone, in any coordinates of both."""
+    both = np.kron([[0.0, 1.0], [0.0, 0.0]], np.eye(2))
+    both[2:, :2] = [[25.0, 0.0], [0.0, -400.0]]  # 5/s and 20/s
+    mixed = np.kron(np.eye(2), [[1.0, 0.7], [-0.4, 1.3]])
+    J = mixed @ both @ np.linalg.inv(mixed)
+    for name, limit in [("semi_implicit_euler", 2.0), ("time_stepping", 2.0), ("rk4", 2 * np.sqrt(2))]:
+        assert longest_step(rd.integrate.method(name), J, 2) * 20 == pytest.approx(limit, rel=2e-3)
+    assert longest_step(rd.integrate.method("explicit_euler"), J, 2) * 20 == pytest.approx(0.0, abs=2.1e-6)
+
+
+def test_a_method_of_ones_own_has_a_limit() -> None:
+    """Heun's rule, 1 + z + z²/2, on a decay: h |λ| = 2, as of the midpoint rule."""
+    tableau = rd.integrate.ButcherTableau(a=((), (1,)), b=(Fraction(1, 2), Fraction(1, 2)), c=(0, 1), order=2)
+    heun = rd.integrate.ExplicitRungeKutta("heun", tableau)
+    plant = rd.Plant(BLOCK, [rd.effects.ViscousFriction(100.0)])
+    fine, coarse = (rd.advise(plant, [0.1], [1.0], duration_s=0.1, integrator=heun, step_s=h) for h in (0.019, 0.021))
+    assert fine.limits["heun"] == pytest.approx(0.02, rel=2e-3)
+    assert fine.stable
+    assert not coarse.stable
 
 
 @pytest.mark.parametrize("ki", [*long([0.0]), 900.0])

@@ -1,10 +1,12 @@
 """Stability of linear maps δx⁺ = Φ(h) δx, and the longest step of a method, or period of a loop, at which it holds.
 
     a sampled loop:          |λ_i(Φ)| ≤ 1,   known to |δλ_i| ≤ |w_i|ᵀ |δΦ| |x_i| / |w_iᴴ x_i|
-    a method on δx' = J δx:  ln ρ(Φ(h)) / h ≤ 2 max(0, Re λ(J)):  what grows in the motion may grow faster by an error
+    a method on δx' = J δx:  ln |R(h λ_i)| / h ≤ 2 max(0, Re λ_i(J)):  what grows in the motion may grow faster
 
-x_i and w_i are the right and left eigenvectors. [Golub, Van Loan, Matrix Computations, 4th ed., 2013, 7.2; Hairer,
-Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, IV.2]
+x_i and w_i are the right and left eigenvectors, R is the stability function of a method whose Φ(h) is R(h J). Of
+others, as semi-implicit Euler, the k-th largest |λ(Φ)| is compared with the k-th largest Re λ(J). [Golub, Van Loan,
+Matrix Computations, 4th ed., 2013, 7.1 and 7.2; Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed.,
+1996, IV.2]
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from robot_dyn.integrate.integrator import System
 
 _BAND = 1e-3  # of |λ|: no eigenvalue further from 1 is taken for one at 1, however defective it is
 _AMPLIFIES = 1e-6  # per radian of the fastest motion: an oscillation that a method amplifies by less is its error
+_ROUNDED = 1e-7  # ln |λ(Φ)|: a double eigenvalue is known to the root of rounding
 _GROWS = 2.0  # times as fast as in the motion: a method that amplifies growth by less is inaccurate, not unstable
 _LEAST, _FARTHEST = 1e-6, 1e3  # h |λ| between which limits are looked for, of the fastest and of the slowest motion
 STILL = 1e-5  # of the fastest |λ|, and per second: differences do not tell less from zero
@@ -31,7 +34,7 @@ _SCAN = (2, 8, 5)  # lengths in each factor of ten up to there, beyond, and in e
 _MOST = 500  # lengths that are tried at each part of a radian, before they grow by factors alone
 _DECAYED = 5.0  # h |Re λ| from which an oscillation is over before the next tick
 _SHARP = 3e-4  # of a limit
-_LARGEST = 690.0  # ln of a growth that is told
+LARGEST = 690.0  # ln of a growth that is told
 
 
 class Stability(StrEnum):
@@ -102,18 +105,48 @@ def longest_step(method: Any, J: Array, n: int) -> float:
         J: (m, m).
         n: Number of positions, the first entries of x.
     """
-    rates, made = np.linalg.eigvals(J), step_map(method, J, n)
-    allowed = _GROWS * max(0.0, float(rates.real.max())) + _AMPLIFIES * float(np.abs(rates).max())
-    return first_unstable(lambda h: np.log(radius(made, h)) / h > allowed, lengths(rates, np.zeros(0)))
+    excess = excess_rate(method, J, n)
+    return first_unstable(lambda h: excess(h) > 0, lengths(np.linalg.eigvals(J), np.zeros(0)))
 
 
-def radius(matrix: Callable[[float], Array], h: float) -> float:
-    """Spectral radius of Φ(h), inf if there is none."""
+def excess_rate(method: Any, J: Array, n: int) -> Callable[[float], float]:
+    """The rate, in [1/s], by which steps h let deviations grow faster than is allowed; a function of h.
+
+    Args: As of `longest_step`.
+    """
+    from scipy.linalg import schur
+
+    T, Z = cast(tuple[Array, Array], schur(J, "complex"))
+    rates, made = T.diagonal(), step_map(method, J, n)
+    allowed = _GROWS * np.maximum(0.0, rates.real) + _AMPLIFIES * np.abs(rates).max()
+    of_each = _acts_on_each(method, J, n)
+
+    def excess(h: float) -> float:
+        try:
+            with np.errstate(all="ignore"):
+                if of_each:  # Φ(h) = R(h J) is triangular in the basis in which J is
+                    grown = np.log(np.abs(np.einsum("ji,jk,ki->i", Z.conj(), made(h), Z)))
+                    return _largest(grown / h - allowed)
+                grown = np.log(np.sort(np.abs(np.linalg.eigvals(made(h)))))
+                return _largest(np.where(grown < _ROUNDED, 0.0, grown / h) - np.sort(allowed))
+        except (RobotDynError, np.linalg.LinAlgError):
+            return inf
+
+    return excess
+
+
+def _largest(rates: Array) -> float:
+    """The largest of some rates, inf where one is none."""
+    return inf if np.isnan(rates).any() else float(rates.max())
+
+
+def _acts_on_each(method: Any, J: Array, n: int) -> bool:
+    """Whether Φ(h) is a function of h J: a method that treats positions and velocities alike does not read n."""
+    h = _SMOOTH / max(STILL, float(np.abs(np.linalg.eigvals(J)).max()))
     try:
-        with np.errstate(all="ignore"):
-            return float(np.abs(np.linalg.eigvals(matrix(h))).max())
-    except (RobotDynError, np.linalg.LinAlgError):
-        return inf
+        return np.array_equal(step_map(method, J, n)(h), step_map(method, J, 0)(h))
+    except RobotDynError:
+        return False
 
 
 def step_map(method: Any, J: Array, n: int) -> Callable[[float], Array]:
@@ -129,7 +162,7 @@ def step_map(method: Any, J: Array, n: int) -> Callable[[float], Array]:
 
 def after(factor: float, times: float) -> float:
     """factor^times, at most e^690 = 4.6e299."""
-    return exp(min(times * log(factor), _LARGEST)) if factor > 0 and times else float(not times)
+    return exp(min(times * log(factor), LARGEST)) if factor > 0 and times else float(not times)
 
 
 def periods(duration_s: float, period_s: float) -> int:
@@ -139,7 +172,7 @@ def periods(duration_s: float, period_s: float) -> int:
 
 def shown(factor: float) -> str:
     """A factor in four digits, or as 1 and two digits; as a bound if it is the largest that is told."""
-    if factor >= exp(_LARGEST):
+    if factor >= exp(LARGEST):
         return "more than 1e+299"
     return f"1 + {factor - 1:.2g}" if 0 < factor - 1 < _BAND else f"{factor:.4g}"
 
