@@ -2,7 +2,8 @@
 
 With e(h) = q_h − q the error of a run of step h:
 
-    order seen   |e(h)| ≈ |q_h − q_2h| / (2ᵖ − 1), where |q_h − q_3h| / |q_h − q_2h| is near (3ᵖ − 1) / (2ᵖ − 1)
+    order seen   |e(h)| ≈ |q_h − q_2h| / (2ᵖ − 1), where |q_h − q_mh| / |q_h − q_2h| is near (mᵖ − 1) / (2ᵖ − 1),
+                 m = 3 and 5: two of three companions may agree by chance
     bounded      |e(h)| ≤ about max |q_h − q_mh| / (m − 1) over m = 2, 3, 5: undivided but for the order 1 that every
                  method keeps; steps of incommensurate lengths do not meet a switch at the same node
     none         where the companions differ by more than a tenth of the motion, or 0.1 rad or m
@@ -28,7 +29,7 @@ ROUNDING = 4500  # units of rounding of q, or as many as steps if there are more
 COARSE = (Fraction(2), Fraction(3), Fraction(5))
 FINE = (Fraction(1, 2), Fraction(1, 3))
 _UNITS = 100.0  # of rounding, that ten steps may leave in q
-_BAND = 2.0  # a ratio of differences may be this factor off the one of the method's order
+_BANDS = 2.0, 8.0  # a ratio of differences, of 3 and of 5, may be this factor off the one of the method's order
 _ROWS = 2000  # of an estimate, at most
 _FAR_OFF = 8.0  # times the bound of the others: above, the longest step is no longer in the range of the method
 _DOUBT = 3.0  # times what follows from the order of the method: above, shorter steps are needed
@@ -59,9 +60,12 @@ class Estimated:
         A, B, C = (differences(self.path, companions[pace], self.n) for pace in COARSE)
         bound = np.maximum(A, B / 2)  # nan after the end of a companion that ended early
         bound = np.fmax(bound, np.minimum(C / 4, _FAR_OFF * bound))
-        ratio = np.maximum(B, self.floor) / np.maximum(A, self.floor)
-        nominal = (3.0**order - 1) / (2.0**order - 1)
-        order_seen = (ratio > nominal / _BAND) & (ratio < nominal * _BAND) | (self.floor >= A)
+        order_seen = np.ones(len(A), bool)
+        for far, pace, band in zip((B, C), COARSE[1:], _BANDS, strict=True):
+            nominal = (float(pace) ** order - 1) / (2.0**order - 1)
+            ratio = np.maximum(far, self.floor) / np.maximum(A, self.floor)
+            order_seen &= (ratio > nominal / band) & (ratio < nominal * band)
+        order_seen |= self.floor >= A
         return self._judged(np.where(self._smooth(order_seen), A / (2.0**order - 1), bound), bound, order_seen)
 
     def doubts(self, result: ErrorEstimate, companions: Mapping[Fraction, Path], order: int) -> bool:
