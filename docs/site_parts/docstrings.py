@@ -12,6 +12,7 @@ from sphinx.domains.python import PyObject
 
 SECTION = re.compile(r"^(Args|Arguments|Attributes|Returns|Yields|Raises|Note|Example|Examples|Warns):$")
 MARKUP = re.compile(r"([|*_\\])")
+LETTER = re.compile(r"(?<=: )(?=\w\.$)")  # "runs: N." would begin an enumeration
 
 
 def escaped(lines: list[str]) -> list[str]:
@@ -36,7 +37,7 @@ def escaped(lines: list[str]) -> list[str]:
 def _escape(line: str) -> str:
     """Code in backticks stays code; between it, signs that mean something to reStructuredText are themselves."""
     parts = re.split(r"`+([^`]+)`+", line)
-    parts[::2] = [MARKUP.sub(r"\\\1", part) if not SECTION.match(line) else part for part in parts[::2]]
+    parts[::2] = [LETTER.sub(r"\\", MARKUP.sub(r"\\\1", x)) if not SECTION.match(line) else x for x in parts[::2]]
     parts[1::2] = [f"``{part}``\\ " if _glued(after) else f"``{part}``" for part, after in _pairs(parts)]
     return _heading(_keywords("".join(parts)))
 
@@ -68,4 +69,5 @@ def setup(app: Any) -> None:
 
 
 def _process(app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:
-    lines[:] = escaped(lines)
+    # of an attribute napoleon takes what stands before a colon in the first line for its type
+    lines[:] = [*["\\ "] * (what in ("attribute", "data", "property")), *escaped(lines)]

@@ -12,6 +12,7 @@ from robot_dyn.errors import SweepError
 from robot_dyn.extras import needs
 from robot_dyn.files import Kind, save, target
 from robot_dyn.sweeps.folder.folder import Folder, read_all
+from robot_dyn.sweeps.folder.rows import TEXTS
 from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep, heading
 
 _CSV, _PARQUET = Kind("a table", ".csv"), Kind("a table", ".parquet", b"PAR1")
@@ -28,7 +29,8 @@ def _tables(sweep: Sweep, folder: Folder) -> Iterator[Mapping[str, np.ndarray]]:
     """Of each chunk, with units in the headings."""
     for rows in read_all(folder):
         run = {"run": np.arange(rows.start, rows.start + len(rows))}
-        ends = {"outcome": np.array(OUTCOMES)[rows.outcome], "ended": rows.ended, "reason": rows.reason}
+        ends = {"outcome": np.array(OUTCOMES)[rows.outcome], "ended": rows.ended}
+        ends |= {name: getattr(rows, name) for name in TEXTS}
         table = run | rows.varied | rows.figures | ends
         yield {heading(sweep, name): column for name, column in table.items()}
 
@@ -52,7 +54,7 @@ def _parquet(tables: Iterator[Mapping[str, np.ndarray]], stream: BinaryIO) -> No
     pa, parquet = needs("pyarrow", extra="data"), needs("pyarrow.parquet", extra="data")
     writer = None
     for each in tables:
-        strings = {name: pa.array(each[name].astype(str).tolist(), pa.string()) for name in ("outcome", "reason")}
+        strings = {name: pa.array(each[name].astype(str).tolist(), pa.string()) for name in ("outcome", *TEXTS)}
         table = pa.table(dict(each) | strings)
         writer = writer or parquet.ParquetWriter(stream, table.schema)
         writer.write_table(table)

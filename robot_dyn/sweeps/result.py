@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
@@ -12,11 +11,14 @@ import numpy as np
 
 from robot_dyn.answer import Answer, Block
 from robot_dyn.errors import SweepError, nearest, shown
+from robot_dyn.queries.units import joint_types_of, units
 from robot_dyn.result import UNREPORTED, reported
+from robot_dyn.simulation.columns import LONG_NAMES
 from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.sweeps import counts
 from robot_dyn.sweeps.expression import Expression, Truth
 from robot_dyn.sweeps.folder.folder import Folder, read_all
-from robot_dyn.sweeps.folder.rows import FINISHED, digest_of
+from robot_dyn.sweeps.folder.rows import FINISHED, TEXTS, digest_of
 from robot_dyn.sweeps.plan.specification import specification
 from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep
 from robot_dyn.sweeps.plan.work import Work
@@ -53,12 +55,12 @@ class SweepResult(Answer):
         return self.folder.missing()
 
     def table(self, *names: str) -> dict[str, np.ndarray]:
-        """Columns of all runs, (N,) by name: "run", what varies, figures, "outcome", "ended", "reason".
+        """Columns of all runs, (N,) by name: "run", what varies, figures, "outcome", "ended", "reason", "remarks".
 
         Their units are in `units`, and in the headings of `export`.
         """
         self._check_complete()
-        known = ("run", *self.sweep.columns, *self.sweep.figures, "outcome", "ended", "reason")
+        known = ("run", *self.sweep.columns, *self.sweep.figures, "outcome", "ended", *TEXTS)
         names = names or known
         for name in names:
             if name not in known:
@@ -140,11 +142,16 @@ class SweepResult(Answer):
         """Samples of runs as a lazy `xarray.Dataset` over run, t and joint, nan where a run was not kept.
 
         Raises:
-            SweepError: If the sweep keeps none.
+            SweepError: If the sweep keeps none, or a file of them is missing.
         """
         if self.folder.samples is None:
             raise SweepError("no samples are kept: give the Sweep samples='q', or sw.samples('q', every=100)")
-        return self.folder.samples.open()
+        self._check_complete()
+        self.folder.check_samples(bits=False)
+        found, types = self.folder.samples.open(), joint_types_of(self.sweep.setup.plant.dynamics)
+        for name in found.data_vars:
+            found[name].attrs |= {"units": units(name, types), "long_name": LONG_NAMES[name]}
+        return found.assign_coords(run=np.arange(self.sweep.runs))
 
     def export(self, path: str | Path) -> Path:
         """Write the table of all runs to a .csv or .parquet file, whole or not at all.
@@ -182,18 +189,13 @@ class SweepResult(Answer):
             SweepError: If a file is missing, damaged, or was changed.
         """
         self._check_complete()
+        self.folder.check_samples(bits=True)
         return digest_of(read_all(self.folder))
 
     @property
     def processors(self) -> dict[str, int]:
         """Number of chunks by processor; the last bits of rows may differ between processors of other features."""
-        found: dict[str, int] = {}
-        for chunk in np.flatnonzero(self.folder.present()).tolist():
-            footer = self.folder.footer(chunk)
-            features = sha256(str(footer.get("features")).encode()).hexdigest()[:8]
-            name = f"{footer.get('processor')} (features {features})"
-            found[name] = found.get(name, 0) + 1
-        return found
+        return counts.processors(self.folder)
 
     @reported
     def status(self) -> dict[str, int]:
@@ -218,12 +220,14 @@ class SweepResult(Answer):
         outcome = self._outcome()
         return {name: int((outcome == k).sum()) for k, name in enumerate(OUTCOMES)}
 
+    @reported
+    def remarks(self) -> dict[str, int] | None:
+        """Number of runs by remark, as of `Rollouts.remarks`, the most frequent first; None where chunks are left."""
+        return None if len(self.missing) else counts.remarks(self.folder)
+
     def reasons(self) -> dict[str, int]:
         """Number of runs by reason of failure, the most frequent first."""
-        columns = self.folder.columns(("outcome", "reason"))
-        texts, counts = np.unique(columns["reason"][columns["outcome"] != FINISHED].astype(str), return_counts=True)
-        order = np.argsort(-counts, kind="stable")
-        return {str(texts[k]): int(counts[k]) for k in order}
+        return counts.reasons(self.folder)
 
     @property
     def title(self) -> str:
@@ -239,6 +243,8 @@ class SweepResult(Answer):
             yield f"rows of several processors, whose last bits may differ: {', '.join(processors)}"
         for text, count in list(self.reasons().items())[:_SHOWN]:
             yield f"{count} times: {text}"
+        for text, count in (self.remarks or {}).items():
+            yield f"remark on {count} of {self.sweep.runs} runs: {text}"
 
     def _check_complete(self) -> None:
         if len(missing := self.missing):

@@ -114,10 +114,29 @@ def test_noise_is_told_with_its_deviation_and_the_acceleration_it_makes(deviatio
     rng = np.random.default_rng(3)
     noisy = REST + deviation * rng.normal(size=REST.shape)
     (found,) = [x for x in rd.plan.from_samples(ARM, noisy, time=T, ends="rest").findings if "noise" in x]
-    said = re.search(r"noise or rounding of (\S+) rad makes accelerations of (\S+) rad/s²", found)
+    said = re.search(r"noise or rounding of (\S+) rad, or times that are off, make accelerations of (\S+) rad", found)
     assert said is not None
     assert float(said[1]) == pytest.approx(deviation, rel=0.5)
     assert float(said[2]) == pytest.approx(np.sqrt(6) * deviation / T[1] ** 2, rel=0.35)
+
+
+@pytest.mark.parametrize("kept", [np.arange(81) != 40, abs(np.arange(81) - 40) > 8, (np.arange(81) % 2 == 0) | (T < 1)])
+def test_noise_is_told_where_samples_are_missing(kept: np.ndarray) -> None:
+    """One sample, a gap, and half the rate: divided differences of independent errors have a known deviation."""
+    noisy = REST + 1e-3 * np.random.default_rng(4).normal(size=REST.shape)
+    text = " ".join(rd.plan.from_samples(ARM, noisy[kept], time=T[kept], ends="rest").findings)
+    said = re.search(r"noise or rounding of (\S+) rad", text)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(1e-3, rel=0.5)
+    assert "noise" not in " ".join(rd.plan.from_samples(ARM, REST[kept], time=T[kept], ends="rest").findings)
+
+
+def test_times_that_are_off_are_told_as_noise_and_uneven_ones_are_not() -> None:
+    rng = np.random.default_rng(5)
+    off = T + 0.2 * T[1] * rng.uniform(-1, 1, len(T)) * (T > 0)
+    assert "times that are off" in " ".join(rd.plan.from_samples(ARM, SMOOTH, time=off, ends="measured").findings)
+    there = np.sin(np.outer(off, [0.5, 0.6, 0.7, 0.8, 0.9, 1.0]) + np.arange(6))
+    assert not rd.plan.from_samples(ARM, there, time=off, ends="measured").findings
 
 
 def test_rounding_of_a_log_is_told_and_a_smooth_one_is_not_called_noisy() -> None:
@@ -182,6 +201,11 @@ def test_what_is_doubtful_is_found(source: dict, options: dict[str, Any], messag
     ("source", "options", "message"),
     [
         (table(np.degrees(SMOOTH)), {}, "angles look like degrees: shoulder_pan_joint is at up to 48"),
+        (
+            table(np.where(np.arange(6) == 2, np.degrees(SMOOTH), SMOOTH)),
+            {},
+            r"degrees: elbow.* if those of shoulder_pan_joint are, too, else head columns as 'elbow_joint \[deg\]'",
+        ),
         (table(REST, ("elbow", *NAMES[1:])), {}, "column 'elbow' is of no joint; nearest: elbow_joint"),
         ({name: x for name, x in table(REST).items() if name != NAMES[5]}, {}, "no column of wrist_3_joint; nearest:"),
         (table(REST) | {"t": np.where(T == 1, 0.9, T)}, {}, r"times must increase: sample 41 is at 0\.9 s"),

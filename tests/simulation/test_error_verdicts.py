@@ -130,9 +130,7 @@ def test_a_switch_in_the_last_step_ends_the_estimate() -> None:
 
 @pytest.mark.parametrize(("seed", "index"), [(31, 32), (20261126, 230), *long([(31, 46), (41, 3)])])
 def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None:
-    """A swing, bristles and stops whose longer steps show another order for a while, by chance that of the method, or
-    magnify rounding.
-    """
+    """A swing, bristles and stops; longer steps show another order, or by chance that one, or magnify rounding."""
     judged = judge(seed, index, scene_of_all)
     assert judged.run.error.verdict is Verdict.ORDER, str(judged)
     assert "rounding" not in judged.run.error.note

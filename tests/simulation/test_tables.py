@@ -80,6 +80,19 @@ def test_a_row_of_a_batch_has_rms_and_extremes_up_to_the_end_of_its_run(batch) -
     assert table["number of remarks"].tolist() == counts
 
 
+def test_what_was_swept_has_its_unit() -> None:
+    params = {
+        "payload_mass:tip": [0.1, 0.2],
+        "viscous_friction.damping": [[0.4, 0.05], [0.5, 0.06]],
+        "mass_scale": [1.0, 1.1],
+    }
+    arm = rd.load("planar_2r").with_(payload=rd.Payload("tip", 0.1))
+    plant = rd.Plant(arm, [rd.effects.ViscousFriction([0.4, 0.05])])
+    headings = list(rd.rollouts(plant, [0.3, 0.2], params=params, duration_s=0.01).table())
+    damping = [f"viscous_friction.damping {name} [N m s/rad]" for name in arm.joint_names]
+    assert headings[1:5] == ["payload_mass:tip [kg]", *damping, "mass_scale"]
+
+
 def test_a_run_that_recorded_nothing_has_no_rms() -> None:
     runs = rd.rollouts(replace(SETUP, integrator="rk4"), record=("q",), params={"kp": [90.0, 45.0]})
     assert not [heading for heading in runs.table() if heading.startswith("rms")]

@@ -193,7 +193,7 @@ def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
 
 def test_a_disk_without_room_is_said_before_the_start(tmp_path: Path) -> None:
     sweep = swept(tmp_path, 10**14, design="random")
-    assert sweep.bytes_expected == 10**14 * (8 * 9 + 5)  # 5 numbers that vary, 3 figures, the end; outcome and reason
-    with pytest.raises(SweepError, match=r"the sweep will take 7\.17e\+06 GiB, and .* has"):
+    assert sweep.bytes_expected == 10**14 * (8 * 9 + 9)  # 5 numbers that vary, 3 figures, the end; outcome, texts
+    with pytest.raises(SweepError, match=r"the sweep will take 7\.54e\+06 GiB, and .* has"):
         sw.run(sweep, tmp_path / "out")
     assert not (tmp_path / "out").exists()

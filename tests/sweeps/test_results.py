@@ -16,6 +16,22 @@ from robot_dyn.errors import SweepError
 from robot_dyn.sweeps.plan.work import Work
 from tests.sweeps.swept import SCENE, VARY, scene, swept
 
+WEAK = """
+robot = "planar_2r"
+duration_s = 0.2
+method = "rk4"
+step_s = 0.002
+record_period_s = 0.02
+start = {q = [0.4, 0.3]}
+effect = [
+  {kind = "gravity"},
+  {kind = "effort_limit", limit_N_m = [1.5, 8.0]},
+  {kind = "dry_friction", level_N_m = [1.0, 3.0]},
+]
+control = {kind = "pd", kp = 20.0, kd = 2.0}
+reference = {kind = "quintic", q = {joint_1 = 0.5, joint_2 = 0.31}, duration_s = 0.2}
+"""
+
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> sw.SweepResult:
@@ -32,6 +48,22 @@ def test_runs_that_fail_are_rows_with_a_reason(done: sw.SweepResult) -> None:
     assert all("mass_scale must be positive" in text for text in table["reason"][raised])
     assert np.isnan(table["error"][failed]).all() and np.isfinite(table["error"][~failed]).all()
     assert sum(done.reasons().values()) == failed.sum()
+
+
+def test_remarks_of_rows_are_those_of_rollouts(tmp_path: Path) -> None:
+    """A weak motor, and friction that holds a joint in some runs; of each run alone, whatever the chunks."""
+    path = scene(tmp_path, WEAK)
+    plan = sw.Sweep(str(path), 60, {"mass_scale": sw.uniform(low=0.2, high=3.0)}, {"error": sw.rms_error()}, seed=3)
+    done = sw.run(plan, tmp_path / "a", chunk=60)
+    rows = done.table("mass_scale", "remarks")
+    runs = rd.rollouts(plan.setup, params={"mass_scale": rows["mass_scale"]})
+    assert rows["remarks"].tolist() == runs.table()["remarks"].tolist()
+    assert sw.run(plan, tmp_path / "b", chunk=7).table("remarks")["remarks"].tolist() == rows["remarks"].tolist()
+    for text, count in (done.remarks or {}).items():
+        assert count == sum(text in each for each in rows["remarks"])
+        assert f"remark on {count} of 60 runs: {text}" in str(done)
+    kinds = " ".join(done.remarks or {})
+    assert "effort_limit_reached" in kinds and "held_while_reference_moves" in kinds
 
 
 def test_quantiles_count_failures_as_infinite(done: sw.SweepResult) -> None:
@@ -110,7 +142,7 @@ def test_a_csv_holds_the_table_to_the_bit(done: sw.SweepResult, tmp_path: Path) 
     table = done.table()
     assert len(rows) == 400 and list(rows[0]) == [
         *("run", "viscous_friction.damping [N m s/rad]", "q0[0] [rad]", "q0[1] [rad]", "mass_scale", "kd [N m s/rad]"),
-        *("error [rad]", "peak [rad/s]", "end [rad]", "outcome", "ended [s]", "reason"),
+        *("error [rad]", "peak [rad/s]", "end [rad]", "outcome", "ended [s]", "reason", "remarks"),
     ]
     for heading, x in zip(rows[0], table.values(), strict=True):
         if x.dtype.kind == "f":

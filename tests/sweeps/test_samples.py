@@ -22,7 +22,8 @@ def test_samples_are_those_of_the_runs(tmp_path: Path, chunk: int) -> None:
     done = sw.run(sweep, tmp_path / "out", chunk=chunk)
     data, table = done.samples(), done.table("outcome")
     assert data.q.dims == ("run", "t", "joint") and dict(data.sizes) == {"run": 150, "t": 51, "joint": 2}
-    assert data.joint.values.tolist() == ["joint_1", "joint_2"]
+    assert data.joint.values.tolist() == ["joint_1", "joint_2"] and data.run.values.tolist() == list(range(150))
+    assert (data.q.attrs["units"], data.u.attrs["units"]) == ("rad", "N m")
     assert np.isnan(data.q.values[np.arange(150) % 3 != 0]).all()
     for i in (0, 63, 147):
         run = done.run(i)
@@ -51,6 +52,21 @@ def test_samples_have_the_same_bits_in_other_chunks_and_are_resumed(tmp_path: Pa
     done.folder.file(3).unlink()
     done = sw.run(sw.read(tmp_path / "b").sweep, tmp_path / "b")
     np.testing.assert_array_equal(done.samples().q.values, whole)
+
+
+def test_samples_that_are_missing_or_changed_are_found(tmp_path: Path) -> None:
+    done = sw.run(swept(tmp_path, 40, samples=sw.samples("q", "v")), tmp_path / "out", chunk=10)
+    digest, shard = done.verify(), tmp_path / "out" / "samples" / "v" / "c" / "2" / "0" / "0"
+    data = bytearray(shard.read_bytes())
+    data[len(data) // 2] ^= 1
+    shard.write_bytes(bytes(data))
+    with pytest.raises(SweepError, match=r"v/c/2/0/0: was changed after it was written; remove the rows of chunk 2"):
+        done.verify()
+    shard.unlink()
+    with pytest.raises(SweepError, match=r"v/c/2/0/0: is missing"):
+        done.samples()
+    done.folder.file(2).unlink()
+    assert sw.run(done.sweep, tmp_path / "out").verify() == digest
 
 
 def test_what_cannot_be_kept_is_refused(tmp_path: Path) -> None:

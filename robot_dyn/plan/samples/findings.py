@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,7 +27,7 @@ _LATE_S, _LATE = 1000.0, 10  # a later start, by so many durations, is that of a
 _ROUNDING = 1e-9  # of a limit that a sample may pass
 DENSE = 16  # samples from which ends at rest, noise, and an error, can be judged
 _AT_REST = 0.05  # of the largest speed of a joint
-_EVEN, _NOISY = 1.5, 0.1  # ratio of steps that are even; part of the rms acceleration that noise may be
+_NOISY = 0.1  # part of the rms acceleration that noise may be
 _ROUNDED = 1e-12  # [rad] or [m]: float64, and no sensor
 
 
@@ -98,12 +99,16 @@ def _refuse_degrees(arm: Robot, table: Columns) -> None:
     fast = ((speed > _limit(arm)) & ~turns).mean(axis=0) > _MANY
     beyond = (far > np.where(np.isfinite(most), _FAR * most, _TURNS)) & ~turns.any(axis=0)
     fits = (far * _DEGREE <= np.where(np.isfinite(most), most, np.inf)) | ~unknown
-    for i in np.flatnonzero((beyond | fast) & unknown)[:1]:
+    of_degrees = (beyond | fast) & unknown
+    for i in np.flatnonzero(of_degrees)[:1]:
         if fits.all():
-            what = f"{arm.joint_names[i]} is at up to {far[i]:.4g}, moving at up to {speed[:, i].max():.4g} a second"
+            name = arm.joint_names[i]
+            what = f"{name} is at up to {far[i]:.4g}, moving at up to {speed[:, i].max():.4g} a second"
+            remedy, others = "give unit='deg'", np.flatnonzero(unknown & ~of_degrees)
+            if len(others):
+                remedy += f" if those of {arm.joint_names[others[0]]} are, too, else head columns as '{name} [deg]'"
             raise PlanError(
-                f"angles look like degrees: {what}; give unit='deg', or unit='rad' if they are"
-                " not; --unit on the command line"
+                f"angles look like degrees: {what}; {remedy}, or unit='rad' if none are; --unit on the command line"
             )
 
 
@@ -195,22 +200,42 @@ def _ends(arm: Robot, table: Columns) -> Iterator[str]:
 def _noise(arm: Robot, table: Columns) -> Iterator[str]:
     """The joint whose acceleration noise or rounding determines most.
 
-    Independent errors of deviation σ have fourth differences of variance 70 σ² and second ones of 6 σ², while those of
-    a smooth motion vanish with the step as its fourth power and its square.
+    Of a smooth motion fourth divided differences vanish with the step as its fourth power, beside those of independent
+    errors of deviation σ, which are σ times the norm of their weights; second ones are halves of accelerations.
     """
-    dt = np.diff(table.t)
-    if len(table.t) < DENSE or dt.max() > _EVEN * dt.min():
+    if len(table.t) < DENSE:
         return
-    fourth, second = (np.sqrt((np.diff(table.q, r, axis=0) ** 2).mean(axis=0)) for r in (4, 2))
-    noise, step = fourth / np.sqrt(70), float(np.median(dt))
+    fourth, second = _divided(table, 4), _divided(table, 2)
+    if not min(len(fourth.norms), len(second.norms)):
+        return
+    noise = np.sqrt(((fourth.values / fourth.norms[:, None]) ** 2).mean(axis=0))
+    by_noise = 2 * noise * np.sqrt((second.norms**2).mean())
     with np.errstate(invalid="ignore", divide="ignore"):
-        part = np.nan_to_num(np.minimum(np.sqrt(6) * noise / second, 1.0))
+        part = np.nan_to_num(np.minimum(by_noise / (2 * np.sqrt((second.values**2).mean(axis=0))), 1.0))
     part[noise < _ROUNDED] = 0.0  # of joints that rest
     i = int(part.argmax())
     if part[i] > _NOISY:
-        unit = of_joint("rad", arm.joint_types[i])
+        unit, others = of_joint("rad", arm.joint_types[i]), int((part > _NOISY).sum()) - 1
+        also = f" ({others} other joint{'s' * (others > 1)} alike)" * bool(others)
         yield (
-            f"{arm.joint_names[i]}: noise or rounding of {noise[i]:.1g} {unit} makes accelerations of"
-            f" {np.sqrt(6) * noise[i] / step**2:.2g} {unit}/s², {part[i]:.0%} of those of the samples, and torques with"
+            f"{arm.joint_names[i]}{also}: noise or rounding of {noise[i]:.1g} {unit}, or times that are off, make"
+            f" accelerations of {by_noise[i]:.2g} {unit}/s², {part[i]:.0%} of those of the samples, and torques with"
             " them; smooth the samples first, as scipy.signal.savgol_filter does"
         )
+
+
+class _Divided(NamedTuple):
+    """Divided differences Σ_j w_j q_j of neighbouring samples: values, (k, n), and norms of their weights w, (k,)."""
+
+    values: np.ndarray
+    norms: np.ndarray
+
+
+def _divided(table: Columns, order: int) -> _Divided:
+    """Divided differences of an order, without those that span a gap."""
+    t = np.lib.stride_tricks.sliding_window_view(table.t, order + 1)
+    t = t[np.diff(t).max(axis=1) <= _GAP * np.median(np.diff(table.t))]
+    at = np.searchsorted(table.t, t)
+    apart = t[:, :, None] - t[:, None, :] + np.eye(order + 1)
+    weights = 1 / apart.prod(axis=2)
+    return _Divided(np.einsum("kj,kji->ki", weights, table.q[at]), np.sqrt((weights**2).sum(axis=1)))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, final
 
 import numpy as np
 
+from robot_dyn.coefficients import with_values
+from robot_dyn.effects.dry_friction import DryFriction
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, jumps
 from robot_dyn.simulation.diagnostics.step_remarks import KINDS, Units, against, of_reference, of_steps, units_of
@@ -59,6 +61,21 @@ def overview(runs: Rollouts) -> Overview:
     if runs.setup is not None:
         remarks = (*remarks, *_of_references(runs, runs.setup), *_linearised(runs, worst))
     return Overview(worst, remarks, errors)
+
+
+def remarks_on_each(runs: Rollouts) -> tuple[Remark, ...]:
+    """The remarks that a run has whatever the others of its batch are, without remedies."""
+    found = () if runs.observed is None else tuple(counted(runs, runs.observed, lambda _: lambda _: ""))
+    return found if runs.setup is None else (*found, *_of_references(runs, runs.setup))
+
+
+def texts_by_run(remarks: Iterable[Remark], count: int) -> list[str]:
+    """What the remarks on each of so many runs are about, such as "effort_limit_reached u elbow"; empty for none."""
+    of_run: list[list[str]] = [[] for _ in range(count)]
+    for each in remarks:
+        for run in each.runs:
+            of_run[run].append(f"{each.kind} {each.quantity} {each.joint}")
+    return ["; ".join(texts) for texts in of_run]
 
 
 def of_some(runs: Rollouts, numbers: range, whole: Overview) -> Overview:
@@ -137,18 +154,22 @@ def counted(runs: Rollouts, of: Observed, remedy: Callable[[int], Callable[[Epis
 
 def _of_references(runs: Rollouts, setup: Setup) -> Iterator[Remark]:
     """Remarks on the reference, which all runs share: where it jumps from their starts, which joints friction holds."""
+    from robot_dyn.simulation.rollouts.batch import parts_of_run
+
     q0 = np.tile(setup.q0, (len(runs), 1)) if runs.q0 is None else runs.q0
     v0 = np.tile(setup.v0, (len(runs), 1)) if runs.v0 is None else runs.v0
     for remark, gaps in jumps(setup, q0, v0, units(runs)):
         yield _in_runs(remark, int(gaps.argmax()), gaps > 0)
-    if runs.observed is None:
+    if runs.observed is None or not any(isinstance(each, DryFriction) for each in setup.plant.effects):
         return
     extremes, of = runs.observed.extremes, dict[str, list[tuple[int, Remark]]]()
     for run in map(int, np.flatnonzero(at_rest(extremes).any(axis=1))):
-        for remark in held(runs.setup_of(run), extremes[run], runs.t[runs.t <= runs.ended[run]], units(runs)):
+        plant, controller = parts_of_run(setup, {name: x[run] for name, x in runs.params.items()}, run)
+        of_run = with_values(setup, {"plant": plant, "controller": controller, "q0": q0[run]})  # all was checked
+        for remark in held(of_run, extremes[run], runs.t[runs.t <= runs.ended[run]], units(runs)):
             of.setdefault(remark.joint, []).append((run, remark))
     for each in of.values():
-        worst, remark = max(each, key=lambda of_run: of_run[1].limit or 0.0)
+        worst, remark = max(each, key=lambda pair: pair[1].limit or 0.0)
         yield _in_runs(remark, worst, np.isin(np.arange(len(runs)), [run for run, _ in each]))
 
 

@@ -74,10 +74,12 @@ def sweepable(what: Setup | Plant | Dynamics) -> Sweepable:
     plant = setup.plant if setup is not None else what if isinstance(what, Plant) else Plant(what)  # pyright: ignore[reportArgumentType]
     controller = None if setup is None else setup.controller
     known = sweepable_parameters(plant.dynamics, plant.effects, controller)
-    return Sweepable(tuple({each.name: _swept(each, plant.dynamics) for each in reversed(known)}.values())[::-1])
+    found = {each.name: swept_parameter(each, plant.dynamics) for each in reversed(known)}
+    return Sweepable(tuple(found.values())[::-1])
 
 
-def _swept(known: Any, dynamics: Any) -> SweptParameter:
+def swept_parameter(known: Any, dynamics: Any) -> SweptParameter:
+    """A parameter as `robot_dyn.codegen.parameters` has it, with its unit."""
     types = joint_types_of(dynamics)
     of_joints, size = known.declared.of_joints, known.value.size
     signal = SIGNALS.get(known.name.partition(".")[0], SIGNAL)

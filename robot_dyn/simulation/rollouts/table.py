@@ -11,7 +11,9 @@ from robot_dyn.queries.units import of_joint, unit, units
 from robot_dyn.simulation.columns import LONG_NAMES, Column, Variable
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_squares
+from robot_dyn.simulation.rollouts.overview import texts_by_run
 from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.rollouts.sweepable import swept_parameter
 
 Types = Mapping[str, str | None]  # of joints, by name
 
@@ -65,10 +67,9 @@ def _tracking_unit(runs: Rollouts, types: Types) -> str:
 
 def _of_remarks(runs: Rollouts) -> Iterator[Column]:
     """How many remarks are about a run, and what they are about."""
-    about = [(set(each.runs), f"{each.kind} {each.quantity} {each.joint}") for each in runs.remarks]
-    of_run = [[text for of, text in about if i in of] for i in range(len(runs))]
-    yield Column("number of remarks", np.array([len(texts) for texts in of_run]))
-    yield Column("remarks", np.array(["; ".join(texts) for texts in of_run]))
+    texts = texts_by_run(runs.remarks, len(runs))
+    yield Column("number of remarks", np.array([text.count(";") + 1 if text else 0 for text in texts]))
+    yield Column("remarks", np.array(texts))
 
 
 def _of_parameters(runs: Rollouts, types: Types) -> Iterator[Column]:
@@ -78,10 +79,13 @@ def _of_parameters(runs: Rollouts, types: Types) -> Iterator[Column]:
         () if setup is None else parameters(setup.plant.dynamics, setup.plant.effects, setup.controller, runs.params)
     )
     of_joints = {each.name: each.declared for each in known if each.declared.of_joints}
+    dynamics = None if setup is None else setup.plant.dynamics
+    about = {each.name: swept_parameter(each, dynamics).unit for each in known}
     for name, values in runs.params.items():
         columns = values.T
         if name in of_joints and len(columns) == len(types):
             for (joint, kind), x in zip(types.items(), columns, strict=True):
                 yield Column(name, x, of_joint(of_joints[name].unit, kind), joint)
         else:
-            yield from (Column(name, x, of=str(k + 1) * (len(columns) > 1)) for k, x in enumerate(columns))
+            several = len(columns) > 1
+            yield from (Column(name, x, about.get(name, ""), str(k + 1) * several) for k, x in enumerate(columns))

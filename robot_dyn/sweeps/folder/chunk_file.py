@@ -16,7 +16,7 @@ from robot_dyn.errors import SweepError
 from robot_dyn.extras import needs
 from robot_dyn.files import reading
 from robot_dyn.simulation.results.archive import Archive, ArchiveError, write
-from robot_dyn.sweeps.folder.rows import Rows
+from robot_dyn.sweeps.folder.rows import TEXTS, Rows
 
 _FOOTER = "footer"
 _REMEDY = "run the sweep again, after removing this file"
@@ -58,11 +58,12 @@ class Format:
             SweepError: If it is damaged, or of other columns.
         """
         table, footer = self.table(path, None)
-        missing = {"outcome", "ended", "reason", *names.varied, *names.figures} ^ table.keys()
+        missing = {"outcome", "ended", *TEXTS, *names.varied, *names.figures} ^ table.keys()
         if missing:
             raise SweepError(f"{path}: its columns are not those of the sweep: {min(missing)!r}; {_REMEDY}")
         varied, figures = ({name: table[name] for name in each} for each in (names.varied, names.figures))
-        return Rows(int(footer["start"]), table["outcome"], table["ended"], table["reason"], varied, figures), footer
+        ends = (table[name] for name in ("outcome", "ended", *TEXTS))
+        return Rows(int(footer["start"]), *ends, varied, figures), footer
 
     def footer(self, path: Path) -> dict[str, Any]:
         """The footer of a file; SweepError if it is damaged."""
@@ -81,18 +82,19 @@ def _of(path: Path) -> Iterator[None]:
         raise SweepError(f"{path}: is not a complete chunk ({what}); {_REMEDY}") from None
 
 
-def _dictionary(reason: np.ndarray) -> tuple[list[str], np.ndarray]:
+def _dictionary(column: np.ndarray) -> tuple[list[str], np.ndarray]:
     """The texts that occur, and the place of each row's among them."""
-    texts = sorted(set(reason.tolist()))
+    texts = sorted(set(column.tolist()))
     places = {text: k for k, text in enumerate(texts)}
-    return texts, np.array([places[text] for text in reason.tolist()], np.int32)
+    return texts, np.array([places[text] for text in column.tolist()], np.int32)
 
 
 def _npz(rows: Rows, footer: dict[str, Any]) -> bytes:
-    texts, codes = _dictionary(rows.reason)
-    columns = {f"column {name}": x for name, x in rows.columns.items()} | {"column reason": codes}
+    of = {name: _dictionary(getattr(rows, name)) for name in TEXTS}
+    columns = {f"column {name}": x for name, x in rows.columns.items()}
+    columns |= {f"column {name}": codes for name, (_, codes) in of.items()}
     stream = io.BytesIO()
-    about = json.dumps(footer | {"reasons": texts})
+    about = json.dumps(footer | {"texts": {name: texts for name, (texts, _) in of.items()}})
     write(stream, columns | {_FOOTER: np.array(about)}, compressed=False)
     return stream.getvalue()
 
@@ -106,21 +108,22 @@ def _read_npz(path: Path, names: Sequence[str] | None) -> tuple[dict[str, np.nda
         else:
             found = {f"column {name}": archive.array(f"column {name}") for name in names}
         table = {name.removeprefix("column "): x for name, x in found.items() if name != _FOOTER}
-        if "reason" in table:
-            table["reason"] = np.array(footer["reasons"], object)[table["reason"]]
+        for name in table.keys() & set(TEXTS):
+            table[name] = np.array(footer["texts"][name], object)[table[name]]
         _check_lengths(table, footer)
         return table, footer
 
 
 def _parquet(rows: Rows, footer: dict[str, Any]) -> bytes:
     pa, parquet = needs("pyarrow", extra="data"), needs("pyarrow.parquet", extra="data")
-    texts, codes = _dictionary(rows.reason)
-    run = np.arange(rows.start, rows.start + len(rows))
-    columns = {"run": run} | rows.columns
-    table = pa.table(columns | {"reason": pa.DictionaryArray.from_arrays(codes, pa.array(texts, pa.string()))})
+    columns = {"run": np.arange(rows.start, rows.start + len(rows))} | rows.columns
+    for name in TEXTS:
+        texts, codes = _dictionary(getattr(rows, name))
+        columns[name] = pa.DictionaryArray.from_arrays(codes, pa.array(texts, pa.string()))
+    table = pa.table(columns)
     table = table.replace_schema_metadata({_FOOTER: json.dumps(footer)})
     stream = io.BytesIO()
-    parquet.write_table(table, stream, compression="zstd", compression_level=1, use_dictionary=["reason"])
+    parquet.write_table(table, stream, compression="zstd", compression_level=1, use_dictionary=list(TEXTS))
     return stream.getvalue()
 
 
@@ -132,8 +135,8 @@ def _read_parquet(path: Path, names: Sequence[str] | None) -> tuple[dict[str, np
         wanted = [name for name in file.schema_arrow.names if name != "run"] if names is None else list(names)
         read = file.read(columns=wanted, use_threads=False)
         table = {name: read[name].combine_chunks().to_numpy(zero_copy_only=False).copy() for name in wanted}
-        if "reason" in table:
-            table["reason"] = table["reason"].astype(object)
+        for name in table.keys() & set(TEXTS):
+            table[name] = table[name].astype(object)
         _check_lengths(table, footer)
         return table, footer
 

@@ -23,7 +23,7 @@ from robot_dyn.errors import SweepError
 from robot_dyn.files import read, why
 from robot_dyn.sweeps.folder.chunk_file import FORMAT, Columns, Format
 from robot_dyn.sweeps.folder.files import Exclusive, Files, make_folder, remove_abandoned, write
-from robot_dyn.sweeps.folder.rows import Rows
+from robot_dyn.sweeps.folder.rows import TEXTS, Rows
 from robot_dyn.sweeps.folder.samples import SampleStore
 
 MOST_FILES = 20_000  # of a folder
@@ -109,7 +109,7 @@ class Folder:
         footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": rows.digest()}
         try:
             if self.samples is not None:
-                self.samples.write(chunk, samples, self.files)
+                footer["samples"] = self.samples.write(chunk, samples, self.files)
             write(self.file(chunk), self.format.packed(rows, footer | self.about), self.files)
         except OSError as error:
             raise SweepError(
@@ -136,8 +136,13 @@ class Folder:
         self._check(self.file(chunk), chunk, footer)
         return footer
 
+    def check_samples(self, bits: bool) -> None:
+        """Raise SweepError where samples that were written are missing, or, if `bits`, have changed."""
+        for chunk in range(self.count) if self.samples is not None else ():
+            self.samples.check(chunk, self.footer(chunk)["samples"], bits)
+
     def columns(self, names: Iterable[str]) -> dict[str, np.ndarray]:
-        """Columns of all rows, (N,), the reasons as texts; errors as of `read`."""
+        """Columns of all rows, (N,); errors as of `read`."""
         names = list(dict.fromkeys(names))
         found = {name: np.empty(self.runs, _type(name)) for name in names}
         for chunk in range(self.count):
@@ -156,7 +161,7 @@ class Folder:
 
 
 def _type(name: str) -> Any:
-    return {"outcome": np.int8, "reason": object}.get(name, float)
+    return np.int8 if name == "outcome" else object if name in TEXTS else float
 
 
 def folder_of(path: Path, data: dict[str, Any], digest: str, names: Columns, about: dict[str, Any]) -> Folder:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, final
 
@@ -55,19 +56,39 @@ class SampleStore:
         zarr = needs("zarr", extra=_EXTRA)
         return zarr.open_group(self.path, mode="r")["t"][:]
 
-    def write(self, chunk: int, kept: Mapping[str, np.ndarray], files: Files) -> None:
-        """Write the samples (k, m, n) of the runs of a chunk, nan where they are not kept; OSError if that fails."""
-        zarr = needs("zarr", extra=_EXTRA)
+    def write(self, chunk: int, kept: Mapping[str, np.ndarray], files: Files) -> dict[str, str]:
+        """Write the samples (k, m, n) of the runs of a chunk, nan where they are not kept; OSError if that fails.
+
+        Returns:
+            SHA-256 of the file of each quantity that has some.
+        """
+        zarr, digests = needs("zarr", extra=_EXTRA), dict[str, str]()
         for name, x in kept.items():
             memory = zarr.storage.MemoryStore()
             array = self._array(zarr, memory, name, np.empty(x.shape[1]), ("",) * x.shape[2])
             start = chunk * self.chunk
             array[start : start + len(x)] = x
-            folder = self.path / name / "c" / str(chunk) / "0"
-            folder.mkdir(parents=True, exist_ok=True)
+            path = self._shard(name, chunk)
+            path.parent.mkdir(parents=True, exist_ok=True)
             shard = memory._store_dict.get(f"{name}/c/{chunk}/0/0")
             if shard is not None:  # it has something
-                write(folder / "0", shard.to_bytes(), files)
+                data = shard.to_bytes()
+                write(path, data, files)
+                digests[name] = sha256(data).hexdigest()
+        return digests
+
+    def check(self, chunk: int, digests: Mapping[str, str], bits: bool) -> None:
+        """Raise SweepError where a file of a chunk is missing, or, if `bits`, is not what was written."""
+        remedy = f"remove the rows of chunk {chunk}, and run the sweep again"
+        for name, digest in digests.items():
+            path = self._shard(name, chunk)
+            if not path.is_file():
+                raise SweepError(f"{path}: is missing; {remedy}")
+            if bits and sha256(path.read_bytes()).hexdigest() != digest:
+                raise SweepError(f"{path}: was changed after it was written; {remedy}")
+
+    def _shard(self, name: str, chunk: int) -> Path:
+        return self.path / name / "c" / str(chunk) / "0" / "0"
 
     def open(self) -> Any:
         """All as a lazy `xarray.Dataset` over run, t and joint."""

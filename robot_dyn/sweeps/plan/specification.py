@@ -23,7 +23,7 @@ from robot_dyn.sweeps.plan import figures
 from robot_dyn.sweeps.plan.samples import samples
 from robot_dyn.sweeps.plan.sweep import Sweep
 
-FORMAT = 1
+FORMAT = 2
 _PLACES = ("scene",)  # that may differ: where the scene lies
 
 

@@ -17,6 +17,7 @@ from robot_dyn.simulation.rollouts.sweepable import sweepable
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.sweeps.designs import Design, design
 from robot_dyn.sweeps.distributions import Distribution, distribution
+from robot_dyn.sweeps.folder.rows import TEXTS
 from robot_dyn.sweeps.imported import imported, path_of
 from robot_dyn.sweeps.plan.figures import Figure, figure
 from robot_dyn.sweeps.plan.samples import Samples, samples_of
@@ -26,7 +27,7 @@ from robot_dyn.values import Caching, Value
 READER = "robot_dyn.scene.scene:read_scene"  # of scenes, a room above: it is named as users' functions are
 STARTS = ("q0", "v0")
 OUTCOMES = ("finished", "diverged", "raised")
-RESERVED = ("run", "outcome", "ended", "reason", "failed", *OUTCOMES)
+RESERVED = ("run", "outcome", "ended", *TEXTS, "failed", *OUTCOMES)
 FORMATS = ("npz", "parquet")
 
 
@@ -147,8 +148,8 @@ class Sweep(Answer, Value, Caching):
 
     @cached_property
     def bytes_expected(self) -> int:
-        """What its rows and samples take on disk, at most but for footers and reasons."""
-        rows = 8 * (len(self.columns) + len(self.figures) + 1) + 5
+        """What its rows and samples take on disk, at most but for footers and texts."""
+        rows = 8 * (len(self.columns) + len(self.figures) + 1) + 1 + 4 * len(TEXTS)
         if self.samples is None or self.samples.failed:
             return self.runs * rows
         numbers = samples_of_run(self.setup) * self.setup.plant.dynamics.n * len(self.samples.names)

@@ -16,6 +16,7 @@ from robot_dyn.errors import RobotDynError, SweepError, because
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES
+from robot_dyn.simulation.rollouts.overview import remarks_on_each, texts_by_run
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.rollouts import batch_of, manners, run_batch
 from robot_dyn.simulation.setup.size import MOST_BYTES
@@ -134,6 +135,7 @@ class Work:
         """Rows of runs that were made; figures of those that finished."""
         rows.outcome[at] = np.where(result.diverged, DIVERGED, FINISHED)
         rows.ended[at], rows.reason[at] = result.ended, np.array(result.advice, object)
+        rows.remarks[at] = texts_by_run(remarks_on_each(result), len(result))
         whole = np.flatnonzero(~result.diverged)
         if not len(whole):
             return
