@@ -31,8 +31,9 @@ NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a"
 
 # Made by the library: their constructors take what it computed.
 RESULTS = {
-    "Advice", "Certificate", "Checkup", "Comparison", "Cost", "InverseKinematics", "MotorBudget", "Motors", "PathPlan",
-    "Plan", "Proof", "Rollouts", "RunDifference", "Stress", "SweepResult", "Trajectory", "WorkPrecision",
+    "Advice", "Certificate", "Checkup", "Comparison", "Cost", "Estimate", "InverseKinematics", "MotorBudget", "Motors",
+    "PathPlan", "Plan", "Proof", "Rollouts", "Run", "RunDifference", "Sensitivity", "Stress", "SweepResult",
+    "Trajectory", "WorkPrecision",
 }  # fmt: skip
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
@@ -387,6 +388,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "SweepResult.quantiles": (swept.quantiles, {"figure": "end", "probabilities": [0.5], "level": 0.9}),
         "SweepResult.reasons": (swept.reasons, {}),
         "SweepResult.run": (swept.run, {"i": 3}),
+        "SweepResult.setup_of": (swept.setup_of, {"i": 3}),
         "SweepResult.save_report": (swept.save_report, {"path": folder / "report.html"}),
         "SweepResult.sensitivity": (swept.sensitivity, {"figure": "end", "level": 0.9, "given": "finished"}),
         "SweepResult.table": (swept.table, {}),

@@ -117,6 +117,10 @@ def data_set(
 
 
 def attributes(run: Trajectory | Rollouts) -> dict[str, str]:
-    """What a table says of its run as a whole: robot, joints, method, versions. No path of this machine is in it."""
-    about = {name: run.about[name] for name in ("robot", "versions") if name in run.about}
-    return {"title": "run of robot_dyn", "method": run.statistics.method} | about
+    """What a table says of its run as a whole: robot, settings, versions, and the summary without its times.
+
+    No path of this machine is in it.
+    """
+    about = {name: run.about[name] for name in ("robot", "edits", "settings", "run", "versions") if name in run.about}
+    lines = [line for line in run.summary.splitlines() if not line.startswith("time: ")]
+    return {"title": "run of robot_dyn", "method": run.statistics.method} | about | {"summary": "\n".join(lines)}

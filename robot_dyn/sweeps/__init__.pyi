@@ -5,14 +5,17 @@ from robot_dyn.sweeps.distributions.by_name import lognormal as lognormal
 from robot_dyn.sweeps.distributions.by_name import normal as normal
 from robot_dyn.sweeps.distributions.by_name import triangular as triangular
 from robot_dyn.sweeps.distributions.by_name import uniform as uniform
+from robot_dyn.sweeps.estimate import Estimate as Estimate
 from robot_dyn.sweeps.plan.figures import final as final
 from robot_dyn.sweeps.plan.figures import peak as peak
 from robot_dyn.sweeps.plan.figures import rms_error as rms_error
 from robot_dyn.sweeps.plan.from_scene import from_scene as from_scene
+from robot_dyn.sweeps.plan.runs import Run as Run
 from robot_dyn.sweeps.plan.samples import samples as samples
 from robot_dyn.sweeps.plan.sweep import Sweep as Sweep
 from robot_dyn.sweeps.result import SweepResult as SweepResult
 from robot_dyn.sweeps.run_sweep import read as read
 from robot_dyn.sweeps.run_sweep import run as run
+from robot_dyn.sweeps.sensitivity import Sensitivity as Sensitivity
 
 __all__: list[str]

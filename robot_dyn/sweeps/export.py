@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -13,6 +15,7 @@ from robot_dyn.extras import needs
 from robot_dyn.files import Kind, save, target
 from robot_dyn.sweeps.folder.folder import Folder, read_all
 from robot_dyn.sweeps.folder.rows import TEXTS
+from robot_dyn.sweeps.plan.specification import specification
 from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep, heading
 
 _CSV, _PARQUET = Kind("a table", ".csv"), Kind("a table", ".parquet", b"PAR1")
@@ -21,7 +24,7 @@ _CSV, _PARQUET = Kind("a table", ".csv"), Kind("a table", ".parquet", b"PAR1")
 def export(sweep: Sweep, folder: Folder, path: str | Path) -> Path:
     """Write the rows of a complete folder to a .csv or .parquet file; SweepError if it cannot be written."""
     path = target(path, (_CSV, _PARQUET), SweepError)
-    write = _parquet if path.suffix.lower() == ".parquet" else _csv
+    write = partial(_parquet, sweep) if path.suffix.lower() == ".parquet" else _csv
     return save(path, lambda stream: write(_tables(sweep, folder), stream), SweepError)
 
 
@@ -50,13 +53,31 @@ def _cell(value: object) -> str:
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
 
 
-def _parquet(tables: Iterator[Mapping[str, np.ndarray]], stream: BinaryIO) -> None:
+def _parquet(sweep: Sweep, tables: Iterator[Mapping[str, np.ndarray]], stream: BinaryIO) -> None:
     pa, parquet = needs("pyarrow", extra="data"), needs("pyarrow.parquet", extra="data")
     writer = None
     for each in tables:
         strings = {name: pa.array(each[name].astype(str).tolist(), pa.string()) for name in ("outcome", *TEXTS)}
         table = pa.table(dict(each) | strings)
-        writer = writer or parquet.ParquetWriter(stream, table.schema)
-        writer.write_table(table)
+        if writer is None:
+            about = _about_columns(sweep)
+            fields = [field.with_metadata(about.get(field.name, {})) for field in table.schema]
+            schema = pa.schema(fields, metadata={"title": "runs of robot_dyn", "sweep": _about(sweep)})
+            writer = parquet.ParquetWriter(stream, schema)
+        writer.write_table(table.cast(schema))
     if writer is not None:
         writer.close()
+
+
+def _about(sweep: Sweep) -> str:
+    """The specification as JSON, with the name of the scene in place of its path."""
+    return json.dumps(specification(sweep).data | {"scene": Path(sweep.scene).name}, ensure_ascii=False)
+
+
+def _about_columns(sweep: Sweep) -> dict[str, dict[str, str]]:
+    """By heading: unit, distribution of what varies, and how a figure is computed."""
+    varied = {name: name if name in sweep.vary else name.rpartition("[")[0] for name in sweep.columns}
+    parts = {column: {"distribution": sweep.vary[name]} for column, name in varied.items()}
+    parts |= {name: {"computed by": figure} for name, figure in sweep.figures.items()}
+    of = {name: {key: json.dumps(part.to_dict()) for key, part in each.items()} for name, each in parts.items()}
+    return {heading(sweep, name): {"unit": sweep.units.get(name, "")} | of.get(name, {}) for name in (*of, "ended")}

@@ -83,11 +83,11 @@ def _of_figure(result: SweepResult, name: str, x: np.ndarray) -> Iterator[str]:
     rows = [(each.statistic, each.estimate, each.low, each.high) for each in quantiles]
     level = f"{100 * quantiles[0].level:g} % interval from"
     parts = [table(("", "estimate", level, "to"), rows), text(f"{quantiles[0].n} runs, {quantiles[0].failed} failed")]
-    worst = [(i, float(x[i]), _repeat(result, i)) for i in result.worst(name, min(_WORST, len(x)), given="finished")]
+    worst = [(i, float(x[i]), _repeat(result, i)) for i in result.worst(name, min(_WORST, len(x)), given="known")]
     yield side_by_side([*([_histogram(title, finite)] if len(finite) else []), f"<div>{''.join(parts)}</div>"])
     yield table(("worst runs that finished", title, "repeat it by"), worst)
     try:
-        yield from html_of(result.sensitivity(name, given="finished").blocks())
+        yield from html_of(result.sensitivity(name, given="known").blocks())
     except SweepError as none:  # of a grid, or of a figure that is the same in all runs
         yield text(f"no sensitivity: {none}")
 

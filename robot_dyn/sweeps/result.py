@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from robot_dyn.answer import Answer, Block
-from robot_dyn.errors import SweepError, nearest, shown
-from robot_dyn.queries.units import joint_types_of, units
+from robot_dyn.errors import SweepError, nearest
+from robot_dyn.queries.units import joint_types_of
 from robot_dyn.result import UNREPORTED, reported
-from robot_dyn.simulation.columns import LONG_NAMES
 from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.sweeps import counts
-from robot_dyn.sweeps.expression import Expression, Truth
+from robot_dyn.sweeps.event import happened
 from robot_dyn.sweeps.folder.folder import Folder, read_all
 from robot_dyn.sweeps.folder.rows import FINISHED, TEXTS, digest_of
 from robot_dyn.sweeps.plan.specification import specification
-from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep
+from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep, heading
 from robot_dyn.sweeps.plan.work import Work
 from robot_dyn.validate import choice, integer
 
@@ -83,7 +83,8 @@ class SweepResult(Answer):
         """
         from robot_dyn.sweeps import statistics
 
-        return statistics.quantiles(self._figure(figure), probabilities, level, self._replicate)
+        found = statistics.quantiles(self._figure(figure), probabilities, level, self._replicate)
+        return tuple(self._named(each, figure) for each in found)
 
     def probability(self, event: str, level: float = 0.95, given: str | None = None) -> Estimate:
         """Probability of an event, such as "diverged | error > 0.1", with its interval.
@@ -92,19 +93,23 @@ class SweepResult(Answer):
             event: Of names of columns and outcomes, numbers, comparisons, | & ! and parentheses. "failed" is a run that
                 diverged or raised.
             level: Of the interval.
-            given: "finished" for the probability among the runs that finished.
+            given: "finished" for that among the runs that finished, "known" among those in which it is known.
 
         Raises:
-            SweepError: If the event is unknown in a run that failed, of which there is no figure.
+            SweepError: If the event is unknown in a run, of which there is no figure.
         """
         from robot_dyn.sweeps import statistics
 
-        truth, keep, replicate = self._event(event), self._given(given), self._replicate
-        unknown = (truth.certain != truth.possible) & keep
-        if unknown.any():
+        self._check_complete()
+        truth, replicate = happened(self.sweep, self.folder, event), self._replicate
+        known = truth.certain == truth.possible
+        keep = known if statistics.checked_given(given) == "known" else self._given(given)
+        if (unknown := ~known & keep).any():
+            remedy = f"write 'failed | {event}', or ask with given='finished'"
+            if (unknown & self._given("finished")).any():
+                remedy = "some finished, and have no figure: ask with given='known'"
             raise SweepError(
-                f"{event!r} is unknown in {int(unknown.sum())} runs that failed or have no figure, such as run"
-                f" {int(unknown.argmax())}: write 'failed | {event}', or ask with given='finished'"
+                f"{event!r} is unknown in {int(unknown.sum())} runs, such as run {int(unknown.argmax())}: {remedy}"
             )
         failed = int((self._outcome() != FINISHED).sum()) if given is None else 0
         of = None if replicate is None else replicate[keep]
@@ -112,29 +117,35 @@ class SweepResult(Answer):
         return replace(found, statistic=f"probability of {event}{'' if given is None else ' given finished'}")
 
     def mean(self, figure: str, level: float = 0.95, given: str | None = None) -> Estimate:
-        """Mean of a figure with its interval; refused where runs failed, unless asked for with given="finished"."""
+        """Mean of a figure with its interval, of all runs; `given` "finished" or "known" as of `probability`."""
         from robot_dyn.sweeps import statistics
 
-        return statistics.mean(self._figure(figure), level, self._replicate, given=_checked(given))
+        return self._named(statistics.mean(self._values(figure, given), level, self._replicate, given=given), figure)
 
     def sensitivity(self, figure: str, level: float = 0.95, given: str | None = None) -> Sensitivity:
         """Which of what varies matters: first and total Sobol' indices of design "saltelli", else of given data."""
         from robot_dyn.sweeps import sensitivity
 
-        y, names, design = self._figure(figure), self.sweep.dimensions, self.sweep.rows
+        y, names, design = self._values(figure, given), self.sweep.dimensions, self.sweep.rows
         if isinstance(self.sweep.design, str) and self.sweep.design == "saltelli":
-            return sensitivity.saltelli(y, names, self._replicate, level, given=_checked(given))
-        return sensitivity.given_data(
-            y, design.rows(0, self.sweep.runs), names, level, self._replicate, given=_checked(given)
-        )
+            found = sensitivity.saltelli(y, names, self._replicate, level, given=given)
+        else:
+            x = design.rows(0, self.sweep.runs)
+            found = sensitivity.given_data(y, x, names, level, self._replicate, given=given)
+        return replace(found, figure=heading(self.sweep, figure))
 
     def worst(self, figure: str, count: int = 5, given: str | None = None) -> tuple[int, ...]:
         """Numbers of the runs with the largest values of a figure; `run(i)` repeats one.
 
-        Runs that failed come first, in their order, unless `given` is "finished".
+        Runs without a value come first, in their order, but those that failed if `given` is "finished", and none if
+        it is "known".
         """
         count = integer("count", count, least=1, most=self.sweep.runs, error=SweepError)
-        runs, x = np.flatnonzero(self._given(given)), self._figure(figure)[self._given(given)]
+        from robot_dyn.sweeps.statistics import checked_given
+
+        x = self._figure(figure)
+        keep = np.isfinite(x) if checked_given(given) == "known" else self._given(given)
+        runs, x = np.flatnonzero(keep), x[keep]
         order = np.argsort(-np.where(np.isnan(x), np.inf, x), kind="stable")
         return tuple(runs[order[:count]].tolist())
 
@@ -148,10 +159,7 @@ class SweepResult(Answer):
             raise SweepError("no samples are kept: give the Sweep samples='q', or sw.samples('q', every=100)")
         self._check_complete()
         self.folder.check_samples(bits=False)
-        found, types = self.folder.samples.open(), joint_types_of(self.sweep.setup.plant.dynamics)
-        for name in found.data_vars:
-            found[name].attrs |= {"units": units(name, types), "long_name": LONG_NAMES[name]}
-        return found.assign_coords(run=np.arange(self.sweep.runs))
+        return self.folder.samples.open(joint_types_of(self.sweep.setup.plant.dynamics))
 
     def export(self, path: str | Path) -> Path:
         """Write the table of all runs to a .csv or .parquet file, whole or not at all.
@@ -175,12 +183,16 @@ class SweepResult(Answer):
         return save_report(self, path)
 
     def run(self, i: int) -> Trajectory:
-        """Repeat run i by itself, with all that is recorded of runs: the same bits.
+        """Repeat run i by itself, with all that rollouts record: the same bits.
 
         Raises:
             SweepError: If there is no such run, or it raised; says why.
         """
         return Work(self.sweep).run(integer("run", i, most=self.sweep.runs - 1, error=SweepError))
+
+    def setup_of(self, i: int) -> Setup:
+        """The setup of run i, as for `rd.simulate`, which estimates its error; SweepError as of `run`."""
+        return Work(self.sweep).setup_of(integer("run", i, most=self.sweep.runs - 1, error=SweepError))
 
     def verify(self) -> str:
         """Read every file, and return the digest of all rows; that of another folder of the same sweep is the same.
@@ -245,6 +257,7 @@ class SweepResult(Answer):
             yield f"{count} times: {text}"
         for text, count in (self.remarks or {}).items():
             yield f"remark on {count} of {self.sweep.runs} runs: {text}"
+        yield "rd.simulate(done.setup_of(i)) makes run i by itself, with the error of its method and its energy ledger"
 
     def _check_complete(self) -> None:
         if len(missing := self.missing):
@@ -262,23 +275,22 @@ class SweepResult(Answer):
         known = (*self.sweep.figures, *self.sweep.columns, "ended")
         return self.folder.columns((choice("figure", name, known, error=SweepError),))[name]
 
-    def _columns(self, names: Iterable[str]) -> Mapping[str, np.ndarray]:
-        """Columns and outcomes by name."""
-        self._check_complete()
-        known = {*self.sweep.figures, *self.sweep.columns, "ended"}
-        outcomes = {*OUTCOMES, "failed"}
-        for name in names:
-            if name not in known | outcomes:
-                raise SweepError(f"no column {name!r}; {nearest(name, sorted(known | outcomes))}")
-        found = self.folder.columns(name for name in names if name in known)
-        if outcomes & set(names):
-            outcome = self._outcome()
-            found |= {name: outcome == k for k, name in enumerate(OUTCOMES)} | {"failed": outcome != FINISHED}
-        return found
+    def _values(self, name: str, given: str | None) -> np.ndarray:
+        """A figure of all runs; SweepError if one that finished is asked for, and has none."""
+        x = self._figure(name)
+        if isinstance(given, str) and given == "finished" and (none := ~np.isfinite(x) & self._given(given)).any():
+            raise SweepError(
+                f"{name!r} has no value in {int(none.sum())} runs that finished, such as run {int(none.argmax())}: ask"
+                " with given='known', which leaves them out"
+            )
+        return x
+
+    def _named(self, found: Estimate, figure: str) -> Estimate:
+        """With the figure it is of, and its unit."""
+        return replace(found, statistic=f"{found.statistic} of {heading(self.sweep, figure)}")
 
     def _given(self, given: str | None) -> np.ndarray:
         """Which runs are asked about, (N,)."""
-        given = _checked(given)
         return np.ones(self.sweep.runs, bool) if given is None else self._outcome() == FINISHED
 
     @property
@@ -286,14 +298,3 @@ class SweepResult(Answer):
         """The scrambling of each run; None of independent ones."""
         design = self.sweep.rows
         return None if design.independent else design.replicate_of(np.arange(self.sweep.runs))
-
-    def _event(self, text: str) -> Truth:
-        """Of each run, whether an event happened."""
-        expression = Expression(text)
-        return expression.of(self._columns(expression.names))
-
-
-def _checked(given: Any) -> str | None:
-    if given is not None and not (isinstance(given, str) and given == "finished"):
-        raise SweepError(f"given is None or 'finished', got {shown(given)}")
-    return given

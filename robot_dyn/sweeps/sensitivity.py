@@ -42,6 +42,8 @@ class Sensitivity(Answer):
         n: Runs.
         failed: Runs without a finite value.
         method: How the indices were computed.
+        figure: What is sensitive.
+        given: As of `SweepResult.sensitivity`.
     """
 
     names: tuple[str, ...]
@@ -52,10 +54,12 @@ class Sensitivity(Answer):
     n: int
     failed: int
     method: str
+    figure: str = ""
+    given: str | None = None
 
     def blocks(self) -> Iterator[Block]:
-        given = " given finished" if self.failed else ""
-        yield f"sensitivity{given}: {self.method}; {self.n} runs, {self.failed} failed"
+        what = f"sensitivity{f' of {self.figure}' * bool(self.figure)}{f' given {self.given}' if self.given else ''}"
+        yield f"{what}: {self.method}; {self.n} runs, {self.failed} without a value"
         columns: dict[str, list[str]] = {"parameter": list(self.names)}
         for index, estimates in (("first order", self.first), ("total", self.total)):
             if estimates:
@@ -65,7 +69,10 @@ class Sensitivity(Answer):
             columns["PAWN"] = [text(x) for x in self.pawn]
         yield Table(tuple(columns), tuple(zip(*columns.values(), strict=True)))
         if self.pawn:
-            yield f"PAWN of a parameter without influence: {text(self.pawn_noise)}; total indices need design saltelli"
+            yield (
+                "PAWN: how far the distribution of the figure, given the parameter, is from that of all runs, 0 to 1;"
+                f" {text(self.pawn_noise)} without influence. Total indices need design 'saltelli'"
+            )
 
 
 def saltelli(
@@ -82,10 +89,10 @@ def saltelli(
         names: Of the d parameters.
         replicate: The scrambling of each run, shape (N,).
         level: Of the intervals.
-        given: "finished" leaves out pairs of rows of which a run failed.
+        given: "finished" or "known" leaves out pairs of rows of which a run has no value.
 
     Raises:
-        SweepError: If an argument has another form, or runs failed and `given` is not "finished".
+        SweepError: If an argument has another form, or runs failed and `given` is None.
 
     Sources: Saltelli et al., Comput. Phys. Commun. 181, 2010, table 2 (b), (f); Jansen, ibid. 117, 1999.
     """
@@ -106,7 +113,7 @@ def saltelli(
         for name, x, a, b in zip(names, *columns, strict=True)
     ]
     method = f"Sobol' indices (Saltelli 2010, Jansen), jackknife over {groups.count} scramblings"
-    return Sensitivity(names, tuple(made[:d]), tuple(made[d:]), (), 0.0, len(y), failed, method)
+    return Sensitivity(names, tuple(made[:d]), tuple(made[d:]), (), 0.0, len(y), failed, method, given=given)
 
 
 def given_data(
@@ -125,10 +132,10 @@ def given_data(
         names: Of the d parameters.
         level: Of the intervals.
         replicate: The scrambling of each run, shape (N,); None for independent runs.
-        given: "finished" leaves out runs that failed.
+        given: "finished" or "known" leaves out runs without a value.
 
     Raises:
-        SweepError: If an argument has another form, or runs failed and `given` is not "finished".
+        SweepError: If an argument has another form, or runs failed and `given` is None.
 
     Sources: Sudret, Global sensitivity analysis using polynomial chaos expansions, Reliab. Eng. Syst. Saf. 93, 2008;
     Pianosi, Wagener, A simple and efficient method for global sensitivity analysis based on cumulative distribution
@@ -158,7 +165,8 @@ def given_data(
     noise = _pawn(y, _bins(np.random.default_rng(0).random(len(y))))
     over = f"{groups.count} {'groups of runs' if replicate is None else 'scramblings'}"
     method = f"first order by fits of degree {degree}, jackknife over {over}; PAWN, median over {bins.max() + 1} bins"
-    return Sensitivity(names, estimates, (), tuple(_pawn(y, each) for each in bins.T), noise, n, failed, method)
+    pawn = tuple(_pawn(y, each) for each in bins.T)
+    return Sensitivity(names, estimates, (), pawn, noise, n, failed, method, given=given)
 
 
 def _indices(rows: np.ndarray) -> np.ndarray:

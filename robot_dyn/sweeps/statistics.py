@@ -31,6 +31,8 @@ from robot_dyn.validate import float64, integer, number, numbers
 FEW = 5
 """Events below which intervals of probabilities are said to be conservative."""
 NOT_RANDOM = "points that are not random"
+GIVEN = None, "finished", "known"
+"""Which runs a question is about: all, those that finished, or those of them that have the figures it asks of."""
 
 
 def quantiles(
@@ -115,10 +117,10 @@ def mean(x: Any, level: float = 0.95, replicate: Any = None, *, given: str | Non
         x: The figure of each run, shape (N,); a run whose figure is not finite failed.
         level: Of the interval.
         replicate: As of `quantiles`.
-        given: "finished" for the mean of the runs that did not fail.
+        given: "finished" or "known" for the mean of the runs with a value.
 
     Raises:
-        SweepError: If runs failed and `given` is not "finished", or fewer than two did not.
+        SweepError: If runs failed and `given` is None, or fewer than two did not.
     """
     x, level = check_figure(x), check_level(level)
     finite = check_finished(x, "mean", given)
@@ -136,7 +138,7 @@ def mean(x: Any, level: float = 0.95, replicate: Any = None, *, given: str | Non
         statistics = groups.means(finished - estimate)
         estimate += float(statistics.mean())
         half, method = half_width_of_mean(statistics, level), _over(groups)
-    statistic = "mean" if given is None else "mean given finished"
+    statistic = "mean" if given is None else f"mean given {given}"
     note = _note_of_mean(finished)
     return Estimate(statistic, estimate, estimate - half, estimate + half, level, n, n - len(finished), method, note)
 
@@ -154,13 +156,19 @@ def clopper_pearson(k: int, n: int, level: float) -> tuple[float, float]:
 def check_finished(x: np.ndarray, what: str, given: str | None) -> np.ndarray:
     """Which runs finished; SweepError if some did not and the question is not about those that did."""
     finite = np.isfinite(x)
-    if given not in (None, "finished"):
-        raise SweepError(f'given must be "finished" or None, got {shown(given)}')
-    if given is None and (failed := int(np.sum(~finite))):
+    if checked_given(given) is None and (failed := int(np.sum(~finite))):
         raise SweepError(
-            f'{failed} of {len(x)} runs failed and have no value: a {what} of the others is given="finished"'
+            f"{failed} of {len(x)} runs failed or have no value: a {what} of those that finished is given='finished',"
+            " of those with a value given='known'"
         )
     return finite
+
+
+def checked_given(given: Any) -> str | None:
+    """What `given` may be; SweepError otherwise."""
+    if given is not None and not (isinstance(given, str) and given in GIVEN):
+        raise SweepError(f"given must be {', '.join(map(repr, GIVEN[1:]))} or None, got {shown(given)}")
+    return given
 
 
 @lru_cache(maxsize=64)

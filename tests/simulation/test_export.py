@@ -82,7 +82,9 @@ def test_parquet_is_the_table_with_units(of: str, request, tmp_path: Path) -> No
     for field in back.schema:
         quantity, of_what, unit = (field.metadata[key].decode() for key in (b"quantity", b"of", b"unit"))
         assert field.name == " ".join(filter(None, (quantity, of_what, unit and f"[{unit}]")))
-    assert back.schema.metadata[b"robot"] == b"cart_pole"
+    about = {key.decode(): text.decode() for key, text in back.schema.metadata.items()}
+    assert about["robot"] == "cart_pole" and about.get("settings") == of.about.get("settings")
+    assert about["summary"].splitlines()[0] == of.summary.splitlines()[0]
 
 
 @pytest.mark.parametrize("of", ["tame", "hostile", "batch"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import sys
 from pathlib import Path
 
@@ -66,6 +67,29 @@ def test_remarks_of_rows_are_those_of_rollouts(tmp_path: Path) -> None:
     assert "effort_limit_reached" in kinds and "held_while_reference_moves" in kinds
 
 
+def test_a_figure_that_finished_runs_have_not_is_no_failure(tmp_path: Path, monkeypatch) -> None:
+    """Of runs whose figure is nan: mean, probability and sensitivity say so, and are those of the others if asked."""
+    (tmp_path / "no_figure.py").write_text(
+        "def late(run):\n    return run.q[-1, 0] if run.q[0, 0] > 0.4 else float('nan')\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    vary = {"q0": sw.normal(mean=[0.4, 0.9], sd=0.1)}
+    done = sw.run(swept(tmp_path, 200, vary=vary, figures={"late": "no_figure:late"}), tmp_path / "out")
+    x = done.table("late")["late"]
+    some = np.isfinite(x)
+    assert done.outcomes == {"finished": 200, "diverged": 0, "raised": 0} and 50 < some.sum() < 150
+    for ask in (done.mean, done.sensitivity):
+        with pytest.raises(SweepError, match=rf"{(~some).sum()} runs that finished, .*given='known'"):
+            ask("late", given="finished")
+    assert done.mean("late", given="known").estimate == pytest.approx(x[some].mean(), rel=1e-12)
+    assert "mean given known of late" in str(done.mean("late", given="known"))
+    with pytest.raises(SweepError, match=r"some finished, and have no figure: ask with given='known'"):
+        done.probability("failed | late > 0.45")
+    assert done.probability("late > 0.45", given="known").estimate == (x[some] > 0.45).mean()
+    assert set(done.worst("late", 200, given="known")) == set(np.flatnonzero(some))
+    assert "sensitivity of late given known" in str(done.sensitivity("late", given="known"))
+
+
 def test_quantiles_count_failures_as_infinite(done: sw.SweepResult) -> None:
     x = done.table("error")["error"]
     counted = np.sort(np.where(np.isnan(x), np.inf, x))
@@ -86,7 +110,7 @@ def test_a_probability_is_that_of_clopper_and_pearson(done: sw.SweepResult) -> N
 
 def test_an_event_that_is_unknown_in_failed_runs_is_refused(done: sw.SweepResult) -> None:
     failed = int((done.table("outcome")["outcome"] != "finished").sum())
-    with pytest.raises(SweepError, match=rf"unknown in {failed} runs .* write 'failed \| error > 0.05'"):
+    with pytest.raises(SweepError, match=rf"unknown in {failed} runs, such as run 0: write 'failed \| error > 0.05'"):
         done.probability("error > 0.05")
     assert done.probability("error > 0.05", given="finished").n == 400 - failed
     assert "given finished" in done.probability("error > 0.05", given="finished").statistic
@@ -94,7 +118,7 @@ def test_an_event_that_is_unknown_in_failed_runs_is_refused(done: sw.SweepResult
 
 def test_means_and_sensitivities_of_failed_runs_are_refused(done: sw.SweepResult) -> None:
     for question in (done.mean, done.sensitivity):
-        with pytest.raises(SweepError, match='given="finished"'):
+        with pytest.raises(SweepError, match=r"given='finished'"):
             question("error")
     x = done.table("error")["error"]
     assert done.mean("error", given="finished").estimate == pytest.approx(np.nanmean(x), rel=1e-12)
@@ -149,6 +173,27 @@ def test_a_csv_holds_the_table_to_the_bit(done: sw.SweepResult, tmp_path: Path) 
             np.testing.assert_array_equal([float(row[heading]) for row in rows], x)
         else:
             assert [row[heading] for row in rows] == [str(each) for each in x]
+
+
+def test_a_parquet_file_says_what_its_columns_are(done: sw.SweepResult, tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    back, table = parquet.read_table(done.export(tmp_path / "rows.parquet")), done.table()
+    for heading, x in zip(back.column_names, table.values(), strict=True):
+        np.testing.assert_array_equal(back[heading].to_numpy(zero_copy_only=False), x)
+    of = {field.name: field.metadata or {} for field in back.schema}
+    assert of["peak [rad/s]"][b"unit"] == b"rad/s" and b"peak" in of["peak [rad/s]"][b"computed by"]
+    assert of["q0[1] [rad]"][b"distribution"] == json.dumps(VARY["q0"].to_dict()).encode()
+    stated = json.loads(back.schema.metadata[b"sweep"])
+    assert stated["seed"] == 3 and stated["setup"]["robot"] == "planar_2r" and stated["scene"] == "scene.toml"
+    assert str(tmp_path.parent) not in back.schema.metadata[b"sweep"].decode()
+
+
+def test_a_run_repeated_by_its_setup_is_that_of_the_sweep(done: sw.SweepResult) -> None:
+    """Interpreted and with its error; rounding alone differs."""
+    run = done.run(2)
+    again = rd.simulate(done.setup_of(2))
+    assert run.outcome.ending == again.outcome.ending and again.error is not None
+    np.testing.assert_allclose(again.q, run.q, rtol=0, atol=1e-12)
 
 
 def test_the_report_has_each_figure_and_the_lines_that_repeat_runs(done: sw.SweepResult, tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def test_given_data_give_first_order_indices_of_any_design(name: str) -> None:
     made = sensitivity.given_data(y, u, NAMES, replicate=None if design.independent else replicate)
     np.testing.assert_allclose(estimates(made.first), FIRST, atol=0.02)
     np.testing.assert_allclose(estimates(made.first), rbd_fast.analyze(PROBLEM, u, y, seed=1)["S1"], atol=0.03)
-    assert made.total == () and "total indices need design saltelli" in repr(made)
+    assert made.total == () and "Total indices need design 'saltelli'" in repr(made)
     assert "independent" not in made.method and ("scramblings" in made.method) == (name != "random")
 
 
@@ -146,7 +146,9 @@ def test_failed_runs_are_refused_and_left_out_by_pairs_where_asked_for() -> None
     _, u, y, replicate = runs("saltelli", 16 * 5 * 64)
     failed = y.copy()
     failed[[7, 11, 400]] = np.nan  # of pairs 1, 2, 80
-    with pytest.raises(SweepError, match=r'3 of 5120 runs failed .*sensitivity of the others is given="finished"'):
+    with pytest.raises(
+        SweepError, match=r"3 of 5120 runs failed .*sensitivity of those that finished is given=\'finished\'"
+    ):
         sensitivity.saltelli(failed, NAMES, replicate)
     made = sensitivity.saltelli(failed, NAMES, replicate, given="finished")
     kept = np.ones(1024, bool)

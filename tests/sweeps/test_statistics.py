@@ -151,7 +151,7 @@ def test_quantiles_count_failed_runs_as_infinite(replicate: Any) -> None:
 
 def test_means_with_failed_runs_are_refused_unless_asked_for() -> None:
     failed = np.concatenate([X, [np.nan, inf, -inf]])
-    with pytest.raises(SweepError, match=r'3 of 1603 runs failed and have no value: .*given="finished"'):
+    with pytest.raises(SweepError, match=r"3 of 1603 runs failed or have no value: .*given=\'finished\'"):
         statistics.mean(failed)
     made = statistics.mean(failed, given="finished")
     assert (made.estimate, *ends(made)) == (lambda a: (a.estimate, *ends(a)))(statistics.mean(X))
@@ -195,7 +195,7 @@ WRONG: dict[str, Callable[[], Any]] = {
     "a figure must have shape": lambda: statistics.quantiles([], 0.5),
     "a figure must be real numbers": lambda: statistics.mean(["a"]),
     "level must be below 1, such as 0.95, got 95": lambda: statistics.mean(X, 95),
-    'given must be "finished" or None': lambda: statistics.mean(X, given="all"),
+    "given must be 'finished', 'known' or None": lambda: statistics.mean(X, given="all"),
     "a mean needs two runs that finished, got 1": lambda: statistics.mean([1.0, np.nan], given="finished"),
     "events must be truth values, .* float64": lambda: statistics.probability(X),
     "failed must be a whole number": lambda: statistics.probability(X > 1, failed=N + 1),

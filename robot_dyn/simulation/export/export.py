@@ -47,15 +47,14 @@ def kinds(run: Trajectory | Rollouts) -> tuple[Kind, ...]:
 def export(run: Trajectory | Rollouts, path: str | Path) -> Path:
     """Write a run, or a batch, to a file for other programs, whole or not at all; its suffix says in which format.
 
-    | suffix | what it holds | needs |
-    |---|---|---|
-    | .csv | `run.table()`: a row for each sample, or for each run of a batch; float() returns the numbers | |
-    | .parquet | the same columns, with quantity, joint and unit of each as metadata | robot-dyn[data] |
-    | .nc | `run.to_xarray()` as netCDF-3, with units as attributes | robot-dyn[data] |
-    | .mcap | of one run, as messages of ROS 2: q, v, u and its causes; desired q; power, energy | robot-dyn[data] |
+        .csv      run.table(): a row for each sample, or for each run of a batch; float() returns the numbers
+        .parquet  the same columns, with quantity, joint and unit of each as metadata
+        .nc       run.to_xarray() as netCDF-3, with units as attributes
+        .mcap     of one run, as messages of ROS 2: q, v, u and its causes; desired q; power, energy
 
-    Numbers are written to the bit, times of an MCAP log to 1 ns. Another file of the same format under that name is
-    replaced; a file of another kind is not. The suffix .csv is added if the path has none.
+    All but .csv need robot-dyn[data]. Robot, settings, versions and the summary are metadata of the whole. Numbers are
+    written to the bit, times of an MCAP log to 1 ns. Another file of the same format under that name is replaced; a
+    file of another kind is not. The suffix .csv is added if the path has none.
 
     Raises:
         RunFileError: If it cannot be written.

@@ -137,7 +137,9 @@ def one_by_one(batch: Batch, most: int, threads: int, on_progress: Callable[[flo
         np.array([each.t for each in outcomes]), ending == Ending.DIVERGED, ending == Ending.STOPPED,
         tuple(map(advice_of, outcomes)), steps, evaluations,
     )  # fmt: skip
-    engine = f"{'compiled' if runs.compiled else 'interpreted'}, {B} runs one after the other on each thread"
+    engine = (
+        f"{'compiled' if runs.compiled else 'interpreted'}, {B} run{'s' * (B > 1)} one after the other on each thread"
+    )
     step = 0.0 if setup.integrator.controls_error else setup.duration_s / setup.steps
     most_steps, most_evaluations, spent = int(steps.max()), int(evaluations.max()), perf_counter() - began
     statistics = Statistics(setup.integrator.name, step, most_steps, most_evaluations, spent, engine=engine)

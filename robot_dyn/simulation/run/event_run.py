@@ -42,6 +42,7 @@ from robot_dyn.simulation.setup.size import samples as most_samples
 from robot_dyn.values import cached, copied
 
 _SAMPLES = 1000  # of a run without a record period
+_GROWS = "y grows without bound, or tolerances are too tight"
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
 _BRIEF = 1e-9  # of a run: events of one threshold in that part of it chatter
 _ACCUMULATED = 1000  # changes of the mode, in that part of the run: no motion that ends them is left between
@@ -172,10 +173,13 @@ class EventRun(SwitchedRun):
         if self.now[Now.EVALUATIONS] > self.most:
             return TooLong(int(self.now[Now.EVALUATIONS]))
         t, y = self.time, self.y
+        if not np.isfinite(t):  # of an event that was looked for in states that overflow
+            t = float(self.records.t[: int(self.now[Now.ROW])].max(initial=0.0))
+            raise DivergedError(t, f"the state overflows in a step after t = {t:.9g}: {_GROWS}")
         if t > self.past_horizon + self.setup.duration_s / _COMPARED:
             return Outcome(Ending.FINISHED, self.past_horizon)
         self.watch.pace(t, y, int(self.now[Now.STEPS]))
-        where = f"at t = {t}, max |y| = {np.abs(y).max():.3g}: y grows without bound, or tolerances are too tight"
+        where = f"at t = {t}, max |y| = {np.abs(y).max():.3g}: {_GROWS}"
         if ended is Ended.EVENT:
             if (name := self._event(t, y)) is not None:
                 self._sample_end(t)

@@ -169,12 +169,13 @@ class SwitchedRun(Driver):
     def _accumulated(self, t: float, y: np.ndarray, holding: Holding, joint: str) -> Accumulation:
         """Why another method is to make the run; DivergedError if none may."""
         first = float(holding.changes[holding.changed[0] % len(holding.changes)])
-        what = f"{len(holding.changes)} changes of what holds joints in {t - first:.1e} s, the last of joint {joint!r}"
+        span = float(np.ptp(holding.changes))  # a step that was taken back may have noted a later one
+        what = f"{len(holding.changes)} changes of what holds joints in {span:.1e} s, the last of joint {joint!r}"
         motion = self.equation.equation_of_motion
         alone = motion.payloads or motion.drives  # which time stepping does not take
         if alone or not self.chooses:
             remedy = "soft stops and regularised friction" if alone else "integrator='time_stepping' and a step_s"
-            raise DivergedError(t, f"events accumulate at t = {t}: {what}; take {remedy}")
+            raise DivergedError(t, f"events accumulate at t = {t:.9g}: {what}; take {remedy}")
         speed = float(np.abs(y[self.rules.n : 2 * self.rules.n]).max())
         text = f"{what}, at t = {t:.6g} s"
         remedy = f"made by time stepping with steps of {STEP_S} s, without an estimate of its error"

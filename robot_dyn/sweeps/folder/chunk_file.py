@@ -62,8 +62,8 @@ class Format:
         if missing:
             raise SweepError(f"{path}: its columns are not those of the sweep: {min(missing)!r}; {_REMEDY}")
         varied, figures = ({name: table[name] for name in each} for each in (names.varied, names.figures))
-        ends = (table[name] for name in ("outcome", "ended", *TEXTS))
-        return Rows(int(footer["start"]), *ends, varied, figures), footer
+        outcome, ended, reason, remarks = (table[name] for name in ("outcome", "ended", *TEXTS))
+        return Rows(int(footer["start"]), outcome, ended, reason, remarks, varied, figures), footer
 
     def footer(self, path: Path) -> dict[str, Any]:
         """The footer of a file; SweepError if it is damaged."""

@@ -138,8 +138,9 @@ class Folder:
 
     def check_samples(self, bits: bool) -> None:
         """Raise SweepError where samples that were written are missing, or, if `bits`, have changed."""
-        for chunk in range(self.count) if self.samples is not None else ():
-            self.samples.check(chunk, self.footer(chunk)["samples"], bits)
+        if self.samples is not None:
+            for chunk in range(self.count):
+                self.samples.check(chunk, self.footer(chunk)["samples"], bits)
 
     def columns(self, names: Iterable[str]) -> dict[str, np.ndarray]:
         """Columns of all rows, (N,); errors as of `read`."""

@@ -60,8 +60,10 @@ class Rows(Value):
         def of(name: str) -> dict[str, np.ndarray]:
             return {key: np.concatenate([getattr(each, name)[key] for each in parts]) for key in getattr(first, name)}
 
-        ends = (np.concatenate([getattr(each, name) for each in parts]) for name in ("outcome", "ended", *TEXTS))
-        return cls(first.start, *ends, of("varied"), of("figures"))
+        outcome, ended, reason, remarks = (
+            np.concatenate([getattr(each, name) for each in parts]) for name in ("outcome", "ended", *TEXTS)
+        )
+        return cls(first.start, outcome, ended, reason, remarks, of("varied"), of("figures"))
 
     @property
     def columns(self) -> dict[str, np.ndarray]:

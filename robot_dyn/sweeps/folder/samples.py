@@ -16,6 +16,8 @@ import numpy as np
 
 from robot_dyn.errors import SweepError
 from robot_dyn.extras import needs
+from robot_dyn.queries.units import units
+from robot_dyn.simulation.columns import LONG_NAMES
 from robot_dyn.sweeps.folder.files import Files, make_folder, write
 
 _INNER = 64  # runs that are read together, where all are kept
@@ -90,12 +92,14 @@ class SampleStore:
     def _shard(self, name: str, chunk: int) -> Path:
         return self.path / name / "c" / str(chunk) / "0" / "0"
 
-    def open(self) -> Any:
-        """All as a lazy `xarray.Dataset` over run, t and joint."""
+    def open(self, joint_types: tuple[str | None, ...]) -> Any:
+        """All as a lazy `xarray.Dataset` over run, t and joint, with units."""
         xarray = needs("xarray", extra="data")
         needs("zarr", extra=_EXTRA)
         found = xarray.open_zarr(self.path, consolidated=False, chunks=None)
-        return found.assign_coords(joint=list(found.attrs.pop("joint")))
+        for name in self.names:
+            found[name].attrs |= {"units": units(name, joint_types), "long_name": LONG_NAMES[name]}
+        return found.assign_coords(run=np.arange(self.runs), joint=list(found.attrs.pop("joint")))
 
     def _array(self, zarr: Any, store: Any, name: str, t: np.ndarray, joints: tuple[str, ...]) -> Any:
         """An array of the store without numbers."""

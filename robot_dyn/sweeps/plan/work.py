@@ -14,11 +14,12 @@ import numpy as np
 
 from robot_dyn.errors import RobotDynError, SweepError, because
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.batch import Batch, parts_of_run
 from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.simulation.rollouts.overview import remarks_on_each, texts_by_run
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.rollouts import batch_of, manners, run_batch
+from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_BYTES
 from robot_dyn.sweeps.folder.rows import DIVERGED, FINISHED, RAISED, Rows
 from robot_dyn.sweeps.folder.samples import check_times
@@ -82,6 +83,16 @@ class Work:
             if not isinstance(result, str) and not result.diverged.all():
                 return result.t
         raise SweepError(f"samples: none of the first {count} runs finishes, so that their times are not known")
+
+    def setup_of(self, i: int) -> Setup:
+        """The setup of run i; SweepError with its reason if there is none."""
+        setup, values = self.sweep.setup, {name: x[0] for name, x in self.sweep.values(i, i + 1).items()}
+        starts = {name: values.pop(name) for name in STARTS if name in values}
+        try:
+            plant, controller = parts_of_run(setup, {name: _flat(x[None])[0] for name, x in values.items()}, i)
+            return replace(setup, plant=plant, controller=controller, **starts)
+        except RobotDynError as error:
+            raise SweepError(f"run {i} raised: {error}") from None
 
     def run(self, i: int) -> Trajectory:
         """Run i as a trajectory; SweepError with its reason if it raised."""
