@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.codegen.threads import thread_count
-from robot_dyn.errors import SweepError, shown
+from robot_dyn.errors import SceneError, SweepError, shown
 from robot_dyn.files import file_path
 from robot_dyn.sweeps.engines.share import share as share_of
 from robot_dyn.sweeps.engines.threads import Threads
@@ -91,25 +91,33 @@ def run(
     return SweepResult(sweep, known)
 
 
-def read(folder: str | Path) -> SweepResult:
+def read(folder: str | Path, scene: str | Path | None = None) -> SweepResult:
     """What the folder of a sweep holds.
 
+    Args:
+        folder: It may have been moved.
+        scene: Where its scene lies now; where it was unless given.
+
     Raises:
-        SweepError: If it holds none, or its scene has changed since.
+        SweepError: If it holds none, or its scene is not there, or has changed since.
     """
-    known, work = opened(file_path(folder, SweepError))
+    known, work = opened(file_path(folder, SweepError), scene)
     return SweepResult(work.sweep, known)
 
 
-def opened(path: Path) -> tuple[Folder, Work]:
-    """The folder of a sweep, and its work; SweepError as of `read`."""
+def opened(path: Path, scene: str | Path | None = None) -> tuple[Folder, Work]:
+    """The folder of a sweep, and its work; arguments and errors as of `read`."""
     text, table = read_specification(path)
     where = str(path / "sweep.json")
     try:
         stored = Specification(json.loads(text))
     except ValueError as error:
         raise SweepError(f"{where}: is not JSON ({error})") from None
-    sweep = sweep_of(stored.data, table, where)
+    data = stored.data if scene is None else stored.data | {"scene": scene}
+    try:
+        sweep = sweep_of(data, table, where)
+    except SceneError as error:
+        raise SweepError(f"{where}: {error}; sw.read(folder, scene=…), --scene, where it lies now") from None
     stored.check_same(specification(sweep).with_chunk(stored.chunk), where)
     return _folder(path, sweep, stored), Work(sweep)
 

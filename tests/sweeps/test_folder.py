@@ -191,6 +191,19 @@ def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["sweep.json"]
 
 
+def test_a_folder_is_moved_with_its_scene(tmp_path: Path) -> None:
+    (tmp_path / "here").mkdir()
+    digest = sw.run(swept(tmp_path / "here", 40), tmp_path / "here" / "out").verify()
+    (tmp_path / "here").rename(tmp_path / "there")
+    folder, scene = tmp_path / "there" / "out", tmp_path / "there" / "scene.toml"
+    with pytest.raises(SweepError, match=r"no such file.*sw.read\(folder, scene=…\), --scene, where it lies now"):
+        sw.read(folder)
+    assert sw.read(folder, scene).verify() == digest
+    scene.write_text(scene.read_text().replace("0.9", "0.8"))
+    with pytest.raises(SweepError, match="holds another sweep: setup"):
+        sw.read(folder, scene)
+
+
 def test_a_disk_without_room_is_said_before_the_start(tmp_path: Path) -> None:
     sweep = swept(tmp_path, 10**14, design="random")
     assert sweep.bytes_expected == 10**14 * (8 * 9 + 9)  # 5 numbers that vary, 3 figures, the end; outcome, texts

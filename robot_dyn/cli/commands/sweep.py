@@ -49,6 +49,7 @@ def sweep(
         str | None, typer.Option(help="Workers of Dask in place of threads: local:2, or tls://host:8786.")
     ] = None,
     share: Annotated[str | None, typer.Option(metavar="3/16", help="The part of one job of an array.")] = None,
+    scene: Annotated[str | None, typer.Option(help="Of a folder: where its scene lies now, if it was moved.")] = None,
     chunk: Annotated[int | None, typer.Option(help="Runs of a file; about 2 s of work unless given.")] = None,
     probability: Annotated[
         list[str] | None,
@@ -78,7 +79,7 @@ def sweep(
             )
         if folder is None:
             raise SweepError(f"{what}: of which folder? robot-dyn sweep {what} FOLDER")
-        result = sw.read(folder)
+        result = sw.read(folder, scene)
         if what == "run":
             result = _run(result.sweep, folder, options)
         elif what == "verify":
