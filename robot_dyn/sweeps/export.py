@@ -64,7 +64,7 @@ def _parquet(sweep: Sweep, tables: Iterator[Mapping[str, np.ndarray]], stream: B
             fields = [field.with_metadata(about.get(field.name, {})) for field in table.schema]
             schema = pa.schema(fields, metadata={"title": "runs of robot_dyn", "sweep": _about(sweep)})
             writer = parquet.ParquetWriter(stream, schema)
-        writer.write_table(table.cast(schema))
+        writer.write_table(table.cast(writer.schema))
     if writer is not None:
         writer.close()
 
