@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from hashlib import sha256
 
@@ -10,11 +11,16 @@ import numpy as np
 from robot_dyn.sweeps.folder.folder import Folder
 from robot_dyn.sweeps.folder.rows import FINISHED
 
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(?:e[-+]?\d+)?")
+
 
 def reasons(folder: Folder) -> dict[str, int]:
-    """Runs by reason of failure, the most frequent first."""
+    """Runs by reason of failure, the most frequent first; those that differ in numbers alone under the first one."""
     columns = folder.columns(("outcome", "reason"))
-    return dict(Counter(columns["reason"][columns["outcome"] != FINISHED].tolist()).most_common())
+    first, count = dict[str, str](), Counter[str]()
+    for text in columns["reason"][columns["outcome"] != FINISHED].tolist():
+        count[first.setdefault(_NUMBER.sub("…", text), text)] += 1
+    return dict(count.most_common())
 
 
 def remarks(folder: Folder) -> dict[str, int]:

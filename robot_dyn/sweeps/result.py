@@ -238,7 +238,7 @@ class SweepResult(Answer):
         return None if len(self.missing) else counts.remarks(self.folder)
 
     def reasons(self) -> dict[str, int]:
-        """Number of runs by reason of failure, the most frequent first."""
+        """Number of runs by reason of failure, the most frequent first; texts that differ in numbers alone are one."""
         return counts.reasons(self.folder)
 
     @property

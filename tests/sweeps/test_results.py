@@ -49,6 +49,8 @@ def test_runs_that_fail_are_rows_with_a_reason(done: sw.SweepResult) -> None:
     assert all("mass_scale must be positive" in text for text in table["reason"][raised])
     assert np.isnan(table["error"][failed]).all() and np.isfinite(table["error"][~failed]).all()
     assert sum(done.reasons().values()) == failed.sum()
+    assert sum(count for text, count in done.reasons().items() if "mass_scale" in text) == raised.sum()
+    assert sum("mass_scale" in text for text in done.reasons()) == 1, "texts that differ in numbers alone are one"
 
 
 def test_remarks_of_rows_are_those_of_rollouts(tmp_path: Path) -> None:
