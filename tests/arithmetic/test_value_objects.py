@@ -101,6 +101,9 @@ def values() -> dict[str, Any]:
         rd.plan.inverse_kinematics(ARM, ARM.placement(Q, "tip"), frame="tip", starts=2),
         rd.plan.Motors(peak={"shoulder": 9.0}, continuous={}, speed={}, armature={}),
         (motion := rd.plan.path(ARM, [Q, Q + 0.5], effort=50.0, velocity=1.0)), motion.plan,
+        rd.sweeps.Estimate("mean", 1.0, 0.9, 1.1, 0.95, 4, 0, "Student's t"),
+        rd.sweeps.Sensitivity(("kp",), (), (), (), 0.0, 4, 0, "fits of degree 2"),
+        rd.sweeps.Run(Q, Q, Q, None, None, None, None, None, np.ones((3, 2, 2)), 0.05, {"q0": Q}),
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}
     return named | {"Compiled": rd.Compiled(ARM), "CompiledPlant": rd.Compiled(plant)}

@@ -105,7 +105,7 @@ def test_swept_numbers_of_joints_have_columns_by_joint(tmp_path) -> None:
     rows = list(csv.DictReader(text.splitlines()))
     assert '"' not in text.splitlines()[0]
     assert [[float(row[head]) for head in heads] for row in rows] == swept["viscous_friction.damping"]
-    assert [float(row["gravity 3"]) for row in rows] == [-9.81, -1.6]
+    assert [float(row["gravity 3 [m/s²]"]) for row in rows] == [-9.81, -1.6]
 
 
 def test_a_damaged_file_is_refused_or_whole(run, tmp_path) -> None:
