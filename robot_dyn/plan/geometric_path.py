@@ -20,6 +20,7 @@ from robot_dyn.errors import PlanError
 _MOST_POINTS = 2000
 _SLOWEST = 1e-3  # of |q'|, in the path's mean: where it vanishes, s is no measure of the way
 _CORNER = 1e-9  # jump of q', in |q'|
+_FARTHEST = 1e100  # [rad] or [m]: squares do not overflow
 numbers = partial(validate.numbers, error=PlanError)
 
 
@@ -56,7 +57,7 @@ def through(points: np.ndarray) -> PiecewisePolynomial:
     """The natural cubic spline through points, (m, n), over the length of the straight lines between them.
 
     Raises:
-        PlanError: If there are fewer than two points, more than 2000, or two equal ones follow each other.
+        PlanError: If there are fewer than two points, or more than 2000, one is too far, or two that follow are equal.
 
     Source: de Boor, A Practical Guide to Splines, 2001, ch. IV.
     """
@@ -64,6 +65,8 @@ def through(points: np.ndarray) -> PiecewisePolynomial:
 
     if not 2 <= len(points) <= _MOST_POINTS:
         raise PlanError(f"points must be 2 to {_MOST_POINTS}, got {len(points)}")
+    if (most := np.abs(points).max()) > _FARTHEST:
+        raise PlanError(f"points must be within {_FARTHEST:g} rad or m, got {most:g}")
     length = np.linalg.norm(np.diff(points, axis=0), axis=-1)
     if not (length > 1e-9 * length.sum()).all():
         raise PlanError(f"points {int(np.argmin(length))} and {int(np.argmin(length)) + 1} are equal; leave one out")
