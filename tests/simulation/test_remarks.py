@@ -346,3 +346,16 @@ def test_a_task_that_is_damped_says_so_between_samples_too(steps) -> None:
             assert said.value == pytest.approx(np.linalg.eigvalsh(J @ np.linalg.inv(arm.M(q)) @ J.T)[0], rel=1e-6)
             assert said.duration == pytest.approx(0.3)
             assert "task damped near a singularity: tip for 0.3 s from 0 s" in run.summary
+
+
+def test_chatter_by_the_quantum_of_an_encoder_is_told_from_chatter_by_gains() -> None:
+    """Of computed torque M⁻¹ kd is kd, times the period 0.04: differences of a rounded position reverse the torque."""
+    arm, goal = rd.load("planar_2r"), rd.control.quintic([0.3, 0.2], [0.8, 0.6], 0.2)
+    law = rd.control.ComputedTorque(arm, goal, kp=400.0, kd=40.0, period_s=1e-3)
+    rounded = [rd.control.Quantisation(2 * np.pi / 2**12)]
+    for filters, chatters in (([], True), ([rd.control.LowPass(50.0)], False)):
+        loop = rd.control.Loop(law, rounded, [rd.control.Differences(), *filters])
+        run = rd.simulate(rd.Plant(arm), [0.3, 0.2], controller=loop, duration_s=0.2, estimate_error=False)
+        said = [each.remedy for each in run.remarks if each.kind == "chatter"]
+        assert bool(said) is chatters
+        assert all("kd period_s / M is 0.04, and reverses nothing: quantisation" in text for text in said)

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.control.digital_loop.block import Noise, Quantisation
+from robot_dyn.control.digital_loop.loop import Loop
 from robot_dyn.effects.effect import Conservative, Dissipative, Stateful
 from robot_dyn.errors import RobotDynError
 from robot_dyn.integrate.differences import by_state, rowwise
@@ -181,7 +183,7 @@ def against(setup: Setup, t: np.ndarray, q: np.ndarray) -> Callable[[Episode], s
 def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
     """What to do about a chatter, with the largest kd T/M: the eigenvalue of −M⁻¹ ∂u/∂v times the period."""
     general = "take a shorter period_s or less damping: it reverses where an eigenvalue of M⁻¹ kd period_s is above 1"
-    controller = setup.controller
+    controller = setup.controller.controller if isinstance(setup.controller, Loop) else setup.controller
     assert controller is not None
     z, v = np.zeros(controller.state_size), np.zeros(len(q))
     try:
@@ -190,12 +192,22 @@ def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
             ratio = float(np.abs(np.linalg.eigvals(np.linalg.solve(setup.plant.at(t).M(q), -slope))).max()) * period
     except (RobotDynError, np.linalg.LinAlgError):
         return general
+    if ratio <= 1 and (blocks := _of_sensors(setup.controller)):
+        what = f"kd period_s / M is {ratio:.2g}, and reverses nothing: {' and '.join(blocks)} of the measurement does"
+        return f"{what}; filter it, as rd.control.LowPass does, or take less damping: a shorter period is no remedy"
     if not 1 < ratio < np.inf:
         return general
     return (
         f"kd period_s / M is {ratio:.3g}, and above 1 it reverses, above 2 it grows: take period_s below "
         f"{period / ratio:.2g} s, or less damping"
     )
+
+
+def _of_sensors(controller: Any) -> tuple[str, ...]:
+    """Blocks of the measurement of a loop that change from tick to tick by themselves, each once."""
+    blocks = (*controller.position, *controller.velocity) if isinstance(controller, Loop) else ()
+    kinds = {Quantisation: "quantisation", Noise: "noise"}
+    return tuple(dict.fromkeys(name for each in blocks for kind, name in kinds.items() if isinstance(each, kind)))
 
 
 def _coarse(setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray, units: Units) -> Iterator[Remark]:
