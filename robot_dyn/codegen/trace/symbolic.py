@@ -59,6 +59,8 @@ class Symbols(np.ndarray):
     def __array_function__(self, function: Any, kinds: Any, args: Any, options: Any) -> Any:
         if function is np.where and len(args) == 3:
             return _symbols(np.frompyfunc(select, 3, 1)(*(np.asarray(x) for x in args)))
+        if function is np.clip and len(args) == 3 and not options and args[1] is not None is not args[2]:
+            return np.minimum(np.maximum(args[0], args[1]), args[2])
         return _symbols(super().__array_function__(function, kinds, args, options))
 
 
@@ -130,7 +132,9 @@ def every_branch(function: Callable[[], Array]) -> Array:
             yes = np.asarray(function(), dtype=object)
         left -= 1
         if left < 0:
-            raise TraceError(f"more than {_MOST_BRANCHES} branches; write the effect with np.where or without if")
+            raise TraceError(
+                f"more than {_MOST_BRANCHES} branches; write it with np.where or np.clip, without if, min or max"
+            )
         result = yes
         for depth in reversed(
             range(len(decided), len(conditions))
