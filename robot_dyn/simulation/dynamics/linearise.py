@@ -20,6 +20,7 @@ from robot_dyn.queries.units import without_rounding
 from robot_dyn.validate import one_state
 
 _STEPS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of Richardson's extrapolated central difference: error O(h⁴) and u/h
+_AT_REST = 1e-9  # of the acceleration without actuation
 _ONE_SIDED = 0.01  # of a slope: a larger difference between its two sides is not curvature at the shortest step
 _NO_DERIVATIVE = "the plant has no derivative at this state, such as at an effort limit or a stop; move the state"
 _AGREE = 1e-6  # of the largest slope: two steps that differ by more do not show a derivative
@@ -67,7 +68,8 @@ def linearise(plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = Non
         A, shape (2n, 2n), and B, shape (2n, n); shown as the eigenvalues of A.
 
     Raises:
-        QueryError: If an argument is wrong, or the acceleration has no derivative at this state.
+        QueryError: If an argument is wrong, the acceleration has no derivative at this state, no actuation makes it 0
+            and u is not given, or effects have states of their own.
     """
     if not isinstance(plant, Plant):
         plant = Plant(plant)
@@ -75,13 +77,21 @@ def linearise(plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = Non
     if drives := plant.equation_of_motion.drives:
         name = next(iter(drives.values())).name
         raise QueryError(f"linearise: {name} has motors of its own, which are no part of (q, v); leave it out")
+    for k in plant.equation_of_motion.states:
+        raise QueryError(f"linearise: {plant.effects[k].name} has states, which are no part of (q, v); leave it out")
     names, n = plant.dynamics.joint_names, plant.dynamics.n
     q, v = one_state("q", q, names), one_state("v", np.zeros(n) if v is None else v, names)
-    u = plant.inverse_dynamics(t, q, v, np.zeros(n)) if u is None else one_state("u", u, names)
+    balanced = u is None
+    u = plant.inverse_dynamics(t, q, v, np.zeros(n)) if balanced else one_state("u", u, names)
     x = np.concatenate([q, v, u])
 
     def a(x: np.ndarray) -> np.ndarray:
         return plant.forward_dynamics(t, x[:n], x[n : 2 * n], x[2 * n :])
+
+    if balanced and np.abs(a(x)).max() > _AT_REST * (1 + np.abs(a(np.concatenate([q, v, 0 * u]))).max()):
+        raise QueryError(
+            "linearise: no actuation within the limits of the plant holds this state; give u"
+        )
 
     slopes, rest = of_fourth_order(a, x, _STEPS[0]), list(_STEPS[1:])
     while rest:  # steep friction needs a short step; the longest one that a shorter one confirms errs least
