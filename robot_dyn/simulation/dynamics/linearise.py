@@ -89,9 +89,7 @@ def linearise(plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = Non
         return plant.forward_dynamics(t, x[:n], x[n : 2 * n], x[2 * n :])
 
     if balanced and np.abs(a(x)).max() > _AT_REST * (1 + np.abs(a(np.concatenate([q, v, 0 * u]))).max()):
-        raise QueryError(
-            "linearise: no actuation within the limits of the plant holds this state; give u"
-        )
+        raise QueryError("linearise: no actuation within the limits of the plant holds this state; give u")
 
     slopes, rest = of_fourth_order(a, x, _STEPS[0]), list(_STEPS[1:])
     while rest:  # steep friction needs a short step; the longest one that a shorter one confirms errs least
