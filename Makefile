@@ -21,9 +21,9 @@ test-long: .venv/installed
 # hours: all hard cases and their figures in build/hard_cases; error estimates on 600 random scenes. With a fixed seed and
 # with that of the day, which each prints.
 stress: .venv/installed
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.hard --full --write --seed $$(date +%Y%m%d)
-	$(BIN)/python -m tests.estimates --scenes 600 --seed 1
-	$(BIN)/python -m tests.estimates --scenes 600 --seed $$(date +%Y%m%d)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.campaigns.hard --full --write --seed $$(date +%Y%m%d)
+	$(BIN)/python -m tests.campaigns.estimates --scenes 600 --seed 1
+	$(BIN)/python -m tests.campaigns.estimates --scenes 600 --seed $$(date +%Y%m%d)
 
 # what CI asks for besides the tests
 check: .venv/installed

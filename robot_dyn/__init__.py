@@ -3,21 +3,20 @@
 An arm              load, list_robots, Robot, Payload; `arm.M(q)`, `arm.C(q, v)`, `arm.N(q, v)`, …
 Other formulations  Lagrangian, Compiled, euler_lagrange
 What it answers     info (an arm), why (a torque by cause), explain (what is integrated), sweepable (by rollouts)
-Trust               compare, check
-Motors              budget (of a plan or a run: torque, power and headroom of each joint, by cause)
+Trust               compare
 A simulation        Plant, Setup, Event, read_scene, simulate, rollouts, linearise, advise
 To look at          replay, show, plot, save_replay, save_plot, compare_runs
 To keep             save_run, load_run, save_rollouts, load_rollouts, export
 What comes of it    Trajectory, Rollouts; RobotDynError, ModelWarning, PrecisionWarning; STANDARD_GRAVITY in [m/s²]
 
 Rooms, whose docstrings list what is in them: effects (friction, springs, stops, limits, …), control (controllers,
-references, what a real loop adds), integrate (methods), plan (motions to follow, inverse kinematics), studies
-(work-precision diagrams, certificates, costs, proofs, stress tests), sweeps (many runs under uncertainty).
+references, recorded motions, inverse kinematics), integrate (methods), accuracy (work-precision diagrams, certificates,
+costs) and tools (doctor of files, motors, sweeps, proofs, stress tests).
 """
 
 from __future__ import annotations
 
-from robot_dyn.public import public_names
+from robot_dyn.foundations.public import public_names
 
 TYPE_CHECKING = False  # as of typing, whose import takes longer than all of this
 if TYPE_CHECKING:

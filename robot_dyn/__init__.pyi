@@ -1,10 +1,11 @@
 # The public names and where they live: type checkers read this file, and public_names does.
+from robot_dyn import accuracy as accuracy
 from robot_dyn import control as control
 from robot_dyn import effects as effects
 from robot_dyn import integrate as integrate
-from robot_dyn import plan as plan
-from robot_dyn import studies as studies
-from robot_dyn import sweeps as sweeps
+from robot_dyn import tools as tools
+from robot_dyn.accuracy.advice import advise as advise
+from robot_dyn.accuracy.run_difference import compare_runs as compare_runs
 from robot_dyn.codegen.plant import Compiled as Compiled
 from robot_dyn.cross_check.compare import compare as compare
 from robot_dyn.description.catalog import list_robots as list_robots
@@ -12,9 +13,9 @@ from robot_dyn.description.edits import STANDARD_GRAVITY as STANDARD_GRAVITY
 from robot_dyn.description.edits import Payload as Payload
 from robot_dyn.effects.plant import Plant as Plant
 from robot_dyn.effects.why import why as why
-from robot_dyn.errors import ModelWarning as ModelWarning
-from robot_dyn.errors import PrecisionWarning as PrecisionWarning
-from robot_dyn.errors import RobotDynError as RobotDynError
+from robot_dyn.foundations.errors import ModelWarning as ModelWarning
+from robot_dyn.foundations.errors import PrecisionWarning as PrecisionWarning
+from robot_dyn.foundations.errors import RobotDynError as RobotDynError
 from robot_dyn.lagrange.euler_lagrange import euler_lagrange as euler_lagrange
 from robot_dyn.lagrange.lagrangian import Lagrangian as Lagrangian
 from robot_dyn.model.info import info as info
@@ -35,10 +36,6 @@ from robot_dyn.simulation.rollouts.sweepable import sweepable as sweepable
 from robot_dyn.simulation.setup.event import Event as Event
 from robot_dyn.simulation.setup.setup import Setup as Setup
 from robot_dyn.simulation.simulate import simulate as simulate
-from robot_dyn.studies.advice import advise as advise
-from robot_dyn.studies.doctor.check import check as check
-from robot_dyn.studies.motor_budget.budget import budget as budget
-from robot_dyn.studies.run_difference import compare_runs as compare_runs
 from robot_dyn.view.plots.plots import plot as plot
 from robot_dyn.view.plots.plots import save_plot as save_plot
 from robot_dyn.view.replay import replay as replay

@@ -28,11 +28,11 @@ Imports = set[tuple[str, str]]  # (importing room, imported room)
 Place = tuple[float, float]
 DARK, UPWARD, FILL = "#1f3b57", "#c0392b", "#eef3f8"
 WIDTH, HEIGHT = 1.5, 0.5  # of a box; rows are 1 apart
+BASE = "foundations"
 ACROSS = {  # middles of the boxes, such that no arrow passes behind another box
-    "cli": 0.0, "scene": -2.4, "sweeps": 2.6, "studies": 0.0, "view": 0.0, "simulation": 0.0, "codegen": 0.0,
-    "plan": -3.3,
-    "effects": -3.2, "control": -1.2, "integrate": 3.2, "cross_check": 3.0, "model": 1.4, "lagrange": 1.4,
-    "shapes": 3.2, "queries": -0.6, "description": 2.4,
+    "tools": 0.0, "cli": -1.2, "scene": -3.0, "accuracy": 1.4, "report": 2.6, "view": 0.6, "simulation": 0.0,
+    "codegen": -1.0, "effects": -3.2, "control": -1.2, "integrate": 3.2, "cross_check": 3.0, "model": 1.4,
+    "lagrange": 1.4, "shapes": 3.2, "queries": -0.6, "description": 2.4,
 }  # fmt: skip
 
 
@@ -103,8 +103,7 @@ def text(pairs: Imports) -> str:
     order = [name for layer in layers() for name in layer]
     rooms = [name for name in order if is_room(name)]
     below = {room: [other for other in rooms if (room, other) in pairs] for room in rooms}
-    single = [name for name in order if not is_room(name)]
-    return "\n".join([*(f"{room}: {', '.join(below[room])}" for room in rooms), f"single files: {', '.join(single)}"])
+    return "\n".join(f"{room}: {', '.join(below[room])}" for room in rooms)
 
 
 def arrow(start: Place, end: Place, upward: bool) -> FancyArrowPatch:
@@ -131,8 +130,9 @@ def box(axes: Axes, place: Place, width: float, label: str, size: float) -> None
 
 
 def drawn(pairs: Imports) -> Figure:
-    """Rooms as boxes, imports as arrows, but for those that others imply; upward ones are dashed."""
-    rows = [rooms for layer in layers() if (rooms := [name for name in layer if is_room(name)])]
+    """Draw rooms as boxes and imports as arrows, without those that others imply; upward ones are dashed."""
+    rows = [layer for layer in layers() if layer != [BASE]]
+    pairs = {(start, end) for start, end in pairs if end != BASE}
     at = {room: (ACROSS[room], -float(down)) for down, rooms in enumerate(rows) for room in rooms}
     upward = {(start, end) for start, end in pairs if at[end][1] >= at[start][1]}
     figure = Figure(figsize=(9.0, 10.0), facecolor="white")
@@ -142,9 +142,7 @@ def drawn(pairs: Imports) -> Figure:
         axes.add_patch(arrow(at[start], at[end], (start, end) in upward))
     for room, place in at.items():
         box(axes, place, WIDTH, room, 14)
-    single = [name for layer in layers() for name in layer if not is_room(name)]
-    half = (len(single) + 1) // 2
-    box(axes, (0.0, -float(len(rows))), 7.8, f"{'   '.join(single[:half])}\n{'   '.join(single[half:])}", 10)
+    box(axes, (0.0, -float(len(rows))), 7.8, f"{BASE}: every room may import them", 14)
     axes.set_xlim(-4.2, 4.2)
     axes.set_ylim(-len(rows) - 0.4, 0.4)
     return figure

@@ -34,7 +34,7 @@ from benchmarks import (
 )
 from benchmarks.measure import Effort, command_line
 
-from robot_dyn.studies.environment import environment
+from robot_dyn.report.environment import environment
 
 SUBJECTS: dict[str, tuple[Callable[[Effort], None], ...]] = {
     "queries": (queries.queries, queries.lagrangian, queries.right_angles, queries.startup),

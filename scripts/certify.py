@@ -1,6 +1,6 @@
 """True digits of M, C, N, inverse and forward dynamics of many robots: the tables of docs/studies/certify.md.
 
-Each is `rd.studies.certify`. With --keep FILE the results are stored there, a line of JSON each,
+Each is `rd.accuracy.certify`. With --keep FILE the results are stored there, a line of JSON each,
 and a later call continues.
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 from benchmarks.measure import command_line
 
 import robot_dyn as rd
-from robot_dyn.result import plain
+from robot_dyn.foundations.result import plain
 
 MOST_JOINTS = 12
 IMPLEMENTATIONS = (
@@ -82,7 +82,7 @@ if __name__ == "__main__":
     settings: dict[str, Any] = {"samples": 100, "repeats": 1} if options.quick else {}
     for name in ["planar_2r"] if options.quick else options.robots or arms():
         if name not in documents:
-            documents[name] = {"name": name} | plain(rd.studies.certify(rd.load(name), **settings))
+            documents[name] = {"name": name} | plain(rd.accuracy.certify(rd.load(name), **settings))
             if options.keep:
                 with options.keep.open("a") as file:
                     file.write(json.dumps(documents[name]) + "\n")

@@ -1,6 +1,6 @@
 """Error against time: a pendulum, a double pendulum, UR5, Panda-7, a stiff scene, and one with stops.
 
-Each is `rd.studies.work_precision`; the diagrams are those of docs/studies/work_precision.md.
+Each is `rd.accuracy.work_precision`; the diagrams are those of docs/studies/work_precision.md.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ if __name__ == "__main__":
     if unknown := set(options.scenes) - set(SCENES):
         parser.error(f"no scene {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
     if options.quick:
-        say(rd.studies.work_precision(setup("pendulum"), methods=["DOP853", "rk4"], budget_s=2.0))
+        say(rd.accuracy.work_precision(setup("pendulum"), methods=["DOP853", "rk4"], budget_s=2.0))
     for each in () if options.quick else options.scenes:
         print(f"\n## {each}\n", flush=True)
-        result = rd.studies.work_precision(setup(each), budget_s=options.budget)
+        result = rd.accuracy.work_precision(setup(each), budget_s=options.budget)
         say(result)
-        rd.studies.save_result(result, PICTURES / f"accuracy_{each}.png")
+        rd.accuracy.save_result(result, PICTURES / f"accuracy_{each}.png")

@@ -13,7 +13,7 @@ from robot_dyn.description import catalog, description
 from robot_dyn.model.robot import Robot
 from robot_dyn.view.geometry.visuals import Drawing, drawing
 
-pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 
 FLOAT32 = 1e-6  # [m]: coordinates of a few metres at most, in float32
 

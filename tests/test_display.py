@@ -7,7 +7,7 @@ import pytest
 from lxml import html
 
 import robot_dyn as rd
-from robot_dyn import display
+from robot_dyn.foundations import display
 
 ARM = rd.load("planar_2r").with_(payload=rd.Payload("bar_2", 0.5))
 

@@ -1,6 +1,6 @@
 """Mutants of each kind of input, many more in `make test-long`: accepted or refused, never other exceptions or a hang.
 
-More by hand: python -m tests.fuzz scenes --cases 20000; ROBOT_DYN_FUZZ_CASES sets how many there are here.
+More by hand: python -m tests.campaigns.fuzz scenes --cases 20000; ROBOT_DYN_FUZZ_CASES sets how many there are here.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz.campaign import CASES, FUZZERS, MANY, run
+from tests.campaigns.fuzz.campaign import CASES, FUZZERS, MANY, run
 from tests.long import long
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import RobotDynError, RobotDynWarning, shown
-from tests.fuzz.campaign import HangError, limited
+from robot_dyn.foundations.errors import RobotDynError, RobotDynWarning, shown
+from tests.campaigns.fuzz.campaign import HangError, limited
 from tests.wrong_arguments import LAX, NOT_TEXT, Example, examples, public, wrong
 
 LIMIT_S = 20  # of one call; the machine may be busy
@@ -104,7 +104,7 @@ def test_equal_runs_and_setups_do_not_raise() -> None:
         lambda robot, run: rd.Robot(robot.model),
         lambda robot, run: rd.Setup(rd.Plant(robot), [0.1, 0.2], record_period_s=1e-320),
         lambda robot, run: rd.compare(robot, seed=-1),
-        lambda robot, run: rd.studies.Ball(0),
+        lambda robot, run: rd.accuracy.Ball(0),
         lambda robot, run: rd.effects.JointStopSpring([0.0, 0.0], [1.0, 1.0, 1.0], 1.0),
         lambda robot, run: rd.control.circle([0, 0, 0], 1.0, [0, 0, 1], 1.0, turns=1e300),
     ],

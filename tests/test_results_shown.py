@@ -17,7 +17,7 @@ from nbclient import NotebookClient
 from nbconvert import HTMLExporter
 
 import robot_dyn as rd
-from robot_dyn.answer import Answer, Table
+from robot_dyn.foundations.answer import Answer, Table
 
 ARM = rd.load("planar_2r")
 Q = np.array([0.3, 0.4])
@@ -26,15 +26,15 @@ MOST_TEXT, MOST_HTML = 8000, 250_000  # characters
 # What makes each result, as a cell of a notebook does.
 CELLS = {
     "compare": "rd.compare(arm, samples=5)",
-    "check": "rd.check('kinova')",
+    "check": "rd.tools.doctor.check('kinova')",
     "advise": "rd.advise(arm, q, duration_s=0.1, integrator='rk4', step_s=1e-3)",
-    "prove": "rd.studies.prove(rd.Setup(rd.Plant(arm), q, duration_s=0.2))",
-    "certify": "rd.studies.certify(arm, samples=100, repeats=1)",
-    "cost": "rd.studies.cost(arm, q, budget_s=0.5, repeats=2)",
-    "work_precision": "rd.studies.work_precision(rd.Setup(rd.Plant(arm), q, duration_s=0.1),"
+    "prove": "rd.tools.proof.prove(rd.Setup(rd.Plant(arm), q, duration_s=0.2))",
+    "certify": "rd.accuracy.certify(arm, samples=100, repeats=1)",
+    "cost": "rd.accuracy.cost(arm, q, budget_s=0.5, repeats=2)",
+    "work_precision": "rd.accuracy.work_precision(rd.Setup(rd.Plant(arm), q, duration_s=0.1),"
     " methods=['rk4', 'DOP853'], peers=False, budget_s=1.0, repeats=1)",
-    "stress": "rd.studies.stress(arm, samples=100, runs=0, budget_s=4.0)",
-    "budget": "rd.budget(rd.control.quintic(q, q + 1, 1.0), arm, effort=50.0, velocity=9.0)",
+    "stress": "rd.tools.stress.stress(arm, samples=100, runs=0, budget_s=4.0)",
+    "budget": "rd.tools.motors.budget(rd.control.quintic(q, q + 1, 1.0), arm, effort=50.0, velocity=9.0)",
     "linearise": "rd.linearise(arm, q)",
     "task_dynamics": "rd.control.task_dynamics(arm, q, np.ones(2), 'tip', rows=(0, 2))",
 }
@@ -137,7 +137,7 @@ def test_the_repr_of_what_is_around_results_is_short(name: str) -> None:
 def test_results_are_shown_without_ipython_and_figures_without_pyplot() -> None:
     program = (
         "import sys, robot_dyn as rd; arm = rd.load('pendulum'); rd.compare(arm, samples=1)._repr_html_();"
-        f" q = [0.1]; rd.plot({RUN})._repr_png_(); rd.studies.cost(arm, q, budget_s=0.1, repeats=1)._repr_html_();"
+        f" q = [0.1]; rd.plot({RUN})._repr_png_(); rd.accuracy.cost(arm, q, budget_s=0.1, repeats=1)._repr_html_();"
         " print([m for m in ('IPython', 'matplotlib.pyplot') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True)

@@ -13,10 +13,10 @@ import casadi as ca
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.answer import Answer
-from robot_dyn.arithmetic import Arithmetic
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Bound, Conservative, Drive, Effect, Force, Stateful
+from robot_dyn.foundations.answer import Answer
+from robot_dyn.foundations.arithmetic import Arithmetic
 from robot_dyn.integrate.integrator import System
 from tests.queries import ARGUMENTS, FRAMED
 
@@ -71,7 +71,7 @@ LAX = {  # arguments that may be infinite or unknown, or of any shape
 SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
 
 
-ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.plan, rd.studies, rd.sweeps)
+ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.plan, rd.studies, rd.tools.sweeps)
 
 SHOWS = {"blocks", "tables", "to_json"}  # methods of answers, which take no argument
 OF_EXTRAS = {"to_pandas", "to_xarray", "samples"}  # take none either, and need packages that may be absent
@@ -104,25 +104,27 @@ def examples(folder: Path) -> dict[str, Example]:
     robot = rd.load("cart_pole")
     q, v, u = np.array([0.3, -0.4]), np.array([0.7, 1.1]), np.array([1.3, 0.9])
     friction, hold = rd.effects.ViscousFriction(0.1), rd.control.hold(q)
-    certified = rd.studies.certify(robot, samples=100, repeats=1)
+    certified = rd.accuracy.certify(robot, samples=100, repeats=1)
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
     setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
-    proven = rd.studies.prove(setup, bits=53)
-    measured = rd.studies.work_precision(replace(setup, engine="interpreted"), methods=["rk4"], budget_s=2.0, repeats=1)
-    priced = rd.studies.cost(setup, budget_s=1e-9, repeats=1)
+    proven = rd.tools.proof.prove(setup, bits=53)
+    measured = rd.accuracy.work_precision(
+        replace(setup, engine="interpreted"), methods=["rk4"], budget_s=2.0, repeats=1
+    )
+    priced = rd.accuracy.cost(setup, budget_s=1e-9, repeats=1)
     saved, scene, urdf = rd.save_run(run, folder / "run"), folder / "scene.toml", folder / "arm.urdf"
     scene.write_text('robot = "cart_pole"\nduration_s = 0.01\n', encoding="utf-8")
     urdf.write_bytes(robot.description.xml)
     of_sweep = folder / "of_sweep.toml"
     start = '{q0 = "normal(mean=[0.1, 0.2], sd=0.1)"}'
     of_sweep.write_text(f'{scene.read_text()}method = "rk4"\n[sweep]\nruns = 48\nvary = {start}\n', encoding="utf-8")
-    sweep = rd.sweeps.from_scene(of_sweep, figures={"end": rd.sweeps.final("q", "slide")})
-    swept = rd.sweeps.run(sweep, folder / "sweep", threads=1, chunk=16)
+    sweep = rd.tools.sweeps.from_scene(of_sweep, figures={"end": rd.tools.sweeps.final("q", "slide")})
+    swept = rd.tools.sweeps.run(sweep, folder / "sweep", threads=1, chunk=16)
     table, motors = folder / "samples.csv", folder / "motors.csv"
     motors.write_text("joint,peak [N m]\nslide,50\n")
     table.write_text("t [s],q x [m],q y [rad]\n0,0.1,0.2\n1,0.3,0.5\n", encoding="utf-8")
-    needs = rd.budget(rd.control.quintic(q, v, 1.0), plant, effort=50.0, velocity=4.0)
+    needs = rd.tools.motors.budget(rd.control.quintic(q, v, 1.0), plant, effort=50.0, velocity=4.0)
     adaptive = rd.integrate.Adaptive()
     system = System(lambda t, y: -y, 1)
     linked = {"frame": "pole", "expressed_in": "body"}
@@ -150,7 +152,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "Adaptive.solve": (adaptive.solve, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
         "Adaptive.steps": (adaptive.steps, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
         "Adaptive.with_tolerances": (adaptive.with_tolerances, {"factor": 10.0, "longest_s": 0.5}),
-        "Ball": (rd.studies.Ball, {"bits": 53}),
+        "Ball": (rd.accuracy.Ball, {"bits": 53}),
         "Compiled": (rd.Compiled, {"robot_or_plant": robot, "dtype": "float64", "threads": 1, "cache": False}),
         "ComputedTorque": (rd.control.ComputedTorque, pair),
         "ActuatorLag": (rd.effects.ActuatorLag, {"time_constant": [0.1, 0.2]}),
@@ -179,7 +181,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "Trajectory.causes": (run.causes, {}),
         "Trajectory.proven_digits": (run.proven_digits, {"proof": proven}),
         "prove": (
-            rd.studies.prove,
+            rd.tools.proof.prove,
             {"setup": setup, "until_s": 0.001, "bits": 53, "q0": q, "v0": v, "width_q": 1e-9,
              "width_v": 1e-9, "budget_s": 1.0, "on_progress": print},
         ),
@@ -253,19 +255,19 @@ def examples(folder: Path) -> dict[str, Example]:
         ),
         "ViscousFriction": (rd.effects.ViscousFriction, {"damping": [0.1, 0.2]}),
         "certify": (
-            rd.studies.certify,
+            rd.accuracy.certify,
             {"robot": robot, "q": q, "v": v, "a": u, "tau": u, "samples": 100, "seed": 3, "repeats": 1,
              "on_progress": lambda part, what: None},
         ),
         "Certificate.of": (certified.of, {"quantity": "M", "implementation": "Pinocchio"}),
-        "save_result": (rd.studies.save_result, {"result": certified, "path": folder / "digits.csv", "theme": "dark"}),
+        "save_result": (rd.accuracy.save_result, {"result": certified, "path": folder / "digits.csv", "theme": "dark"}),
         "stress": (
-            rd.studies.stress,
+            rd.tools.stress.stress,
             {"robot": robot, "samples": 100, "runs": 0, "seed": 3, "budget_s": 1e-3,
              "on_progress": lambda spent, what: None},
         ),
         "check": (
-            rd.check,
+            rd.tools.doctor.check,
             {"name_or_path": "planar_2r", "package_dirs": [folder], "mass": None, "total_mass": None,
              "density": 1000.0, "units": True, "xacro": None},
         ),
@@ -287,7 +289,7 @@ def examples(folder: Path) -> dict[str, Example]:
             {"kinetic": lambda t, q, v: v[0] ** 2 / 2, "potential": lambda t, q: ca.cos(q[0]), "n": 1},
         ),
         "from_samples": (
-            rd.plan.from_samples,
+            rd.control.from_samples,
             {"arm": robot, "source": {"slide": [0.1, 0.2, 0.3], "hinge": [0.1, 0.3, 0.4]}, "time": [0.0, 1.0, 2.0],
              "joints": {"slide": "slide", "hinge": "hinge"}, "unit": "rad", "ends": "measured", "q0": q,
              "start_s": 0.5, "topic": None},
@@ -320,7 +322,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "LineSpringDamper": (rd.effects.LineSpringDamper, strut | {"stiffness": 10.0, "damping": 0.1, "length": 0.2}),
         "joint_stops": (rd.effects.joint_stops, stops | {"stiffness": 10.0, "damping": 0.1}),
         "inverse_kinematics": (
-            rd.plan.inverse_kinematics,
+            rd.control.inverse_kinematics,
             {"arm": robot, "pose": robot.placement(q, "pole"), "frame": "pole", "q0": q, "seed": 1, "starts": 2,
              "tolerance": 1e-9, "iterations": 5},
         ),
@@ -341,25 +343,25 @@ def examples(folder: Path) -> dict[str, Example]:
         "export": (rd.export, {"run": several, "path": folder / "table"}),
         "load_rollouts": (rd.load_rollouts, {"path": rd.save_rollouts(several, folder / "all"), "max_bytes": 2**30}),
         "method": (rd.integrate.method, {"name": "rk4"}),
-        "midpoint": (rd.studies.midpoint, {"x": rd.Lagrangian(robot, rd.studies.Ball(60)).N(q)}),
-        "radius": (rd.studies.radius, {"x": rd.Lagrangian(robot, rd.studies.Ball(60)).N(q)}),
+        "midpoint": (rd.accuracy.midpoint, {"x": rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)}),
+        "radius": (rd.accuracy.radius, {"x": rd.Lagrangian(robot, rd.accuracy.Ball(60)).N(q)}),
         "plot": (rd.plot, {"run": run, "only": ["torques"], "joints": ["hinge"], "limits": u, "theme": "light",
              "style": "paper", "width_mm": 120.0}),
         "path": (
-            rd.plan.path,
+            rd.tools.motors.path,
             {"plant": robot, "points": [q, v], "share": 0.9, "effort": 50.0, "velocity": 4.0, "acceleration": 30.0,
              "motors": None},
         ),
         "budget": (
-            rd.budget,
+            rd.tools.motors.budget,
             {"motion": rd.control.quintic(q, v, 1.0), "plant": plant, "payload": rd.Payload("pole", 0.5),
              "motors": None, "effort": 50.0, "velocity": 4.0, "continuous": u},
         ),
         "MotorBudget.max_payload": (needs.max_payload, {"link": "pole", "com": [0.1, 0.2, 0.3]}),
         "MotorBudget.fastest": (needs.fastest, {"share": 0.9}),
-        "read_motors": (rd.plan.read_motors, {"path": motors}),
+        "read_motors": (rd.tools.motors.read_motors, {"path": motors}),
         "point_to_point": (
-            rd.plan.point_to_point,
+            rd.tools.motors.point_to_point,
             {"arm": robot, "q0": q, "q1": v, "acceleration": 1.0, "jerk": 9.0, "velocity": u, "v0": 0.1, "v1": 0.0,
              "start_s": 0.1},
         ),
@@ -377,9 +379,9 @@ def examples(folder: Path) -> dict[str, Example]:
              "record": ("q",), "cuts": True, "numbers": [3, 1], "threads": 1, "most_bytes": 10**9},
         ),
         "Sweep": (
-            rd.sweeps.Sweep,
-            {"scene": scene, "runs": 8, "vary": {"q0": rd.sweeps.uniform(low=[0.1, 0.2], high=0.3)},
-             "figures": {"peak": rd.sweeps.peak("v")}, "design": "random", "seed": 1, "storage": "npz"},
+            rd.tools.sweeps.Sweep,
+            {"scene": scene, "runs": 8, "vary": {"q0": rd.tools.sweeps.uniform(low=[0.1, 0.2], high=0.3)},
+             "figures": {"peak": rd.tools.sweeps.peak("v")}, "design": "random", "seed": 1, "storage": "npz"},
         ),
         "Sweep.values": (swept.sweep.values, {"start": 0, "stop": 3}),
         "SweepResult.export": (swept.export, {"path": folder / "rows.csv"}),
@@ -394,20 +396,20 @@ def examples(folder: Path) -> dict[str, Example]:
         "SweepResult.table": (swept.table, {}),
         "SweepResult.verify": (swept.verify, {}),
         "SweepResult.worst": (swept.worst, {"figure": "end", "count": 2, "given": "finished"}),
-        "choice": (rd.sweeps.choice, {"values": [1.0, 2.0]}),
-        "final": (rd.sweeps.final, {"of_what": "q", "joint": "slide"}),
-        "from_scene": (rd.sweeps.from_scene, {"path": of_sweep}),
-        "lognormal": (rd.sweeps.lognormal, {"median": 1.0, "sigma_of_log": 0.1}),
-        "normal": (rd.sweeps.normal, {"mean": 1.0, "sd": 0.1}),
-        "peak": (rd.sweeps.peak, {"of_what": "v", "joint": "slide"}),
-        "read": (rd.sweeps.read, {"folder": folder / "sweep"}),
-        "rms_error": (rd.sweeps.rms_error, {"joint": "slide"}),
+        "choice": (rd.tools.sweeps.choice, {"values": [1.0, 2.0]}),
+        "final": (rd.tools.sweeps.final, {"of_what": "q", "joint": "slide"}),
+        "from_scene": (rd.tools.sweeps.from_scene, {"path": of_sweep}),
+        "lognormal": (rd.tools.sweeps.lognormal, {"median": 1.0, "sigma_of_log": 0.1}),
+        "normal": (rd.tools.sweeps.normal, {"mean": 1.0, "sd": 0.1}),
+        "peak": (rd.tools.sweeps.peak, {"of_what": "v", "joint": "slide"}),
+        "read": (rd.tools.sweeps.read, {"folder": folder / "sweep"}),
+        "rms_error": (rd.tools.sweeps.rms_error, {"joint": "slide"}),
         "run": (
-            rd.sweeps.run,
+            rd.tools.sweeps.run,
             {"sweep": swept.sweep, "folder": folder / "sweep", "threads": 1, "chunk": 16, "on_progress": print_nothing},
         ),
-        "triangular": (rd.sweeps.triangular, {"low": 0.0, "mode": 0.5, "high": 1.0}),
-        "uniform": (rd.sweeps.uniform, {"low": 0.0, "high": 1.0}),
+        "triangular": (rd.tools.sweeps.triangular, {"low": 0.0, "mode": 0.5, "high": 1.0}),
+        "uniform": (rd.tools.sweeps.uniform, {"low": 0.0, "high": 1.0}),
         "save_plot": (rd.save_plot, {"run": run, "path": folder / "plot.png", "dpi": 50.0, "joints": ["hinge"]}),
         "save_replay": (
             rd.save_replay,
@@ -416,7 +418,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "save_rollouts": (rd.save_rollouts, {"runs": several, "path": folder / "many"}),
         "save_run": (rd.save_run, {"trajectory": run, "path": folder / "again"}),
         "show": (rd.show, {"robot": robot, "q": q, "package_dirs": [folder], "inertia": False}),
-        "samples": (partial(rd.sweeps.samples, "q"), {"every": 3, "failed": True}),
+        "samples": (partial(rd.tools.sweeps.samples, "q"), {"every": 3, "failed": True}),
         "simulate": (rd.simulate, {"what": plant, "on_progress": lambda t: None, "q0": q, "duration_s": 0.01}),
         "task_dynamics": (
             rd.control.task_dynamics,
@@ -429,13 +431,13 @@ def examples(folder: Path) -> dict[str, Example]:
         "advise": (rd.advise, {"what": plant, "q0": q, "v0": v, "duration_s": 0.01}),
         "Cost.of": (priced.of, {"what": "gravity"}),
         "cost": (
-            rd.studies.cost,
+            rd.accuracy.cost,
             {"what": setup, "q0": q, "v0": v, "budget_s": 1e-9, "repeats": 1, "on_progress": print_nothing},
         ),
         "WorkPrecision.digits": (measured.digits, {"error": 1e-6}),
         "WorkPrecision.sentence_of": (measured.sentence_of, {"digits": 6}),
         "work_precision": (
-            rd.studies.work_precision,
+            rd.accuracy.work_precision,
             {"what": replace(setup, engine="interpreted"), "q0": q, "v0": v, "duration_s": 0.01, "methods": ["rk4"],
              "peers": False, "budget_s": 2.0, "repeats": 1, "on_progress": print_nothing},
         ),

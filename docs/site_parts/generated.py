@@ -24,12 +24,12 @@ def root_file(name: str) -> str:
 MAKERS: dict[str, Callable[[str], str]] = {
     "rooms": rooms.page,  # the public names of a room, from its stub and docstrings
     "commands": commands.page,  # the commands, from the command line itself
-    "hard cases": hard_cases.page,  # counts from docs/data/hard_cases.json, laws from tests/hard
+    "hard cases": hard_cases.page,  # counts from docs/data/hard_cases.json, laws from tests/campaigns/hard
     "gallery": gallery.page,  # the scripts of docs/gallery
     "root file": root_file,
 }
 NAMES = "|".join([*MAKERS, "table of contents"])
-COMMENT = re.compile(rf"^<!-- made by ({NAMES})(?: of (\w+))? -->$", flags=re.MULTILINE)
+COMMENT = re.compile(rf"^<!-- made by ({NAMES})(?: of ([\w.]+))? -->$", flags=re.MULTILINE)
 
 
 def replaced(text: str) -> str:

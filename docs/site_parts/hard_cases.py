@@ -1,4 +1,4 @@
-"""The page of hard cases: counts of docs/data/hard_cases.json, laws of the docstrings in tests/hard."""
+"""The page of hard cases: counts of docs/data/hard_cases.json, laws of the docstrings in tests/campaigns/hard."""
 
 from __future__ import annotations
 

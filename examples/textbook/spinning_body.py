@@ -10,9 +10,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from robot_dyn.description.solids import box
+from robot_dyn.foundations.spatial import hat
 from robot_dyn.lagrange.euler_lagrange import euler_lagrange
 from robot_dyn.lagrange.rigid_body import angular_momentum, body_acceleration, kinetic_energy
-from robot_dyn.spatial import hat
 
 book = box(1.2, 0.3, 0.2, 0.05)  # [kg], edges in [m]: I₁ < I₂ < I₃ along x, y, z
 

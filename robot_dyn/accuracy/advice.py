@@ -15,15 +15,15 @@ from typing import Any, Unpack, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
-from robot_dyn.arithmetic import Array
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError, RobotDynError, escaped
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import QueryError, RobotDynError, escaped
+from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import units
-from robot_dyn.result import UNREPORTED, reported
 from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest, jacobian
 from robot_dyn.simulation.dynamics.sampled_loop import linearised, remedy
 from robot_dyn.simulation.dynamics.stability import (
@@ -107,7 +107,7 @@ class Advice(Answer):
 
     @property
     def drawing(self) -> str:
-        from robot_dyn.display import levels
+        from robot_dyn.foundations.display import levels
 
         return levels("longest stable step [s]; dashed: the step of the setup", self.limits, self.step_s)
 

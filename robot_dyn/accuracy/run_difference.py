@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf, nan
-from typing import Any, ClassVar, final
+from typing import TYPE_CHECKING, Any, ClassVar, final
 
 import numpy as np
 
-from robot_dyn.answer import Block, Table
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.answer import Block, Table
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.result import UNREPORTED
+from robot_dyn.foundations.validate import instance, number
 from robot_dyn.queries.units import unit, units
-from robot_dyn.result import UNREPORTED
+from robot_dyn.report.result import Result
 from robot_dyn.simulation.comparison.difference import TOLERANCE, Difference, difference
 from robot_dyn.simulation.comparison.differing_settings import (
     DifferingSetting,
@@ -22,8 +24,9 @@ from robot_dyn.simulation.comparison.differing_settings import (
 )
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.studies.result import Result
-from robot_dyn.validate import instance, number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @final
@@ -104,6 +107,11 @@ class RunDifference(Result):
     def rows(self) -> Iterator[Mapping[str, Any]]:
         """A row for each quantity of each joint."""
         return (vars(each) for each in self.joints)
+
+    def draw(self, theme: str = "light") -> Figure:
+        from robot_dyn.accuracy.run_difference_figure import draw
+
+        return draw(self, theme)
 
     def tables(self) -> Iterator[Block]:
         where = "interpolated between their samples" if self.interpolated else "common samples"

@@ -2,7 +2,7 @@
 
 Ctrl-C ends any command with exit code 130; its handler is installed before anything else is imported.
 
-commands/        the commands, by topic
+commands/        the commands, by topic; those of tools are entry points `robot_dyn.commands`
 groups.py        the commands as --help lists them
 app.py           the application, options that commands share, progress bars; completion.py and interrupts.py
 robots.py        how the file of a robot is read: options that commands with a robot share
@@ -21,10 +21,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-_TOPICS = (
-    "query", "budget", "simulate", "sweep", "show", "check", "cost", "prove", "stress", "diff", "demo", "cache",
-    "export",
-)  # fmt: skip
+_TOPICS = "query", "simulate", "show", "cost", "diff", "demo", "cache", "export"
 
 
 def main() -> None:
@@ -44,16 +41,19 @@ def _run() -> Any:
     """The exit code of the command."""
     import warnings
     from importlib import import_module
+    from importlib.metadata import entry_points
 
     from typer.main import get_command
 
     from robot_dyn.cli.app import app
     from robot_dyn.cli.groups import group, without_types_of_flags
     from robot_dyn.cli.terminal import failed, finish, open_streams, to_stderr
-    from robot_dyn.errors import RobotDynError, RobotDynWarning
+    from robot_dyn.foundations.errors import RobotDynError, RobotDynWarning
 
     for topic in _TOPICS:
         import_module(f"robot_dyn.cli.commands.{topic}")
+    for command in entry_points(group="robot_dyn.commands"):  # of tools
+        command.load()
     group(app)
     program = without_types_of_flags(get_command(app))
     open_streams()

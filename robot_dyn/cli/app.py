@@ -11,7 +11,7 @@ import typer
 
 from robot_dyn.cli import completion
 from robot_dyn.cli.terminal import put
-from robot_dyn.errors import escaped
+from robot_dyn.foundations.errors import escaped
 
 app = typer.Typer(
     name="robot-dyn",

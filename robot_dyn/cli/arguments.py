@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robot_dyn.errors import QueryError, RobotDynError, nearest
-from robot_dyn.files import Kind, target
+from robot_dyn.foundations.errors import QueryError, RobotDynError, nearest
+from robot_dyn.foundations.files import Kind, target
 
 if TYPE_CHECKING:
     import numpy as np

@@ -7,8 +7,8 @@ import re
 from contextlib import suppress
 
 from robot_dyn.description.catalog import find, list_robots
-from robot_dyn.errors import RobotDynError
-from robot_dyn.files import read_start
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.files import read_start
 
 _READ = 2**22  # bytes of a URDF that are searched for joints
 _MOVES = re.compile(

@@ -1,4 +1,7 @@
-"""The commands as `robot-dyn --help` lists them: groups by what a user wants, a line each."""
+"""The commands as `robot-dyn --help` lists them: groups by what a user wants, a line each.
+
+Commands of tools state their group and their line themselves, and stand behind those of the core.
+"""
 
 from __future__ import annotations
 
@@ -21,38 +24,36 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
         "query": "Ask for M, C, N, torques and accelerations at a state.",
         "explain": "Say what a scene integrates, and where numbers came from.",
         "sweepable": "List the parameters that runs of a scene can sweep.",
-        "budget": "Say whether motors suffice for a motion, and why.",
         "cost": "Count and time what effects, control and terms cost.",
     },
     "Run it": {
         "simulate": "Run a scene.",
-        "sweep": "Run a scene many times, with what varies, into a folder.",
         "advise": "Say whether step and control period are short enough.",
     },
     "Trust it": {
         "compare": "Compare Pinocchio with the library's own Lagrangian.",
         "certify": "Count the digits of M, C, N and dynamics that are true.",
         "accuracy": "Show what each digit of a motion costs in time.",
-        "prove": "Prove where the arm of a scene will be.",
-        "stress": "Look for what breaks first on an arm.",
     },
     "Files": {
         "export": "Write a run as CSV, Parquet, netCDF or a log of ROS 2.",
         "scene": "Print a scene file to start from.",
-        "check": "Check URDF files, and repair what can be repaired.",
         "cache": "List or remove the compiled kernels that are kept on disk.",
     },
 }
 
 
 def group(app: typer.Typer) -> None:
-    """Give each command its group and its line, in the order of `GROUPS`; others come first, without a group."""
+    """Give each command of the core its group and its line, and sort all commands by their group."""
     listed = [(title, name, line) for title, lines in GROUPS.items() for name, line in lines.items()]
     place = {name: number for number, (_, name, _) in enumerate(listed)}
-    for each in app.registered_commands:
-        if (at := place.get(_name(each))) is not None:
-            each.rich_help_panel, _, each.short_help = listed[at]
-    app.registered_commands.sort(key=lambda each: place.get(_name(each), -1))
+    for command in app.registered_commands:
+        if (at := place.get(_name(command))) is not None:
+            command.rich_help_panel, _, command.short_help = listed[at]
+    titles = {title: number for number, title in enumerate(GROUPS)}
+    app.registered_commands.sort(
+        key=lambda command: (titles.get(str(command.rich_help_panel), -1), place.get(_name(command), len(listed)))
+    )
 
 
 def without_types_of_flags(command: Any) -> Any:

@@ -15,8 +15,8 @@ from robot_dyn.cli.terminal import say, say_json, to_stderr
 
 def outputs(of: Any, output: str | None, csv: str | None, inputs: Iterable[str], force: bool) -> list[Path]:
     """The paths to write a figure and a table of a class of results to, those that are given."""
-    from robot_dyn.studies.figure import ResultError
-    from robot_dyn.studies.save import table_kind
+    from robot_dyn.report.figure import ResultError
+    from robot_dyn.report.save import table_kind
     from robot_dyn.view.plots.plots import PICTURES
 
     paths = [arguments.output(output, PICTURES, ResultError, inputs, force)] if output else []
@@ -28,10 +28,10 @@ def give(result: Any, paths: Iterable[Path], as_json: bool, dark: bool = False, 
 
     The exit code is 130 if the user ended it.
     """
-    from robot_dyn.result import plain
+    from robot_dyn.foundations.result import plain
 
     try:  # the files first: a terminal or pipe may be gone
-        written = [rd.studies.save_result(drawn or result, path, theme="dark" if dark else "light") for path in paths]
+        written = [rd.accuracy.save_result(drawn or result, path, theme="dark" if dark else "light") for path in paths]
     finally:
         said = (part for each in more.values() for part in ("", each))
         say_json(result, **{key: plain(each) for key, each in more.items()}) if as_json else say(result, *said)

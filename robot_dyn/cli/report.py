@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.answer import Table
 from robot_dyn.cross_check.agreement import Comparison, marked
 from robot_dyn.cross_check.compare import compare
 from robot_dyn.effects.plant_state import plant_state
+from robot_dyn.foundations.answer import Table
 from robot_dyn.model.info import info
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import numbers_row

@@ -20,7 +20,7 @@ import typer
 
 from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import PackageDir, Xacro
-from robot_dyn.errors import ModelWarning
+from robot_dyn.foundations.errors import ModelWarning
 
 if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot

@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from robot_dyn.answer import Answer, Table
-from robot_dyn.errors import RobotDynError, escaped
+from robot_dyn.foundations.answer import Answer, Table
+from robot_dyn.foundations.errors import RobotDynError, escaped
 
 _MOST = 4000  # characters of a message
 
@@ -87,7 +87,7 @@ def put(text: str) -> None:
 
 def say_json(value: Any, **more: Any) -> None:
     """Print a document or a result as JSON, with more keys; errors as of `say`."""
-    from robot_dyn.result import json_text, plain
+    from robot_dyn.foundations.result import json_text, plain
 
     put(re.sub(r"[^\n\x20-\x7e]", lambda match: _json_escaped(match[0]), json_text(plain(value) | more)))
 

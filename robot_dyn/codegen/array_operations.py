@@ -20,8 +20,8 @@ from robot_dyn.codegen.loops.numbers import converted, real, scalar, truth
 from robot_dyn.codegen.loops.values import ArrayValue, Scalar, StaticValue, Value
 
 if TYPE_CHECKING:
-    from robot_dyn.arithmetic import Array
     from robot_dyn.codegen.loops.function import Function
+    from robot_dyn.foundations.arithmetic import Array
 
 _POINTER = F64.as_pointer()
 _NUMBERS = 32, 8, 4, 1  # of a sum at a time, in registers

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 
-from robot_dyn.arithmetic import Array, apply
+from robot_dyn.foundations.arithmetic import Array, apply
+from robot_dyn.foundations.spatial import bracket
+from robot_dyn.foundations.validate import check_batches
 from robot_dyn.model.coriolis import columnwise_bracket, columnwise_dual
 from robot_dyn.model.robot import Robot
-from robot_dyn.spatial import bracket
-from robot_dyn.validate import check_batches
 
 
 def forward_dynamics_derivatives(robot: Robot, q: Array, v: Array, tau: Array) -> np.ndarray:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy import empty
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.derivatives import forward_dynamics_derivatives
 from robot_dyn.codegen.engine import Engine
 from robot_dyn.codegen.self_check import SelfCheck
@@ -20,11 +19,12 @@ from robot_dyn.codegen.threads import thread_count
 from robot_dyn.codegen.trace.right_angles import RightAngle, completed
 from robot_dyn.codegen.trace.trace import QUANTITIES, Trace
 from robot_dyn.description.inertial_parameters import Parametrised
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.validate import choice, instance, truth
+from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Axes, Dynamics
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS_DERIVATIVES
-from robot_dyn.validate import choice, instance, truth
-from robot_dyn.values import OnFirstUse
 
 _DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
 

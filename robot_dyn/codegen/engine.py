@@ -13,7 +13,6 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Float
 from robot_dyn.codegen.kernel import Kernel
 from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.self_check import STATES, SelfCheck
@@ -21,11 +20,12 @@ from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.codegen.trace.trace import Traced
 from robot_dyn.codegen.waiting import announced
-from robot_dyn.errors import QueryError, RobotDynWarning
+from robot_dyn.foundations.arithmetic import Float
+from robot_dyn.foundations.errors import QueryError, RobotDynWarning
+from robot_dyn.foundations.validate import converted, shaped, times
+from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.queries.batch import DoubtError, answered
 from robot_dyn.queries.quantity import Quantity
-from robot_dyn.validate import converted, shaped, times
-from robot_dyn.values import OnFirstUse
 
 # Measured on chains: forward dynamics of 64 joints, 48 875 instructions, takes 8 s to compile; a batch is then 13 times
 # as fast as Pinocchio, one state from Python twice. The time grows as the count: above this, a quarter of a minute.

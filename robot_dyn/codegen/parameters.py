@@ -13,12 +13,12 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.coefficients import Coefficient, declared, with_values
 from robot_dyn.control.controller import Controller
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.coefficients import Coefficient, declared, with_values
 from robot_dyn.lagrange.tree import Described, tree
 from robot_dyn.model.robot import Robot
 

@@ -15,7 +15,6 @@ from typing import Any, overload
 import casadi as ca
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.dynamics import CompiledDynamics
 from robot_dyn.codegen.engine import Engine
 from robot_dyn.codegen.parameters import ROBOT, Parameter, joined, parameters, split
@@ -27,6 +26,7 @@ from robot_dyn.codegen.trace.symbolic_plant import symbolic_plant
 from robot_dyn.codegen.trace.trace import Traced
 from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import PLANT
 

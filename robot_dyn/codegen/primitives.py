@@ -31,7 +31,7 @@ from robot_dyn.integrate import primitives
 from robot_dyn.integrate.primitives import GOING, LOST, NOISE, PATIENCE, SETTLED
 
 if TYPE_CHECKING:
-    from robot_dyn.arithmetic import Array
+    from robot_dyn.foundations.arithmetic import Array
 
 
 def combination(x: Array, y: Array, h: Any, weights: Array, K: Array, count: int) -> None:

@@ -13,7 +13,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.magnitude import Magnitudes, magnitudes
 from robot_dyn.lagrange.scale import (

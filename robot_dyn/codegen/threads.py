@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import final
 
-from robot_dyn.validate import integer
+from robot_dyn.foundations.validate import integer
 
 _MOST_THREADS = 4096
 

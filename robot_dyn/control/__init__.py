@@ -5,7 +5,8 @@
     of a frame         OperationalSpace; task_dynamics (TaskDynamics), orientation_error, rotation_vector
     a function         ControlLaw: (t, q, v) as a controller
     joint motions      quintic, via_points, hold (PiecewisePolynomial), Samples
-    motions of a frame line, circle (CartesianReference)
+    recorded motions   from_samples: of files, data frames, logs and arrays (Plan)
+    motions of a frame line, circle (CartesianReference); inverse_kinematics (InverseKinematics)
     a real loop        Loop with delays and blocks: Quantisation, Differences, LowPass, RateLimit, Noise
                        Multirate: two rates
     to write one       Controller, Stateless, Block, Reference: base classes
@@ -13,6 +14,6 @@
 docs/developers/extending.md writes a controller step by step; robot_dyn/control/README.md lists its files.
 """
 
-from robot_dyn.public import public_names
+from robot_dyn.foundations.public import public_names
 
 __getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]

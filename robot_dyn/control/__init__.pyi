@@ -24,11 +24,15 @@ from robot_dyn.control.operational_space import TaskDynamics as TaskDynamics
 from robot_dyn.control.operational_space import task_dynamics as task_dynamics
 from robot_dyn.control.orientation import orientation_error as orientation_error
 from robot_dyn.control.orientation import rotation_vector as rotation_vector
+from robot_dyn.control.plan import Plan as Plan
+from robot_dyn.control.pose import InverseKinematics as InverseKinematics
+from robot_dyn.control.pose import inverse_kinematics as inverse_kinematics
 from robot_dyn.control.reference import PiecewisePolynomial as PiecewisePolynomial
 from robot_dyn.control.reference import Reference as Reference
 from robot_dyn.control.reference import hold as hold
 from robot_dyn.control.reference import quintic as quintic
 from robot_dyn.control.reference import via_points as via_points
-from robot_dyn.control.samples import Samples as Samples
+from robot_dyn.control.samples.measured import from_samples as from_samples
+from robot_dyn.control.samples.spline import Samples as Samples
 
 __all__: list[str]

@@ -11,13 +11,13 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import coefficient
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import PiecewisePolynomial, Reference, hermite, number, numbers, quintic
-from robot_dyn.errors import ControlError, shown
-from robot_dyn.spatial import rotation as rotation_about
-from robot_dyn.validate import duration
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.errors import ControlError, shown
+from robot_dyn.foundations.spatial import rotation as rotation_about
+from robot_dyn.foundations.validate import duration
 
 _MOST_TURNS = 1000
 _TURN_KNOTS, _RAMP_KNOTS = 64, 32  # per turn and per ramp: the accuracy that `circle` states

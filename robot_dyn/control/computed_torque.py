@@ -9,14 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, final
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import coefficient
 from robot_dyn.control.controller import Stateless, check_model
 from robot_dyn.control.independent_joint import DAMPING, STIFFNESS, joint_count
 from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.errors import ControlError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.errors import ControlError
+from robot_dyn.foundations.threshold import smooth
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.threshold import smooth
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Stateless
-from robot_dyn.errors import ControlError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import ControlError
 
 
 @final

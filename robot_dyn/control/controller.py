@@ -13,14 +13,14 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import check_coefficients, declared, with_values
 from robot_dyn.control.reference import Reference
-from robot_dyn.errors import ControlError, shown
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import check_coefficients, declared, with_values
+from robot_dyn.foundations.errors import ControlError, shown
+from robot_dyn.foundations.threshold import Threshold
+from robot_dyn.foundations.validate import duration
+from robot_dyn.foundations.values import Value
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.threshold import Threshold
-from robot_dyn.validate import duration
-from robot_dyn.values import Value
 
 
 class Nested(NamedTuple):
@@ -52,9 +52,10 @@ class Controller(Value, ABC):
         v: velocity, (n,), in [rad/s] or [m/s]
         z: controller states, (state_size,)
 
-    and with symbols in place of these numbers where it is compiled: written in `robot_dyn.arithmetic` and NumPy's
-    operators it runs in both engines. Its attributes may be references, models of the arm and numbers, of any names;
-    coefficients that are declared (`robot_dyn.coefficients`) are checked on construction, and may be swept.
+    and with symbols in place of these numbers where it is compiled: written in `robot_dyn.foundations.arithmetic` and
+    NumPy's operators it runs in both engines. Its attributes may be references, models of the arm and numbers, of any
+    names; coefficients that are declared (`robot_dyn.foundations.coefficients`) are checked on construction, and may be
+    swept.
 
     Attributes:
         term: The law u = … in short form, for `explain`.

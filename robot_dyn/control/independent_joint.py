@@ -11,13 +11,13 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.control.controller import Controller, Stateless
 from robot_dyn.control.reference import PiecewisePolynomial, numbers
-from robot_dyn.errors import ControlError, shown
-from robot_dyn.saturation import limits_reached, middle_of, piece, saturated
-from robot_dyn.threshold import Threshold, smooth
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import coefficient, with_values
+from robot_dyn.foundations.errors import ControlError, shown
+from robot_dyn.foundations.saturation import limits_reached, middle_of, piece, saturated
+from robot_dyn.foundations.threshold import Threshold, smooth
 
 STIFFNESS = coefficient("N m/rad", symbol="kp", least=0)
 DAMPING = coefficient("N m s/rad", symbol="kd", least=0)

@@ -14,18 +14,18 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
-from robot_dyn.arithmetic import Array, apply, symmetric, transpose
-from robot_dyn.coefficients import coefficient
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.controller import Stateless, check_model
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import number, numbers
-from robot_dyn.errors import ControlError, shown
-from robot_dyn.linear_algebra import eigh
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.arithmetic import Array, apply, symmetric, transpose
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.errors import ControlError, shown
+from robot_dyn.foundations.linear_algebra import eigh
+from robot_dyn.foundations.threshold import smooth
+from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.queries.dynamics import Dynamics, acceleration
-from robot_dyn.threshold import smooth
-from robot_dyn.values import Value, read_only
 
 POSITION, POSE = (0, 1, 2), (0, 1, 2, 3, 4, 5)  # rows of a twist
 

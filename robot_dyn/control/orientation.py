@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, sqrt, transpose
+from robot_dyn.foundations.arithmetic import Array, sqrt, transpose
 
 
 def rotation_vector(R: Array) -> Array:

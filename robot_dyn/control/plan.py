@@ -9,12 +9,12 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
+from robot_dyn.control.extremes import extremes
 from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.plan.extremes import extremes
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.result import reported
+from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.queries.units import of_joint
-from robot_dyn.result import reported
-from robot_dyn.values import Value, read_only
 
 _ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
 _PER = {"velocity": "[/s]", "acceleration": "[/s²]", "jerk": "[/s³]"}

@@ -14,18 +14,18 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
-from robot_dyn.arithmetic import transpose
+from robot_dyn.control.levenberg_marquardt import Descent, descend, held
 from robot_dyn.control.orientation import rotation_vector
-from robot_dyn.errors import PlanError
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.arithmetic import transpose
+from robot_dyn.foundations.errors import PlanError
+from robot_dyn.foundations.result import reported
+from robot_dyn.foundations.spatial import homogeneous
+from robot_dyn.foundations.validate import choice, instance, integer, number, numbers, one_state
+from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.model.robot import Robot
-from robot_dyn.plan.levenberg_marquardt import Descent, descend, held
 from robot_dyn.queries.dynamics import Axes
 from robot_dyn.queries.units import of_joint
-from robot_dyn.result import reported
-from robot_dyn.spatial import homogeneous
-from robot_dyn.validate import choice, instance, integer, number, numbers, one_state
-from robot_dyn.values import Value, read_only
 
 _SOUGHT = 1e-11  # of ‖e‖, in [m] and [rad]: below what is asked for, above rounding
 _ROTATION = 1e-6  # of RᵀR − 1: beyond, R was not meant as a rotation

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn import validate
-from robot_dyn.arithmetic import Array
-from robot_dyn.errors import ControlError, QueryError
-from robot_dyn.validate import choice, duration, times
-from robot_dyn.values import Value
+from robot_dyn.foundations import validate
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import ControlError, QueryError
+from robot_dyn.foundations.validate import choice, duration, times
+from robot_dyn.foundations.values import Value
 
 # values given at each end of a piece, by kind of spline
 _DERIVATIVES = {"cubic": 2, "quintic": 3}

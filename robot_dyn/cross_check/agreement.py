@@ -8,11 +8,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
 from robot_dyn.description.urdf import UNBOUNDED
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.lagrange.scale import floored, scaled
 from robot_dyn.queries.units import numbers_row
-from robot_dyn.result import UNREPORTED, reported
 
 
 @final
@@ -95,7 +95,7 @@ class Comparison(Answer):
 
     @property
     def drawing(self) -> str:
-        from robot_dyn.display import levels
+        from robot_dyn.foundations.display import levels
 
         shares = {each.quantity: each.share for each in self.agreements}
         return levels("worst error / allowed; exact agreement is left out", shares, 1.0)

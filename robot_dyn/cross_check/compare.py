@@ -17,7 +17,8 @@ import numpy as np
 from robot_dyn.cross_check.agreement import Agreement, Comparison, Pair, worst_by_quantity
 from robot_dyn.cross_check.second_reading import second_reading
 from robot_dyn.description.inertial_parameters import parameter_names
-from robot_dyn.errors import SingularError
+from robot_dyn.foundations.errors import SingularError
+from robot_dyn.foundations.validate import function, instance, integer, number
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.magnitude import Magnitudes, magnitudes
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
@@ -25,7 +26,6 @@ from robot_dyn.lagrange.scale import acceleration_norm, diagonal_scale, mass_nor
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Axes
 from robot_dyn.queries.quantity import EQUATION, FORWARD_DYNAMICS, INVERSE_DYNAMICS
-from robot_dyn.validate import function, instance, integer, number
 
 TOLERANCE = 1e-12
 

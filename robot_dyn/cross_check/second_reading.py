@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.cross_check.agreement import Pair
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.urdf import UNBOUNDED
-from robot_dyn.errors import shorten
+from robot_dyn.foundations.arithmetic import FLOAT64
+from robot_dyn.foundations.errors import shorten
+from robot_dyn.foundations.spatial import homogeneous, rotation_rpy
 from robot_dyn.lagrange.tree import tree
-from robot_dyn.spatial import homogeneous, rotation_rpy
 
 _MOMENTS = np.triu_indices(3)  # Ixx, Ixy, Ixz, Iyy, Iyz, Izz
 _NONE = float(UNBOUNDED)

@@ -11,7 +11,7 @@ from importlib import metadata
 from pathlib import Path
 
 from robot_dyn.description.packages import environment_folders, package_folders
-from robot_dyn.errors import CatalogError, nearest, shorten, shown
+from robot_dyn.foundations.errors import CatalogError, nearest, shorten, shown
 
 # Files whose stem is shared, or not descriptive.
 _RENAMED = {

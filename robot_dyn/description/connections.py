@@ -7,7 +7,7 @@ from typing import NoReturn
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.errors import nearest, shorten
+from robot_dyn.foundations.errors import nearest, shorten
 
 LARGEST = 1e12  # of a length, a mass, a moment, a ratio: beyond it the equations of motion overflow
 

@@ -9,10 +9,10 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Arithmetic, Array
-from robot_dyn.errors import OverflowedError
-from robot_dyn.validate import LEAST_EXACT, is_moderate
-from robot_dyn.values import Value
+from robot_dyn.foundations.arithmetic import Arithmetic, Array
+from robot_dyn.foundations.errors import OverflowedError
+from robot_dyn.foundations.validate import LEAST_EXACT, is_moderate
+from robot_dyn.foundations.values import Value
 
 _EXACT = LEAST_EXACT / np.finfo(np.float64).eps  # positions below this are known to LEAST_EXACT
 
@@ -90,7 +90,7 @@ class Couplings(Value):
         if self._rounded.size and full.dtype.kind == "f" and self._hidden(full):
             raise OverflowedError(
                 "q is so large that rounding hides where the joints that follow others are, to"
-                f" {LEAST_EXACT:g} rad or m; take a smaller q, or rd.Lagrangian(robot, rd.studies.Ball(bits))"
+                f" {LEAST_EXACT:g} rad or m; take a smaller q, or rd.Lagrangian(robot, rd.accuracy.Ball(bits))"
             )
         return full
 

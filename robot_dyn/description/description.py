@@ -18,9 +18,9 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.description import urdf
 from robot_dyn.description.markup import parse
-from robot_dyn.errors import DescriptionError
-from robot_dyn.files import read_start
-from robot_dyn.validate import instance
+from robot_dyn.foundations.errors import DescriptionError
+from robot_dyn.foundations.files import read_start
+from robot_dyn.foundations.validate import instance
 
 MAX_BYTES = 16 * 2**20  # the largest robot of example-robot-data has 0.2 MiB
 _MARK = "\ufeff".encode()  # outweighs the encoding that a text declares, which is that of its file

@@ -11,9 +11,9 @@ import numpy as np
 
 from robot_dyn.description.inertia import implausibility
 from robot_dyn.description.urdf import LARGEST
-from robot_dyn.errors import EditError, nearest, shown
-from robot_dyn.signatures import takes, unchanged
-from robot_dyn.validate import instance, numbers
+from robot_dyn.foundations.errors import EditError, nearest, shown
+from robot_dyn.foundations.signatures import takes, unchanged
+from robot_dyn.foundations.validate import instance, numbers
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s²], CGPM 1901
 

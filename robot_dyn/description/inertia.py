@@ -12,9 +12,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError
-from robot_dyn.spatial import hat, spatial_inertia
-from robot_dyn.validate import number, numbers, rows
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.spatial import hat, spatial_inertia
+from robot_dyn.foundations.validate import number, numbers, rows
 
 _SLACK = 1e-9  # of the largest moment: printed digits
 _LEVER_SLACK = 1e-12  # of m c², and of m (1 m)²: rounding left behind by merging bodies

@@ -13,8 +13,8 @@ from typing import Protocol
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.spatial import first_moment, hat
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.spatial import first_moment, hat
 
 NAMES = ("m", "m cx", "m cy", "m cz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 _MOMENTS = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)  # rows and columns of I

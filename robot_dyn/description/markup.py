@@ -10,7 +10,7 @@ import re
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.errors import DescriptionError, shorten
+from robot_dyn.foundations.errors import DescriptionError, shorten
 
 MAX_DEPTH = 32  # of nested elements; a URDF needs 6
 

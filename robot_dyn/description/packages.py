@@ -12,7 +12,7 @@ from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
-from robot_dyn.errors import CatalogError, shown
+from robot_dyn.foundations.errors import CatalogError, shown
 
 _MAX_BYTES = 2**16  # of a package.xml
 _MAX_FOLDERS = 5000  # looked into below one folder

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.description.inertia import MassProperties
-from robot_dyn.errors import QueryError
-from robot_dyn.spatial import hat
-from robot_dyn.validate import integer, number, numbers, rows
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.spatial import hat
+from robot_dyn.foundations.validate import integer, number, numbers, rows
 
 Density = Callable[[np.ndarray], Any]
 Chart = Callable[[np.ndarray], tuple[Any, Any]]

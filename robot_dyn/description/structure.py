@@ -11,10 +11,10 @@ from typing import Any, final
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.description.couplings import Mimic, resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
+from robot_dyn.foundations.arithmetic import FLOAT64
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _FAR = 10.0  # times the longest distance between joints

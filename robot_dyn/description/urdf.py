@@ -13,7 +13,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.description import connections
 from robot_dyn.description.connections import LARGEST
-from robot_dyn.errors import DescriptionError, nearest, shorten
+from robot_dyn.foundations.errors import DescriptionError, nearest, shorten
 
 MAX_JOINTS = 1000  # Pinocchio crashes the process on chains of some thousands
 MOVING = ("revolute", "continuous", "prismatic")

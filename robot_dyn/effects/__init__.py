@@ -12,6 +12,6 @@
 docs/developers/extending.md writes an effect step by step; robot_dyn/effects/README.md lists its files.
 """
 
-from robot_dyn.public import public_names
+from robot_dyn.foundations.public import public_names
 
 __getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]

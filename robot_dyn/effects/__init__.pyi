@@ -1,5 +1,4 @@
 # The public names of this room and where they live: type checkers read this file, and __init__.py does.
-from robot_dyn.coefficients import coefficient as coefficient
 from robot_dyn.effects.actuator import ActuatorLag as ActuatorLag
 from robot_dyn.effects.actuator import EffortLimit as EffortLimit
 from robot_dyn.effects.carried_payload import CarriedPayload as CarriedPayload
@@ -33,7 +32,8 @@ from robot_dyn.effects.set_valued import Mode as Mode
 from robot_dyn.effects.set_valued import SetValued as SetValued
 from robot_dyn.effects.spring import Spring as Spring
 from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
+from robot_dyn.foundations.coefficients import coefficient as coefficient
+from robot_dyn.foundations.threshold import Threshold as Threshold
 from robot_dyn.queries.dynamics import Dynamics as Dynamics
-from robot_dyn.threshold import Threshold as Threshold
 
 __all__: list[str]

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING, Any, final
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import URDF, coefficient, with_values
 from robot_dyn.effects.effect import Bound, Effect, Stateful
-from robot_dyn.errors import EffectError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import URDF, coefficient, with_values
+from robot_dyn.foundations.errors import EffectError
+from robot_dyn.foundations.saturation import limits_reached, middle_of, piece, saturated
+from robot_dyn.foundations.threshold import Threshold, smooth
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.saturation import limits_reached, middle_of, piece, saturated
-from robot_dyn.threshold import Threshold, smooth
 
 if TYPE_CHECKING:
     import numpy as np

@@ -14,11 +14,11 @@ from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any, final
 
-from robot_dyn.coefficients import coefficient
 from robot_dyn.description.edits import Payload
 from robot_dyn.effects.effect import Timed
-from robot_dyn.errors import EditError, EffectError
-from robot_dyn.validate import instance, truth
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.errors import EditError, EffectError
+from robot_dyn.foundations.validate import instance, truth
 
 _START = coefficient("s", shapes=((),), swept=False)
 _END = coefficient("s", shapes=((),), infinite=True, swept=False)

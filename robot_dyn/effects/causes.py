@@ -12,16 +12,16 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
 from robot_dyn.effects.carried_payload import CarriedPayload, robot_with
 from robot_dyn.effects.effect import Drive, Stateful, numbered
 from robot_dyn.effects.plant import Plant, carrying
 from robot_dyn.effects.set_valued import SetValued
-from robot_dyn.errors import EffectError, QueryError, RobotDynError
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.errors import EffectError, QueryError, RobotDynError
+from robot_dyn.foundations.validate import rows
+from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_types_of, unit, without_rounding
-from robot_dyn.validate import rows
-from robot_dyn.values import Value, read_only
 
 OF_BODIES = "inertia", "Coriolis", "gravity"
 _ROUNDING = 1e-12  # of the terms, by which a torque at its bound may leave it

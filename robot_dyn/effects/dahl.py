@@ -13,12 +13,12 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Dissipative
 from robot_dyn.effects.lugre import Bristles
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.threshold import Threshold
 
 _SLOW = 1e-6  # of the deflection f_c/σ, per second: no digit depends on reversals of slower motion
 

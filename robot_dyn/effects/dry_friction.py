@@ -7,11 +7,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.effects.effect import require
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
-from robot_dyn.errors import EffectError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import coefficient, with_values
+from robot_dyn.foundations.errors import EffectError
 from robot_dyn.queries.dynamics import Dynamics
 
 

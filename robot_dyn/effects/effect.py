@@ -16,13 +16,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import check_coefficients, declared
-from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import check_coefficients, declared
+from robot_dyn.foundations.errors import EffectError, QueryError
+from robot_dyn.foundations.threshold import Threshold, smooth
+from robot_dyn.foundations.validate import rows
+from robot_dyn.foundations.values import Value
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.threshold import Threshold, smooth
-from robot_dyn.validate import rows
-from robot_dyn.values import Value
 
 
 class Effect(Value):
@@ -35,11 +35,11 @@ class Effect(Value):
         q: position, (..., n), in [rad] or [m] by joint
         v: velocity, (..., n), in [rad/s] or [m/s]
 
-    and with symbols in place of these numbers when it is compiled. Methods that use only `robot_dyn.arithmetic` and
-    NumPy's operators run in both engines.
+    and with symbols in place of these numbers when it is compiled. Methods that use only
+    `robot_dyn.foundations.arithmetic` and NumPy's operators run in both engines.
 
-    Declared coefficients (`robot_dyn.coefficients`) are checked on construction and may be swept. They may be given by
-    joint name, or as "urdf" where files state them.
+    Declared coefficients (`robot_dyn.foundations.coefficients`) are checked on construction and may be swept. They may
+    be given by joint name, or as "urdf" where files state them.
 
     Attributes:
         term: Equation in short form, for `explain`.

@@ -14,13 +14,13 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Bound, Conservative, Drive, Effect, Force, Stateful
 from robot_dyn.effects.set_valued import SetValued, settled
-from robot_dyn.errors import EffectError, call, users_line
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import EffectError, call, users_line
+from robot_dyn.foundations.validate import integer
 from robot_dyn.queries.dynamics import Dynamics, acceleration
-from robot_dyn.validate import integer
 
 
 @final

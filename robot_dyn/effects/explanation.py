@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
 
-from robot_dyn.answer import Answer, Block
 from robot_dyn.description.catalog import abbreviated
+from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.model.findings import reservations
 from robot_dyn.queries.units import coefficient_texts, joint_types_of
 

@@ -8,11 +8,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, tanh
-from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Dissipative
+from robot_dyn.foundations.arithmetic import Array, tanh
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.threshold import smooth
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.threshold import smooth
 
 
 @final

@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import with_values
 from robot_dyn.effects.effect import Drive
-from robot_dyn.errors import EffectError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.errors import EffectError
 
 
 class GearedMotor(Drive):

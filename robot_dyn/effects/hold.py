@@ -13,7 +13,7 @@ from typing import final
 import numpy as np
 
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
-from robot_dyn.result import reported
+from robot_dyn.foundations.result import reported
 
 
 @final

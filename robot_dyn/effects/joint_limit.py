@@ -13,12 +13,12 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, positive_part
-from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.effects.effect import Conservative, Dissipative, Effect, require
-from robot_dyn.errors import EffectError
+from robot_dyn.foundations.arithmetic import Array, positive_part
+from robot_dyn.foundations.coefficients import coefficient, with_values
+from robot_dyn.foundations.errors import EffectError
+from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.threshold import Threshold
 
 _NOWHERE = 1e9  # position of a stop that does not exist
 _LOWER_STOP, _UPPER_STOP = ("lower stop", "left", "touched"), ("upper stop", "touched", "left")

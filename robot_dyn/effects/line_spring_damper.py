@@ -12,14 +12,14 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, apply, sqrt, transpose
-from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Conservative, Dissipative, Effect, check_frame
-from robot_dyn.errors import EffectError
+from robot_dyn.foundations.arithmetic import Array, apply, sqrt, transpose
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.errors import EffectError
+from robot_dyn.foundations.spatial import hat
+from robot_dyn.foundations.threshold import smooth
+from robot_dyn.foundations.validate import instance
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.spatial import hat
-from robot_dyn.threshold import smooth
-from robot_dyn.validate import instance
 
 _POINT = coefficient("m", symbol="p, in the axes of the frame", shapes=((3,),))
 _OTHER = coefficient("m", symbol="p', in the axes of the other frame, or of the base", shapes=((3,),))

@@ -14,11 +14,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Active, Stateful, require
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.threshold import Threshold
 
 _SLOW = 1e-6  # of v_s: no digit depends on reversals of slower motion
 _REVERSAL = "velocity", "turns positive", "turns negative"

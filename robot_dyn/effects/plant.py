@@ -10,8 +10,6 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
-from robot_dyn.coefficients import with_values
 from robot_dyn.effects.carried_payload import CarriedPayload, robot_with
 from robot_dyn.effects.effect import Bound, Conservative, Effect, Force, Stateful
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
@@ -19,9 +17,11 @@ from robot_dyn.effects.explanation import explanation
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.hold import Hold, held
 from robot_dyn.effects.set_valued import Mode, SetValued
-from robot_dyn.errors import EffectError, OverflowedError, QueryError, shown
+from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
+from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.errors import EffectError, OverflowedError, QueryError, shown
+from robot_dyn.foundations.validate import check_batches, is_moderate, is_plain, joint_values, number
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.validate import check_batches, is_moderate, is_plain, joint_values, number
 
 
 @final

@@ -8,18 +8,18 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
 from robot_dyn.effects.effect import numbered
 from robot_dyn.effects.hold import Hold
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.result import UNREPORTED
+from robot_dyn.foundations.validate import instance, number, one_state
+from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import PLANT, C, M
 from robot_dyn.queries.units import numbers_row, units, without_rounding
-from robot_dyn.result import UNREPORTED
-from robot_dyn.validate import instance, number, one_state
-from robot_dyn.values import Value, read_only
 
 
 @final

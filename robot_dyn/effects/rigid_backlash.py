@@ -13,11 +13,11 @@ from typing import Any, ClassVar, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.effects.effect import require
 from robot_dyn.effects.geared_motor import GearedMotor
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import coefficient, with_values
 from robot_dyn.queries.dynamics import Dynamics
 
 

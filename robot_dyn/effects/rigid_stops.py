@@ -8,11 +8,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.effects.effect import require
 from robot_dyn.effects.joint_limit import LOWER, UPPER
 from robot_dyn.effects.set_valued import Interval, Mode, SetValued
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import coefficient, with_values
 from robot_dyn.queries.dynamics import Dynamics
 
 _NEAR = 4e-15  # of a stop, or in its unit: as close as rounding leaves an event

@@ -14,12 +14,12 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, positive_part
-from robot_dyn.coefficients import coefficient, with_values
 from robot_dyn.effects.effect import Dissipative
 from robot_dyn.effects.geared_motor import GearedMotor
+from robot_dyn.foundations.arithmetic import Array, positive_part
+from robot_dyn.foundations.coefficients import coefficient, with_values
+from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.threshold import Threshold
 
 _FORWARD = ("forward side of the backlash", "touched", "left")
 _BACKWARD = ("backward side of the backlash", "left", "touched")

@@ -16,11 +16,11 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.convex import LARGE, not_found
 from robot_dyn.effects.effect import Dissipative
 from robot_dyn.effects.settling import settle, settling
-from robot_dyn.threshold import smooth
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.convex import LARGE, not_found
+from robot_dyn.foundations.threshold import smooth
 
 
 class Interval(NamedTuple):

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.convex import active_set
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.convex import active_set
 
 _ROUNDING = 1e-12  # of the accelerations that add up
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, final
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Conservative
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.threshold import smooth
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.threshold import smooth
 
 
 @final

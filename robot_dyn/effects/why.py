@@ -8,18 +8,18 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
-from robot_dyn.coefficients import declared, with_values
-from robot_dyn.display import bars
 from robot_dyn.effects.effect import Force
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.plant_state import PlantState, plant_state
-from robot_dyn.errors import QueryError, nearest
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.coefficients import declared, with_values
+from robot_dyn.foundations.display import bars
+from robot_dyn.foundations.errors import QueryError, nearest
+from robot_dyn.foundations.validate import instance
 from robot_dyn.lagrange.breakdown import breakdown
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import coefficient_texts, unit, without_rounding
-from robot_dyn.validate import instance
 
 _AT_REST = "dry friction and stops, at rest"
 _CAUSES: tuple[str, ...] = "inertia", "Coriolis", "gravity", "effect"

@@ -8,13 +8,13 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, transpose
-from robot_dyn.arithmetic import apply as times
-from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.effect import Active, Timed, check_frame
-from robot_dyn.errors import EffectError
+from robot_dyn.foundations.arithmetic import Array, transpose
+from robot_dyn.foundations.arithmetic import apply as times
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.errors import EffectError
+from robot_dyn.foundations.validate import instance, rows
 from robot_dyn.queries.dynamics import Axes, Dynamics
-from robot_dyn.validate import instance, rows
 
 _TIME = coefficient("s", shapes=((),), infinite=True, swept=False)
 

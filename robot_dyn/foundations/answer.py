@@ -8,7 +8,7 @@ from itertools import groupby
 from math import isfinite
 from typing import final
 
-from robot_dyn.errors import escaped
+from robot_dyn.foundations.errors import escaped
 
 
 @final
@@ -100,7 +100,7 @@ class Answer:
 
     def to_json(self) -> str:
         """The JSON document of docs/reference/json.md."""
-        from robot_dyn.result import json_text  # late: the command line writes lines without NumPy
+        from robot_dyn.foundations.result import json_text  # late: the command line writes lines without NumPy
 
         return json_text(self)
 
@@ -108,7 +108,7 @@ class Answer:
         return "\n".join(line for each in self.blocks() for line in _lines(each))
 
     def _repr_html_(self) -> str:
-        from robot_dyn import display
+        from robot_dyn.foundations import display
 
         first, *rest = self.blocks()
         parts = html_of([first, *rest] if self.title else rest)
@@ -117,7 +117,7 @@ class Answer:
 
 def html_of(blocks: Iterable[Block]) -> Iterator[str]:
     """Texts and tables as parts of a page."""
-    from robot_dyn import display
+    from robot_dyn.foundations import display
 
     for of_text, some in groupby(blocks, lambda each: isinstance(each, str)):
         if of_text:

@@ -17,8 +17,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError, shown
-from robot_dyn.validate import integer, real
+from robot_dyn.foundations.errors import QueryError, shown
+from robot_dyn.foundations.validate import integer, real
 
 Array = Any  # numpy.ndarray of floats, or of flint.arb objects; NumPy's own types do not tell them apart
 
@@ -171,7 +171,7 @@ def _of_each(x: Any, of: Callable[[Any], float]) -> Array:
     balls = np.asarray(x, dtype=object)
     if not all(isinstance(ball, arb) for ball in balls.flat):
         raise QueryError(
-            f"give an array of balls, such as rd.Lagrangian(robot, rd.studies.Ball(200)) answers, got {shown(x)}"
+            f"give an array of balls, such as rd.Lagrangian(robot, rd.accuracy.Ball(200)) answers, got {shown(x)}"
         )
     return np.vectorize(of, otypes=[float])(balls)
 

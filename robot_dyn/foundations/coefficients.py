@@ -17,11 +17,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import EffectError, RobotDynError, nearest, shown
-from robot_dyn.validate import instance, number, numbers, truth
+from robot_dyn.foundations.errors import EffectError, RobotDynError, nearest, shown
+from robot_dyn.foundations.validate import instance, number, numbers, truth
 
 URDF = "urdf"  # in place of a coefficient: the value in the robot's file
-_KEY = "robot_dyn.coefficients"
+_KEY = "robot_dyn.foundations.coefficients"
 JOINTS = ((), ("n",))  # one number for all joints, or one for each
 
 

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.errors import RobotDynError
-from robot_dyn.linear_algebra import cholesky_solve
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.linear_algebra import cholesky_solve
 
 PASSES = 8  # of Newton's method, before one place is changed at a time: 6 were enough in 18 000 steps of an arm
 LARGE = 1e300  # a larger bound does not exist; infinity cannot be compared with symbols

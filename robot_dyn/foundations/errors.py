@@ -116,7 +116,7 @@ class UndecidedError(SingularError):
         RobotDynError.__init__(
             self,
             f"forward dynamics not decided: whether joint {joint!r} carries inertia {where} is lost in the rounding of"
-            f" {arithmetic}; ask rd.Lagrangian(robot, rd.studies.Ball(bits)) with enough bits",
+            f" {arithmetic}; ask rd.Lagrangian(robot, rd.accuracy.Ball(bits)) with enough bits",
         )
         self.joint = joint
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-from robot_dyn.errors import MissingExtraError
+from robot_dyn.foundations.errors import MissingExtraError
 
 
 def needs(module: str, *, extra: str) -> ModuleType:

@@ -17,7 +17,7 @@ from stat import S_IMODE, S_ISDIR, S_ISREG
 from time import time
 from typing import Any, BinaryIO, final
 
-from robot_dyn.errors import RobotDynError, shown
+from robot_dyn.foundations.errors import RobotDynError, shown
 
 _NEW_S = 10.0  # a younger file may be open and not yet locked
 # Locks distinguish a file that is being written from an abandoned one; Windows cannot remove open files, so needs none.

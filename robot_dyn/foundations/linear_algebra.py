@@ -16,7 +16,7 @@ from contextvars import ContextVar
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, sqrt
+from robot_dyn.foundations.arithmetic import Array, sqrt
 
 _SWEEPS = 8  # of Jacobi's method: it converges quadratically, six rows in six sweeps
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.threshold import Threshold
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.threshold import Threshold
 
 _UPPER, _LOWER = ("upper effort limit", "reached", "left"), ("lower effort limit", "left", "reached")
 

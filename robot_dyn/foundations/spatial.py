@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, cos, sin, transpose
+from robot_dyn.foundations.arithmetic import Array, cos, sin, transpose
 
 
 def hat(a: Array) -> Array:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import final
 
-from robot_dyn.errors import EffectError
-from robot_dyn.validate import instance, integer, number, truth
+from robot_dyn.foundations.errors import EffectError
+from robot_dyn.foundations.validate import instance, integer, number, truth
 
 _MOST = 10**6  # joints
 

@@ -14,7 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, RobotDynError, nearest, shorten, shown
+from robot_dyn.foundations.errors import (
+    NotFiniteError,
+    OverflowedError,
+    QueryError,
+    RobotDynError,
+    nearest,
+    shorten,
+    shown,
+)
 
 Shape = tuple[int | str, ...]  # a length with a name, such as "n", may be any but 0
 Kind = type[RobotDynError]

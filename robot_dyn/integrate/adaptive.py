@@ -14,14 +14,14 @@ from typing import Any, ClassVar, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.validate import choice, function, instance, number, numbers, rows
 from robot_dyn.integrate import dop853
 from robot_dyn.integrate.controlled_steps import Status, Steps
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
 from robot_dyn.integrate.step_control import ControlledStepper, control_of
-from robot_dyn.validate import choice, function, instance, number, numbers, rows
 
 EXPLICIT, STIFF, AUTO = "DOP853", "Rosenbrock", "auto"
 ADAPTIVE = (EXPLICIT, STIFF, AUTO)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 
 NONE = 2.0  # in place of a root
 _NARROW = 1e-13  # of a step

@@ -8,8 +8,8 @@ from typing import Any, cast, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.errors import OverflowedError, RobotDynError, is_mistake
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import OverflowedError, RobotDynError, is_mistake
 from robot_dyn.integrate.integrator import RightSide, System
 from robot_dyn.integrate.primitives import between
 from robot_dyn.integrate.step_control import At, Choice, ControlledStepper, chosen_step, first_step

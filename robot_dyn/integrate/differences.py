@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 
 INSIDE = 0.01  # of a width: a central difference of tanh is then off by 3e-5, which Newton's iteration corrects
 _LEAST = 64  # units in the last place of an entry that a difference spans at least

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import combination, copy, evaluate, norm, subtract
 from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end, rate_at_start
 

@@ -12,13 +12,13 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, NamedTuple, final
 
-from robot_dyn.arithmetic import Arithmetic, Array
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.arithmetic import Arithmetic, Array
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.dop853 import table
 from robot_dyn.integrate.integrator import PlainMethod, RightSide, Stepper
 from robot_dyn.integrate.primitives import combination, evaluate
 from robot_dyn.integrate.tableau import ButcherTableau, Coefficients
-from robot_dyn.values import aligned
 
 
 class Stages(NamedTuple):

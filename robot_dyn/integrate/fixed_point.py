@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, midpoint, radius
-from robot_dyn.errors import OverflowedError
+from robot_dyn.foundations.arithmetic import Array, midpoint, radius
+from robot_dyn.foundations.errors import OverflowedError
 from robot_dyn.integrate.primitives import GOING, MOST_ITERATIONS, SETTLED, settle
 
 _INFLATION = 1.1  # Rump's ε-inflation: more than the rounding, less than 1 / the rate of contraction

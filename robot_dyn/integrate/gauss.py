@@ -14,8 +14,10 @@ from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Arithmetic, Array
-from robot_dyn.errors import OverflowedError, QueryError
+from robot_dyn.foundations.arithmetic import Arithmetic, Array
+from robot_dyn.foundations.errors import OverflowedError, QueryError
+from robot_dyn.foundations.validate import integer
+from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.fixed_point import enclose_fixed_point, unit_roundoff
 from robot_dyn.integrate.integrator import (
     IntegrationError,
@@ -27,8 +29,6 @@ from robot_dyn.integrate.integrator import (
 )
 from robot_dyn.integrate.primitives import GOING, MOST_ITERATIONS, SETTLED, combination, evaluate, settle
 from robot_dyn.integrate.tableau import ButcherTableau, Coefficients, Surd, combine
-from robot_dyn.validate import integer
-from robot_dyn.values import aligned
 
 
 def _surd(rational: tuple[int, int], factor: tuple[int, int], radicand: int) -> Surd:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64, Array
+from robot_dyn.foundations.arithmetic import FLOAT64, Array
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.primitives import combination, copy, subtract
 from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end, rate_at_start

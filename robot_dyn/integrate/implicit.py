@@ -13,8 +13,8 @@ from typing import Any, ClassVar, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, apply
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.arithmetic import Array, apply
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.integrate.fixed_point import MOST_ITERATIONS, fixed_point
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System, arithmetic_like, singular
 from robot_dyn.integrate.tableau import ButcherTableau, combine

@@ -15,8 +15,8 @@ from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Arithmetic, Array, Ball, Float
-from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.foundations.arithmetic import Arithmetic, Array, Ball, Float
+from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.integrate.differences import by_state, by_time
 from robot_dyn.integrate.primitives import evaluate
 

@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from robot_dyn.errors import QueryError, shown
+from robot_dyn.foundations.errors import QueryError, shown
+from robot_dyn.foundations.validate import choice
 from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
 from robot_dyn.integrate.explicit import EXPLICIT_EULER, MIDPOINT, RK4, SemiImplicitEuler, order_8
 from robot_dyn.integrate.gauss import Gauss
@@ -19,7 +20,6 @@ from robot_dyn.integrate.implicit import SDIRK_3, LinearlyImplicitEuler
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
 from robot_dyn.integrate.time_stepping import TimeStepping
-from robot_dyn.validate import choice
 
 _READY = (
     EXPLICIT_EULER,

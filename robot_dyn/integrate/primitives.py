@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, midpoint
+from robot_dyn.foundations.arithmetic import Array, midpoint
 
 MOST_ITERATIONS = 100  # the iteration must gain a binary digit in two rounds, to end in float64
 PATIENCE = 2  # rounds: where q' = v and v' = −k q, increments shrink only every second one

@@ -14,13 +14,13 @@ from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, Stepper, singular
 from robot_dyn.integrate.primitives import combination, copy, evaluate, factor, norm, solve, subtract
 from robot_dyn.integrate.rosenbrock_table import RODAS5P, Numbers, RosenbrockTable
 from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end
-from robot_dyn.values import aligned
 
 
 class Linear(NamedTuple):

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Arithmetic, Array
+from robot_dyn.foundations.arithmetic import Arithmetic, Array
 
 Row = tuple[float, ...]
 

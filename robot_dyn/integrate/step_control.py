@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import combination, evaluate, norm, subtract
 
 _BETA_ORDER = 0.2  # β times the order of the error: the part that the error before has in the next step

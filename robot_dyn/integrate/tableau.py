@@ -15,8 +15,8 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Arithmetic, Array, sqrt
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.arithmetic import Arithmetic, Array, sqrt
+from robot_dyn.foundations.errors import QueryError
 
 _ROUNDINGS = 8  # of float64, relative to Σ |a_ij|, that a row may be off by
 

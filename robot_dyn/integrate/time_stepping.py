@@ -16,8 +16,8 @@ from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Arithmetic, Array
-from robot_dyn.convex import active_set
+from robot_dyn.foundations.arithmetic import Arithmetic, Array
+from robot_dyn.foundations.convex import active_set
 from robot_dyn.integrate.integrator import PlainMethod, RightSide, Stepper, System, arithmetic_like
 from robot_dyn.integrate.primitives import copy, evaluate
 

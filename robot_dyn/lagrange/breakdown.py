@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import final
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.validate import joint_values
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.summand import coriolis_matrix, gravity_torque, mass_matrix, of_links
-from robot_dyn.validate import joint_values
 
 
 @final

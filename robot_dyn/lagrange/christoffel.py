@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, transpose
-from robot_dyn.spatial import bracket
+from robot_dyn.foundations.arithmetic import Array, transpose
+from robot_dyn.foundations.spatial import bracket
 
 
 def jacobian_derivative(J: Array) -> Array:

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.validate import choice, shaped
 from robot_dyn.lagrange.exact import RESOLUTION, Exact, entry_units
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import acceleration_norm, solved_norm, solved_tolerance
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, MOST_DIGITS, C, M, N, Quantity, by_name
-from robot_dyn.validate import choice, shaped
 
 if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot
@@ -86,7 +86,7 @@ def doubt(robot: Robot, quantity: str, state: Sequence[Any], answer: Any, least:
     has = "has" if counts else "is only certain to have"
     return (
         f"{quantity} of {robot.name} {has} {held:.1f} digits{where}, fewer than {least:g}; use"
-        " rd.Lagrangian(robot, np.longdouble), or rd.studies.Ball(bits) for digits that are proven"
+        " rd.Lagrangian(robot, np.longdouble), or rd.accuracy.Ball(bits) for digits that are proven"
     )
 
 

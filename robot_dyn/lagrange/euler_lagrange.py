@@ -15,10 +15,10 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import apply
-from robot_dyn.errors import OverflowedError, QueryError, RobotDynError, SingularError
-from robot_dyn.linear_algebra import NotPositiveDefiniteError, cholesky_solve
-from robot_dyn.validate import integer, rows
+from robot_dyn.foundations.arithmetic import apply
+from robot_dyn.foundations.errors import OverflowedError, QueryError, RobotDynError, SingularError
+from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
+from robot_dyn.foundations.validate import integer, rows
 
 Kinetic = Callable[[Any, Any, Any], Any]
 Potential = Callable[[Any, Any], Any]

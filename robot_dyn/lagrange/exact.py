@@ -15,8 +15,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Arithmetic, Array, Ball, midpoint, radius
-from robot_dyn.errors import UndecidedError
+from robot_dyn.foundations.arithmetic import Arithmetic, Array, Ball, midpoint, radius
+from robot_dyn.foundations.errors import UndecidedError
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, joint_units, mass_norm, scaled, solved_norm
 from robot_dyn.lagrange.tree import Described

@@ -13,9 +13,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import OverflowedError, QueryError
+from robot_dyn.foundations.errors import OverflowedError, QueryError
+from robot_dyn.foundations.validate import integer, number, numbers
 from robot_dyn.lagrange.euler_lagrange import EulerLagrange, Potential, euler_lagrange, traced
-from robot_dyn.validate import integer, number, numbers
 
 Positions = Callable[[Any, Any], Sequence[Any]]
 

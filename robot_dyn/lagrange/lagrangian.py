@@ -15,7 +15,10 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import (
+from robot_dyn.description.description import Description
+from robot_dyn.description.inertial_parameters import NAMES as PARAMETERS
+from robot_dyn.description.inertial_parameters import Parametrised, parameters
+from robot_dyn.foundations.arithmetic import (
     Arithmetic,
     Array,
     apply,
@@ -23,10 +26,17 @@ from robot_dyn.arithmetic import (
     in_arithmetic,
     transpose,
 )
-from robot_dyn.description.description import Description
-from robot_dyn.description.inertial_parameters import NAMES as PARAMETERS
-from robot_dyn.description.inertial_parameters import Parametrised, parameters
-from robot_dyn.errors import QueryError, shown
+from robot_dyn.foundations.errors import QueryError, shown
+from robot_dyn.foundations.spatial import (
+    adjoint,
+    adjoint_inverse,
+    block_diagonal,
+    bracket,
+    first_moment,
+    hat,
+    homogeneous,
+)
+from robot_dyn.foundations.validate import shaped
 from robot_dyn.lagrange.christoffel import jacobian_derivative
 from robot_dyn.lagrange.linkage import BASE, Configuration, Linkage, linkage
 from robot_dyn.lagrange.summand import (
@@ -41,8 +51,6 @@ from robot_dyn.lagrange.tree import Described, tree
 from robot_dyn.queries.batch import answered
 from robot_dyn.queries.dynamics import Axes, Dynamics, acceleration, entry
 from robot_dyn.queries.quantity import ALL
-from robot_dyn.spatial import adjoint, adjoint_inverse, block_diagonal, bracket, first_moment, hat, homogeneous
-from robot_dyn.validate import shaped
 
 
 @final

@@ -13,11 +13,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Arithmetic, Array, apply, sqrt, symmetric, transpose
 from robot_dyn.description.couplings import Couplings, resolve
 from robot_dyn.description.inertial_parameters import ordered
+from robot_dyn.foundations.arithmetic import Arithmetic, Array, apply, sqrt, symmetric, transpose
+from robot_dyn.foundations.spatial import adjoint_inverse, hat, rotation_rpy, spatial_inertia, turned_about
 from robot_dyn.lagrange.tree import Joint, Link, Tree
-from robot_dyn.spatial import adjoint_inverse, hat, rotation_rpy, spatial_inertia, turned_about
 
 BASE = -1  # the body that does not move
 

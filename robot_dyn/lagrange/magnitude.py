@@ -16,8 +16,8 @@ from typing import final
 import numpy as np
 
 from robot_dyn.description.couplings import Couplings
+from robot_dyn.foundations.spatial import first_moment
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage
-from robot_dyn.spatial import first_moment
 
 _UNITS = (  # blocks [[m, m c], [m c, I]] of unit parameters, and which of the ten have them
     (slice(0, 1), np.array([[1.0, 0.0], [0.0, 0.0]])),

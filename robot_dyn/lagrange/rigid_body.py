@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import apply, transpose
 from robot_dyn.description.inertia import MassProperties, rotation_matrix
-from robot_dyn.errors import OverflowedError, QueryError
-from robot_dyn.linear_algebra import NotPositiveDefiniteError, cholesky_solve
-from robot_dyn.validate import check_batches, rows
+from robot_dyn.foundations.arithmetic import apply, transpose
+from robot_dyn.foundations.errors import OverflowedError, QueryError
+from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
+from robot_dyn.foundations.validate import check_batches, rows
 
 _too_large_shows_in_the_result = np.errstate(over="ignore", invalid="ignore")
 

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from robot_dyn.arithmetic import apply
+from robot_dyn.foundations.arithmetic import apply
 
 
 def scaled(error: np.ndarray, scale: np.ndarray) -> np.ndarray:

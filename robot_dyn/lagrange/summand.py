@@ -14,8 +14,8 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, apply, transpose
 from robot_dyn.description.inertial_parameters import unit_inertias
+from robot_dyn.foundations.arithmetic import Array, apply, transpose
 from robot_dyn.lagrange.christoffel import christoffel, inertia_derivative
 from robot_dyn.lagrange.linkage import BASE, Configuration
 

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.errors import QueryError, SingularError, UndecidedError
+from robot_dyn.foundations.errors import QueryError, SingularError, UndecidedError
+from robot_dyn.foundations.validate import number
 from robot_dyn.queries.dynamics import acceleration
 from robot_dyn.queries.quantity import MOST_DIGITS
-from robot_dyn.validate import number
 
 LEAST_DIGITS = 8  # of forward dynamics; with fewer, M is called nearly singular
 

@@ -21,8 +21,8 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
 from robot_dyn.description.couplings import Couplings
+from robot_dyn.foundations.spatial import bracket, first_moment, hat
 from robot_dyn.model.regrouped import regrouped, rounding, slides
-from robot_dyn.spatial import bracket, first_moment, hat
 
 # ad_X is linear in X: its 36 entries, (6, 36)
 _AD = bracket(np.eye(6)).reshape(6, 36)

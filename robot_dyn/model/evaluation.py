@@ -17,14 +17,14 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
 from robot_dyn.description.couplings import Couplings
-from robot_dyn.errors import PrecisionWarning
+from robot_dyn.foundations.errors import PrecisionWarning
+from robot_dyn.foundations.validate import is_moderate, is_plain, shaped
 from robot_dyn.model.conditioning import Regularity, regularity
 from robot_dyn.model.kernels import Kernel
 from robot_dyn.model.mechanism import Mechanism
 from robot_dyn.queries.batch import answered
 from robot_dyn.queries.dynamics import Array, acceleration
 from robot_dyn.queries.quantity import ALL, DOUBTFUL
-from robot_dyn.validate import is_moderate, is_plain, shaped
 
 if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot

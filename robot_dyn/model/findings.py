@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.description.couplings import resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.inertia import implausibility
 from robot_dyn.description.mobile_base import stands_on
 from robot_dyn.description.structure import StatedLink, Structure, structure
-from robot_dyn.errors import shorten
+from robot_dyn.foundations.arithmetic import FLOAT64
+from robot_dyn.foundations.errors import shorten
 from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, Regularity
 
 LONGEST = 1e4  # [m], also for a mimic's multiplier: a sum with such a length is rounded by about 1e-12 m

@@ -15,7 +15,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.description.description import check
 from robot_dyn.description.urdf import UNBOUNDED
-from robot_dyn.errors import DescriptionError, shorten
+from robot_dyn.foundations.errors import DescriptionError, shorten
 from robot_dyn.model.robot import Robot
 
 _KINDS = {

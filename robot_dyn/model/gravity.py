@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robot_dyn.errors import ModelWarning, RobotDynError
+from robot_dyn.foundations.errors import ModelWarning, RobotDynError
 
 if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
 from robot_dyn.description.catalog import abbreviated
 from robot_dyn.description.edits import Edits, Payload
+from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.model.gravity import gravity_acts, no_torque
 
 if TYPE_CHECKING:
@@ -106,8 +106,8 @@ def info(robot: Robot) -> Info:
     Raises:
         QueryError: If it is no robot.
     """
+    from robot_dyn.foundations.validate import instance
     from robot_dyn.model.robot import Robot
-    from robot_dyn.validate import instance
 
     instance("robot", robot, Robot, "give one, such as rd.load('ur5')")
     columns = [getattr(robot, each) for each in list(Joint.__dataclass_fields__)[2:]]

@@ -13,10 +13,10 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
 from robot_dyn.description.couplings import Couplings
+from robot_dyn.foundations.spatial import hat
 from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.coriolis import jacobian_rate as rate_of
 from robot_dyn.queries.dynamics import Axes, entry
-from robot_dyn.spatial import hat
 
 Kernel = Callable[..., Any]  # the model argument may be a `Coriolis`
 

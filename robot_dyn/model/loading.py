@@ -11,9 +11,9 @@ from robot_dyn.description.packages import searched
 from robot_dyn.description.sources import mjcf, robot_descriptions
 from robot_dyn.description.sources.mjcf import is_mjcf
 from robot_dyn.description.sources.xacro import expand
-from robot_dyn.errors import CatalogError, DescriptionError, QueryError
+from robot_dyn.foundations.errors import CatalogError, DescriptionError, QueryError
+from robot_dyn.foundations.validate import choice, truth
 from robot_dyn.model.robot import Robot
-from robot_dyn.validate import choice, truth
 
 STATED, FROM_SHAPES = "stated", "from_shapes"
 

@@ -17,11 +17,11 @@ from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.inertial_parameters import NAMES, ordered
 from robot_dyn.description.urdf import UNBOUNDED
-from robot_dyn.errors import DescriptionError, EditError
+from robot_dyn.foundations.errors import DescriptionError, EditError
+from robot_dyn.foundations.validate import instance
 from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.kernels import FrameKernels, Scratch
 from robot_dyn.model.pinocchio_model import build, joint_ids, link_frames
-from robot_dyn.validate import instance
 
 T = TypeVar("T")
 

@@ -9,12 +9,12 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.description.couplings import Couplings, Mimic, resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.structure import stated_mimics
-from robot_dyn.errors import DescriptionError, EditError, nearest
+from robot_dyn.foundations.arithmetic import FLOAT64
+from robot_dyn.foundations.errors import DescriptionError, EditError, nearest
 
 MAX_MOVING = 250  # Pinocchio's scratch memory for n joints is 63 n³ bytes: here 1 GB
 _MARK = "joint:"  # prefix while Pinocchio works by name: a joint may share a link's name or be called "universe"

@@ -19,7 +19,8 @@ from robot_dyn.description.couplings import Couplings
 from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Changes, Edits, takes_changes
 from robot_dyn.description.inertial_parameters import Parametrised, ordered
-from robot_dyn.errors import announce
+from robot_dyn.foundations.errors import announce
+from robot_dyn.foundations.validate import is_moderate, is_plain, is_state
 from robot_dyn.model import kernels
 from robot_dyn.model.conditioning import LEAST_DIGITS, checked_digits
 from robot_dyn.model.coriolis import Coriolis
@@ -31,7 +32,6 @@ from robot_dyn.model.mechanism import Mechanism, forwarded
 from robot_dyn.model.to_urdf import to_urdf
 from robot_dyn.queries.dynamics import Array, Axes, Dynamics
 from robot_dyn.queries.quantity import DOUBTFUL
-from robot_dyn.validate import is_moderate, is_plain, is_state
 
 
 @final

@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.description.couplings import resolve
 from robot_dyn.description.edits import STANDARD_GRAVITY, Payload
 from robot_dyn.description.markup import parse
 from robot_dyn.description.structure import stated_mimics
 from robot_dyn.description.urdf import UNBOUNDED
-from robot_dyn.errors import DescriptionError, ModelWarning
-from robot_dyn.files import Kind, save, target
+from robot_dyn.foundations.arithmetic import FLOAT64
+from robot_dyn.foundations.errors import DescriptionError, ModelWarning
+from robot_dyn.foundations.files import Kind, save, target
+from robot_dyn.foundations.spatial import rotation, rotation_rpy, rpy_of
 from robot_dyn.model.pinocchio_model import state_edits
-from robot_dyn.spatial import rotation, rotation_rpy, rpy_of
 
 if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot

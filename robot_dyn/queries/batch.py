@@ -10,9 +10,16 @@ from contextlib import suppress
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64, Arithmetic, Array
-from robot_dyn.errors import NotFiniteError, OverflowedError, QueryError, RobotDynError, SingularError, shown
-from robot_dyn.validate import check_batches, converted
+from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
+from robot_dyn.foundations.errors import (
+    NotFiniteError,
+    OverflowedError,
+    QueryError,
+    RobotDynError,
+    SingularError,
+    shown,
+)
+from robot_dyn.foundations.validate import check_batches, converted
 
 _REFUSALS = (NotFiniteError, OverflowedError, SingularError)  # of a state; all else is wrong with the query
 

@@ -8,10 +8,10 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, rounding
-from robot_dyn.errors import OverflowedError, SingularError, UndecidedError, shown
-from robot_dyn.linear_algebra import NotPositiveDefiniteError, cholesky_solve
-from robot_dyn.validate import choice
+from robot_dyn.foundations.arithmetic import Array, rounding
+from robot_dyn.foundations.errors import OverflowedError, SingularError, UndecidedError, shown
+from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
+from robot_dyn.foundations.validate import choice
 
 T = TypeVar("T")
 

@@ -13,7 +13,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 
 DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hides
 MOST_DIGITS = 20  # of an answer that are counted

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.coefficients import Coefficient, declared
+from robot_dyn.foundations.coefficients import Coefficient, declared
 
 _ROUNDING = 1e-12  # some thousand units of rounding, 2⁻⁵³: what sums of terms of that size may leave of 0
 _NONE = 1e9  # a stop farther away does not exist

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.errors import RobotDynError
-from robot_dyn.studies.result import Result
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.report.result import Result
 from robot_dyn.view.plots.figure import THEMES, drawable, framed
 
 if TYPE_CHECKING:

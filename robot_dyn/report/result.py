@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from robot_dyn.answer import Answer, Block
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.answer import Answer, Block
+from robot_dyn.foundations.errors import RobotDynError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Result(Answer):
@@ -45,13 +48,27 @@ class Result(Answer):
         yield from (f"left out: {each}" for each in self.left_out)
         yield ", ".join(f"{name} {value}" for name, value in self.environment.items())
 
+    def draw(self, theme: str = "light") -> Figure:
+        """Draw the result as a figure; a subclass without a figure does not define it.
+
+        Args:
+            theme: For "light" or "dark" paper, or "page" for an HTML page.
+
+        Raises:
+            ResultError: If there is nothing to draw.
+        """
+        raise NotImplementedError
+
+    @classmethod
+    def drawn(cls) -> bool:
+        """Return True if results of this class have a figure."""
+        return cls.draw is not Result.draw
+
     @property
     def drawing(self) -> str:
-        from robot_dyn.studies.figure import inline
-        from robot_dyn.studies.save import DRAWINGS
+        from robot_dyn.report.figure import inline
 
-        draw = DRAWINGS.get(type(self))
         try:
-            return "" if draw is None else inline(draw(self, "page"))
+            return inline(self.draw("page")) if self.drawn() else ""
         except RobotDynError:  # there is nothing to draw
             return ""

@@ -4,39 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from robot_dyn import files
-from robot_dyn.result import json_text
-from robot_dyn.studies import run_difference_figure
-from robot_dyn.studies.certificate import diagram as certificate_diagram
-from robot_dyn.studies.certificate.certificate import Certificate
-from robot_dyn.studies.costs import diagram as cost_diagram
-from robot_dyn.studies.costs.cost import Cost
-from robot_dyn.studies.figure import ResultError
-from robot_dyn.studies.motor_budget import diagram as budget_diagram
-from robot_dyn.studies.motor_budget.result import MotorBudget
-from robot_dyn.studies.result import Result
-from robot_dyn.studies.run_difference import RunDifference
-from robot_dyn.studies.work_precision_diagram import diagram
-from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
-from robot_dyn.validate import choice, instance
+from robot_dyn.foundations import files
+from robot_dyn.foundations.result import json_text
+from robot_dyn.foundations.validate import choice, instance
+from robot_dyn.report.figure import ResultError
+from robot_dyn.report.result import Result
 from robot_dyn.view.plots.figure import THEMES
 from robot_dyn.view.plots.plots import PICTURES
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 JSON = files.Kind("a result", ".json", b'{\n "robot":')
-DRAWINGS: Mapping[type, Callable[[Any, str], Figure]] = {
-    Certificate: certificate_diagram.draw,
-    Cost: cost_diagram.draw,
-    MotorBudget: budget_diagram.draw,
-    RunDifference: run_difference_figure.draw,
-    WorkPrecision: diagram.draw,
-}
 
 
 def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Path:
@@ -58,7 +36,7 @@ def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Pa
         "result",
         result,
         Result,
-        "give that of rd.studies.certify, cost, stress or work_precision, of rd.compare_runs or rd.budget",
+        "give one of rd.accuracy (certify, cost, work_precision), of rd.compare_runs, or of a tool",
     )
     choice("theme", theme, THEMES)
     path = files.target(path, kinds(type(result)), ResultError)
@@ -68,13 +46,13 @@ def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Pa
     elif path.suffix.lower() == JSON.suffix:
         stream.write(json_text(result).encode())
     else:
-        DRAWINGS[type(result)](result, theme).savefig(stream, format=path.suffix[1:].lower(), dpi=120)
+        result.draw(theme).savefig(stream, format=path.suffix[1:].lower(), dpi=120)
     return files.save(path, lambda file: file.write(stream.getvalue()), ResultError)
 
 
 def kinds(of: type[Result]) -> tuple[files.Kind, ...]:
     """The files that a result of a class can be."""
-    return (*(PICTURES if of in DRAWINGS else ()), *((table_kind(of),) if of.columns else ()), JSON)
+    return (*(PICTURES if of.drawn() else ()), *((table_kind(of),) if of.columns else ()), JSON)
 
 
 def table_kind(of: type[Result]) -> files.Kind:

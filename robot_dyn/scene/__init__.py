@@ -2,7 +2,7 @@
 
 scene.py         the file: its keys, `read_scene`, and the Setup it describes
 effects.py, control.py, references.py    the tables [[effect]], [control] and [reference]
-sweep.py         the table [sweep]
+tool_tables.py   tables of tools, such as [sweep]: entry points, imported where a scene has them
 declared.py      tables whose keys are the coefficients that classes declare; user_effects.py those of the caller
 schema.py        rules for every table: types of values, units, no unknown key
 messages.py, lines.py    error messages, with the line of the key

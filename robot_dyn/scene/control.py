@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal, Union
 import numpy as np
 from pydantic import Field
 
-from robot_dyn.coefficients import URDF
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
 from robot_dyn.control.controller import Controller
@@ -19,7 +18,8 @@ from robot_dyn.control.independent_joint import PD, PID, gains_from
 from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import numbers
 from robot_dyn.effects.actuator import stated_efforts
-from robot_dyn.errors import SceneError
+from robot_dyn.foundations.coefficients import URDF
+from robot_dyn.foundations.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
 from robot_dyn.scene.effects import AnyEdit, bare

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, create_model
 
-from robot_dyn.coefficients import URDF, Coefficient, declared
 from robot_dyn.control.digital_loop.block import SIGNAL
+from robot_dyn.foundations.coefficients import URDF, Coefficient, declared
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.schema import Part, PerJoint, Stated, per_joint
 

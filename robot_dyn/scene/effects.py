@@ -7,7 +7,6 @@ from typing import Annotated, Any, ClassVar, Literal, Union
 
 from pydantic import Field, WrapValidator
 
-from robot_dyn.coefficients import URDF
 from robot_dyn.description.edits import STANDARD_GRAVITY, Payload
 from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
 from robot_dyn.effects.carried_payload import CarriedPayload
@@ -24,7 +23,8 @@ from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.effects.series_elastic import SeriesElastic
 from robot_dyn.effects.spring import Spring
 from robot_dyn.effects.wrench import ExternalWrench
-from robot_dyn.errors import SceneError
+from robot_dyn.foundations.coefficients import URDF
+from robot_dyn.foundations.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
 from robot_dyn.scene.schema import (

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.coefficients import URDF
 from robot_dyn.control.digital_loop.loop import LINES, Loop
 from robot_dyn.control.digital_loop.multirate import Multirate
 from robot_dyn.effects.explanation import Explanation, Number, Term, as_they_act, edit_terms, explanation
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.coefficients import URDF
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.scene.control import BLOCKS, Control

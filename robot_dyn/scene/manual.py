@@ -16,7 +16,7 @@ from robot_dyn.scene.loading import Loading
 from robot_dyn.scene.references import AnyReference
 from robot_dyn.scene.scene import Scene, Start
 from robot_dyn.scene.schema import Part, kinds_of
-from robot_dyn.scene.sweep import SweepTable
+from robot_dyn.scene.tool_tables import tool_tables
 
 _OPENING = """# Scenes
 
@@ -77,7 +77,9 @@ def manual() -> str:
         parts += _kinds(*blocks)
     parts += ["## `[reference]`\n\nWhat the controller follows; one table, with its `kind`.\n"]
     parts += _kinds(*get_args(get_args(AnyReference)[0]))
-    parts += _section("`[sweep]`", _text(SweepTable), SweepTable)
+    for name, entry in sorted(tool_tables().items()):
+        table = entry.load()
+        parts += _section(f"`[{name}]`", _text(table), table)
     return "\n".join(parts).rstrip() + "\n"
 
 

@@ -8,9 +8,10 @@ from typing import Any, get_args
 
 from pydantic import ValidationError
 
-from robot_dyn.errors import nearest, shorten
+from robot_dyn.foundations.errors import nearest, shorten
 from robot_dyn.scene.lines import line_of
 from robot_dyn.scene.schema import Part, kinds_of
+from robot_dyn.scene.tool_tables import tool_tables
 
 # Branches of a value that may be written in several ways, by pydantic's names.
 _WAYS = {
@@ -87,7 +88,7 @@ def _message(first: Any, found: list[Any], path: tuple[str | int, ...], table: A
     kind, context, at = first["type"], first.get("ctx", {}), where(table, path)
     got = f"got {shown(first.get('input'))}"
     if kind == "extra_forbidden":
-        keys = list(_section(table, path[:-1], schema).model_fields)
+        keys = [*_section(table, path[:-1], schema).model_fields, *(() if path[:-1] else tool_tables())]
         section = where(table, path[:-1]) or "a scene"
         key, close = str(path[-1]), nearest(str(path[-1]), keys)
         others = f"; keys: {', '.join(keys)}" if close.startswith("nearest") else ""

@@ -10,11 +10,11 @@ from pydantic import Field
 
 from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
-from robot_dyn.errors import PlanWarning, SceneError
+from robot_dyn.control.samples.columns import columns
+from robot_dyn.control.samples.findings import refuse_other_units
+from robot_dyn.control.samples.measured import from_samples
+from robot_dyn.foundations.errors import PlanWarning, SceneError
 from robot_dyn.model.robot import Robot
-from robot_dyn.plan.samples.columns import columns
-from robot_dyn.plan.samples.findings import refuse_other_units
-from robot_dyn.plan.samples.measured import from_samples
 from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Truth, Vector3, per_joint
 
 
@@ -99,7 +99,7 @@ class ViaPoints(Reference):
 
 
 class Sampled(Reference):
-    """The motion through samples of a file, as rd.plan.from_samples makes it: what is doubtful in them is a warning."""
+    """The motion through samples of a file, as rd.control.from_samples makes it, with a warning of doubtful ones."""
 
     kind: Literal["samples"]
     file: str

@@ -12,8 +12,8 @@ from pydantic import ValidationError, WrapValidator
 
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import RobotDynError, SceneError, nearest, shorten
-from robot_dyn.files import Kind, read
+from robot_dyn.foundations.errors import RobotDynError, SceneError, nearest, shorten
+from robot_dyn.foundations.files import Kind, read
 from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
@@ -24,7 +24,7 @@ from robot_dyn.scene.loading import Loading
 from robot_dyn.scene.messages import located, validation_message, where
 from robot_dyn.scene.references import AnyReference, Hold, Sampled, ViaPoints
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
-from robot_dyn.scene.sweep import SweepTable
+from robot_dyn.scene.tool_tables import with_tool_tables
 from robot_dyn.scene.user_effects import Factories, UserEffect, check_factories, user_defined_or
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
@@ -74,8 +74,6 @@ class Scene(Part):
     """What drives the joints; nothing by default."""
     reference: AnyReference = Hold(kind="hold")
     """What the controller follows; rest at the start by default."""
-    sweep: SweepTable | None = None
-    """What varies in many runs; none by default."""
 
     def loaded(self, folder: Path) -> Robot:
         """Return the robot of its file."""
@@ -163,10 +161,11 @@ def _parsed(text: str, source: str, effects: Factories | None = None) -> tuple[S
         table = tomllib.loads(text.removeprefix("\ufeff"))  # the mark of some editors for UTF-8
     except (ValueError, RecursionError) as error:
         raise SceneError(f"{source}: {_syntax(error)}; correct the file") from None
+    schema = with_tool_tables(Scene, table)
     try:
-        scene = Scene.model_validate(table, context=dict(effects or {}))
+        scene = schema.model_validate(table, context=dict(effects or {}))
     except ValidationError as error:
-        raise SceneError(f"{source}: {validation_message(error, table, text, Scene)}") from None
+        raise SceneError(f"{source}: {validation_message(error, table, text, schema)}") from None
     if scene.control is None and "reference" in scene.model_fields_set:
         message = located(text, ["reference"], "reference: nothing follows it; add a [control]")
         raise SceneError(f"{source}: {message}")

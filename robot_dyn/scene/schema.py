@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from robot_dyn.coefficients import URDF
 from robot_dyn.description.edits import by_joint
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.coefficients import URDF
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 
 

@@ -8,13 +8,13 @@ from typing import Any
 
 from pydantic import ValidationInfo, ValidatorFunctionWrapHandler
 
-from robot_dyn.coefficients import Coefficient
 from robot_dyn.effects.effect import Effect
-from robot_dyn.errors import SceneError, shown
+from robot_dyn.foundations.coefficients import Coefficient
+from robot_dyn.foundations.errors import SceneError, shown
+from robot_dyn.foundations.validate import number, numbers
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import keys_of
 from robot_dyn.scene.schema import Part, per_joint
-from robot_dyn.validate import number, numbers
 
 Factories = Mapping[str, Callable[..., Effect]]
 

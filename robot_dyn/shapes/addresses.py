@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from robot_dyn.description import catalog
-from robot_dyn.errors import CatalogError, shorten
+from robot_dyn.foundations.errors import CatalogError, shorten
 from robot_dyn.shapes.mesh_files import MeshError
 
 _LEVELS = 4  # of folders above a URDF that may be its package, as in package/robots/arm/urdf

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from robot_dyn.errors import shorten
+from robot_dyn.foundations.errors import shorten
+from robot_dyn.foundations.spatial import homogeneous, rotation_rpy
 from robot_dyn.shapes.mesh_files import MeshError
-from robot_dyn.spatial import homogeneous, rotation_rpy
 
 SMALLEST, LARGEST = 1e-9, 1e6  # [m], of a length; the latter of a position, too
 LENGTHS = {"box": {"size": 3}, "cylinder": {"radius": 1, "length": 1}, "sphere": {"radius": 1}}  # numbers in each

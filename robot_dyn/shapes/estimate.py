@@ -19,7 +19,7 @@ from robot_dyn.description.edits import Edits
 from robot_dyn.description.inertia import MassProperties
 from robot_dyn.description.markup import parse
 from robot_dyn.description.structure import StatedLink, Structure, structure
-from robot_dyn.errors import DescriptionError, QueryError
+from robot_dyn.foundations.errors import DescriptionError, QueryError
 from robot_dyn.shapes.link_shapes import LinkShape, link_shapes
 from robot_dyn.shapes.masses import Masses
 

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, final
 
-from robot_dyn.errors import QueryError, nearest, shown
+from robot_dyn.foundations.errors import QueryError, nearest, shown
+from robot_dyn.foundations.validate import number
 from robot_dyn.shapes.link_shapes import LinkShape
-from robot_dyn.validate import number
 
 
 @final

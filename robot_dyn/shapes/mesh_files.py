@@ -12,7 +12,7 @@ from urllib.parse import unquote
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.errors import RobotDynError, shorten
+from robot_dyn.foundations.errors import RobotDynError, shorten
 
 MAX_BYTES = 64 * 2**20  # of one mesh or texture; the largest in example-robot-data is 28 MiB
 MAX_NODES = 20_000  # of a scene, counting every instance

@@ -22,7 +22,7 @@ import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from numpy import ndarray
 
-from robot_dyn.errors import shorten
+from robot_dyn.foundations.errors import shorten
 from robot_dyn.shapes.mesh_files import MeshError, beside, bounded, check_gltf, checked_collada
 from robot_dyn.shapes.triangles import Mesh, welded
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.description.inertia import MassProperties
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 
 _FLAT = 1e-9  # of the cube of its length: the volume of a surface that encloses none
 

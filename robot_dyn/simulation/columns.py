@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError, shorten
-from robot_dyn.extras import needs
+from robot_dyn.foundations.errors import QueryError, shorten
+from robot_dyn.foundations.extras import needs
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.results.trajectory import Trajectory

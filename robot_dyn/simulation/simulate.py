@@ -13,6 +13,8 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.validate import function
+from robot_dyn.foundations.values import cached, derived
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.time_stepping import TimeStepping
 from robot_dyn.queries.dynamics import Dynamics
@@ -32,8 +34,6 @@ from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import check_record
-from robot_dyn.validate import function
-from robot_dyn.values import cached, derived
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.trajectory import Trajectory

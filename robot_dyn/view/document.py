@@ -13,15 +13,15 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.description.packages import searched
-from robot_dyn.errors import QueryError, shorten
+from robot_dyn.foundations.errors import QueryError, shorten
+from robot_dyn.foundations.spatial import homogeneous
+from robot_dyn.foundations.validate import instance, one_state, truth
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Array
 from robot_dyn.simulation.comparison.differing_settings import run_names
 from robot_dyn.simulation.observation.remarks import lines
 from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.spatial import homogeneous
-from robot_dyn.validate import instance, one_state, truth
 from robot_dyn.view import commands
 from robot_dyn.view.causes import causes, resolution
 from robot_dyn.view.geometry.coarse import look_of

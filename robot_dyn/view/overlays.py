@@ -11,10 +11,10 @@ from typing import final
 
 import numpy as np
 
+from robot_dyn.foundations.spatial import first_moment
 from robot_dyn.lagrange.linkage import BASE, Pose
 from robot_dyn.shapes.triangles import Mesh
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.spatial import first_moment
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
 from robot_dyn.view.geometry.shapes import arrow, cylinder, sphere

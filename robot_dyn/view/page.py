@@ -13,9 +13,9 @@ from tempfile import mkdtemp
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, final
 
-from robot_dyn.errors import RobotDynError
-from robot_dyn.files import Kind, save, target, why
-from robot_dyn.validate import integer
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.files import Kind, save, target, why
+from robot_dyn.foundations.validate import integer
 from robot_dyn.view.picture import HEIGHT, WIDTH, picture
 from robot_dyn.view.web.text import page_text
 

@@ -12,7 +12,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.spatial import homogeneous
+from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.view.commands import Command
 
 WIDTH, HEIGHT, _FINE = 720, 480, 2  # [pixels]; drawn larger by the last, and reduced: smooth edges

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
-from robot_dyn.errors import ModelWarning
-from robot_dyn.files import target
+from robot_dyn.foundations.errors import ModelWarning
+from robot_dyn.foundations.files import target
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Array
 from robot_dyn.simulation.results.trajectory import Trajectory

@@ -11,9 +11,9 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.foundations.spatial import hat, homogeneous
 from robot_dyn.model.gravity import gravity_acts
 from robot_dyn.model.robot import Robot
-from robot_dyn.spatial import hat, homogeneous
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
 from robot_dyn.view.geometry.shapes import arrow

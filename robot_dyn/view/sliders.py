@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.foundations.spatial import first_moment
 from robot_dyn.queries.units import unit
-from robot_dyn.spatial import first_moment
 from robot_dyn.view.stage import Stage
 
 _TURN, _SLIDE = pi, 1.0  # [rad], [m]; how far a joint without limits can be moved

@@ -14,11 +14,11 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError, nearest
+from robot_dyn.foundations.errors import QueryError, nearest
+from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage, Pose
 from robot_dyn.model.robot import Robot
-from robot_dyn.spatial import homogeneous
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
 from robot_dyn.view.geometry.visuals import Piece

@@ -31,10 +31,10 @@ from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.inertia import MassProperties
 from robot_dyn.description.structure import structure
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.spatial import rotation_rpy
 from robot_dyn.shapes.estimate import estimates, marked, shapes_of_lacking
 from robot_dyn.shapes.masses import Masses
-from robot_dyn.spatial import rotation_rpy
 
 DENSITY = 1160.0  # [kg/m³], the median of the links of the half from which the rules were chosen
 STATES = 20

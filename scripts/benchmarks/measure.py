@@ -18,9 +18,9 @@ from typing import Any, final
 import numpy as np
 
 import robot_dyn as rd
+from robot_dyn.report.timing import in_turns
 from robot_dyn.scene.scene import parse_scene
 from robot_dyn.scene.starters import starter
-from robot_dyn.studies.timing import in_turns
 
 PICTURES = Path(__file__).parents[2] / "docs" / "pictures"
 BATCH = 4096

@@ -18,7 +18,7 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn.description.sources.mjcf import LEAVABLE
-from robot_dyn.errors import ModelWarning, RobotDynError
+from robot_dyn.foundations.errors import ModelWarning, RobotDynError
 
 STATES = 20
 mujoco: Any = import_module("mujoco")  # which has no types

@@ -20,7 +20,7 @@ from scipy.integrate import quad
 from scipy.special import ellipj
 
 from benchmarks.measure import Effort, row, table
-from robot_dyn import sweeps as sw
+from robot_dyn.tools import sweeps as sw
 
 LOW, HIGH, T, G = 0.4, 1.6, 0.25, 9.80665
 LEVELS, EVENTS = (0.5, 0.9, 0.99), (0.01, 0.1)

@@ -16,7 +16,7 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 
 import robot_dyn as rd
 from benchmarks.measure import Effort, row, table
-from robot_dyn.extras import needs
+from robot_dyn.foundations.extras import needs
 
 # the frame of each arm that is brought to poses; kinova has continuous joints, panda two coupled fingers
 FRAMES = {"ur5": "tool0", "panda": "panda_hand", "kinova": "j2s6s200_end_effector", "xarm7": "link_eef", "z1": "link06"}
@@ -42,7 +42,7 @@ def installed(*modules: str) -> bool:
 
 
 def point_to_point(effort: Effort) -> None:
-    """Pieces of `rd.plan.point_to_point` beside ruckig's own evaluation at 100 times of each motion."""
+    """Pieces of `rd.tools.motors.point_to_point` beside ruckig's own evaluation at 100 times of each motion."""
     if not installed("ruckig"):
         return
     ruckig, motions = needs("ruckig", extra="plan"), 3 if effort.quick else 200
@@ -53,7 +53,7 @@ def point_to_point(effort: Effort) -> None:
         for _ in range(motions):
             ends = np.array([robot.random_configuration(rng) for _ in range(2)])
             limits = robot.velocity_limit, rng.uniform(1, 9, robot.n), rng.uniform(5, 80, robot.n)
-            plan = rd.plan.point_to_point(robot, *ends, acceleration=limits[1], jerk=limits[2])
+            plan = rd.tools.motors.point_to_point(robot, *ends, acceleration=limits[1], jerk=limits[2])
             asked, its = ruckig.InputParameter(robot.n), ruckig.Trajectory(robot.n)
             asked.current_position, asked.target_position = ends
             asked.max_velocity, asked.max_acceleration, asked.max_jerk = limits
@@ -107,7 +107,7 @@ def _judged(plant: rd.Plant, points: np.ndarray) -> tuple[float, ...]:
     """Largest torque and speed, share of time at a limit, share without a known reason, and seconds to plan."""
     robot: Any = plant.dynamics
     began = perf_counter()
-    found = rd.plan.path(plant, points)
+    found = rd.tools.motors.path(plant, points)
     seconds = perf_counter() - began
     q, v, a = found.reference.at((np.arange(10_000) + 0.3) * found.duration / 10_000)
     torque = np.abs(robot.inverse_dynamics(q, v, a) - plant.torque(0.0, q, v)) / robot.effort_limit
@@ -126,7 +126,7 @@ def poses(effort: Effort) -> None:
         for seed in range(count):
             g = robot.placement(robot.random_configuration(rng), frame)
             began = perf_counter()
-            answer = rd.plan.inverse_kinematics(robot, g, frame=frame, seed=seed)
+            answer = rd.control.inverse_kinematics(robot, g, frame=frame, seed=seed)
             times.append(perf_counter() - began)
             error = max(_errors(robot, frame, answer.q, g))
             if answer.converged and error <= REACHED:
@@ -148,7 +148,7 @@ def poses_beside_pink(effort: Effort) -> None:
         for k in range(count):
             g = robot.placement(robot.random_configuration(rng), frame)
             began = perf_counter()
-            mine.append(rd.plan.inverse_kinematics(robot, g, frame=frame, starts=1).converged)
+            mine.append(rd.control.inverse_kinematics(robot, g, frame=frame, starts=1).converged)
             times[k, 0], began = perf_counter() - began, perf_counter()
             its.append(_by_pink(robot, frame, g))
             times[k, 1] = perf_counter() - began

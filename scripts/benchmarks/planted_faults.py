@@ -23,9 +23,9 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.description import catalog
 from robot_dyn.description.description import content
 from robot_dyn.description.sources.xacro import expand
-from robot_dyn.errors import RobotDynError
-from robot_dyn.studies.doctor.check import Checkup, checked
-from robot_dyn.studies.doctor.finding import Severity
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.tools.doctor.checkup import Checkup, checked
+from robot_dyn.tools.doctor.finding import Severity
 
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 Fault = Callable[[Any], bool]  # plants itself in a link or joint; False where it does not apply

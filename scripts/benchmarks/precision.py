@@ -1,6 +1,6 @@
 """What accuracy costs in time: free swing of Panda-7 over 1 s, all methods beside SciPy, MuJoCo, Drake and heyoka.
 
-It is `rd.studies.work_precision`; a whole call of `rd.simulate`, with all that it checks, watches and tells,
+It is `rd.accuracy.work_precision`; a whole call of `rd.simulate`, with all that it checks, watches and tells,
 stands beside it.
 """
 
@@ -20,7 +20,7 @@ def precision(effort: Effort) -> None:
     """A table of the time that each takes to an error, and the diagram of all."""
     setup = rd.Setup(rd.Plant(arms()["Panda-7"]), READY, engine="compiled", estimate_error=False)
     quick: Any = {"methods": ["DOP853", "rk4"], "budget_s": 2.0, "repeats": 1} if effort.quick else {"budget_s": 120.0}
-    result = rd.studies.work_precision(setup, **quick)
+    result = rd.accuracy.work_precision(setup, **quick)
     table("what", *(f"to {x:g}, ms" for x in TARGETS), *(f"over DOP853, {x:g}" for x in TARGETS))
     base = [result.ladders[0].price(x) for x in TARGETS]
     for ladder in result.ladders:
@@ -35,7 +35,7 @@ def precision(effort: Effort) -> None:
     row("whole call of simulate, DOP853", *(f"{1e3 * x:.3f}" for x in whole(setup, effort)), *["—"] * len(TARGETS))
     print("\n( ) extrapolated by the order.", result.sentence)
     if (picture := effort.picture("precision")) is not None:
-        rd.studies.save_result(result, picture)
+        rd.accuracy.save_result(result, picture)
 
 
 def whole(setup: rd.Setup, effort: Effort) -> list[float]:

@@ -14,8 +14,8 @@ import numpy as np
 
 import robot_dyn as rd
 from benchmarks.measure import Effort, panda, row, table
-from robot_dyn.studies.proof.motion import motion
-from robot_dyn.studies.proof.tape import Tape
+from robot_dyn.tools.proof.motion import motion
+from robot_dyn.tools.proof.tape import Tape
 
 LITERAL = (("pendulum", 1.0), ("planar_2r", 1.0), ("ur5", 0.1), ("ur5", 0.5), ("panda", 0.05), ("panda", 0.1))
 HORIZONS = {"pendulum": 20.0, "planar_2r": 10.0, "ur5": 2.0, "panda": 0.5}
@@ -40,7 +40,7 @@ class Case:
         what: What acts, in words.
         effects: Besides gravity.
         control: (robot, q) → controller, or None.
-        options: Of `rd.studies.prove`.
+        options: Of `rd.tools.proof.prove`.
         start: q and v, drawn from seed 0 if not given.
     """
 
@@ -52,7 +52,7 @@ class Case:
     options: dict[str, Any] = field(default_factory=dict)
     start: tuple[np.ndarray, np.ndarray] | None = None
 
-    def prove(self, bits: int) -> tuple[rd.studies.Proof, float, float]:
+    def prove(self, bits: int) -> tuple[rd.tools.proof.Proof, float, float]:
         """The theorem, the time of tracing and that of the rest, in [s]."""
         robot, rng = arm(self.name), np.random.default_rng(0)
         q, v = (rng.uniform(-1, 1, robot.n) for _ in range(2)) if self.start is None else self.start
@@ -61,7 +61,7 @@ class Case:
         began = process_time()
         Tape(motion(setup, self.until_s))
         traced = process_time()
-        made = rd.studies.prove(setup, self.until_s, bits, budget_s=600.0, **self.options)
+        made = rd.tools.proof.prove(setup, self.until_s, bits, budget_s=600.0, **self.options)
         return made, traced - began, max(process_time() - traced - (traced - began), 0.0)
 
 

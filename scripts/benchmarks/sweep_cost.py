@@ -28,18 +28,18 @@ import psutil
 
 import robot_dyn as rd
 from benchmarks.planar_scene import planar_scene
-from robot_dyn import sweeps as sw
 from robot_dyn.scene.starters import starter
-from robot_dyn.sweeps.engines.cluster import client_of
-from robot_dyn.sweeps.folder.folder import Folder
-from robot_dyn.sweeps.plan.work import Work
-from robot_dyn.sweeps.run_sweep import begun, opened
+from robot_dyn.tools import sweeps as sw
+from robot_dyn.tools.sweeps.engines.cluster import client_of
+from robot_dyn.tools.sweeps.folder.folder import Folder
+from robot_dyn.tools.sweeps.plan.work import Work
+from robot_dyn.tools.sweeps.run_sweep import begun, opened
 
 MIB = 2**20
 RESUME = """
 import time
-from robot_dyn import sweeps as sw
-from robot_dyn.sweeps.plan.work import Work
+from robot_dyn.tools import sweeps as sw
+from robot_dyn.tools.sweeps.plan.work import Work
 began, cpu, plain, first = time.perf_counter(), time.process_time(), Work.made, []
 def made(self, *given):
     first.append(time.perf_counter() - began)

@@ -24,9 +24,9 @@ from typing import Any
 import psutil
 
 from benchmarks.planar_scene import planar_scene
-from robot_dyn import sweeps as sw
-from robot_dyn.sweeps.folder import files
-from robot_dyn.sweeps.run_sweep import begun
+from robot_dyn.tools import sweeps as sw
+from robot_dyn.tools.sweeps.folder import files
+from robot_dyn.tools.sweeps.run_sweep import begun
 
 RUNS, CHUNK = 20_000, 256
 CALLS = "open", "write", "sync", "close", "rename", "sync_folder"

@@ -14,7 +14,7 @@ from scipy.special import chdtri, ndtri
 from scipy.stats import binom
 
 from benchmarks.measure import Effort, lowest, printed, row, table
-from robot_dyn.sweeps import designs, sensitivity, statistics
+from robot_dyn.tools.sweeps import designs, sensitivity, statistics
 
 DESIGNS = ("random", "sobol", "halton", "latin")
 DIMENSIONS = 3
@@ -171,7 +171,7 @@ def costs(effort: Effort) -> None:
 _PLAN = """
 import resource, sys, time
 import numpy, scipy.stats
-from robot_dyn.sweeps import designs
+from robot_dyn.tools.sweeps import designs
 def peak(): return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 before, began = peak(), time.perf_counter()
 design = designs.design(sys.argv[1], int(sys.argv[2]), 7, 1)

@@ -18,7 +18,7 @@ import robot_dyn as rd
 from benchmarks.measure import row, table
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.structure import structure
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 
 SHARED = 20.0  # [kg], by the links without a mass of any arm: whether it moves does not depend on it
 _NO_ROBOTS = ("macro", "gazebo", "ros2_control", "transmission", "srdf")

@@ -23,7 +23,7 @@ def motion(
     """Midpoints of q and v at the end, and how far the last two columns are apart, the sum over the steps.
 
     Args:
-        plant: Of `rd.Lagrangian(robot, rd.studies.Ball(BITS))`.
+        plant: Of `rd.Lagrangian(robot, rd.accuracy.Ball(BITS))`.
         q: Start, decimals as text, or floats.
         v: Velocity.
         until_s: End, in [s].
@@ -34,7 +34,7 @@ def motion(
     from flint import arb
 
     n, doubt = plant.dynamics.n, 0.0
-    with rd.studies.Ball(BITS).scope():
+    with rd.accuracy.Ball(BITS).scope():
 
         def rate(t: Any, y: np.ndarray) -> np.ndarray:
             u = np.zeros(n) if control is None else control(t, y[:n], y[n:])

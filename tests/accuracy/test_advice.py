@@ -14,9 +14,9 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.simulation.dynamics.sampled_loop import linearised
 from robot_dyn.simulation.dynamics.stability import longest_step
+from tests.campaigns.estimates.advised import blow_up, limited
+from tests.campaigns.estimates.scenes import RAIL
 from tests.command import run
-from tests.estimates.advised import blow_up, limited
-from tests.estimates.scenes import RAIL
 from tests.long import long
 from tests.loops import growth
 

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.accuracy.certificate.certificate import Certificate
+from robot_dyn.accuracy.certificate.diagram import draw
+from robot_dyn.accuracy.certificate.digit_count import DigitCount
+from robot_dyn.accuracy.certificate.implementation import Implementation, implementations
+from robot_dyn.accuracy.certificate.worst_case_search import random_states
 from robot_dyn.lagrange.digits import QUANTITIES
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
-from robot_dyn.studies.certificate.certificate import Certificate
-from robot_dyn.studies.certificate.diagram import draw
-from robot_dyn.studies.certificate.digit_count import DigitCount
-from robot_dyn.studies.certificate.implementation import Implementation, implementations
-from robot_dyn.studies.certificate.worst_case_search import random_states
 from tests.long import long
 
 GIVEN = {"q": [0.3, -1.1], "v": [0.5, 0.4], "a": [0.2, 0.9], "tau": [1.0, -2.0]}
@@ -27,7 +27,7 @@ QUICK = {"samples": 100, "repeats": 1}
 
 @pytest.fixture(scope="module")
 def made() -> Certificate:
-    return rd.studies.certify(rd.load("planar_2r"), **GIVEN, **QUICK)
+    return rd.accuracy.certify(rd.load("planar_2r"), **GIVEN, **QUICK)
 
 
 def implementation(robot: rd.Robot, name: str) -> Implementation:
@@ -64,11 +64,11 @@ def test_digits_of_articulated_bodies_follow_from_400_bits(made: Certificate) ->
     """By the same recursion in balls of 400 bits, in the norm of M and on the scale, written anew."""
     found, own = made.of("forward_dynamics", "articulated body"), rd.Lagrangian(rd.load("planar_2r"))
     q, v, tau = (np.array(found.state[name]) for name in ("q", "v", "tau"))
-    fine = rd.Lagrangian(own.robot, rd.studies.Ball(400))
+    fine = rd.Lagrangian(own.robot, rd.accuracy.Ball(400))
     with fine.arithmetic.scope():
         exact = articulated_body(fine.linkage, *(fine.arithmetic.array(x) for x in (q, v, tau)))
         computed = articulated_body(own.linkage, *(np.tile(x, (8, 1)) for x in (q, v, tau)))[0]
-        error = rd.studies.midpoint(fine.arithmetic.array(computed) - exact)
+        error = rd.accuracy.midpoint(fine.arithmetic.array(computed) - exact)
     inertia = own.M(q)
     parts = [np.linalg.solve(inertia, x) for x in (tau, own.coriolis_torque(q, v), own.N(q))]
     norm = [np.sqrt(x @ inertia @ x) for x in (error, *parts)]
@@ -77,7 +77,7 @@ def test_digits_of_articulated_bodies_follow_from_400_bits(made: Certificate) ->
 
 def test_decimals_of_the_file_are_held_to_their_float64() -> None:
     """M of the pendulum is the decimal 0.083333333333333333 and 0.25, at every state."""
-    found = rd.studies.certify(rd.load("pendulum"), **QUICK)
+    found = rd.accuracy.certify(rd.load("pendulum"), **QUICK)
     literal = Fraction("0.083333333333333333")
     error = abs(Fraction(float(literal)) - literal) / (literal + Fraction("0.25"))
     assert found.decimals["M"] == pytest.approx(-log10(error), abs=1e-6)
@@ -147,7 +147,7 @@ def test_machine_code_is_judged_by_its_right_angles_and_the_file_by_its_own() ->
 def test_a_joint_without_inertia_is_named_and_the_rest_is_counted() -> None:
     with pytest.warns(rd.ModelWarning):
         robot = rd.load("massless_tip")
-    made = rd.studies.certify(robot, **QUICK)
+    made = rd.accuracy.certify(robot, **QUICK)
     assert made.left_out == ("forward dynamics: joint 'pointer_joint' carries no inertia",)
     assert made.quantities == ("M", "C", "N", "inverse_dynamics")
     assert made.condition.searched == np.inf
@@ -159,14 +159,14 @@ def test_a_joint_without_inertia_is_named_and_the_rest_is_counted() -> None:
     [("mimic_chain", ("articulated bodies: they take no coupled joints",)), *long([("cart_pole", ())])],
 )
 def test_coupled_joints_and_joints_that_slide_are_counted(name: str, left_out: tuple[str, ...]) -> None:
-    found = rd.studies.certify(rd.load(name), **QUICK)
+    found = rd.accuracy.certify(rd.load(name), **QUICK)
     assert found.left_out == left_out
     assert min(each.searched for each in found.digits if "float32" not in each.implementation) > 12
 
 
 def test_the_same_seed_counts_the_same(made: Certificate) -> None:
-    again = rd.studies.certify(rd.load("planar_2r"), **GIVEN, **QUICK)
-    other = rd.studies.certify(rd.load("planar_2r"), seed=1, **QUICK)
+    again = rd.accuracy.certify(rd.load("planar_2r"), **GIVEN, **QUICK)
+    other = rd.accuracy.certify(rd.load("planar_2r"), seed=1, **QUICK)
     assert [each.searched for each in again.digits] == [each.searched for each in made.digits]
     assert [each.searched for each in other.digits] != [each.searched for each in made.digits]
 
@@ -176,7 +176,7 @@ def test_ctrl_c_keeps_what_was_counted() -> None:
         if what.startswith("C"):
             raise KeyboardInterrupt
 
-    made = rd.studies.certify(rd.load("pendulum"), on_progress=stop, **QUICK)
+    made = rd.accuracy.certify(rd.load("pendulum"), on_progress=stop, **QUICK)
     assert made.interrupted and made.quantities == ("M",)
     assert made.left_out == ("what was to come when it was interrupted",)
 
@@ -189,12 +189,12 @@ def test_what_was_not_counted_is_told(made: Certificate) -> None:
 
 
 def test_files_hold_what_was_counted(made: Certificate, tmp_path) -> None:
-    path = rd.studies.save_result(made, tmp_path / "digits.csv")
+    path = rd.accuracy.save_result(made, tmp_path / "digits.csv")
     with path.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(made.digits) + len(made.decimals)
     assert [float(row["searched"]) for row in rows[: len(made.digits)]] == [each.searched for each in made.digits]
-    assert rd.studies.save_result(made, tmp_path / "digits", theme="dark").read_bytes().startswith(b"\x89PNG")
+    assert rd.accuracy.save_result(made, tmp_path / "digits", theme="dark").read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_diagram_has_a_panel_for_each_quantity(made: Certificate) -> None:
@@ -222,9 +222,9 @@ def test_the_diagram_has_a_panel_for_each_quantity(made: Certificate) -> None:
 )
 def test_mistakes_are_told_before_the_work(arguments, message: str) -> None:
     with pytest.raises(rd.RobotDynError, match=message):
-        rd.studies.certify(rd.load("planar_2r"), **arguments)
+        rd.accuracy.certify(rd.load("planar_2r"), **arguments)
     with pytest.raises(rd.RobotDynError, match=r"robot: give one of rd\.load, got 'ur5'"):
-        rd.studies.certify("ur5")  # pyright: ignore[reportArgumentType]
+        rd.accuracy.certify("ur5")  # pyright: ignore[reportArgumentType]
 
 
 def test_articulated_bodies_answer_a_batch_with_joints_that_slide() -> None:
@@ -246,7 +246,7 @@ def test_an_implementation_whose_numbers_overflow_everywhere_is_left_out_by_name
     )  # fmt: skip
     with pytest.warns(rd.ModelWarning, match="1e\\+09 times"):
         robot = rd.Robot.from_text(text)
-    made = rd.studies.certify(robot, samples=100, repeats=1)
+    made = rd.accuracy.certify(robot, samples=100, repeats=1)
     assert any(
         each.endswith("by Lagrangian, float32: no random state has a finite answer") for each in made.left_out
     ), made.left_out

@@ -13,18 +13,18 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.accuracy.costs import step_cost
+from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Pair, Version, Way, in_turns
+from robot_dyn.accuracy.costs.query_cost import QueryCost
+from robot_dyn.accuracy.costs.text import _cells
 from robot_dyn.codegen.parameters import parameters
 from robot_dyn.codegen.trace.from_casadi import program_of
-from robot_dyn.errors import QueryError, RobotDynError
-from robot_dyn.result import json_text
+from robot_dyn.foundations.errors import QueryError, RobotDynError
+from robot_dyn.foundations.result import json_text
+from robot_dyn.report.time_budget import Budget
 from robot_dyn.scene.starters import starter
 from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.studies.costs import step_cost
-from robot_dyn.studies.costs.ab_comparison import ABComparison, Pair, Version, Way, in_turns
-from robot_dyn.studies.costs.query_cost import QueryCost
-from robot_dyn.studies.costs.text import _cells
-from robot_dyn.studies.time_budget import Budget
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
@@ -54,7 +54,7 @@ def test_counts_are_those_of_the_programs_that_are_run(control: str) -> None:
     """Four evaluations and, where control is sampled, a tick; without a part, those of a setup made without it."""
     controller = CONTROLLERS[control]
     given = setup(FRICTION, SPRING, controller=controller)
-    found = rd.studies.cost(given, **TINY)
+    found = rd.accuracy.cost(given, **TINY)
     without = {
         "viscous_friction": setup(SPRING, controller=controller),
         "spring": setup(FRICTION, controller=controller),
@@ -75,7 +75,7 @@ def test_viscous_friction_costs_what_is_counted_by_hand() -> None:
 
     2 products b v and 2 sums; 2 products and 1 sum of the power: 7, and at most 3 changes of sign.
     """
-    added = rd.studies.cost(setup(FRICTION), **TINY).parts["viscous_friction"]
+    added = rd.accuracy.cost(setup(FRICTION), **TINY).parts["viscous_friction"]
     assert added % 4 == 0 and 7 <= added // 4 <= 10
 
 
@@ -83,12 +83,12 @@ def test_viscous_friction_costs_what_is_counted_by_hand() -> None:
 def test_what_is_off_costs_nothing_and_parts_add_up(control: str) -> None:
     """All on = rigid bodies + each part + what several share; a part never adds to a setup that is without it."""
     given = setup(FRICTION, SPRING, *rd.effects.joint_stops(-1.0, 1.0), controller=CONTROLLERS[control])
-    found = rd.studies.cost(given, **TINY)
+    found = rd.accuracy.cost(given, **TINY)
     whole = found.of(step_cost.EVERYTHING)
     assert whole.second.instructions + sum(found.parts.values()) + found.shared == whole.first.instructions
     assert all(count > 0 for count in found.parts.values())
     assert abs(found.shared) <= sum(found.parts.values()) / 10
-    again = rd.studies.cost(replace(given, plant=rd.Plant(ARM, [SPRING, *given.plant.effects[2:]])), **TINY)
+    again = rd.accuracy.cost(replace(given, plant=rd.Plant(ARM, [SPRING, *given.plant.effects[2:]])), **TINY)
     assert again.of(step_cost.EVERYTHING).first.instructions == found.of("viscous_friction").second.instructions
     assert "viscous_friction" not in again.parts
 
@@ -139,7 +139,7 @@ def test_machine_code_of_constants_has_no_inputs_and_the_numbers_of_its_robot() 
 
 
 def test_what_cannot_be_done_is_said_with_the_reason() -> None:
-    coupled = rd.studies.cost(rd.load("mimic_chain"), np.full(rd.load("mimic_chain").n, 0.3), **TINY)
+    coupled = rd.accuracy.cost(rd.load("mimic_chain"), np.full(rd.load("mimic_chain").n, 0.3), **TINY)
     assert any("joints are coupled" in each for each in coupled.left_out)
     assert any("right angles of the file: the file states none" in each for each in coupled.left_out)
 
@@ -147,7 +147,7 @@ def test_what_cannot_be_done_is_said_with_the_reason() -> None:
         def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:
             return -np.array([float(x) for x in v])
 
-    odd = rd.studies.cost(setup(Odd()), **TINY)
+    odd = rd.accuracy.cost(setup(Odd()), **TINY)
     assert any("parts: effect odd cannot be compiled" in each for each in odd.left_out)
     assert odd.sentence == "no step was counted" and odd.of("forward dynamics")
     with pytest.raises(QueryError, match="no cost of 'wind'; known: Coriolis matrix"):
@@ -155,8 +155,8 @@ def test_what_cannot_be_done_is_said_with_the_reason() -> None:
 
 
 def test_long_programs_are_counted_and_not_timed(monkeypatch) -> None:
-    monkeypatch.setattr("robot_dyn.studies.costs.query_cost._MOST_TIMED", 30)
-    found = rd.studies.cost(setup(), budget_s=20.0, repeats=1)
+    monkeypatch.setattr("robot_dyn.accuracy.costs.query_cost._MOST_TIMED", 30)
+    found = rd.accuracy.cost(setup(), budget_s=20.0, repeats=1)
     row = found.of("forward dynamics")
     assert row.first.instructions > 30 and row.first.time_s is None
     why = f"time of forward dynamics, M, Cholesky: {row.first.instructions} instructions, more than 30, take long"
@@ -175,7 +175,7 @@ def test_the_page_has_the_counts_of_today(tmp_path) -> None:
 
 
 def test_a_budget_that_ends_says_what_was_not_timed() -> None:
-    found = rd.studies.cost(setup(), **TINY)
+    found = rd.accuracy.cost(setup(), **TINY)
     assert all(each.time_ratio is None and each.first.repeats == 0 for each in found.alternatives)
     assert "time of everything, on: the budget of 1e-09 s ended" in found.left_out
 
@@ -221,7 +221,7 @@ def test_ratios_are_of_the_same_turn_and_a_difference_lost_in_them_is_not_told()
 
 
 def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
-    result = rd.studies.cost(setup(FRICTION, controller=CONTROLLERS["sampled"]), budget_s=0.5, repeats=2)
+    result = rd.accuracy.cost(setup(FRICTION, controller=CONTROLLERS["sampled"]), budget_s=0.5, repeats=2)
     read = json.loads(json_text(result))
     kept = [
         ABComparison(
@@ -239,10 +239,10 @@ def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
     assert tuple(kept) == result.alternatives
     assert read["sentence"] == result.sentence and read["parts"] == result.parts
     assert kept[0].time_ratio is not None
-    with open(rd.studies.save_result(result, tmp_path / "table.csv"), encoding="utf-8") as file:
+    with open(rd.accuracy.save_result(result, tmp_path / "table.csv"), encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["first_instructions"]) for row in rows] == [each.first.instructions for each in kept]
-    assert rd.studies.save_result(result, tmp_path / "plot", theme="dark").read_bytes().startswith(b"\x89PNG")
+    assert rd.accuracy.save_result(result, tmp_path / "plot", theme="dark").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
@@ -255,4 +255,4 @@ def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
 )
 def test_mistakes_are_told(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(QueryError, match=message):
-        rd.studies.cost(setup(), **wrong)
+        rd.accuracy.cost(setup(), **wrong)

@@ -17,23 +17,23 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 import robot_dyn as rd
-from robot_dyn.errors import QueryError
+from robot_dyn.accuracy.work_precision_diagram.diagram import most_precise
+from robot_dyn.accuracy.work_precision_diagram.measurement import Rung, Walk, measure
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest, own, recorded, whole
+from robot_dyn.accuracy.work_precision_diagram.past_horizon import past_horizon
+from robot_dyn.accuracy.work_precision_diagram.peers import found
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError, desired_motion
+from robot_dyn.accuracy.work_precision_diagram.reference_run import HorizonError, Reference, reference
+from robot_dyn.accuracy.work_precision_diagram.text import programs
+from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.result import json_text
 from robot_dyn.integrate.explicit import ExplicitRungeKutta
 from robot_dyn.integrate.tableau import ButcherTableau
 from robot_dyn.queries.units import format_duration
-from robot_dyn.result import json_text
+from robot_dyn.report.time_budget import Budget, Limit
 from robot_dyn.scene.scene import parse_scene
 from robot_dyn.scene.starters import starter
-from robot_dyn.studies.time_budget import Budget, Limit
-from robot_dyn.studies.work_precision_diagram.diagram import most_precise
-from robot_dyn.studies.work_precision_diagram.measurement import Rung, Walk, measure
-from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, own, recorded, whole
-from robot_dyn.studies.work_precision_diagram.past_horizon import past_horizon
-from robot_dyn.studies.work_precision_diagram.peers import found
-from robot_dyn.studies.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError, desired_motion
-from robot_dyn.studies.work_precision_diagram.reference_run import HorizonError, Reference, reference
-from robot_dyn.studies.work_precision_diagram.text import programs
-from robot_dyn.studies.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
 from tests.long import long
 
 UNTIL_DONE = Limit(math.inf)
@@ -138,7 +138,7 @@ def test_beyond_the_horizon_energy_and_the_way_back_judge() -> None:
 
 def test_an_accuracy_of_the_setup_is_not_used() -> None:
     """It would choose the method, which differs from run to run here."""
-    (only,) = rd.studies.work_precision(
+    (only,) = rd.accuracy.work_precision(
         replace(swing(0.1), accuracy=1e-6), methods=["rk4"], repeats=1, peers=False
     ).ladders
     assert only.points
@@ -146,7 +146,7 @@ def test_an_accuracy_of_the_setup_is_not_used() -> None:
 
 def test_a_motion_without_reference_is_refused() -> None:
     with pytest.raises(HorizonError, match=r"no run of 0\.3 s ends by DOP853 or Rosenbrock"):
-        rd.studies.work_precision(replace(swing(), controller=lambda t, q, v: v * (np.nan if t > 0.1 else 1.0)))
+        rd.accuracy.work_precision(replace(swing(), controller=lambda t, q, v: v * (np.nan if t > 0.1 else 1.0)))
 
 
 def points(*errors: float, believed: bool = True, each_s: float = 1e-3) -> tuple[Point, ...]:
@@ -156,9 +156,9 @@ def points(*errors: float, believed: bool = True, each_s: float = 1e-3) -> tuple
     )
 
 
-def invented(*ladders: ToleranceLadder, floor: float = 1e-12) -> rd.studies.WorkPrecision:
+def invented(*ladders: ToleranceLadder, floor: float = 1e-12) -> rd.accuracy.WorkPrecision:
     truth = Reference(np.zeros(2), np.zeros((2, 1)), floor, ("one", "other"), 1.0)
-    return rd.studies.WorkPrecision("arm", (), "rad", 1.0, truth, ladders, (), {"processor": "P"}, 1.0, 1.0)
+    return rd.accuracy.WorkPrecision("arm", (), "rad", 1.0, truth, ladders, (), {"processor": "P"}, 1.0, 1.0)
 
 
 def of(
@@ -355,29 +355,29 @@ def test_a_program_that_cannot_be_imported_is_left_out(monkeypatch) -> None:
     def broken(_: object) -> list[MethodUnderTest]:
         raise ImportError("no library")
 
-    monkeypatch.setattr("robot_dyn.studies.work_precision_diagram.peers.PEERS", {"scipy": broken})
+    monkeypatch.setattr("robot_dyn.accuracy.work_precision_diagram.peers.PEERS", {"scipy": broken})
     setup = recorded(whole(rd.Setup(rd.Plant(rd.load("pendulum")), [0.3])), 0.1)
     assert found(setup) == ([], ["scipy: cannot be imported (no library)"])
 
 
 def test_json_and_csv_hold_the_runs(tmp_path) -> None:
-    result = rd.studies.work_precision(swing(0.1), methods=["rk4", "DOP853"], repeats=1, peers=False)
+    result = rd.accuracy.work_precision(swing(0.1), methods=["rk4", "DOP853"], repeats=1, peers=False)
     read = json.loads(json_text(result))
     kept = [Point(**{key: x for key, x in row.items() if key in Point.__annotations__}) for row in read["rows"]]
     assert kept == [p for each in result.ladders for p in each.points]
     assert read["sentence"] == result.sentence and read["reference"]["error"] == result.reference.error
-    with open(rd.studies.save_result(result, tmp_path / "runs.csv"), encoding="utf-8") as file:
+    with open(rd.accuracy.save_result(result, tmp_path / "runs.csv"), encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["error"]) for row in rows] == [p.error for p in kept]
     assert [int(row["evaluations"]) for row in rows] == [p.evaluations for p in kept]
     marked = [row["on_front"] for row in read["rows"]]
     assert [row["on_front"] == "True" for row in rows] == marked and any(marked)
-    assert rd.studies.save_result(result, tmp_path / "plot").read_bytes().startswith(b"\x89PNG")
+    assert rd.accuracy.save_result(result, tmp_path / "plot").read_bytes().startswith(b"\x89PNG")
 
 
 def test_evaluations_are_counted_exactly() -> None:
     """RK4 takes four a step and steps end at the records: 25 of them, or two, four, … times as many."""
-    result = rd.studies.work_precision(swing(0.1), methods=["rk4"], repeats=1, peers=False)
+    result = rd.accuracy.work_precision(swing(0.1), methods=["rk4"], repeats=1, peers=False)
     (only,) = result.ladders
     assert [(p.steps, p.evaluations) for p in only.points[:3]] == [(25, 100), (50, 200), (100, 400)]
 
@@ -400,7 +400,7 @@ def test_a_budget_that_ends_says_what_was_left_out(smooth) -> None:
 )
 def test_wrong_options_are_refused(wrong: dict[str, object], message: str) -> None:
     with pytest.raises(QueryError, match=message):
-        rd.studies.work_precision(swing(0.1), **wrong)
+        rd.accuracy.work_precision(swing(0.1), **wrong)
 
 
 def test_each_program_is_named_with_its_cheapest_method_or_with_what_ended_it() -> None:

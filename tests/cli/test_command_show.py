@@ -10,7 +10,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.cli.commands import demo
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.view.plots.plots import PLOTS
 from tests.browser import opened
 from tests.command import run, said
@@ -51,7 +51,7 @@ def test_the_demo_ends_with_a_replay_a_plot_and_a_run(tmp_path, browser) -> None
 def test_the_price_needs_no_other_program(monkeypatch) -> None:
     """Without any, and where there is no reference, the demo says so and goes on."""
     swing = rd.Setup(rd.Plant(rd.load("pendulum")), [0.3], duration_s=0.2, engine="compiled")
-    monkeypatch.setattr("robot_dyn.studies.work_precision_diagram.peers.find_spec", lambda name: None)
+    monkeypatch.setattr("robot_dyn.accuracy.work_precision_diagram.peers.find_spec", lambda name: None)
     lines = list(demo._price(swing))
     assert re.match(r"  robot_dyn.*: ([\d.]+ [µm]?s|reached by no run)", lines[2])
     named = [line for line in lines if "left out" in line]

@@ -91,12 +91,12 @@ def test_mistakes_are_told_in_one_line_before_the_work(
 
 WATCHED = {  # where each is at work: behind the first ladder, and before what is timed
     "accuracy": """
-from robot_dyn.studies.work_precision_diagram import measurement as study
+from robot_dyn.accuracy.work_precision_diagram import measurement as study
 work = study._walk
 study._walk = lambda *given: (work(*given), tell())[0]
 """,
     "cost": """
-from robot_dyn.studies.costs import cost as study
+from robot_dyn.accuracy.costs import cost as study
 work = study.in_turns
 study.in_turns = lambda *given: (tell(), work(*given))[1]
 """,

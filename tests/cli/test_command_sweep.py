@@ -6,9 +6,9 @@ import json
 import re
 from pathlib import Path
 
-from robot_dyn import sweeps as sw
+from robot_dyn.tools import sweeps as sw
 from tests import command
-from tests.sweeps.swept import SCENE, scene
+from tests.tools.sweeps.swept import SCENE, scene
 
 
 def test_a_scene_is_swept_into_a_folder_and_asked(tmp_path: Path) -> None:

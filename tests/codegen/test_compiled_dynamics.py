@@ -18,7 +18,7 @@ from robot_dyn.codegen.engine import SizeWarning
 from robot_dyn.codegen.kernel import Kernel
 from robot_dyn.codegen.self_check import SelfCheckError
 from robot_dyn.codegen.trace.trace import Trace
-from robot_dyn.errors import OverflowedError, QueryError, SingularError
+from robot_dyn.foundations.errors import OverflowedError, QueryError, SingularError
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import floored
 from robot_dyn.queries.quantity import EQUATION

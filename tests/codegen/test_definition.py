@@ -14,11 +14,11 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.codegen.store.definition import definition
+from robot_dyn.foundations.values import LRUByIdentity
 from robot_dyn.simulation.compiled import build, programs
 from robot_dyn.simulation.compiled.build import compiled_equation
 from robot_dyn.simulation.compiled.structure import structure
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.values import LRUByIdentity
 from tests.codegen.test_kernel import Memory
 
 ARM = rd.load("planar_2r")
@@ -31,7 +31,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.arithmetic import tanh
+from robot_dyn.foundations.arithmetic import tanh
 
 GAIN, WEIGHTS, LEVELS = 2.0, np.array([0.5, 0.25]), ((1.0, 2.0), (3.0, 4.0))
 

@@ -12,8 +12,8 @@ from robot_dyn.control.controller import ControlError
 from robot_dyn.control.operational_space import POSE, POSITION, OperationalSpace, TaskDynamics, task_dynamics
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import hold
-from robot_dyn.errors import QueryError
-from robot_dyn.spatial import rotation
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.spatial import rotation
 
 NONE = np.zeros(0)
 PANDA = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.polynomial import polynomial
 
+from robot_dyn.control.extremes import extremes
 from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.plan.extremes import extremes
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import PlanError
+from robot_dyn.foundations.errors import PlanError
 
 ARM = rd.load("ur5")
 T = np.linspace(0, 2, 81)
@@ -31,7 +31,7 @@ def derivatives(piece: np.ndarray, s: float) -> list[np.ndarray]:
 
 @pytest.mark.parametrize(("ends", "q"), [("rest", REST), ("measured", SMOOTH)])
 def test_the_motion_passes_through_the_samples_with_four_continuous_derivatives(ends: str, q: np.ndarray) -> None:
-    plan = rd.plan.from_samples(ARM, table(q), ends=ends)
+    plan = rd.control.from_samples(ARM, table(q), ends=ends)
     np.testing.assert_allclose(plan.reference.at(T)[0], q, atol=1e-13)
     h, c = np.diff(plan.reference.breaks), plan.reference.coefficients
     for k in range(len(c) - 1):
@@ -42,7 +42,7 @@ def test_the_motion_passes_through_the_samples_with_four_continuous_derivatives(
 
 
 def test_ends_at_rest_have_neither_velocity_nor_acceleration() -> None:
-    plan = rd.plan.from_samples(ARM, table(REST))
+    plan = rd.control.from_samples(ARM, table(REST))
     for t in (0.0, 2.0):
         _, v, a = plan.reference.at(t)
         np.testing.assert_allclose(np.concatenate([v, a]), 0, atol=1e-10)
@@ -50,7 +50,7 @@ def test_ends_at_rest_have_neither_velocity_nor_acceleration() -> None:
 
 def test_of_a_motion_of_degree_five_nothing_is_lost() -> None:
     """The minimum-jerk motion is one polynomial, which the spline is: only rounding remains between the samples."""
-    plan = rd.plan.from_samples(ARM, table(REST))
+    plan = rd.control.from_samples(ARM, table(REST))
     t = np.linspace(0, 2, 1001)
     exact = rd.control.quintic(REST[0], REST[-1], 2.0).at(t)
     for mine, its, tolerance in zip(plan.reference.at(t), exact, (1e-13, 1e-11, 1e-9), strict=True):
@@ -58,7 +58,7 @@ def test_of_a_motion_of_degree_five_nothing_is_lost() -> None:
 
 
 def test_the_error_that_is_said_is_that_of_the_samples_left_out() -> None:
-    plan = rd.plan.from_samples(ARM, table(SMOOTH), ends="measured")
+    plan = rd.control.from_samples(ARM, table(SMOOTH), ends="measured")
     half = rd.control.Samples(T[::2], SMOOTH[::2])
     off = np.abs(half.at(T[1::2])[0] - SMOOTH[1::2])
     assert f"misses the others by at most {off.max():.2g} rad" in plan.method
@@ -66,7 +66,7 @@ def test_the_error_that_is_said_is_that_of_the_samples_left_out() -> None:
 
 def test_arrays_tables_frames_and_files_in_any_unit_are_one_motion(tmp_path: Path) -> None:
     pandas = pytest.importorskip("pandas")
-    read = partial(rd.plan.from_samples, ARM, ends="rest")
+    read = partial(rd.control.from_samples, ARM, ends="rest")
     expected = read(SMOOTH, time=T).reference.coefficients
     shuffled = {"time [ms]": 1000 * T} | {
         f"{name} [deg]": np.degrees(SMOOTH[:, NAMES.index(name)]) for name in sorted(NAMES)
@@ -93,19 +93,19 @@ def test_the_table_of_a_run_is_read_back(tmp_path: Path) -> None:
     """Its q, v and a are met at the samples, exactly."""
     arm = rd.load("planar_2r")
     run = rd.simulate(arm, q0=[0.3, 0.4], duration_s=0.5)
-    plan = rd.plan.from_samples(arm, rd.export(run, tmp_path / "run.csv"), ends="measured")
+    plan = rd.control.from_samples(arm, rd.export(run, tmp_path / "run.csv"), ends="measured")
     for mine, its in zip(plan.reference.at(run.t), (run.q, run.v, run.a), strict=True):
         np.testing.assert_allclose(mine, its, atol=1e-9)
-    assert np.abs(rd.plan.from_samples(arm, tmp_path / "run.csv", ends="rest").reference.at(0.0)[1]).max() < 1e-10
+    assert np.abs(rd.control.from_samples(arm, tmp_path / "run.csv", ends="rest").reference.at(0.0)[1]).max() < 1e-10
 
 
 def test_samples_that_move_at_an_end_need_a_word() -> None:
     """A stop within one step would take a torque that the motion does not need."""
     with pytest.raises(PlanError, match=r"moves at .* rad/s at the start: say whether .*ends='measured'.*ends='rest'"):
-        rd.plan.from_samples(ARM, table(SMOOTH))
+        rd.control.from_samples(ARM, table(SMOOTH))
     with pytest.raises(PlanError, match=r"at the end: say whether"):
-        rd.plan.from_samples(ARM, {"t": T[:41]} | {name: x[:41] for name, x in table(REST).items() if name != "t"})
-    assert rd.plan.from_samples(ARM, REST[::20], time=T[::20]).duration == 2.0  # way points are few
+        rd.control.from_samples(ARM, {"t": T[:41]} | {name: x[:41] for name, x in table(REST).items() if name != "t"})
+    assert rd.control.from_samples(ARM, REST[::20], time=T[::20]).duration == 2.0  # way points are few
 
 
 @pytest.mark.parametrize("deviation", [1e-3, 1e-4])
@@ -113,7 +113,7 @@ def test_noise_is_told_with_its_deviation_and_the_acceleration_it_makes(deviatio
     """Of 81 samples the deviation of fourth differences is known to some 10 %; second ones have √6 σ / h²."""
     rng = np.random.default_rng(3)
     noisy = REST + deviation * rng.normal(size=REST.shape)
-    (found,) = [x for x in rd.plan.from_samples(ARM, noisy, time=T, ends="rest").findings if "noise" in x]
+    (found,) = [x for x in rd.control.from_samples(ARM, noisy, time=T, ends="rest").findings if "noise" in x]
     said = re.search(r"noise or rounding of (\S+) rad, or times that are off, make accelerations of (\S+) rad", found)
     assert said is not None
     assert float(said[1]) == pytest.approx(deviation, rel=0.5)
@@ -124,28 +124,28 @@ def test_noise_is_told_with_its_deviation_and_the_acceleration_it_makes(deviatio
 def test_noise_is_told_where_samples_are_missing(kept: np.ndarray) -> None:
     """One sample, a gap, and half the rate: divided differences of independent errors have a known deviation."""
     noisy = REST + 1e-3 * np.random.default_rng(4).normal(size=REST.shape)
-    text = " ".join(rd.plan.from_samples(ARM, noisy[kept], time=T[kept], ends="rest").findings)
+    text = " ".join(rd.control.from_samples(ARM, noisy[kept], time=T[kept], ends="rest").findings)
     said = re.search(r"noise or rounding of (\S+) rad", text)
     assert said is not None
     assert float(said[1]) == pytest.approx(1e-3, rel=0.5)
-    assert "noise" not in " ".join(rd.plan.from_samples(ARM, REST[kept], time=T[kept], ends="rest").findings)
+    assert "noise" not in " ".join(rd.control.from_samples(ARM, REST[kept], time=T[kept], ends="rest").findings)
 
 
 def test_times_that_are_off_are_told_as_noise_and_uneven_ones_are_not() -> None:
     rng = np.random.default_rng(5)
     off = T + 0.2 * T[1] * rng.uniform(-1, 1, len(T)) * (T > 0)
-    assert "times that are off" in " ".join(rd.plan.from_samples(ARM, SMOOTH, time=off, ends="measured").findings)
+    assert "times that are off" in " ".join(rd.control.from_samples(ARM, SMOOTH, time=off, ends="measured").findings)
     there = np.sin(np.outer(off, [0.5, 0.6, 0.7, 0.8, 0.9, 1.0]) + np.arange(6))
-    assert not rd.plan.from_samples(ARM, there, time=off, ends="measured").findings
+    assert not rd.control.from_samples(ARM, there, time=off, ends="measured").findings
 
 
 def test_rounding_of_a_log_is_told_and_a_smooth_one_is_not_called_noisy() -> None:
     """0.1° every 25 ms is an acceleration of √6 · 0.1° / √12 / h² = 2 rad/s², of some 3 here."""
     degrees = np.degrees(REST)
-    found = rd.plan.from_samples(ARM, np.round(degrees, 1), time=T, unit="deg").findings
+    found = rd.control.from_samples(ARM, np.round(degrees, 1), time=T, unit="deg").findings
     assert any(re.search(r"noise or rounding of 0\.000[456] rad", each) for each in found)
     for q in (REST, SMOOTH):
-        assert not rd.plan.from_samples(ARM, q, time=T, ends="measured").findings
+        assert not rd.control.from_samples(ARM, q, time=T, ends="measured").findings
 
 
 def changed(row: int, joint: int, x: float) -> np.ndarray:
@@ -192,7 +192,7 @@ def changed(row: int, joint: int, x: float) -> np.ndarray:
     ],
 )
 def test_what_is_doubtful_is_found(source: dict, options: dict[str, Any], message: str) -> None:
-    plan = rd.plan.from_samples(ARM, source, **options)
+    plan = rd.control.from_samples(ARM, source, **options)
     assert any(re.search(message, each) for each in plan.findings), plan.findings
     assert all(f"finding: {each}" in repr(plan) for each in plan.findings)
 
@@ -237,7 +237,7 @@ def test_what_is_doubtful_is_found(source: dict, options: dict[str, Any], messag
 )
 def test_what_has_no_single_meaning_is_refused(source: Any, options: dict[str, Any], message: str) -> None:
     with pytest.raises(PlanError, match=message):
-        rd.plan.from_samples(ARM, source, **options)
+        rd.control.from_samples(ARM, source, **options)
 
 
 ROWS = "\n".join(",".join(f"{x:.9g}" for x in (t, *q)) for t, q in zip(T, REST, strict=True))
@@ -247,7 +247,7 @@ HEADS = ",".join(("t", *NAMES))
 @pytest.mark.parametrize("text", [f"\ufeff{HEADS}\n{ROWS}", f"{HEADS}\n{ROWS}".replace("\n", "\r\n")])
 def test_marks_and_line_ends_of_editors_change_nothing(tmp_path: Path, text: str) -> None:
     (tmp_path / "log.csv").write_bytes(text.encode())
-    found = rd.plan.from_samples(ARM, tmp_path / "log.csv").reference
+    found = rd.control.from_samples(ARM, tmp_path / "log.csv").reference
     np.testing.assert_allclose(found.at(T)[0], REST, atol=1e-8)  # 9 digits were written
 
 
@@ -274,7 +274,7 @@ def test_marks_and_line_ends_of_editors_change_nothing(tmp_path: Path, text: str
 def test_what_is_no_table_is_told_by_file_and_line(tmp_path: Path, text: str | bytes, message: str) -> None:
     (tmp_path / "log.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(PlanError, match=message):
-        rd.plan.from_samples(ARM, tmp_path / "log.csv")
+        rd.control.from_samples(ARM, tmp_path / "log.csv")
 
 
 def test_a_file_that_is_too_large_is_refused_before_it_is_read(tmp_path: Path) -> None:
@@ -282,23 +282,25 @@ def test_a_file_that_is_too_large_is_refused_before_it_is_read(tmp_path: Path) -
     with path.open("wb") as stream:
         stream.truncate(2**28 + 1)  # takes no space
     with pytest.raises(PlanError, match="is larger than 256 MiB; give a CSV file"):
-        rd.plan.from_samples(ARM, path)
+        rd.control.from_samples(ARM, path)
 
 
 def test_units_may_stand_in_parentheses_and_times_in_the_index() -> None:
-    expected = rd.plan.from_samples(ARM, REST, time=T).reference.coefficients
-    found = rd.plan.from_samples(ARM, {"Time (s)": T} | {f"{n} (rad)": x for n, x in zip(NAMES, REST.T, strict=True)})
+    expected = rd.control.from_samples(ARM, REST, time=T).reference.coefficients
+    found = rd.control.from_samples(
+        ARM, {"Time (s)": T} | {f"{n} (rad)": x for n, x in zip(NAMES, REST.T, strict=True)}
+    )
     np.testing.assert_array_equal(found.reference.coefficients, expected)
     pandas = pytest.importorskip("pandas")
     frame = pandas.DataFrame(table(REST)).set_index("t")
     zoned = frame.set_index(pandas.to_datetime(1.7e9 + T, unit="s", utc=True).rename("stamp"))
     for source, options in ((frame, {}), (frame, {"time": T}), (zoned, {})):
-        plan = rd.plan.from_samples(ARM, source, **options)
+        plan = rd.control.from_samples(ARM, source, **options)
         np.testing.assert_allclose(plan.reference.breaks, T, atol=1e-6)  # of stamps since 1970, in float
         np.testing.assert_allclose(plan.reference.at(plan.reference.breaks)[0], REST, atol=1e-12)
     twice = frame.reset_index().set_axis(["t", *NAMES[:5], NAMES[4]], axis=1)
     with pytest.raises(PlanError, match="column 'wrist_2_joint' is there twice"):
-        rd.plan.from_samples(ARM, twice)
+        rd.control.from_samples(ARM, twice)
     missing = zoned.set_index(pandas.Index([*zoned.index[:-1], pandas.NaT], name="stamp"))
     with pytest.raises(PlanError, match="column 'stamp': sample 81 is NaT"):
-        rd.plan.from_samples(ARM, missing)
+        rd.control.from_samples(ARM, missing)

@@ -10,9 +10,9 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.control.orientation import orientation_error
-from robot_dyn.errors import PlanError, QueryError
-from robot_dyn.plan.pose import InverseKinematics, error_and_jacobian, logarithm
-from robot_dyn.spatial import hat
+from robot_dyn.control.pose import InverseKinematics, error_and_jacobian, logarithm
+from robot_dyn.foundations.errors import PlanError, QueryError
+from robot_dyn.foundations.spatial import hat
 
 # kinova has continuous joints, panda a coupled one
 ARMS = {"ur5": "tool0", "panda": "panda_hand", "kinova": "j2s6s200_end_effector", "xarm7": "link_eef", "z1": "link06"}
@@ -37,7 +37,7 @@ def reached(name: str, poses: int) -> float:
     found = 0
     for seed in range(poses):
         g = arm.placement(arm.random_configuration(rng), frame)
-        answer = rd.plan.inverse_kinematics(arm, g, frame=frame, seed=seed)
+        answer = rd.control.inverse_kinematics(arm, g, frame=frame, seed=seed)
         assert answer.starts == 20
         for q in answer.solutions:
             assert (arm.lower <= q).all() and (q <= arm.upper).all()
@@ -86,7 +86,7 @@ def answer_at_limit() -> tuple[rd.Robot, InverseKinematics]:
     arm = load("panda").with_(lock={"panda_finger_joint1": 0.01})
     q = (arm.lower + arm.upper) / 2
     q[1] = arm.upper[1] + 0.2  # the pose asks joint 2 to pass its limit; the last joints are short
-    return arm, rd.plan.inverse_kinematics(arm, arm.placement(q, "panda_link3"), frame="panda_link3")
+    return arm, rd.control.inverse_kinematics(arm, arm.placement(q, "panda_link3"), frame="panda_link3")
 
 
 def test_the_limit_that_holds_a_joint_is_named() -> None:
@@ -102,7 +102,7 @@ def test_out_of_reach_without_a_limit_is_said() -> None:
     arm = load("ur5")
     g = arm.placement(np.full(6, 0.3), "tool0").copy()
     g[:3, 3] = [2.0, 0.3, 0.4]
-    answer = rd.plan.inverse_kinematics(arm, g, frame="tool0")
+    answer = rd.control.inverse_kinematics(arm, g, frame="tool0")
     assert not answer.converged and not answer.held_by and "no joint limit holds it" in repr(answer)
     assert answer.position_error > 1
 
@@ -111,7 +111,7 @@ def test_a_robot_arm_with_a_spherical_wrist_has_eight_solutions() -> None:
     """The UR5 has up to eight, apart from whole turns: two each of shoulder, elbow and wrist."""
     arm = load("ur5")
     q = np.array([0.3, -1.0, 1.2, -0.7, 0.9, 0.4])
-    answer = rd.plan.inverse_kinematics(arm, arm.placement(q, "tool0"), frame="tool0", q0=q + 0.05, starts=60)
+    answer = rd.control.inverse_kinematics(arm, arm.placement(q, "tool0"), frame="tool0", q0=q + 0.05, starts=60)
     assert len(answer.solutions) == 8 and not answer.unique and answer.redundancy == 0
     np.testing.assert_allclose(answer.q, q, atol=1e-8)  # the nearest to q0
 
@@ -120,19 +120,22 @@ def test_joints_that_do_not_move_the_frame_stay_and_turns_are_the_nearest() -> N
     arm, rng = load("kinova"), np.random.default_rng(4)
     frame = ARMS["kinova"]
     q0 = arm.random_configuration(rng) + 4 * np.pi * (np.isinf(arm.upper))
-    answer = rd.plan.inverse_kinematics(arm, arm.placement(q0 + 0.01 * np.sign(np.pi - q0), frame), frame=frame, q0=q0)
+    answer = rd.control.inverse_kinematics(
+        arm, arm.placement(q0 + 0.01 * np.sign(np.pi - q0), frame), frame=frame, q0=q0
+    )
     assert answer.converged
     np.testing.assert_allclose(answer.q, q0, atol=0.05)
     panda = load("panda")
     q0 = panda.random_configuration(rng)
     assert (
-        rd.plan.inverse_kinematics(panda, panda.placement(q0, "panda_hand"), frame="panda_hand", q0=q0).q[-1] == q0[-1]
+        rd.control.inverse_kinematics(panda, panda.placement(q0, "panda_hand"), frame="panda_hand", q0=q0).q[-1]
+        == q0[-1]
     )
 
 
 def test_a_position_alone_leaves_the_orientation_free() -> None:
     arm = load("ur5")
-    answer = rd.plan.inverse_kinematics(arm, ([0.4, 0.2, 0.3], None), frame="tool0")
+    answer = rd.control.inverse_kinematics(arm, ([0.4, 0.2, 0.3], None), frame="tool0")
     assert answer.converged and np.isnan(answer.rotation_error) and answer.redundancy == 3
     np.testing.assert_allclose(arm.placement(answer.q, "tool0")[:3, 3], [0.4, 0.2, 0.3], atol=1e-9)
 
@@ -140,7 +143,7 @@ def test_a_position_alone_leaves_the_orientation_free() -> None:
 def test_answers_repeat() -> None:
     arm = load("ur5")
     g = arm.placement(np.full(6, 0.7), "tool0")
-    first, again = (rd.plan.inverse_kinematics(arm, (g[:3, 3], g[:3, :3]), frame="tool0", seed=5) for _ in range(2))
+    first, again = (rd.control.inverse_kinematics(arm, (g[:3, 3], g[:3, :3]), frame="tool0", seed=5) for _ in range(2))
     np.testing.assert_array_equal(first.solutions, again.solutions)
     assert "solutions" in first.to_json()
 
@@ -158,7 +161,7 @@ def test_answers_repeat() -> None:
 def test_what_is_no_pose_is_told(change: dict, error: type[Exception], message: str) -> None:
     arm = load("ur5")
     with pytest.raises(error, match=message):
-        rd.plan.inverse_kinematics(
+        rd.control.inverse_kinematics(
             **{"arm": arm, "pose": arm.placement(np.zeros(6), "tool0"), "frame": "tool0"} | change
         )
 
@@ -172,7 +175,7 @@ def test_pink_reaches_the_same_poses() -> None:
     for _ in range(10):
         q = rng.uniform(-2, 2, 6)
         g = arm.placement(q, "tool0")
-        answer = rd.plan.inverse_kinematics(arm, g, frame="tool0", q0=q + 0.02)
+        answer = rd.control.inverse_kinematics(arm, g, frame="tool0", q0=q + 0.02)
         configuration = pink.Configuration(arm.model, arm.model.createData(), q + 0.02)
         task = pink.FrameTask("tool0", position_cost=1.0, orientation_cost=1.0)
         task.set_target(pin.SE3(g))
@@ -185,7 +188,7 @@ def test_pink_reaches_the_same_poses() -> None:
 def test_a_pose_in_millimetres_is_said_to_be_far_away() -> None:
     """Reach of a UR5 is 0.85 m: 400 mm read as 400 m is that far off; 1.2 m is not."""
     arm = load("ur5")
-    far = repr(rd.plan.inverse_kinematics(arm, ([400.0, 200.0, 300.0], np.eye(3)), frame="tool0", starts=4))
-    near = repr(rd.plan.inverse_kinematics(arm, ([1.2, 0.0, 0.3], np.eye(3)), frame="tool0", starts=4))
+    far = repr(rd.control.inverse_kinematics(arm, ([400.0, 200.0, 300.0], np.eye(3)), frame="tool0", starts=4))
+    near = repr(rd.control.inverse_kinematics(arm, ([1.2, 0.0, 0.3], np.eye(3)), frame="tool0", starts=4))
     assert "if the pose is in mm" in far and "in mm" not in near
     assert "1 rad counts as 1 m" in far and "1 rad counts as 1 m" in near

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import PlanError
+from robot_dyn.foundations.errors import PlanError
 
 writer = pytest.importorskip("mcap_ros2.writer")
 
@@ -69,7 +69,7 @@ def write(path: Path, messages: Iterable[Message], topic: str = "/joint_states",
 
 def test_joints_are_found_by_name_at_the_times_of_the_headers(tmp_path: Path) -> None:
     """The motion is one polynomial of degree 5: times to the nanosecond give it back to rounding of positions."""
-    plan = rd.plan.from_samples(ARM, write(tmp_path / "log.mcap", measured()))
+    plan = rd.control.from_samples(ARM, write(tmp_path / "log.mcap", measured()))
     np.testing.assert_allclose(plan.reference.at(T)[0], Q, atol=1e-8)  # 1 ns at 1 rad/s, 9 digits of a stamp
     np.testing.assert_allclose(plan.reference.at(0.5 * (T[1:] + T[:-1]))[0], 0.5 * (Q[1:] + Q[:-1]), atol=1e-3)
     assert plan.reference.start == 0 and plan.duration == pytest.approx(2.0, abs=1e-9) and plan.findings == ()
@@ -80,32 +80,32 @@ def test_times_of_the_log_are_those_at_which_it_got_the_messages(tmp_path: Path)
     messages = measured()
     path = write(tmp_path / "log.mcap", messages)
     t = np.array([each.log - messages[0].log for each in messages]) * 1e-9
-    plan = rd.plan.from_samples(ARM, path, time="log")
+    plan = rd.control.from_samples(ARM, path, time="log")
     np.testing.assert_allclose(plan.reference.breaks, t, atol=1e-12)
     assert "times of the log, from" in plan.method
     unstamped = write(tmp_path / "unstamped.mcap", [each._replace(header=0) for each in messages])
-    plan = rd.plan.from_samples(ARM, unstamped)
+    plan = rd.control.from_samples(ARM, unstamped)
     np.testing.assert_allclose(plan.reference.breaks, t, atol=1e-12)
     assert "times of the log, as the headers have none" in plan.method
 
 
 def test_other_joints_and_messages_of_others_are_left_out_and_said(tmp_path: Path) -> None:
     both = [each._replace(names=[*each.names, "finger"], position=[*each.position, 0.1]) for each in measured()]
-    expected = rd.plan.from_samples(ARM, write(tmp_path / "plain.mcap", measured())).reference.coefficients
+    expected = rd.control.from_samples(ARM, write(tmp_path / "plain.mcap", measured())).reference.coefficients
     gripper = [Message(each.header + 1, each.log + 1, ["finger"], [0.2]) for each in both]
     between = [each for pair in zip(measured(), gripper, strict=True) for each in pair]
     for name, messages in (("both", both), ("between", between)):
-        plan = rd.plan.from_samples(ARM, write(tmp_path / f"{name}.mcap", messages))
+        plan = rd.control.from_samples(ARM, write(tmp_path / f"{name}.mcap", messages))
         np.testing.assert_array_equal(plan.reference.coefficients, expected)
         assert plan.method.endswith("; without finger")
 
 
 def test_names_of_the_log_are_given_by_joint(tmp_path: Path) -> None:
     path = write(tmp_path / "log.mcap", measured(tuple(f"left_{name}" for name in NAMES)), "/left/states", "/x")
-    plan = rd.plan.from_samples(ARM, path, joints={name: f"left_{name}" for name in NAMES})
+    plan = rd.control.from_samples(ARM, path, joints={name: f"left_{name}" for name in NAMES})
     np.testing.assert_allclose(plan.reference.at(T)[0], Q, atol=1e-8)
     with pytest.raises(PlanError, match=r"0 messages of /left/states name joints of the arm.*left_wrist"):
-        rd.plan.from_samples(ARM, path)
+        rd.control.from_samples(ARM, path)
 
 
 def test_a_log_of_rd_export_is_read_back(tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ def test_a_log_of_rd_export_is_read_back(tmp_path: Path) -> None:
     path = rd.export(run, tmp_path / "run.mcap")
     assert run.desired is not None
     for topic, q in (("/joint_states", run.q), ("/desired/joint_states", run.desired)):
-        plan = rd.plan.from_samples(ARM, path, topic=topic, ends="rest")
+        plan = rd.control.from_samples(ARM, path, topic=topic, ends="rest")
         np.testing.assert_allclose(plan.reference.at(plan.reference.breaks)[0], q, atol=1e-14)
         np.testing.assert_allclose(plan.reference.breaks, run.t, atol=1e-9)
 
@@ -148,7 +148,7 @@ def test_a_log_without_a_single_meaning_is_refused(
 ) -> None:
     path = write(tmp_path / "log.mcap", messages, other="/x")
     with pytest.raises(PlanError, match=message):
-        rd.plan.from_samples(ARM, path, **options)
+        rd.control.from_samples(ARM, path, **options)
 
 
 @pytest.mark.parametrize(
@@ -165,11 +165,11 @@ def test_a_broken_log_is_refused_by_name(tmp_path: Path, change: Any, message: s
     path = write(tmp_path / "log.mcap", measured())
     path.write_bytes(change(path.read_bytes()))
     with pytest.raises(PlanError, match=rf"{re.escape(str(path))}: .*{message}"):
-        rd.plan.from_samples(ARM, path)
+        rd.control.from_samples(ARM, path)
 
 
 @pytest.mark.parametrize("options", [{"topic": "/joint_states"}, {"time": "header"}])
 def test_options_of_logs_are_refused_for_other_sources(options: dict[str, str]) -> None:
     table = {"t": T} | dict(zip(NAMES, Q.T, strict=True))
     with pytest.raises(PlanError, match=r"is of an MCAP log, and the samples are not of one"):
-        rd.plan.from_samples(ARM, table, **options)
+        rd.control.from_samples(ARM, table, **options)

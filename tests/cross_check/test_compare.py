@@ -10,7 +10,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.cross_check.compare import compare, random_state
-from robot_dyn.errors import DescriptionError, ModelWarning, QueryError
+from robot_dyn.foundations.errors import DescriptionError, ModelWarning, QueryError
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.linkage import Linkage
 from tests.long import robots

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import RobotDynError
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import diagonal_scale, floored, mass_norm, scaled, solved_tolerance
-from robot_dyn.studies.work_precision_diagram.peers.arm_motion import PeerError
-from tests.hard.other_engines import installed
+from tests.campaigns.hard.other_engines import installed
 from tests.long import robots
 
 TOLERANCE = 1e-12  # of the terms added; MuJoCo's minimum of diagonals and Pinocchio's rounding leave 1e-13
@@ -61,7 +61,7 @@ def test_another_engine_has_the_same_equations(program: str, engine: Callable[[r
     robot = loaded(name)
     if not robot.couplings.trivial:
         pytest.skip("has joints that follow others, which other engines keep as constraints")
-    found = {each.kind for each in rd.check(name).findings}
+    found = {each.kind for each in rd.tools.doctor.check(name).findings}
     try:
         other = engine(robot)
     except PeerError as error:

@@ -12,9 +12,9 @@ import robot_dyn as rd
 from robot_dyn.cross_check.second_reading import second_reading
 from robot_dyn.description import description, urdf
 from robot_dyn.description.description import check
+from tests.campaigns.foreign import macros, markup, robots
+from tests.campaigns.foreign.files import inside
 from tests.command import ROOT
-from tests.foreign import macros, markup, robots
-from tests.foreign.files import inside
 
 LOADING = [file for topic in (markup, macros, robots) for file in topic.FILES if not file.refused]
 # XML, but yourdfpy knows no capsule, no mass without inertia and no default namespace

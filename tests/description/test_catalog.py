@@ -11,7 +11,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.description import catalog
-from robot_dyn.errors import CatalogError, DescriptionError, ModelWarning
+from robot_dyn.foundations.errors import CatalogError, DescriptionError, ModelWarning
 
 URDF = Path(__file__).parents[2] / "urdf"
 REFUSED = {

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import EffectError, ModelWarning
+from robot_dyn.foundations.errors import EffectError, ModelWarning
 from robot_dyn.scene.scene import SceneError
 from tests.hostile.kinds import BODY, LIMIT, MOMENTS, POINT, inside, joint
 from tests.hostile.kinds import arm as altered
@@ -261,7 +261,7 @@ def test_an_effort_limit_of_zero_in_the_file_never_drops_the_arm_in_silence(tmp_
     assert rd.Plant(held, [rd.effects.EffortLimit("urdf")]).actuation(np.array([9.0])).tolist() == [8.0]
 
 
-@pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+@pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 @pytest.mark.parametrize("more", ["", 'limit_N_m = "urdf"'])
 def test_a_scene_says_so_too(more: str, tmp_path: Path) -> None:
     no_effort(tmp_path)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import DescriptionError, ModelWarning
+from robot_dyn.foundations.errors import DescriptionError, ModelWarning
 from robot_dyn.simulation.results.provenance import origin, robot_of
-from tests.foreign import macros, markup, robots
-from tests.foreign.files import Foreign
+from tests.campaigns.foreign import macros, markup, robots
+from tests.campaigns.foreign.files import Foreign
 
 TABLE = [file for topic in (markup, macros, robots) for file in topic.FILES]
 LOADING = [file for file in TABLE if not file.refused]

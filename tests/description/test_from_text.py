@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import robot_dyn as rd
-from robot_dyn.errors import CatalogError, DescriptionError, ModelWarning
+from robot_dyn.foundations.errors import CatalogError, DescriptionError, ModelWarning
 from tests.hostile.kinds import ARM
 
 # --- text

@@ -9,7 +9,7 @@ import pytest
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
-from robot_dyn.errors import EditError, QueryError, RobotDynError
+from robot_dyn.foundations.errors import EditError, QueryError, RobotDynError
 from robot_dyn.simulation.results.provenance import robot_of
 
 TREE = rd.load("skew_tree")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import DescriptionError, MissingExtraError, ModelWarning
+from robot_dyn.foundations.errors import DescriptionError, MissingExtraError, ModelWarning
 from robot_dyn.simulation.results.provenance import robot_of
 from tests.hostile.kinds import ARM as URDF
 

@@ -10,7 +10,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.description.sources import xacro
-from robot_dyn.errors import DescriptionError, ModelWarning
+from robot_dyn.foundations.errors import DescriptionError, ModelWarning
 from tests.command import document, refusal
 from tests.hostile.kinds import ARM
 
@@ -73,7 +73,7 @@ def test_a_xacro_file_without_expressions_is_refused_too(name: str, tmp_path: Pa
     (file := tmp_path / name).write_text(macros.replace('<mass value="1.5"/>', "<xacro:heavy/>"))
     with pytest.raises(DescriptionError, match="is a xacro file; expand the file"):
         rd.load(file)
-    (finding,) = rd.check(file).findings
+    (finding,) = rd.tools.doctor.check(file).findings
     assert (finding.kind, finding.what) == ("refused", "is a xacro file")
     assert rd.load(file, xacro={}).total_mass == rd.Robot.from_text(ARM).total_mass + 7.5
 

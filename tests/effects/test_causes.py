@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import robot_dyn as rd
 from robot_dyn.effects.causes import causes
-from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.foundations.errors import EffectError, QueryError
 from tests.random_trees import RandomTree, trees
 
 BODY = rd.Payload("tool0", 5.0, (0.1, 0.0, 0.2))

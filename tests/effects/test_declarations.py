@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.arithmetic import tanh
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.effects.effect import Effect
-from robot_dyn.errors import EffectError, TraceError
+from robot_dyn.foundations.arithmetic import tanh
+from robot_dyn.foundations.errors import EffectError, TraceError
 from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.compiled.self_check import MachineError
 from robot_dyn.simulation.dynamics.declarations import undeclared

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.coefficients import coefficient
 from robot_dyn.effects.set_valued import settled
-from robot_dyn.errors import EffectError, SingularError
-from tests.estimates.scenes import arms
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.errors import EffectError, SingularError
+from tests.campaigns.estimates.scenes import arms
 from tests.long import long
 
 ENGINES = ["interpreted", "compiled"]
@@ -133,7 +133,7 @@ def test_what_cannot_be_decided_is_refused() -> None:
         tip = rd.load("massless_tip")
     with pytest.raises(SingularError, match="'pointer_joint' carries no inertia"):
         rd.Plant(tip, [rd.effects.DryFriction(1.0)]).forward_dynamics(0.0, [0.3, 0.4], [0.0, 0.0], [0.0, 0.0])
-    for arithmetic in (rd.studies.Ball(80), np.longdouble):
+    for arithmetic in (rd.accuracy.Ball(80), np.longdouble):
         plant = rd.Plant(rd.Lagrangian(ARM, arithmetic), [rd.effects.DryFriction(1.0)])
         with pytest.raises(EffectError, match="dry_friction: which joints it holds is decided in float64"):
             plant.forward_dynamics(0.0, [0.3, 0.4], [0.0, 0.0], [0.0, 0.0])

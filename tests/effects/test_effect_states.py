@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import EffectError
+from robot_dyn.foundations.errors import EffectError
 from tests.long import long
 
 MASS = 0.7

@@ -12,7 +12,7 @@ from flint import arb
 import robot_dyn as rd
 from robot_dyn.effects.effect import Active, Bound, Conservative, Dissipative, Effect, Force
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.foundations.errors import EffectError, QueryError
 
 ROBOT = rd.load("cart_pole")
 B, F, V_S = np.array([0.7, 0.2]), np.array([1.4, 0.3]), np.array([0.05, 0.2])
@@ -133,11 +133,11 @@ def test_effect_runs_in_every_arithmetic(effect: Effect) -> None:
     wide = effect.torque(ROBOT, 0.0, *[v.astype(np.longdouble)] * 2)
     assert wide.dtype == np.longdouble
     np.testing.assert_allclose(wide.astype(float), expected, rtol=1e-14, atol=1e-15)
-    ball = rd.studies.Ball(100)
+    ball = rd.accuracy.Ball(100)
     with ball.scope():
         got = effect.torque(ROBOT, 0.0, ball.array(v), ball.array(v))
         assert isinstance(got.flat[0], arb)
-    np.testing.assert_allclose(rd.studies.midpoint(got), expected, rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(rd.accuracy.midpoint(got), expected, rtol=1e-14, atol=1e-15)
 
 
 def test_a_wrench_is_the_same_in_every_axes() -> None:

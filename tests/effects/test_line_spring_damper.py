@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import EffectError
+from robot_dyn.foundations.errors import EffectError
 from robot_dyn.simulation.run.outcome import Ending
 from tests.long import long
 
@@ -140,10 +140,10 @@ def test_of_two_the_numbers_differ_from_run_to_run_under_their_numbers() -> None
 
 
 def test_it_runs_in_balls_that_hold_the_float_value() -> None:
-    own, (q, v) = rd.Lagrangian(TREE, rd.studies.Ball(200)), state()
+    own, (q, v) = rd.Lagrangian(TREE, rd.accuracy.Ball(200)), state()
     torque = rd.Plant(own, [BETWEEN]).torque(0.0, q, v)
-    assert rd.studies.radius(torque).max() < 1e-50
-    np.testing.assert_allclose(rd.Plant(TREE, [BETWEEN]).torque(0.0, q, v), rd.studies.midpoint(torque), atol=1e-10)
+    assert rd.accuracy.radius(torque).max() < 1e-50
+    np.testing.assert_allclose(rd.Plant(TREE, [BETWEEN]).torque(0.0, q, v), rd.accuracy.midpoint(torque), atol=1e-10)
 
 
 def test_where_the_points_meet_there_is_no_direction() -> None:

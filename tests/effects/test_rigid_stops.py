@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import EffectError, QueryError
-from tests.estimates.held import held_scene
-from tests.estimates.scenes import arms
+from robot_dyn.foundations.errors import EffectError, QueryError
+from tests.campaigns.estimates.held import held_scene
+from tests.campaigns.estimates.scenes import arms
 
 ENGINES = ["interpreted", "compiled"]
 G = 9.80665

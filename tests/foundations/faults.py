@@ -1,4 +1,4 @@
-"""A layer under `robot_dyn.files` in which the k-th call to the system fails, as SQLite's tests inject faults."""
+"""A layer under `robot_dyn.foundations.files` in which the k-th system call fails, as SQLite's tests do."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any, BinaryIO
 from unittest import mock
 
-from robot_dyn import files
+from robot_dyn.foundations import files
 
 CALLS = ("open", "fdopen", "chmod", "chown", "fsync", "replace", "close")  # of `os`; and write, flush of the stream
 
@@ -72,7 +72,7 @@ class Stream:
 
 @contextmanager
 def failing_at(k: int, fail: Callable[[], object]) -> Iterator[Faults]:
-    """The k-th call of `robot_dyn.files` to the system fails; k = 0: none."""
+    """The k-th call of `robot_dyn.foundations.files` to the system fails; k = 0: none."""
     faults = Faults(k, fail)
     with mock.patch.object(files, "os", faults):
         yield faults

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from flint import arb
 
-from robot_dyn.arithmetic import FLOAT64, Ball, Float, arithmetic_of, midpoint
-from robot_dyn.errors import QueryError
-from robot_dyn.linear_algebra import NotPositiveDefiniteError, cholesky_solve
+from robot_dyn.foundations.arithmetic import FLOAT64, Ball, Float, arithmetic_of, midpoint
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 
 RNG = np.random.default_rng(3)
 

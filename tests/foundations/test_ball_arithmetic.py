@@ -7,7 +7,7 @@ import pytest
 from flint import arb, ctx
 
 import robot_dyn as rd
-from robot_dyn.arithmetic import Ball
+from robot_dyn.foundations.arithmetic import Ball
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 
@@ -42,7 +42,7 @@ def test_placement_and_jacobian_are_balls_throughout() -> None:
         balls = getattr(own, name)(*arguments, "wrist_3_link")
         assert {type(x) for x in balls.flat} == {arb}
         np.testing.assert_allclose(
-            rd.studies.midpoint(balls), getattr(robot, name)(*arguments, "wrist_3_link"), atol=1e-14
+            rd.accuracy.midpoint(balls), getattr(robot, name)(*arguments, "wrist_3_link"), atol=1e-14
         )
 
 
@@ -55,7 +55,7 @@ def test_balls_of_more_bits_lie_inside_balls_of_fewer(name: str) -> None:
     with ctx.workprec(200):
         for key, balls in coarse.items():
             assert all(a.overlaps(b) for a, b in zip(balls.flat, fine[key].flat, strict=True))
-            wide, narrow = rd.studies.radius(balls), rd.studies.radius(fine[key])
+            wide, narrow = rd.accuracy.radius(balls), rd.accuracy.radius(fine[key])
             assert 0 < wide.max() < 1e-11, "53 bits: rounding on the scale of 1 to 100 N m"
             assert narrow.max() <= 1e-44 * wide.max()
 
@@ -77,7 +77,7 @@ def test_pinocchio_lies_within_its_rounding_bound_of_the_balls(name: str, bits: 
     scale = {"M": size.M, "C": size.C(v), "N": size.N}
     exact, pinocchio = terms(rd.Lagrangian(robot, Ball(bits)), q, v), terms(robot, q, v)
     for key, balls in exact.items():
-        bound = 128 * robot.n * U * scale[key] + rd.studies.radius(balls)
+        bound = 128 * robot.n * U * scale[key] + rd.accuracy.radius(balls)
         assert np.all(distance(pinocchio[key], balls) <= bound), key
 
 
@@ -134,9 +134,9 @@ def test_forward_dynamics_of_balls_encloses_all_implementations(name: str) -> No
     with own.arithmetic.scope():
         second = articulated_body(own.linkage, *(own.arithmetic.array(x) for x in (q, v, tau)))
         assert all(a.overlaps(b) for a, b in zip(first, second, strict=True))
-    assert np.max(rd.studies.radius(first)) < 1e-50
+    assert np.max(rd.accuracy.radius(first)) < 1e-50
     error = distance(robot.forward_dynamics(q, v, tau), first)
-    assert error.max() <= 1e-12 * np.abs(rd.studies.midpoint(first)).max()
+    assert error.max() <= 1e-12 * np.abs(rd.accuracy.midpoint(first)).max()
 
 
 def test_balls_of_a_box_of_states_enclose_every_state_in_it() -> None:

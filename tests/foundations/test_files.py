@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn import files
-from robot_dyn.errors import QueryError, RobotDynError
-from robot_dyn.files import Kind, save, target
+from robot_dyn.foundations import files
+from robot_dyn.foundations.errors import QueryError, RobotDynError
+from robot_dyn.foundations.files import Kind, save, target
 from robot_dyn.simulation.export.export import export
-from tests.arithmetic.faults import failing_at, raising
+from tests.foundations.faults import failing_at, raising
 from tests.simulation.test_run_file import run  # noqa: F401  the fixture
 
 NOTE = Kind("a note", ".note", b"note")
@@ -99,9 +99,9 @@ def test_whatever_is_saved_survives_a_fault_at_each_call(run, tmp_path: Path, wh
 KILLED = """
 import os, sys
 from pathlib import Path
-from robot_dyn.errors import QueryError
-from robot_dyn.files import save
-from tests.arithmetic.faults import failing_at
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.files import save
+from tests.foundations.faults import failing_at
 with failing_at(int(sys.argv[1]), lambda: os._exit(9)):
     save(Path(sys.argv[2]), lambda stream: stream.write(b"note: new"), QueryError)
 """

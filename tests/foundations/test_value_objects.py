@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.studies.work_precision_diagram.reference_run import Reference
+from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference
 from tests.short_stress import short_stress
 from tests.wrong_arguments import FOR_AUTHORS, ROOMS
 
@@ -43,12 +43,12 @@ def height(t: float, q: np.ndarray, v: np.ndarray) -> float:
     return q[0]
 
 
-def sweep_of_pendulum() -> rd.sweeps.SweepResult:
+def sweep_of_pendulum() -> rd.tools.sweeps.SweepResult:
     with TemporaryDirectory() as folder:
         scene = Path(folder, "scene.toml")
         scene.write_text('robot = "pendulum"\nduration_s = 0.01\nmethod = "rk4"\n', encoding="utf-8")
-        sweep = rd.sweeps.Sweep(str(scene), 4, {"q0": rd.sweeps.uniform(low=[0.1], high=[0.2])})
-        return rd.sweeps.run(sweep, Path(folder, "out"), threads=1, chunk=4)
+        sweep = rd.tools.sweeps.Sweep(str(scene), 4, {"q0": rd.tools.sweeps.uniform(low=[0.1], high=[0.2])})
+        return rd.tools.sweeps.run(sweep, Path(folder, "out"), threads=1, chunk=4)
 
 
 @cache
@@ -73,7 +73,7 @@ def values() -> dict[str, Any]:
     )  # fmt: skip
     made = [
         rd.Event(height), rd.effects.Threshold(0, 0.5, "upper stop", "touched", "left"),
-        rd.integrate.Adaptive(), rd.studies.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM,
+        rd.integrate.Adaptive(), rd.accuracy.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM,
         rd.Lagrangian(ARM), plant,
         rd.control.PD(PLAN, [1.0, 2.0], 1.0), rd.control.PID(PLAN, 1.0, 1.0, 1.0),
         rd.control.PDGravity(ARM, PLAN, 1.0, 1.0),
@@ -93,17 +93,18 @@ def values() -> dict[str, Any]:
         setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
         rd.control.task_dynamics(ARM, Q, Q, "tip", rows=(0, 2)), rd.integrate.method("rk4"),
         rd.integrate.method("gauss_4"), rd.integrate.method("sdirk_3"),
-        rd.studies.WorkPrecision("arm", (), "rad", 1.0, Reference(Q, Q, 1e-12, ("a", "b"), 1.0), (), (), {}, 1.0, 1.0),
-        rd.studies.prove(rd.Setup(plant, Q), 0.01), rd.advise(setup), rd.studies.Cost("arm", (), (), (), {}, 1.0, 1.0),
-        rd.studies.certify(rd.load("pendulum"), samples=100, repeats=1), rd.check("pendulum"),
-        (swept := sweep_of_pendulum()), swept.sweep, rd.budget(PLAN, plant, effort=9.0, velocity=9.0),
+        rd.accuracy.WorkPrecision("arm", (), "rad", 1.0, Reference(Q, Q, 1e-12, ("a", "b"), 1.0), (), (), {}, 1.0, 1.0),
+        rd.tools.proof.prove(rd.Setup(plant, Q), 0.01), rd.advise(setup),
+        rd.accuracy.Cost("arm", (), (), (), {}, 1.0, 1.0),
+        rd.accuracy.certify(rd.load("pendulum"), samples=100, repeats=1), rd.tools.doctor.check("pendulum"),
+        (swept := sweep_of_pendulum()), swept.sweep, rd.tools.motors.budget(PLAN, plant, effort=9.0, velocity=9.0),
         (stressed := short_stress(rd.load("pendulum"))), stressed.worst[0], rd.compare_runs(run, run),
-        rd.plan.inverse_kinematics(ARM, ARM.placement(Q, "tip"), frame="tip", starts=2),
-        rd.plan.Motors(peak={"shoulder": 9.0}, continuous={}, speed={}, armature={}),
-        (motion := rd.plan.path(ARM, [Q, Q + 0.5], effort=50.0, velocity=1.0)), motion.plan,
-        rd.sweeps.Estimate("mean", 1.0, 0.9, 1.1, 0.95, 4, 0, "Student's t"),
-        rd.sweeps.Sensitivity(("kp",), (), (), (), 0.0, 4, 0, "fits of degree 2"),
-        rd.sweeps.Run(Q, Q, Q, None, None, None, None, None, np.ones((3, 2, 2)), 0.05, {"q0": Q}),
+        rd.control.inverse_kinematics(ARM, ARM.placement(Q, "tip"), frame="tip", starts=2),
+        rd.tools.motors.Motors(peak={"shoulder": 9.0}, continuous={}, speed={}, armature={}),
+        (motion := rd.tools.motors.path(ARM, [Q, Q + 0.5], effort=50.0, velocity=1.0)), motion.plan,
+        rd.tools.sweeps.Estimate("mean", 1.0, 0.9, 1.1, 0.95, 4, 0, "Student's t"),
+        rd.tools.sweeps.Sensitivity(("kp",), (), (), (), 0.0, 4, 0, "fits of degree 2"),
+        rd.tools.sweeps.Run(Q, Q, Q, None, None, None, None, None, np.ones((3, 2, 2)), 0.05, {"q0": Q}),
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}
     return named | {"Compiled": rd.Compiled(ARM), "CompiledPlant": rd.Compiled(plant)}

@@ -9,9 +9,9 @@ import pytest
 from flint import arb, ctx
 
 import robot_dyn as rd
-from robot_dyn.errors import UndecidedError
+from robot_dyn.foundations.errors import UndecidedError
+from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
-from robot_dyn.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 
 LINK = """
 <link name="link_{i}"><inertial><origin xyz="0.25 0 0"/><mass value="1.3"/>
@@ -33,9 +33,9 @@ def test_a_straight_chain_of_16_joints_keeps_its_digits_at_53_bits() -> None:
     """
     robot = chain(16)
     q, (v, tau) = np.zeros(16), np.random.default_rng(1).normal(size=(2, 16))
-    coarse, fine = rd.Lagrangian(robot, rd.studies.Ball(53)), rd.Lagrangian(robot, rd.studies.Ball(700))
+    coarse, fine = rd.Lagrangian(robot, rd.accuracy.Ball(53)), rd.Lagrangian(robot, rd.accuracy.Ball(700))
     a = coarse.forward_dynamics(q, v, tau)
-    assert rd.studies.radius(a).max() < 1e-7
+    assert rd.accuracy.radius(a).max() < 1e-7
     with fine.arithmetic.scope():
         exact = articulated_body(fine.linkage, *(fine.arithmetic.array(x) for x in (q, v, tau)))
         assert all(ball.contains(x) for ball, x in zip(a, exact, strict=True))
@@ -58,18 +58,18 @@ def test_solutions_of_all_systems_in_the_balls_lie_inside(radius: float) -> None
             whole = a * c - b * b
             for ball, exact in zip(x, ((d * c - b * e) / whole, (a * e - b * d) / whole), strict=True):
                 assert ball.contains(exact)
-    assert rd.studies.radius(x).max() < 12 * radius + 1e-15, "κ of M is 4.4, and |x| is at most 1.9"
+    assert rd.accuracy.radius(x).max() < 12 * radius + 1e-15, "κ of M is 4.4, and |x| is at most 1.9"
 
 
 def test_each_system_of_a_batch_is_solved_by_itself() -> None:
     rng = np.random.default_rng(3)
     A, b = rng.normal(size=(2, 1, 3, 3)), rng.normal(size=(4, 3))
     M = A @ A.swapaxes(-1, -2) + np.eye(3)
-    ball = rd.studies.Ball(80)
+    ball = rd.accuracy.Ball(80)
     with ball.scope():
         x = cholesky_solve(ball.array(M), ball.array(b))
     assert x.shape == (2, 4, 3)
-    np.testing.assert_allclose(rd.studies.midpoint(x), np.linalg.solve(M, b[..., None])[..., 0], rtol=1e-12)
+    np.testing.assert_allclose(rd.accuracy.midpoint(x), np.linalg.solve(M, b[..., None])[..., 0], rtol=1e-12)
 
 
 @pytest.mark.parametrize(

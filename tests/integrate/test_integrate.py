@@ -13,8 +13,8 @@ import pytest
 from flint import arb
 
 import robot_dyn as rd
-from robot_dyn.arithmetic import Ball
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.arithmetic import Ball
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.integrate.explicit import RK4, ExplicitRungeKutta
 from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.implicit import SinglyDiagonallyImplicit

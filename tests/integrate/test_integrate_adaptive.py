@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot_dyn.errors import OverflowedError, QueryError
+from robot_dyn.foundations.errors import OverflowedError, QueryError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.controlled_steps import Status
 from robot_dyn.integrate.integrator import System

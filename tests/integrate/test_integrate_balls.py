@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from flint import arb, fmpq
 
-from robot_dyn.arithmetic import Ball, midpoint, radius
+from robot_dyn.foundations.arithmetic import Ball, midpoint, radius
 from robot_dyn.integrate.explicit import ExplicitRungeKutta
 from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.integrator import Integrator

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from flint import arb
 
-from robot_dyn.arithmetic import Ball
-from robot_dyn.errors import OverflowedError, RobotDynError
+from robot_dyn.foundations.arithmetic import Ball
+from robot_dyn.foundations.errors import OverflowedError, RobotDynError
 from robot_dyn.integrate.explicit import EXPLICIT_EULER
 from robot_dyn.integrate.fixed_point import MOST_ITERATIONS
 from robot_dyn.integrate.gauss import Gauss

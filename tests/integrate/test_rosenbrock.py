@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.arithmetic import FLOAT64
+from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.integrate.integrator import IntegrationError, System
 from robot_dyn.integrate.primitives import factor, solve
 from robot_dyn.integrate.rosenbrock import ROSENBROCK_5

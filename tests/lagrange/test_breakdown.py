@@ -49,7 +49,7 @@ def test_the_parts_are_the_terms_themselves(name: str) -> None:
 def test_the_parts_add_up_in_balls(quantity: str) -> None:
     """At 200 bits sum and whole share a number, with radii below 1e-50."""
     robot, (q, v, _) = parts_of("mimic_chain")
-    own = rd.Lagrangian(robot, rd.studies.Ball(200))
+    own = rd.Lagrangian(robot, rd.accuracy.Ball(200))
     with own.arithmetic.scope():
         total = sum(getattr(part, quantity) for part in breakdown(own, q, v))
         difference = total - getattr(own, quantity)(*(q, v)[: 2 if quantity == "C" else 1])

@@ -18,7 +18,7 @@ from robot_dyn.lagrange.exact import RESOLUTION, Exact
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.lagrange.recursions.newton_euler import newton_euler
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
-from tests.hard.chains import coincident, text
+from tests.campaigns.hard.chains import coincident, text
 
 FAR = """<robot name="far"><link name="base"/><link name="bar"><inertial><origin xyz="1e6 0 0"/><mass value="1.3"/>
 <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>
@@ -38,7 +38,7 @@ def state(robot: rd.Robot, seed: int = 5) -> dict[str, np.ndarray]:
 def test_truth_by_other_recursions_in_400_bits_lies_inside(name: str) -> None:
     """Newton–Euler for inverse dynamics and for M, column by column; articulated bodies for forward dynamics."""
     robot = rd.load(name)
-    own, x = rd.Lagrangian(robot, rd.studies.Ball(400)), state(robot)
+    own, x = rd.Lagrangian(robot, rd.accuracy.Ball(400)), state(robot)
     exact = Exact(robot)
     with own.arithmetic.scope():
         q, v, a, tau = (own.arithmetic.array(x[name]) for name in ("q", "v", "a", "tau"))
@@ -55,7 +55,7 @@ def test_truth_by_other_recursions_in_400_bits_lies_inside(name: str) -> None:
         with ctx.workprec(400):
             assert all(ball.overlaps(each) for ball, each in zip(truth.values.flat, other.flat, strict=True))
         assert np.all(
-            truth.scale.relative(0 * rd.studies.midpoint(truth.values), rd.studies.radius(truth.values)) <= RESOLUTION
+            truth.scale.relative(0 * rd.accuracy.midpoint(truth.values), rd.accuracy.radius(truth.values)) <= RESOLUTION
         )
         assert truth.error(other) <= 2 * RESOLUTION
 
@@ -70,7 +70,7 @@ def test_bits_are_doubled_until_the_balls_are_narrow(monkeypatch, quantity) -> N
     truth = Exact(robot).at(quantity, x)
     assert truth.bits in (few, few * 2)
     assert np.all(
-        truth.scale.relative(0 * rd.studies.midpoint(truth.values), rd.studies.radius(truth.values)) <= RESOLUTION
+        truth.scale.relative(0 * rd.accuracy.midpoint(truth.values), rd.accuracy.radius(truth.values)) <= RESOLUTION
     )
     assert fine.error(truth.values) <= 2 * RESOLUTION
 

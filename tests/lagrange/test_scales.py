@@ -88,10 +88,10 @@ def test_implementations_agree_on_a_chain_from_a_kilometre_to_a_micrometre() -> 
 def test_the_coriolis_matrix_is_that_of_300_bits() -> None:
     """Entry by entry of A15's Christoffel symbols: 4u of the terms, where world axes leave 1e-7."""
     robot, rng = chain(), np.random.default_rng(1)
-    own, proven = rd.Lagrangian(robot), rd.Lagrangian(robot, rd.studies.Ball(300))
+    own, proven = rd.Lagrangian(robot), rd.Lagrangian(robot, rd.accuracy.Ball(300))
     state = random_state(robot, rng)
     q, v = state["q"], state["v"]
-    true, scale = rd.studies.midpoint(proven.C(q, v)), magnitudes(own.linkage, q).C(v)
+    true, scale = rd.accuracy.midpoint(proven.C(q, v)), magnitudes(own.linkage, q).C(v)
     assert np.all(np.abs(robot.C(q, v) - true) <= 4.5e-16 * scale)
     in_world_axes = pin.computeCoriolisMatrix(robot.model, robot.model.createData(), q, v)
     assert np.max(np.abs(in_world_axes - true) / scale) > 1e-9  # the case is hard enough to tell
@@ -143,7 +143,7 @@ def test_an_entry_without_terms_is_held_to_its_neighbours() -> None:
     np.testing.assert_array_equal(floored(np.array([3.0, 0.0, 2.0])), [3.0, 3.0, 2.0])
 
 
-@pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+@pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 def test_compare_says_what_it_cannot_compare() -> None:
     """Products of inertia of 1e6 make M indefinite at most states; all but forward dynamics is compared."""
     text = (

@@ -8,7 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from robot_dyn.description.solids import box, cylinder
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.spatial import bracket, hat, rotation, rotation_rpy
 from robot_dyn.lagrange.euler_lagrange import EulerLagrange, euler_lagrange
 from robot_dyn.lagrange.rigid_body import (
     angular_momentum,
@@ -18,7 +19,6 @@ from robot_dyn.lagrange.rigid_body import (
     world_acceleration,
     world_wrench,
 )
-from robot_dyn.spatial import bracket, hat, rotation, rotation_rpy
 
 COUNT = 200  # states of a test, as one batch
 X, Y, Z = np.eye(3)

@@ -8,7 +8,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.description.solids import box, from_density
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.lagrange.euler_lagrange import EulerLagrange, euler_lagrange
 from robot_dyn.lagrange.generalized_force import generalized_force, lagrangian_of_particles
 

@@ -13,7 +13,7 @@ import pytest
 
 from robot_dyn.description.inertia import MassProperties, combined
 from robot_dyn.description.solids import box, cylinder, from_density
-from robot_dyn.errors import OverflowedError, QueryError, RobotDynError, SingularError
+from robot_dyn.foundations.errors import OverflowedError, QueryError, RobotDynError, SingularError
 from robot_dyn.lagrange.euler_lagrange import euler_lagrange
 from robot_dyn.lagrange.generalized_force import generalized_force, lagrangian_of_particles
 from robot_dyn.lagrange.rigid_body import angular_momentum, body_acceleration, body_wrench, world_wrench

@@ -10,7 +10,14 @@ from numpy.testing import assert_array_equal
 
 import robot_dyn as rd
 from robot_dyn.description.description import check
-from robot_dyn.errors import EditError, NotFiniteError, OverflowedError, QueryError, SingularError, UndecidedError
+from robot_dyn.foundations.errors import (
+    EditError,
+    NotFiniteError,
+    OverflowedError,
+    QueryError,
+    SingularError,
+    UndecidedError,
+)
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.queries.quantity import EQUATION
 from tests.codegen.arms import compiled
@@ -127,7 +134,7 @@ def planar_chain(n: int) -> rd.Robot:
 
 @pytest.mark.parametrize(
     ("n", "dtype", "rounding", "enough"),
-    [(64, np.float32, "float32", np.float64), (16, rd.studies.Ball(20), "balls of 20 bits", rd.studies.Ball(300))],
+    [(64, np.float32, "float32", np.float64), (16, rd.accuracy.Ball(20), "balls of 20 bits", rd.accuracy.Ball(300))],
     ids=["float32", "balls"],
 )
 def test_a_pivot_lost_in_rounding_accuses_no_joint(n: int, dtype: Any, rounding: str, enough: Any) -> None:
@@ -140,8 +147,8 @@ def test_a_pivot_lost_in_rounding_accuses_no_joint(n: int, dtype: Any, rounding:
     assert own.arithmetic.asarray(own.forward_dynamics(np.stack([q, q]), v, tau, errors="nan")).shape == (2, n)
     answer = rd.Lagrangian(robot, enough).forward_dynamics(q, v, tau)
     assert robot.joint_without_inertia is None
-    if isinstance(enough, rd.studies.Ball):
-        answer = rd.studies.midpoint(answer)
+    if isinstance(enough, rd.accuracy.Ball):
+        answer = rd.accuracy.midpoint(answer)
         with own.arithmetic.scope(), pytest.raises(UndecidedError, match=rounding):
             articulated_body(own.linkage, *(own.arithmetic.array(x) for x in (q, v, tau)))
     np.testing.assert_allclose(answer, robot.forward_dynamics(q, v, tau), rtol=0, atol=1e-8 * np.abs(answer).max())

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import robot_dyn as rd
 from robot_dyn.cross_check.compare import random_state
-from robot_dyn.errors import DescriptionError
+from robot_dyn.foundations.errors import DescriptionError
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.model.coriolis import MOST_ROUNDING
 from robot_dyn.model.regrouped import joint_axes, least_inertia, reach, regrouped, rounding
@@ -42,11 +42,11 @@ def excess(robot: rd.Robot, model: object, seed: int, count: int) -> float:
     couplings, own = robot.couplings, regrouped(robot.model)
     bound, D, worst = rounding(robot.model, own, couplings), reach(own).max(), 0.0
     assert bound < np.inf
-    true, data = rd.Lagrangian(robot, rd.studies.Ball(128)), robot.model.createData()
+    true, data = rd.Lagrangian(robot, rd.accuracy.Ball(128)), robot.model.createData()
     per_speed = np.where(joint_axes(own)[:, 3:].any(axis=1), 1.0, 1 / max(D, 1e-300))
     for q, v in states(robot, seed, count):
         position, velocity = couplings.position(q), couplings.velocity(v)
-        error = couplings.matrix(pin.computeCoriolisMatrix(model, data, position, velocity)) - rd.studies.midpoint(
+        error = couplings.matrix(pin.computeCoriolisMatrix(model, data, position, velocity)) - rd.accuracy.midpoint(
             true.C(q, v)
         )
         units = np.sqrt(robot.M(q).diagonal())
@@ -141,7 +141,7 @@ def test_beyond_the_limits_of_a_prismatic_joint_c_keeps_its_digits() -> None:
     robot = rd.load("cart_pole")
     assert robot.coriolis.regrouped is not None
     q, v = np.array([1e7, 0.7]), np.array([0.3, -1.1])
-    true = rd.studies.midpoint(rd.Lagrangian(robot, rd.studies.Ball(200)).C(q, v))
+    true = rd.accuracy.midpoint(rd.Lagrangian(robot, rd.accuracy.Ball(200)).C(q, v))
     scale = magnitudes(rd.Lagrangian(robot).linkage, np.array([0.0, 0.7])).C(v)
     assert np.all(np.abs(robot.C(q, v) - true) <= 4.5e-16 * scale)
     in_world_axes = pin.computeCoriolisMatrix(robot.coriolis.regrouped, robot.model.createData(), q, v)

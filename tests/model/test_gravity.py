@@ -34,7 +34,7 @@ def test_its_tip_goes_where_the_lecture_says() -> None:
     np.testing.assert_allclose(place[:3, 3], expected, atol=1e-15)
 
 
-@pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")  # of the massless tip
+@pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")  # of the massless tip
 @pytest.mark.parametrize("name", OWN)
 def test_gravity_acts_on_every_robot_of_the_library(name: str) -> None:
     assert gravity_acts(rd.load(name))

@@ -123,9 +123,9 @@ def test_parameters_are_identified_from_torques() -> None:
 def test_balls_hold_the_regressor() -> None:
     robot = rd.load("mimic_chain")
     state = general(robot, 11)
-    proven = rd.Lagrangian(robot, rd.studies.Ball(200)).regressor(*state)
-    assert rd.studies.radius(proven).max() < 1e-50
-    np.testing.assert_allclose(rd.studies.midpoint(proven), robot.regressor(*state), rtol=0, atol=1e-14)
+    proven = rd.Lagrangian(robot, rd.accuracy.Ball(200)).regressor(*state)
+    assert rd.accuracy.radius(proven).max() < 1e-50
+    np.testing.assert_allclose(rd.accuracy.midpoint(proven), robot.regressor(*state), rtol=0, atol=1e-14)
 
 
 def test_unit_inertias_span_the_inertia_of_a_body() -> None:

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import robot_dyn as rd
-from robot_dyn.errors import EditError, OverflowedError
+from robot_dyn.foundations.errors import EditError, OverflowedError
 from tests.queries import general
 
 FINGERS = np.vstack([np.eye(8), np.eye(8)[-1]]), np.zeros(9)
@@ -78,15 +78,15 @@ def test_where_rounding_hides_the_joints_that_follow_the_state_is_refused(implem
     ]
     q = np.full((19, 2), 0.3)
     q[5], q[7] = 3e6, 1e15
-    truth = rd.Lagrangian(robot, rd.studies.Ball(200))
+    truth = rd.Lagrangian(robot, rd.accuracy.Ball(200))
     with pytest.raises(OverflowedError, match=r"rounding hides where the joints that follow .* in row 7 of the batch"):
         engine.M(q)
     with pytest.raises(OverflowedError, match="rounding hides"):
         engine.M(q[7])
     M = engine.M(q, errors="nan")
     assert np.isnan(M[7]).all() and np.isfinite(np.delete(M, 7, axis=0)).all()
-    assert_allclose(M[5], rd.studies.midpoint(truth.M(q[5])), rtol=1e-7)
-    assert np.isfinite(rd.studies.midpoint(truth.M(q[7]))).all()
+    assert_allclose(M[5], rd.accuracy.midpoint(truth.M(q[5])), rtol=1e-7)
+    assert np.isfinite(rd.accuracy.midpoint(truth.M(q[7]))).all()
 
 
 @pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")

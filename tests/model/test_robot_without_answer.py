@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import robot_dyn as rd
-from robot_dyn.errors import ModelWarning, OverflowedError, SingularError
+from robot_dyn.foundations.errors import ModelWarning, OverflowedError, SingularError
 from tests.queries import general
 
 INERTIA = ((0.02, 0.001, -0.002), (0.001, 0.03, 0.003), (-0.002, 0.003, 0.04))
@@ -36,7 +36,7 @@ def point_mass(xyz: str) -> str:
 # --- where M is singular
 
 
-@pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+@pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 def test_a_zero_on_the_diagonal_of_M_decides_that_it_is_singular(tmp_path: Path) -> None:
     """Three parallel axes and a point mass on the last: M = m (l₁₂ᵀ l₁₂ …) with M₃₃ = 0, of rank 1.
 
@@ -66,7 +66,7 @@ def test_massless_tip_has_no_forward_dynamics_until_it_is_held_or_loaded():
     assert_allclose(loaded.inverse_dynamics(q, v, loaded.forward_dynamics(q, v, tau)), tau, rtol=1e-12)
 
 
-@pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+@pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 def test_M_that_is_singular_where_the_mass_lies_on_the_outer_axis(tmp_path: Path):
     """M = diag(m l² sin² q₂, m l²) for a point mass on the z axis at q₂ = 0."""
     links = {"base": "", "yoke": "", "bob": point_mass("0 0 0.5")}
@@ -82,7 +82,7 @@ def test_M_that_is_singular_where_the_mass_lies_on_the_outer_axis(tmp_path: Path
             robot.forward_dynamics(q, v, tau)
 
 
-@pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+@pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 @pytest.mark.parametrize(("l1", "l2"), [(0.3, 0.7), (0.67, 0.34), (0.83, 0.92)])
 def test_M_that_is_singular_where_the_arm_is_straight(tmp_path: Path, l1: float, l2: float):
     """M has det M = m² l₁² l₂² sin² q₂ for a point mass at the tip alone; rounding decides how ABA fails at q₂ = 0."""

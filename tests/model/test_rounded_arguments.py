@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.arithmetic import midpoint
 from robot_dyn.effects.effect import Active
-from robot_dyn.errors import OverflowedError
+from robot_dyn.foundations.arithmetic import midpoint
+from robot_dyn.foundations.errors import OverflowedError
 
 ARM = rd.load("ur5")
 NEAR = np.array([0.3, -0.2, 0.5, 0.7, -0.4, 0.9])
@@ -50,7 +50,7 @@ def test_in_a_batch_the_row_that_rounding_hides_has_no_answer(name: str) -> None
 def test_a_float32_is_one_angle_however_large(name: str, far: float) -> None:
     """What float32 holds is not rounded: 64 u of float32 for M, whose terms are of one sign but for a few."""
     q = (NEAR + far).astype(np.float32)
-    exact = midpoint(rd.Lagrangian(ARM, rd.studies.Ball(200)).M(q))
+    exact = midpoint(rd.Lagrangian(ARM, rd.accuracy.Ball(200)).M(q))
     for given in (q, q.astype(float)):
         difference = np.abs(NARROW[name].M(given) - exact).max()
         assert difference < 64 * np.finfo(np.float32).eps / 2 * np.abs(exact).max()

@@ -13,7 +13,7 @@ import yourdfpy
 from lxml import etree
 
 import robot_dyn as rd
-from robot_dyn.errors import DescriptionError, ModelWarning
+from robot_dyn.foundations.errors import DescriptionError, ModelWarning
 from robot_dyn.view.geometry.visuals import drawing
 from tests.hostile.kinds import ARM, AXIS, LIMIT
 

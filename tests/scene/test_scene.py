@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import SceneError
+from robot_dyn.foundations.errors import SceneError
 from robot_dyn.scene.effects import BY_KIND
 from robot_dyn.scene.explain import of_scene
 from robot_dyn.scene.scene import parse_scene, read_both

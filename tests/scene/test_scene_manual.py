@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import SceneError
+from robot_dyn.foundations.errors import SceneError
 from robot_dyn.scene import control, effects, references, scene
 from robot_dyn.scene.effects import BY_KIND
 from robot_dyn.scene.manual import manual

@@ -14,7 +14,7 @@ from rich.table import Table
 
 import robot_dyn as rd
 from robot_dyn.cli import terminal
-from robot_dyn.errors import RobotDynError, escaped
+from robot_dyn.foundations.errors import RobotDynError, escaped
 from robot_dyn.scene.lines import line_of
 from robot_dyn.scene.scene import SceneError
 from robot_dyn.scene.starters import starter, starters

@@ -1,4 +1,4 @@
-"""Recorded motions in a scene: those of rd.plan.from_samples, with its options; what is doubtful is a warning."""
+"""Recorded motions in a scene: those of rd.control.from_samples, with its options; what is doubtful is a warning."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import PlanWarning
+from robot_dyn.foundations.errors import PlanWarning
 from robot_dyn.scene.scene import SceneError
 
 SCENE = """robot = "planar_2r"
@@ -43,7 +43,7 @@ def test_the_motion_of_a_scene_is_that_of_from_samples(tmp_path: Path) -> None:
     for ends in ("rest", "measured"):
         found, expected = (
             reference(tmp_path, f'{text}ends = "{ends}"\n'),
-            rd.plan.from_samples(ARM, path, ends=ends, **options).reference,
+            rd.control.from_samples(ARM, path, ends=ends, **options).reference,
         )
         np.testing.assert_array_equal(found.breaks, expected.breaks)
         np.testing.assert_array_equal(found.coefficients, expected.coefficients)

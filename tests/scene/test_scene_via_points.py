@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import ControlError
+from robot_dyn.foundations.errors import ControlError
 from robot_dyn.scene.explain import of_scene
 from robot_dyn.scene.scene import SceneError, read_both
 

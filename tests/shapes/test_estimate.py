@@ -13,7 +13,7 @@ import trimesh
 import robot_dyn as rd
 from robot_dyn.description import solids
 from robot_dyn.description.inertia import MassProperties, combined
-from robot_dyn.spatial import rotation_rpy
+from robot_dyn.foundations.spatial import rotation_rpy
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 MEASURED = '<inertial><origin xyz="0.01 0.02 0.3"/><mass value="3.1"/><inertia ixx="0.2" ixy="0.01" ixz="0" iyy="0.3"'
@@ -173,15 +173,15 @@ def test_the_mark_stays_with_the_robot(tmp_path: Path) -> None:
 def test_the_corrected_file_of_the_doctor_is_the_robot_that_is_loaded(tmp_path: Path) -> None:
     path = arm(tmp_path, BOX, ROD)
     masses = {"mass": {"link1": 3.0}, "total_mass": 9.0}
-    checkup = rd.check(path, **masses)  # pyright: ignore[reportArgumentType]
+    checkup = rd.tools.doctor.check(path, **masses)  # pyright: ignore[reportArgumentType]
     assert checkup.repaired is not None and b"<!-- robot-dyn check: " in checkup.repaired
     repaired, loaded = rd.Robot.from_text(checkup.repaired), estimated(path, **masses)
     assert repaired.estimated == loaded.estimated
     np.testing.assert_array_equal(repaired.M([0.3, -0.4]), loaded.M([0.3, -0.4]))
-    found = [each for each in rd.check(path).findings if each.kind == "inertial_missing"]
+    found = [each for each in rd.tools.doctor.check(path).findings if each.kind == "inertial_missing"]
     assert len(found) == 3 and not any(each.changes for each in found)
     (tmp_path / "fixed.urdf").write_bytes(checkup.repaired)
-    kinds = [each.kind for each in rd.check(tmp_path / "fixed.urdf").findings]
+    kinds = [each.kind for each in rd.tools.doctor.check(tmp_path / "fixed.urdf").findings]
     assert kinds.count("inertial_estimated") == 3 and "inertial_missing" not in kinds
 
 
@@ -207,7 +207,7 @@ def test_masses_that_say_nothing_are_refused(tmp_path: Path, masses: dict[str, o
         estimated(path, **masses)
     if masses:
         with pytest.raises(rd.RobotDynError, match=re.escape(message)):
-            rd.check(path, **masses)  # pyright: ignore[reportArgumentType]
+            rd.tools.doctor.check(path, **masses)  # pyright: ignore[reportArgumentType]
 
 
 def test_a_shape_that_cannot_be_read_is_refused(tmp_path: Path) -> None:

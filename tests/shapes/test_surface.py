@@ -10,8 +10,8 @@ import trimesh
 
 from robot_dyn.description import solids
 from robot_dyn.description.inertia import MassProperties
+from robot_dyn.foundations.spatial import rotation_rpy
 from robot_dyn.shapes import primitives, surface
-from robot_dyn.spatial import rotation_rpy
 
 BOX = (0.3, 0.2, 0.5)
 EXACT = 1e-12  # relative: sums of some hundred products of float64

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import QueryError, RobotDynError, SceneError
+from robot_dyn.foundations.errors import QueryError, RobotDynError, SceneError
 from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError
-from tests.estimates.asked import FAMILIES, answer, asked_scene
-from tests.estimates.held import meet
-from tests.estimates.truth import truth
+from tests.campaigns.estimates.asked import FAMILIES, answer, asked_scene
+from tests.campaigns.estimates.held import meet
+from tests.campaigns.estimates.truth import truth
 from tests.long import long
 
 ARM = rd.load("planar_2r")
@@ -23,7 +23,7 @@ START = np.array([0.4, -0.7])
 
 @pytest.mark.parametrize("index", [0, *long([21, 2]), 3, *long([4])], ids=FAMILIES)
 def test_the_error_is_at_most_what_is_asked(index: int) -> None:
-    """Against SciPy on equations written out in tests/estimates, near rounding."""
+    """Against SciPy on equations written out in tests/campaigns/estimates, near rounding."""
     scene, asked = asked_scene(1, index)
     setup = replace(scene.setup, record_period_s=scene.setup.duration_s / 10)
     run = rd.simulate(setup, accuracy=asked)
@@ -35,7 +35,7 @@ def test_the_error_is_at_most_what_is_asked(index: int) -> None:
 
 @pytest.mark.parametrize("index", [6, *long([0, 1, 9])])
 def test_the_error_is_at_most_what_is_asked_where_joints_stick_and_strike(index: int) -> None:
-    """Of random dry friction and rigid stops; more of them by `python -m tests.estimates --held`."""
+    """Of random dry friction and rigid stops; more of them by `python -m tests.campaigns.estimates --held`."""
     found = meet(1, index)
     assert found.met, str(found)
     assert found.estimated <= found.asked
@@ -43,7 +43,7 @@ def test_the_error_is_at_most_what_is_asked_where_joints_stick_and_strike(index:
 
 @pytest.mark.parametrize("index", [*long([0, 1]), 2, *long([3])], ids=["pendulum", "planar_2r", "ur5", "panda"])
 def test_a_request_is_met_and_not_refused_at_an_estimate_below_it(index: int) -> None:
-    """The short form of `python -m tests.estimates --requests 400`, against SciPy over `pin.aba`."""
+    """The short form of `python -m tests.campaigns.estimates --requests 400`, against SciPy over `pin.aba`."""
     found = answer(20261123, index)
     assert found.met, str(found)
     assert found.told

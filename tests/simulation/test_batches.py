@@ -1,11 +1,11 @@
-"""Each run of a random batch is the run that `simulate` makes; more of them by `python -m tests.batches`."""
+"""Each run of a random batch is the run that `simulate` makes; more of them by `python -m tests.campaigns.batches`."""
 
 from __future__ import annotations
 
 import pytest
 
-from tests.batches.judge import judge
-from tests.batches.scenes import FAMILIES
+from tests.campaigns.batches.judge import judge
+from tests.campaigns.batches.scenes import FAMILIES
 from tests.long import long
 
 SEED = 20261123

@@ -17,7 +17,7 @@ from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.codegen.trace.symbolic import TraceError
 from robot_dyn.control.controller import Stateless
 from robot_dyn.effects.effect import Active
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.engine_choice import choose

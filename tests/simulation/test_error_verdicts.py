@@ -11,14 +11,14 @@ from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
 from robot_dyn.effects.effect import Active
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.results import provenance as origin
 from robot_dyn.simulation.results.error_estimate import Verdict
-from tests.estimates.judge import FAR, LEAST, MOST, judge
-from tests.estimates.scenes import FAMILIES, arms
-from tests.estimates.switching import scene_of_all
-from tests.estimates.truth import truth
-from tests.hard.stiff_motion import stop
+from tests.campaigns.estimates.judge import FAR, LEAST, MOST, judge
+from tests.campaigns.estimates.scenes import FAMILIES, arms
+from tests.campaigns.estimates.switching import scene_of_all
+from tests.campaigns.estimates.truth import truth
+from tests.campaigns.hard.stiff_motion import stop
 from tests.long import long
 
 RAIL = arms()["rail"].with_(gravity=(0.0, 0.0, 0.0))

@@ -10,8 +10,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
-from robot_dyn.errors import QueryError, TraceError
-from tests.estimates.scenes import arms
+from robot_dyn.foundations.errors import QueryError, TraceError
+from tests.campaigns.estimates.scenes import arms
 
 G = 9.80665
 BALL = arms()["rail"]  # 1 kg on a vertical rail

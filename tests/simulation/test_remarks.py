@@ -10,7 +10,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.cli import report
-from robot_dyn.result import json_text
+from robot_dyn.foundations.result import json_text
 from robot_dyn.simulation.observation import observer as observers
 from robot_dyn.simulation.observation.guard_levels import NO_LEVELS
 from robot_dyn.simulation.observation.observation import observation_of

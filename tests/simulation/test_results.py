@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.result import UNREPORTED, json_text, plain, reported
-from robot_dyn.studies.figure import ResultError
-from robot_dyn.studies.result import Result
-from robot_dyn.studies.save import DRAWINGS, kinds
+from robot_dyn.foundations.result import UNREPORTED, json_text, plain, reported
+from robot_dyn.report.figure import ResultError
+from robot_dyn.report.result import Result
+from robot_dyn.report.save import DRAWINGS, kinds
 from tests.cli.test_command_documents import names, promised
 
 
@@ -66,19 +66,19 @@ def test_json_holds_fields_and_reported_properties_and_no_number_that_it_lacks()
 
 
 def test_csv_holds_the_rows_and_json_all_of_any_result(tmp_path) -> None:
-    with rd.studies.save_result(ODD, tmp_path / "odd").open(encoding="utf-8", newline="") as file:
+    with rd.accuracy.save_result(ODD, tmp_path / "odd").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert file.name.endswith("odd.csv")  # there is no figure of it
     assert [(float(row["size"]), float(row["double"])) for row in rows] == [(0.1, 0.2), (inf, inf)]
-    assert json.loads(rd.studies.save_result(ODD, tmp_path / "odd.json").read_text(encoding="utf-8")) == plain(ODD)
-    assert rd.studies.save_result(ODD, tmp_path / "odd.json").exists()  # it replaces its own kind
+    assert json.loads(rd.accuracy.save_result(ODD, tmp_path / "odd.json").read_text(encoding="utf-8")) == plain(ODD)
+    assert rd.accuracy.save_result(ODD, tmp_path / "odd.json").exists()  # it replaces its own kind
 
 
 @pytest.mark.parametrize(("name", "content"), [("odd.csv", "price,stock\n1,2"), ("odd.json", '{"robot": 1}')])
 def test_files_of_another_kind_are_not_replaced(tmp_path, name: str, content: str) -> None:
     (tmp_path / name).write_text(content)
     with pytest.raises(ResultError, match="so it is not replaced"):
-        rd.studies.save_result(ODD, tmp_path / name)
+        rd.accuracy.save_result(ODD, tmp_path / name)
     assert (tmp_path / name).read_text() == content
 
 

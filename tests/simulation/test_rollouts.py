@@ -11,7 +11,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.codegen.trace.symbolic import TraceError
 from robot_dyn.effects.effect import Active
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.rollouts import pool
 from tests.command import refusal, said
 

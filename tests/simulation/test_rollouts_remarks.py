@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.export.export import export
 from robot_dyn.simulation.observation.remarks import Kind, lines
 

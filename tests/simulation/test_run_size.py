@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.setup.size import check_record, samples, segments, steps
 
 ARM = rd.Plant(rd.load("planar_2r"), [rd.effects.ExternalWrench("tip", [1.0] * 6, start_s=0.3, end_s=0.7)])
@@ -44,7 +44,7 @@ def test_a_run_that_fits_no_memory_is_refused_before_it_starts(duration, method,
 @pytest.mark.parametrize("duration", [1e13, 1e154, 1e300, 1e308])
 def test_a_run_that_ends_at_a_time_that_floats_do_not_tell_is_refused(duration: float) -> None:
     """A method that chooses its steps is bounded by no number of them; from 2^43 s floats lie 2 ms apart and more."""
-    for run in (rd.simulate, rd.rollouts, rd.studies.work_precision):
+    for run in (rd.simulate, rd.rollouts, rd.accuracy.work_precision):
         with pytest.raises(QueryError, match=r"ends at a time that floats resolve to .* take a shorter duration_s, "):
             run(ARM, [0.1, 0.2], duration_s=duration)
 

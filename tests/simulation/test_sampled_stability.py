@@ -10,7 +10,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.simulation.observation.remarks import Kind
-from tests.estimates.scenes import RAIL
+from tests.campaigns.estimates.scenes import RAIL
 from tests.long import long
 from tests.short_loops import Arm, ShortLoop, judge
 

@@ -12,7 +12,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.control.controller import ControlError, Stateless
 from robot_dyn.effects.effect import Active, Conservative
-from robot_dyn.errors import EffectError, QueryError
+from robot_dyn.foundations.errors import EffectError, QueryError
 from robot_dyn.simulation.run.event_run import EventRun
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from tests.long import long
@@ -262,7 +262,7 @@ def test_a_period_of_ones_own_controller_is_a_time(period: object) -> None:
 def test_a_plant_in_ball_arithmetic_is_refused() -> None:
     """Runs are floats: balls in a float array are not numbers at all."""
     with pytest.raises(QueryError, match="plant: runs are computed in floats"):
-        rd.Setup(rd.Plant(rd.Lagrangian(DOUBLE, rd.studies.Ball(60))), [0.3, -0.4])
+        rd.Setup(rd.Plant(rd.Lagrangian(DOUBLE, rd.accuracy.Ball(60))), [0.3, -0.4])
 
 
 def test_a_companion_whose_energy_overflows_is_no_end_of_the_run() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.integrate.integrator import System
 from robot_dyn.simulation.dynamics.fastest_motion import BODIES, fastest
 from robot_dyn.simulation.dynamics.state_equation import StateEquation

@@ -11,7 +11,7 @@ import pytest
 from lxml import html
 
 import robot_dyn as rd
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.scene.starters import starter
 from tests.command import document, said
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.codegen.loops.call import MachineFunction
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.primitives import INSTEAD
-from robot_dyn.errors import MachineCodeError
+from robot_dyn.foundations.arithmetic import FLOAT64
+from robot_dyn.foundations.errors import MachineCodeError
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.integrator import PlainMethod, Stepper
 from robot_dyn.integrate.methods import FIXED_STEP, method
@@ -32,7 +32,7 @@ from robot_dyn.simulation.run.recording import records_of
 from robot_dyn.simulation.run.time_loop import time_loop
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
-from tests.estimates.scenes import arms
+from tests.campaigns.estimates.scenes import arms
 from tests.long import long
 
 ARM = rd.load("planar_2r")

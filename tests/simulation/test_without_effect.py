@@ -8,7 +8,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.control.controller import ControlError
 from robot_dyn.effects.effect import Active, Effect
-from robot_dyn.errors import CatalogError, EditError, EffectError, QueryError
+from robot_dyn.foundations.errors import CatalogError, EditError, EffectError, QueryError
 from robot_dyn.scene.scene import SceneError
 
 ARM = rd.load("planar_2r")

@@ -13,7 +13,7 @@ import pytest
 import trimesh
 
 import robot_dyn as rd
-from robot_dyn.errors import ModelWarning
+from robot_dyn.foundations.errors import ModelWarning
 from robot_dyn.view.geometry.visuals import Piece, drawing
 
 mujoco: Any = import_module("mujoco")  # which has no types

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.view.plots.plots import PLOTS, plot, save_plot
 from tests.view.plotted import cart_pole, cells, lines, many, stretched, ur5
 

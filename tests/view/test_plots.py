@@ -11,7 +11,7 @@ from matplotlib import rcParams
 from matplotlib.colors import to_rgb
 
 import robot_dyn as rd
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.view.plots.plots import MOST_JOINTS, PLOTS, PlotError, plot, save_plot

@@ -11,7 +11,7 @@ import robot_dyn as rd
 from robot_dyn.view.plots.plots import plot
 from robot_dyn.view.rests import rests
 from tests.browser import opened
-from tests.estimates.scenes import arms
+from tests.campaigns.estimates.scenes import arms
 from tests.view.plotted import cells
 
 G = 9.80665

@@ -13,7 +13,7 @@ import pytest
 from robot_dyn.shapes import meshes
 from tests.drawings import box, boxes, collada_points, drawn, mesh_visual, stl, urdf
 
-pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 
 CORNERS = np.array([[0, 0, 0], [0.3, 0, 0], [0, 0.2, 0], [0, 0, 0.1]], dtype="f4")
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], dtype="<u2")

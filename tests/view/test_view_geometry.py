@@ -13,7 +13,7 @@ from robot_dyn.view.geometry.visuals import drawing
 from tests.drawings import WRITTEN_FOR_GAZEBO, Z_UP, box, boxes, stated_boxes
 from tests.long import long
 
-pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 
 FLOAT32 = 1e-6  # [m]: coordinates of a few metres at most, in float32
 

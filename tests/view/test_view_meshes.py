@@ -18,7 +18,7 @@ from robot_dyn.view.geometry.visuals import drawing
 from tests.drawings import box, boxes, drawn, mesh_visual, stl, urdf
 from tests.hostile.kinds import ARM, MOMENTS
 
-pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.errors.ModelWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 
 FLOAT32 = 1e-6  # [m]: coordinates of a few metres at most, in float32
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import log10, nan
-from typing import Any, ClassVar, final
+from typing import TYPE_CHECKING, Any, ClassVar, final
 
-from robot_dyn.answer import Block
-from robot_dyn.errors import QueryError
+from robot_dyn.accuracy.certificate.text import DECIMALS, certificate_tables
+from robot_dyn.foundations.answer import Block
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.result import reported
+from robot_dyn.foundations.validate import choice
 from robot_dyn.queries.units import format_duration
-from robot_dyn.result import reported
-from robot_dyn.studies.certificate.text import DECIMALS, certificate_tables
-from robot_dyn.studies.result import Result
-from robot_dyn.validate import choice
+from robot_dyn.report.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @final
@@ -107,6 +110,11 @@ class Certificate(Result):
     environment: dict[str, str]
     seed: int
     interrupted: bool = False
+
+    def draw(self, theme: str = "light") -> Figure:
+        from robot_dyn.accuracy.certificate.diagram import draw
+
+        return draw(self, theme)
 
     def tables(self) -> Iterator[Block]:
         return certificate_tables(self)

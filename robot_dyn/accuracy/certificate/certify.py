@@ -16,20 +16,20 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Ball
-from robot_dyn.errors import QueryError
+from robot_dyn.accuracy.certificate.certificate import Certificate, Condition, Held
+from robot_dyn.accuracy.certificate.digit_count import DigitCount
+from robot_dyn.accuracy.certificate.implementation import Implementation, evaluate, implementations
+from robot_dyn.accuracy.certificate.worst_case_search import Batch, Search, random_states, row
+from robot_dyn.foundations.arithmetic import Ball
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.validate import function, instance, integer, joint_values
 from robot_dyn.lagrange.digits import QUANTITIES
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import MOST_DIGITS, M, Quantity
-from robot_dyn.studies.certificate.certificate import Certificate, Condition, Held
-from robot_dyn.studies.certificate.digit_count import DigitCount
-from robot_dyn.studies.certificate.implementation import Implementation, evaluate, implementations
-from robot_dyn.studies.certificate.worst_case_search import Batch, Search, random_states, row
-from robot_dyn.studies.environment import environment
-from robot_dyn.studies.timing import in_turns, repeatable
-from robot_dyn.validate import function, instance, integer, joint_values
+from robot_dyn.report.environment import environment
+from robot_dyn.report.timing import in_turns, repeatable
 
 _AT_LEAST_S = 1e-3  # of a loop that is timed
 _MOST_REPEATS, _LEAST_SAMPLES, _MOST_SAMPLES = 1000, 100, 10**6

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.studies.certificate.certificate import DECIMALS, Certificate, Held
-from robot_dyn.studies.figure import Colours, ResultError, key, legend, lines, sheet, styled
+from robot_dyn.accuracy.certificate.certificate import DECIMALS, Certificate, Held
+from robot_dyn.report.figure import Colours, ResultError, key, legend, lines, sheet, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,16 +7,16 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError
+from robot_dyn.accuracy.certificate.certificate import Held
+from robot_dyn.accuracy.certificate.implementation import Implementation, evaluate
+from robot_dyn.accuracy.certificate.worst_case_search import Batch, Search, row
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.lagrange.digits import digits_of
 from robot_dyn.lagrange.exact import NOTHING, Exact, Scale, Truth, entry_units, in_joint_units
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import CORIOLIS_TORQUE, M, N, Quantity
-from robot_dyn.studies.certificate.certificate import Held
-from robot_dyn.studies.certificate.implementation import Implementation, evaluate
-from robot_dyn.studies.certificate.worst_case_search import Batch, Search, row
 
 FEWER = 250  # random states for each one that balls judge, where no other numbers are fine enough; 8 at least
 _SIDE_BY_SIDE = 8  # states that machine code answers side by side, in the search and in the judgement

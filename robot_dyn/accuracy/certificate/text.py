@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from robot_dyn.answer import Block, Table
+from robot_dyn.foundations.answer import Block, Table
 from robot_dyn.queries.units import format_duration
 
 if TYPE_CHECKING:
-    from robot_dyn.studies.certificate.certificate import Certificate, Held
+    from robot_dyn.accuracy.certificate.certificate import Certificate, Held
 
 DECIMALS = "decimals of the file as float64"  # name of the implementation that computes exactly with these decimals
 

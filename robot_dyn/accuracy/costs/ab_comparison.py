@@ -12,10 +12,10 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError
-from robot_dyn.result import reported
-from robot_dyn.studies.time_budget import Budget
-from robot_dyn.studies.timing import repeatable
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.result import reported
+from robot_dyn.report.time_budget import Budget
+from robot_dyn.report.timing import repeatable
 
 _QUARTILES = (25, 75)
 

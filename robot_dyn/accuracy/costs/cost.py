@@ -4,26 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, final
+from typing import TYPE_CHECKING, Any, ClassVar, final
 
-from robot_dyn.answer import Block
+from robot_dyn.accuracy.costs import step_cost
+from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Pair, Version, in_turns
+from robot_dyn.accuracy.costs.query_cost import QueryCost
+from robot_dyn.accuracy.costs.text import cost_tables
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.answer import Block
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.result import reported
+from robot_dyn.foundations.validate import choice, function, integer, number
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import format_duration
-from robot_dyn.result import reported
+from robot_dyn.report.environment import environment
+from robot_dyn.report.result import Result
+from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.costs import step_cost
-from robot_dyn.studies.costs.ab_comparison import ABComparison, Pair, Version, in_turns
-from robot_dyn.studies.costs.query_cost import QueryCost
-from robot_dyn.studies.costs.text import cost_tables
-from robot_dyn.studies.environment import environment
-from robot_dyn.studies.result import Result
-from robot_dyn.studies.time_budget import Budget
-from robot_dyn.validate import choice, function, integer, number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _MOST_REPEATS = 1000
 
@@ -56,6 +59,11 @@ class Cost(Result):
     budget_s: float
     spent_s: float
     interrupted: bool = False
+
+    def draw(self, theme: str = "light") -> Figure:
+        from robot_dyn.accuracy.costs.diagram import draw
+
+        return draw(self, theme)
 
     def tables(self) -> Iterator[Block]:
         return cost_tables(self)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from robot_dyn.accuracy.costs.ab_comparison import ABComparison
+from robot_dyn.accuracy.costs.cost import Cost
+from robot_dyn.accuracy.costs.step_cost import EVERYTHING
 from robot_dyn.queries.units import format_duration
-from robot_dyn.studies.costs.ab_comparison import ABComparison
-from robot_dyn.studies.costs.cost import Cost
-from robot_dyn.studies.costs.step_cost import EVERYTHING
-from robot_dyn.studies.figure import Colours, ResultError, ink, lines, programs, sheet, styled
+from robot_dyn.report.figure import Colours, ResultError, ink, lines, programs, sheet, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,6 +15,7 @@ from typing import final
 import casadi as ca
 import numpy as np
 
+from robot_dyn.accuracy.costs.ab_comparison import Pair, Way
 from robot_dyn.codegen.kernel import Kernel
 from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.program import Program
@@ -22,10 +23,9 @@ from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.codegen.trace.trace import Trace
-from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.model.robot import Robot
-from robot_dyn.studies.costs.ab_comparison import Pair, Way
-from robot_dyn.studies.timing import seconds
+from robot_dyn.report.timing import seconds
 
 STATES = 1024  # side by side
 PER_STATE = f"state, {STATES} side by side"

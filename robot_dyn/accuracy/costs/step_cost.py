@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.accuracy.costs.ab_comparison import Pair, Way
 from robot_dyn.codegen.parameters import names_of
-from robot_dyn.coefficients import with_values
 from robot_dyn.control.digital_loop.loop import Loop
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.methods import method
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
@@ -33,7 +34,6 @@ from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.watch import Watch
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_BYTES
-from robot_dyn.studies.costs.ab_comparison import Pair, Way
 
 RUNS = 4096  # side by side
 PER_STEP, PER_RUN = "step of RK4", "step of RK4 and run"

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from robot_dyn.answer import Block, Table
+from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Version
+from robot_dyn.foundations.answer import Block, Table
 from robot_dyn.queries.units import format_duration
-from robot_dyn.studies.costs.ab_comparison import ABComparison, Version
 
 if TYPE_CHECKING:
-    from robot_dyn.studies.costs.cost import Cost
+    from robot_dyn.accuracy.costs.cost import Cost
 
 
 def cost_tables(result: Cost) -> Iterator[Block]:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.studies.figure import Colours, ResultError, key, legend, programs, sheet, styled
-from robot_dyn.studies.work_precision_diagram.text import program_of
-from robot_dyn.studies.work_precision_diagram.tolerance_ladder import INTERPRETED, Point, ToleranceLadder
-from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
+from robot_dyn.accuracy.work_precision_diagram.text import program_of
+from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import INTERPRETED, Point, ToleranceLadder
+from robot_dyn.accuracy.work_precision_diagram.work_precision import WorkPrecision
+from robot_dyn.report.figure import Colours, ResultError, key, legend, programs, sheet, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

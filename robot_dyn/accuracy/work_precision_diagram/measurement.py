@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import final
 
-from robot_dyn.errors import RobotDynError
-from robot_dyn.studies.time_budget import Budget, Limit, OvertimeError
-from robot_dyn.studies.timing import TURNS, repeatable
-from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run
-from robot_dyn.studies.work_precision_diagram.reference_run import Reference
-from robot_dyn.studies.work_precision_diagram.tolerance_ladder import (
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest, Run
+from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference
+from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import (
     COMPILED,
     INTERPRETED,
     Point,
     ToleranceLadder,
     ladder_name,
 )
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.report.time_budget import Budget, Limit, OvertimeError
+from robot_dyn.report.timing import TURNS, repeatable
 
 _PART = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # of the budget, for one run
 _SHORT = 1 / 3000  # of the budget: runs that are timed again before the longer ones

@@ -18,6 +18,7 @@ from robot_dyn.codegen.trace.right_angles import completed, models_in_full
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
+from robot_dyn.report.time_budget import Limit
 from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.samples import ledger
@@ -25,7 +26,6 @@ from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_CUT
-from robot_dyn.studies.time_budget import Limit
 
 RECORDS = 25  # approximate number of times at which errors are evaluated
 _MOST_RECORDS = 400  # limit where records must fall on switching times

@@ -17,15 +17,15 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import ATOL, recorded
+from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
 from robot_dyn.effects.effect import Conservative
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.report.time_budget import Budget, Limit, OvertimeError
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
-from robot_dyn.studies.time_budget import Budget, Limit, OvertimeError
-from robot_dyn.studies.work_precision_diagram.method_under_test import ATOL, recorded
-from robot_dyn.studies.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
 
 _PART = 0.02  # of the budget, for one run
 

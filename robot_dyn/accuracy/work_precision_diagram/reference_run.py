@@ -11,15 +11,22 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
+    Run,
+    common,
+    recorded,
+    step_ladder,
+    timed,
+    warmed,
+)
+from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import COMPILED, INTERPRETED
+from robot_dyn.foundations.errors import QueryError, RobotDynError
+from robot_dyn.foundations.result import UNREPORTED, reported
+from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.methods import method
-from robot_dyn.result import UNREPORTED, reported
+from robot_dyn.report.time_budget import Budget, Limit, OvertimeError
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.time_budget import Budget, Limit, OvertimeError
-from robot_dyn.studies.work_precision_diagram.method_under_test import Run, common, recorded, step_ladder, timed, warmed
-from robot_dyn.studies.work_precision_diagram.tolerance_ladder import COMPILED, INTERPRETED
-from robot_dyn.values import Value, read_only
 
 _PARTED = 1e-9  # of the positions: where references differ by more, nothing finer can be shown
 _COARSE = 1e-6  # the same where the second one could not be refined until only rounding is left

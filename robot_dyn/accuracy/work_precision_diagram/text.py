@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.answer import Block, Table
+from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import ToleranceLadder
+from robot_dyn.foundations.answer import Block, Table
 from robot_dyn.queries.units import format_duration
-from robot_dyn.studies.work_precision_diagram.tolerance_ladder import ToleranceLadder
 
 if TYPE_CHECKING:
-    from robot_dyn.studies.work_precision_diagram.work_precision import WorkPrecision
+    from robot_dyn.accuracy.work_precision_diagram.work_precision import WorkPrecision
 
 _DIGITS = (3, 6, 9)
 _OWN = "robot_dyn"

@@ -14,7 +14,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.result import UNREPORTED, reported
+from robot_dyn.foundations.result import UNREPORTED, reported
 
 COMPILED, INTERPRETED = "compiled", "interpreted"
 _RESOLVED = 0.1  # [rad] or [m]: runs with larger errors show no order

@@ -8,38 +8,41 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor, isfinite, log10
-from typing import Any, ClassVar, final
+from typing import TYPE_CHECKING, Any, ClassVar, final
 
-from robot_dyn.answer import Block
-from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError, RobotDynError
-from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
-from robot_dyn.integrate.methods import METHODS, as_method
-from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.queries.units import format_duration, units
-from robot_dyn.result import reported
-from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.results.acting import acting
-from robot_dyn.simulation.setup.options import setup_of, starts
-from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.environment import environment
-from robot_dyn.studies.result import Result
-from robot_dyn.studies.time_budget import Budget
-from robot_dyn.studies.work_precision_diagram.measurement import measure
-from robot_dyn.studies.work_precision_diagram.method_under_test import own, recorded, switches, whole
-from robot_dyn.studies.work_precision_diagram.past_horizon import PastHorizon, past_horizon
-from robot_dyn.studies.work_precision_diagram.peers import found
-from robot_dyn.studies.work_precision_diagram.reference_run import Reference, reference
-from robot_dyn.studies.work_precision_diagram.text import work_precision_tables
-from robot_dyn.studies.work_precision_diagram.tolerance_ladder import (
+from robot_dyn.accuracy.work_precision_diagram.measurement import measure
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import own, recorded, switches, whole
+from robot_dyn.accuracy.work_precision_diagram.past_horizon import PastHorizon, past_horizon
+from robot_dyn.accuracy.work_precision_diagram.peers import found
+from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference, reference
+from robot_dyn.accuracy.work_precision_diagram.text import work_precision_tables
+from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import (
     COMPILED,
     INTERPRETED,
     Point,
     Price,
     ToleranceLadder,
 )
-from robot_dyn.validate import function, instance, integer, number, truth
+from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.answer import Block
+from robot_dyn.foundations.errors import QueryError, RobotDynError
+from robot_dyn.foundations.result import reported
+from robot_dyn.foundations.validate import function, instance, integer, number, truth
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
+from robot_dyn.integrate.methods import METHODS, as_method
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.queries.units import format_duration, units
+from robot_dyn.report.environment import environment
+from robot_dyn.report.result import Result
+from robot_dyn.report.time_budget import Budget
+from robot_dyn.simulation.compiled.engine_choice import choose
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.results.acting import acting
+from robot_dyn.simulation.setup.options import setup_of, starts
+from robot_dyn.simulation.setup.setup import Setup
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # In this order, should the budget end: first what is most used and what costs least.
 _FIRST = ("DOP853", "rk4", "order_8", "explicit_euler", "Rosenbrock", "gauss_6", "gauss_4", "midpoint")
@@ -85,6 +88,11 @@ class WorkPrecision(Result):
     spent_s: float
     interrupted: bool = False
     past_horizon: tuple[PastHorizon, ...] = ()
+
+    def draw(self, theme: str = "light") -> Figure:
+        from robot_dyn.accuracy.work_precision_diagram.diagram import draw
+
+        return draw(self, theme)
 
     def tables(self) -> Iterator[Block]:
         return work_precision_tables(self)

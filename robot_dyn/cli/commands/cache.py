@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
-from robot_dyn.answer import Table
 from robot_dyn.cli.app import Json, app
 from robot_dyn.cli.terminal import say, say_json
+from robot_dyn.foundations.answer import Table
 
 
 @app.command()

@@ -14,7 +14,7 @@ from robot_dyn.cli.app import Budget, Csv, Dark, Force, Json, Name, Plot, Repeat
 from robot_dyn.cli.outcome import give, outputs
 from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 from robot_dyn.cli.terminal import say, say_json
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 
 _DURATION_S = 1.0
 
@@ -47,10 +47,10 @@ def accuracy(
     as_json: Json = False,
 ) -> None:
     """Show what each digit of a motion costs in time, by method and program. Ctrl-C ends it and keeps its runs."""
-    paths = outputs(rd.studies.WorkPrecision, output, csv, [what] if os.path.isfile(what) else [], force)
+    paths = outputs(rd.accuracy.WorkPrecision, output, csv, [what] if os.path.isfile(what) else [], force)
     setup = _setup(what, q, v, duration, options)
     with bar(budget, "starting") as spent:
-        result = rd.studies.work_precision(
+        result = rd.accuracy.work_precision(
             setup, methods=method, peers=peers, budget_s=budget, repeats=repeats, on_progress=spent
         )
     give(result, paths, as_json, dark)
@@ -68,10 +68,10 @@ def cost(
     as_json: Json = False,
 ) -> None:
     """Count and time effects, control and terms of a scene, on and off, and algorithms beside each other."""
-    paths = outputs(rd.studies.Cost, output, csv, [scene], force)
+    paths = outputs(rd.accuracy.Cost, output, csv, [scene], force)
     setup = rd.read_scene(scene)
     with bar(budget, "starting") as spent:
-        result = rd.studies.cost(setup, budget_s=budget, repeats=repeats, on_progress=spent)
+        result = rd.accuracy.cost(setup, budget_s=budget, repeats=repeats, on_progress=spent)
     give(result, paths, as_json, dark)
 
 
@@ -94,12 +94,12 @@ def certify(
     as_json: Json = False,
 ) -> None:
     """Count the digits of M, C, N, inverse and forward dynamics that are true, by program and numbers, beside times."""
-    paths = outputs(rd.studies.Certificate, output, csv, [robot] if os.path.isfile(robot) else [], force)
+    paths = outputs(rd.accuracy.Certificate, output, csv, [robot] if os.path.isfile(robot) else [], force)
     arm = options.load(robot)
     given = {"q": q, "v": v, "a": a, "tau": tau}
     state = {key: arguments.vector(f"--{key}", x, arm.joint_names) for key, x in given.items() if x is not None}
     with bar(1.0, "starting") as done:
-        result = rd.studies.certify(arm, **state, samples=samples, seed=seed, repeats=repeats, on_progress=done)
+        result = rd.accuracy.certify(arm, **state, samples=samples, seed=seed, repeats=repeats, on_progress=done)
     give(result, paths, as_json, dark)
 
 

@@ -12,7 +12,7 @@ import robot_dyn as rd
 from robot_dyn.cli import arguments
 from robot_dyn.cli.app import Force, app, bar
 from robot_dyn.cli.terminal import say
-from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.foundations.errors import QueryError, RobotDynError
 
 _ERROR, _METHOD = 1e-8, "DOP853"  # [rad]
 _BUDGET_S = 8.0  # compiling not counted, which happens once for a version of the library
@@ -28,7 +28,7 @@ def demo(
     At the end it says what 1e-8 rad takes here, by this library and by other programs that are installed.
     """
     from robot_dyn.cli import report
-    from robot_dyn.files import save
+    from robot_dyn.foundations.files import save
     from robot_dyn.scene.scene import SCENE, SceneError
     from robot_dyn.scene.starters import starter
     from robot_dyn.simulation.results.run_file import RUN, RunFileError
@@ -72,13 +72,13 @@ def demo(
 
 def _price(swing: rd.Setup) -> Iterator[str]:
     """What digits of a free swing cost, here and now."""
-    from robot_dyn.studies.work_precision_diagram.text import programs
+    from robot_dyn.accuracy.work_precision_diagram.text import programs
 
     yield ""
     yield f"What 1e-8 rad takes here: {swing.duration_s:g} s of the same arm, swinging freely"
     try:
         with bar(_BUDGET_S, "starting") as spent:
-            result = rd.studies.work_precision(
+            result = rd.accuracy.work_precision(
                 swing, methods=[_METHOD], budget_s=_BUDGET_S, repeats=5, on_progress=spent
             )
     except RobotDynError as error:

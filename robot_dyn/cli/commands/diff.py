@@ -28,7 +28,7 @@ def diff(
 
     The difference is b − a. The exit code is 0 whether they differ or not.
     """
-    from robot_dyn.studies.run_difference import RunDifference
+    from robot_dyn.accuracy.run_difference import RunDifference
 
     paths = outputs(RunDifference, output, csv, [a, b], force)
     give(rd.compare_runs(rd.load_run(a), rd.load_run(b), tolerance=tolerance), paths, as_json, dark)

@@ -11,7 +11,7 @@ from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import Json, Name, app, progress
 from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 from robot_dyn.cli.terminal import say, say_json
-from robot_dyn.errors import QueryError, RobotDynError
+from robot_dyn.foundations.errors import QueryError, RobotDynError
 
 if TYPE_CHECKING:
     import numpy as np

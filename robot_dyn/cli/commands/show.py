@@ -14,7 +14,7 @@ from robot_dyn.cli.app import Dark, Force, Name, PackageDir, app, bar
 from robot_dyn.cli.arguments import output as checked_output
 from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 from robot_dyn.cli.terminal import say, size_of
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 
 if TYPE_CHECKING:
     from robot_dyn.view.live.server import Server
@@ -144,7 +144,7 @@ def _film(
     video: str | None, html: str | None, port: int | None, inputs: list[str], force: bool, size: str
 ) -> tuple[Path, tuple[int, int]] | None:
     """The video to write, checked, and its size in pixels; None if there is none."""
-    from robot_dyn.errors import VideoError
+    from robot_dyn.foundations.errors import VideoError
     from robot_dyn.view.video.video import KINDS
 
     if video is None:

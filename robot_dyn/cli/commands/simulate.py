@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.answer import Table
 from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import Force, Json, Scene, app, bar
 from robot_dyn.cli.terminal import put, say, say_json, to_stderr
+from robot_dyn.foundations.answer import Table
 
 
 @app.command()

@@ -14,7 +14,7 @@ import numpy as np
 from llvmlite import ir
 
 from robot_dyn.codegen.llvm.vectors import I32, I64
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 
 TESTED = "2.2 to 2.4"  # versions of NumPy
 _HEAD = object.__basicsize__  # of PyObject: its last field is the type

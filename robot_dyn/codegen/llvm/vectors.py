@@ -13,7 +13,7 @@ from typing import Any, final
 
 from llvmlite import ir
 
-from robot_dyn.values import LINE
+from robot_dyn.foundations.values import LINE
 
 FLAGS = ("afn", "arcp", "contract", "nsz", "reassoc")  # of LLVM's fast-math flags, all but nnan and ninf
 I1, I32, I64 = ir.IntType(1), ir.IntType(32), ir.IntType(64)

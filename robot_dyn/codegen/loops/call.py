@@ -21,7 +21,7 @@ from robot_dyn.codegen.loops.packing import Packed, pack
 from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.store.keys import digest, sources_of_the_translator
 from robot_dyn.codegen.waiting import announced, interrupts_later
-from robot_dyn.errors import MachineCodeError
+from robot_dyn.foundations.errors import MachineCodeError
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
 _LETTERS: Mapping[str, str] = {"float": "f", "int": "i", "uint": "u", "bool": "b"}

@@ -9,7 +9,7 @@ from typing import Any, final
 import numpy as np
 from llvmlite import ir
 
-from robot_dyn.errors import TraceError
+from robot_dyn.foundations.errors import TraceError
 
 I1, I8, I64, F64 = ir.IntType(1), ir.IntType(8), ir.IntType(64), ir.DoubleType()
 TEXT, WORDS = I8.as_pointer(), I64.as_pointer()

@@ -13,7 +13,7 @@ from types import CodeType, FunctionType
 from typing import Any
 
 from robot_dyn.codegen.store.definition import code_parts
-from robot_dyn.errors import TraceError
+from robot_dyn.foundations.errors import TraceError
 
 
 class SubsetError(TraceError):

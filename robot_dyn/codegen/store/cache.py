@@ -22,7 +22,7 @@ from typing import final
 
 import platformdirs
 
-from robot_dyn.errors import QueryError, RobotDynWarning, shorten
+from robot_dyn.foundations.errors import QueryError, RobotDynWarning, shorten
 
 VARIABLE = "ROBOT_DYN_CACHE"  # names another folder; empty or "off": no cache
 _OTHER = f"name another folder in {VARIABLE}, or set it to off"

@@ -23,7 +23,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.codegen.store.keys import digest_of_texts
-from robot_dyn.coefficients import Coefficient
+from robot_dyn.foundations.coefficients import Coefficient
 
 _NUMBERS = bool, int, float, complex, str, bytes, type(None), type(Ellipsis), type(NotImplemented)
 _BUILTIN = {

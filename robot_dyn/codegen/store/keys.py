@@ -22,7 +22,7 @@ from pathlib import Path
 _ROOT = Path(__file__).parents[2]
 _CODEGEN = _ROOT / "codegen"
 # Rooms above the simulation, which nothing that is traced imports: the layers in pyproject.toml ensure it.
-_ABOVE = {"cli", "scene", "studies", "sweeps", "view"}
+_ABOVE = {"accuracy", "cli", "report", "scene", "tools", "view"}
 
 
 def digest(texts: list[str], *, processor: bool = True) -> str:

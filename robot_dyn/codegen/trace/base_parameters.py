@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, sqrt, symmetric
 from robot_dyn.codegen.trace.origins import of_bodies
 from robot_dyn.codegen.trace.symbol import Symbol
 from robot_dyn.codegen.trace.symbolic import Symbols
+from robot_dyn.foundations.arithmetic import Array, sqrt, symmetric
+from robot_dyn.foundations.spatial import adjoint_inverse, first_moment, hat
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage
-from robot_dyn.spatial import adjoint_inverse, first_moment, hat
 
 
 def regrouped(linkage: Linkage) -> Linkage:

@@ -9,7 +9,7 @@ from typing import Any, final
 
 import casadi as ca
 
-from robot_dyn.linear_algebra import judging_regularity
+from robot_dyn.foundations.linear_algebra import judging_regularity
 
 Node = Any  # casadi.SX, 1 × 1
 

@@ -7,7 +7,7 @@ from itertools import accumulate
 import casadi as ca
 
 from robot_dyn.codegen.program import Kind, Op, Program
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 
 _MOVES = {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST}
 _KINDS = {getattr(ca, f"OP_{kind.value.upper()}"): kind for kind in Kind if kind is not Kind.SINE_COSINE}

@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.spatial import adjoint
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage, Pose
-from robot_dyn.spatial import adjoint
 
 
 def slid(linkage: Linkage) -> Linkage:

@@ -14,8 +14,8 @@ from typing import Any, final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.coefficients import with_values
 from robot_dyn.description.description import Description
+from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.model.robot import Robot
 
 _LEAST_DECIMALS = (

@@ -14,10 +14,10 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
-from robot_dyn.arithmetic import Arithmetic, Array
 from robot_dyn.codegen.trace.condition import Condition, Node, deciding, truth
 from robot_dyn.codegen.trace.symbol import Symbol, node, select, symbol
-from robot_dyn.errors import TraceError
+from robot_dyn.foundations.arithmetic import Arithmetic, Array
+from robot_dyn.foundations.errors import TraceError
 
 _MOST_BRANCHES = 64  # each is a copy of the function in the kernel
 

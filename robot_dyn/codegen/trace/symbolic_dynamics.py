@@ -10,10 +10,10 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.parameters import Parameter, described, split
 from robot_dyn.codegen.trace.symbolic import Symbols, array_of, column, inputs
 from robot_dyn.codegen.trace.trace import Trace, Traced
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.tree import Described
 from robot_dyn.queries.dynamics import Dynamics

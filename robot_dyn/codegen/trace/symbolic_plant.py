@@ -12,20 +12,20 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.parameters import CONTROLLER, Part
 from robot_dyn.codegen.trace.symbolic import Symbol, Symbols, TraceError, column, every_branch
-from robot_dyn.coefficients import with_values
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial, polynomial
 from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Active, Bound, Conservative, Drive, Effect, Stateful
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.set_valued import Mode, SetValued
-from robot_dyn.errors import QueryError, because
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.errors import QueryError, because
 
 _INTERPRETED = "ask the plant itself, or simulate it"
-REMEDY = "write it in robot_dyn.arithmetic and NumPy's operators, or take engine='interpreted'"
+REMEDY = "write it in robot_dyn.foundations.arithmetic and NumPy's operators, or take engine='interpreted'"
 _ARM_INSIDE = "an arm inside a function cannot be traced; take engine='interpreted'"
 _ARM_INSIDE_A_LAW = (
     "an arm inside a function cannot be traced: make it an attribute of a rd.control.Stateless controller, or take"

@@ -15,7 +15,6 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
-from robot_dyn.arithmetic import Array, in_arithmetic
 from robot_dyn.codegen.trace.base_parameters import regrouped
 from robot_dyn.codegen.trace.condition import Node
 from robot_dyn.codegen.trace.from_casadi import instructions
@@ -23,6 +22,7 @@ from robot_dyn.codegen.trace.origins import slid
 from robot_dyn.codegen.trace.symbol import symbol
 from robot_dyn.codegen.trace.symbolic import Symbolic, array_of, column, inputs
 from robot_dyn.codegen.waiting import interrupts_later
+from robot_dyn.foundations.arithmetic import Array, in_arithmetic
 from robot_dyn.lagrange.christoffel import christoffel
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.linkage import Linkage

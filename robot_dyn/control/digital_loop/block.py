@@ -15,10 +15,10 @@ from typing import Any, ClassVar, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import check_coefficients, coefficient
-from robot_dyn.errors import ControlError
-from robot_dyn.values import Value
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import check_coefficients, coefficient
+from robot_dyn.foundations.errors import ControlError
+from robot_dyn.foundations.values import Value
 
 SIGNAL = "signal"  # within a unit, the unit of the signal: rad, rad/s or N m, depending on the line of the block
 

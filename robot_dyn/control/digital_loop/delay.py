@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.errors import ControlError
-from robot_dyn.validate import number
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import ControlError
+from robot_dyn.foundations.validate import number
 
 _LEAST = 1e-6  # of a period, between two instants
 _MOST = 1000  # periods of a delay: each is a state of every joint

@@ -17,15 +17,15 @@ from typing import Any, ClassVar, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import with_values
 from robot_dyn.control.controller import Controller, Nested, check_joints, check_sampled, nested
 from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.control.digital_loop.delay import Instant, delay, instants
 from robot_dyn.control.digital_loop.tick import tick
-from robot_dyn.errors import ControlError, shown
-from robot_dyn.threshold import smooth
-from robot_dyn.validate import integer
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.errors import ControlError, shown
+from robot_dyn.foundations.threshold import smooth
+from robot_dyn.foundations.validate import integer
 
 SIGNALS = {"position": "rad", "velocity": "rad/s", "actuation": "N m"}  # of each line, the unit of what goes through it
 LINES = tuple(SIGNALS)

@@ -13,10 +13,10 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, cos, sin, sqrt
-from robot_dyn.coefficients import coefficient
 from robot_dyn.control.digital_loop.block import Block
-from robot_dyn.errors import ControlError, shown
+from robot_dyn.foundations.arithmetic import Array, cos, sin, sqrt
+from robot_dyn.foundations.coefficients import coefficient
+from robot_dyn.foundations.errors import ControlError, shown
 
 
 @final

@@ -12,11 +12,11 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.coefficients import with_values
 from robot_dyn.control.controller import Controller, Nested, check_sampled, nested
-from robot_dyn.errors import ControlError
-from robot_dyn.threshold import smooth
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.errors import ControlError
+from robot_dyn.foundations.threshold import smooth
 
 _ROUNDED = 1e-9  # relative tolerance for a whole ratio of periods
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.control.digital_loop.delay import shifted
+from robot_dyn.foundations.arithmetic import Array
 
 if TYPE_CHECKING:
     from robot_dyn.control.digital_loop.loop import Loop

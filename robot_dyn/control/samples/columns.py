@@ -9,11 +9,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import PlanError, nearest, shown
+from robot_dyn.control.samples.headings import name_of, size, unit_of
+from robot_dyn.control.samples.sources import TIME_NAMES, Table, table_of
+from robot_dyn.foundations.errors import PlanError, nearest, shown
+from robot_dyn.foundations.validate import choice, instance, number, numbers
 from robot_dyn.model.robot import Robot
-from robot_dyn.plan.samples.headings import name_of, size, unit_of
-from robot_dyn.plan.samples.sources import TIME_NAMES, Table, table_of
-from robot_dyn.validate import choice, instance, number, numbers
 
 _BESIDE = r"([vau]|tau|power|start|desired|deviation) .*|energy|residual|.* state \d+"
 _OF_A_RUN = re.compile(_BESIDE)  # headings beside t and q in the table of a run

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from robot_dyn.errors import PlanError, shorten
-from robot_dyn.files import read
+from robot_dyn.foundations.errors import PlanError, shorten
+from robot_dyn.foundations.files import read
 
 _MOST_BYTES = 2**28
 _REMEDY = "give a CSV file in UTF-8 of at most 256 MiB, with columns t and the joints"

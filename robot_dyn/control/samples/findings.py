@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robot_dyn.control.extremes import extremes
 from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.errors import PlanError
+from robot_dyn.control.samples.columns import Columns
+from robot_dyn.foundations.errors import PlanError
 from robot_dyn.model.robot import Robot
-from robot_dyn.plan.extremes import extremes
-from robot_dyn.plan.samples.columns import Columns
 from robot_dyn.queries.units import of_joint
 
 _GAP = 5  # times the median time between samples

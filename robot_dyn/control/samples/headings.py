@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from robot_dyn.errors import PlanError, shown
+from robot_dyn.foundations.errors import PlanError, shown
 
 _HEADING = re.compile(r"\s*(.*?)\s*(?:\[([^]]*)\]|\(([^)]*)\))?\s*")
 UNITS = {

@@ -14,9 +14,9 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
-from robot_dyn.errors import PlanError, nearest, shorten, shown
-from robot_dyn.extras import needs
-from robot_dyn.files import reading
+from robot_dyn.foundations.errors import PlanError, nearest, shorten, shown
+from robot_dyn.foundations.extras import needs
+from robot_dyn.foundations.files import reading
 
 SUFFIX, TIMES = ".mcap", ("header", "log")
 _TYPE, _TOPIC = "sensor_msgs/msg/JointState", "/joint_states"

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.control.plan import Plan
 from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.control.samples import Samples, spline
-from robot_dyn.errors import PlanError
+from robot_dyn.control.samples.columns import columns
+from robot_dyn.control.samples.findings import DENSE, findings, refuse_moving_ends, refuse_other_units
+from robot_dyn.control.samples.spline import Samples, spline
+from robot_dyn.foundations.errors import PlanError
+from robot_dyn.foundations.validate import choice, instance, number
 from robot_dyn.model.robot import Robot
-from robot_dyn.plan.plan import Plan
-from robot_dyn.plan.samples.columns import columns
-from robot_dyn.plan.samples.findings import DENSE, findings, refuse_moving_ends, refuse_other_units
 from robot_dyn.queries.units import of_joint
-from robot_dyn.validate import choice, instance, number
 
 
 def from_samples(

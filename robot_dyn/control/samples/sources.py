@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.errors import PlanError, shorten, shown
-from robot_dyn.plan.samples.csv_table import read_csv
-from robot_dyn.plan.samples.headings import name_of
-from robot_dyn.plan.samples.joint_states import SUFFIX, TIMES, read_joint_states
-from robot_dyn.validate import numbers
+from robot_dyn.control.samples.csv_table import read_csv
+from robot_dyn.control.samples.headings import name_of
+from robot_dyn.control.samples.joint_states import SUFFIX, TIMES, read_joint_states
+from robot_dyn.foundations.errors import PlanError, shorten, shown
+from robot_dyn.foundations.validate import numbers
 
 TIME_NAMES = "t", "time", "timestamp", "stamp"
 

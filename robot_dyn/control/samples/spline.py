@@ -15,7 +15,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.control.reference import PiecewisePolynomial, hermite, increasing, numbers
-from robot_dyn.errors import ControlError
+from robot_dyn.foundations.errors import ControlError
 
 
 @final
@@ -26,7 +26,7 @@ class Samples(PiecewisePolynomial):
     samples the one polynomial of least degree) where positions alone are given; Hermite's polynomial of degree 3 with
     velocities, and of degree 5 with velocities and accelerations. Steps of integration end at its breaks, so that no
     method loses its order there; they are no longer than the samples lie apart. It begins as fast as the spline does:
-    for a few way points from rest take `via_points`; for files, and for rest at both ends, `rd.plan.from_samples`.
+    for a few way points from rest take `via_points`; for files, and for rest at both ends, `rd.control.from_samples`.
 
     Args:
         t: Increasing times, shape (m,), m at least 2, in [s].

@@ -22,7 +22,6 @@ from typing import Any, final
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.description.couplings import Mimic, resolve
 from robot_dyn.description.description import content
 from robot_dyn.description.edits import Changes
@@ -30,8 +29,9 @@ from robot_dyn.description.sources.mjcf_actuators import Actuators
 from robot_dyn.description.sources.mjcf_model import Compiled, compiled
 from robot_dyn.description.sources.mjcf_shapes import Shapes
 from robot_dyn.description.urdf import UNBOUNDED
-from robot_dyn.errors import DescriptionError, shorten, shown
-from robot_dyn.spatial import rotation, rpy_of
+from robot_dyn.foundations.arithmetic import FLOAT64
+from robot_dyn.foundations.errors import DescriptionError, shorten, shown
+from robot_dyn.foundations.spatial import rotation, rpy_of
 
 SUFFIXES = (".xml", ".mjcf")
 _START = 2**16  # bytes, in which a file says what it is

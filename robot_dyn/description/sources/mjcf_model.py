@@ -10,8 +10,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import DescriptionError, shorten
-from robot_dyn.extras import needs
+from robot_dyn.foundations.errors import DescriptionError, shorten
+from robot_dyn.foundations.extras import needs
 
 
 @final

@@ -18,7 +18,7 @@ import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.description.sources.mjcf_model import Compiled
-from robot_dyn.spatial import rpy_of
+from robot_dyn.foundations.spatial import rpy_of
 
 _GROUPS = 3  # 0 to 2
 _UNSTATED = (0.5, 0.5, 0.5, 1.0)  # the colour for which MuJoCo takes that of the material

@@ -15,8 +15,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, final
 
-from robot_dyn.errors import CatalogError, nearest, shorten
-from robot_dyn.extras import needs
+from robot_dyn.foundations.errors import CatalogError, nearest, shorten
+from robot_dyn.foundations.extras import needs
 
 PREFIX = "robot_descriptions:"
 

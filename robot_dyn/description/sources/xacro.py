@@ -19,7 +19,7 @@ from types import ModuleType
 from typing import Any
 
 from robot_dyn.description import catalog
-from robot_dyn.errors import DescriptionError, RobotDynError, nearest, shorten, shown
+from robot_dyn.foundations.errors import DescriptionError, RobotDynError, nearest, shorten, shown
 
 SECONDS = 60  # of an expansion
 MEMORY = 2 << 30  # bytes

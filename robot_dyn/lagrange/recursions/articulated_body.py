@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, apply, rounding, symmetric
-from robot_dyn.errors import QueryError, SingularError, UndecidedError
+from robot_dyn.foundations.arithmetic import Array, apply, rounding, symmetric
+from robot_dyn.foundations.errors import QueryError, SingularError, UndecidedError
 from robot_dyn.lagrange.linkage import BASE, Linkage, Step
 from robot_dyn.lagrange.recursions.propagation import carried, twists, wrench
 

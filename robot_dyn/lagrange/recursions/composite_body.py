@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, apply
+from robot_dyn.foundations.arithmetic import Array, apply
 from robot_dyn.lagrange.linkage import BASE, Linkage
 
 

@@ -5,7 +5,7 @@ K = ½ Σ V_iᵀ 𝓜_i V_i  +  ½ Σ armature · v²
 
 from __future__ import annotations
 
-from robot_dyn.arithmetic import Array, apply
+from robot_dyn.foundations.arithmetic import Array, apply
 from robot_dyn.lagrange.linkage import Linkage
 from robot_dyn.lagrange.recursions.propagation import twists
 

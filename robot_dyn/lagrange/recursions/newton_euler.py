@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.lagrange.linkage import BASE, Linkage
 from robot_dyn.lagrange.recursions.propagation import accelerations, twists, wrench
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, apply
+from robot_dyn.foundations.arithmetic import Array, apply
+from robot_dyn.foundations.spatial import first_moment, hat
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage, Step
-from robot_dyn.spatial import first_moment, hat
 
 
 def twists(linkage: Linkage, steps: list[Step], v: Array) -> list[Array]:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.description.inertial_parameters import unit_inertias
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.lagrange.linkage import Linkage
 from robot_dyn.lagrange.recursions.propagation import accelerations, twists, wrench
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from robot_dyn.errors import SceneError, nearest
+from robot_dyn.foundations.errors import SceneError, nearest
 
 
 def starters() -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.trajectory import Trajectory
 

@@ -12,7 +12,8 @@ from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.parameters import Parameter, parameters
 from robot_dyn.codegen.program import Programs
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import TraceError
+from robot_dyn.foundations.errors import TraceError
+from robot_dyn.foundations.values import LRUByIdentity
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.compiled.functions import CompiledFunctions
@@ -28,7 +29,6 @@ from robot_dyn.simulation.compiled.programs import (
 )
 from robot_dyn.simulation.compiled.structure import changeable
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.values import LRUByIdentity
 
 _MOST_INSTRUCTIONS = 100_000  # some ten seconds of compiling
 

@@ -12,7 +12,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.codegen.waiting import announced
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.simulation.compiled.programs import Identified, Traces, identify, interpreted, stored
 from robot_dyn.simulation.dynamics.declarations import named, undeclared
 from robot_dyn.simulation.dynamics.state_equation import StateEquation

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.codegen.llvm.machine_code import Passes
 from robot_dyn.codegen.loops.call import QUICK, MachineFunction
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.primitives import INSTEAD
 from robot_dyn.codegen.store.cache import default_store
+from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.integrator import PlainMethod

@@ -15,11 +15,11 @@ from robot_dyn.codegen.store.keys import digest, sources_of_programs
 from robot_dyn.codegen.trace.right_angles import robot_of
 from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import TraceError
+from robot_dyn.foundations.errors import TraceError
+from robot_dyn.foundations.values import LRUByIdentity
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.compiled.structure import of_library, structure
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.values import LRUByIdentity
 
 _robots, _symbols, _interpreted = LRUByIdentity(), LRUByIdentity(), LRUByIdentity()
 

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.trace.right_angles import models_in_full
-from robot_dyn.errors import RobotDynError, because
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import RobotDynError, because
 from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.compiled.functions import STEP, States

@@ -14,11 +14,11 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from robot_dyn.codegen.store.definition import definition
-from robot_dyn.coefficients import declared
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.description.edits import Edits
 from robot_dyn.effects.carried_payload import CarriedPayload
+from robot_dyn.foundations.coefficients import declared
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.dynamics.declarations import attributes, is_frozen

@@ -17,13 +17,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.parameters import ROBOT, Parameter, Part, split
 from robot_dyn.codegen.trace.symbolic import Symbolic, Symbols, column, inputs
 from robot_dyn.codegen.trace.symbolic_dynamics import SymbolicDynamics
 from robot_dyn.codegen.trace.symbolic_plant import Piece, symbolic_controller, symbolic_plant, whichever_way, wide
 from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.errors import call
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import call
 from robot_dyn.simulation.dynamics.bodies import bodies as bodies_of
 from robot_dyn.simulation.dynamics.moreau_jean import behind, problem, solution
 from robot_dyn.simulation.dynamics.state_equation import StateEquation

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from robot_dyn.control.operational_space import OperationalSpace, task_dynamics
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.simulation.observation.remarks import Kind, Remark
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup

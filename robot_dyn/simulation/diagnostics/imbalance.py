@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.effects.effect import Conservative
-from robot_dyn.errors import RobotDynError, call
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import RobotDynError, call
 from robot_dyn.simulation.diagnostics.missed_events import cut_alike, stepped_over
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.ledger import largest

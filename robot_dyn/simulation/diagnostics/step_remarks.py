@@ -11,7 +11,8 @@ import numpy as np
 from robot_dyn.control.digital_loop.block import Noise, Quantisation
 from robot_dyn.control.digital_loop.loop import Loop
 from robot_dyn.effects.effect import Conservative, Dissipative, Stateful
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.values import cached, copied
 from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import unit
@@ -23,7 +24,6 @@ from robot_dyn.simulation.observation.observation import Observation, Observed, 
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Kind, Remark
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import cached, copied
 
 Units = list[tuple[str, str, str]]  # of q, v and u of each joint
 QUANTITIES = ("q", "v", "u")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.adaptive import STIFF
 from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest
 from robot_dyn.simulation.observation.remarks import Remark

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.simulation.dynamics.sampled_loop import SampledLoop, linearised, remedy
 from robot_dyn.simulation.dynamics.stability import after, below, periods, shown
 from robot_dyn.simulation.observation.remarks import Kind, Remark, lines

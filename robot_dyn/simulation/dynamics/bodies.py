@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
 

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.coefficients import cached_properties
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.control.reference import Reference
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.coefficients import cached_properties
 from robot_dyn.model.robot import Robot
 
 _CHANGING = list, dict, set, bytearray

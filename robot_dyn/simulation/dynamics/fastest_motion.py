@@ -13,8 +13,8 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.effects.effect import numbered
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.simulation.dynamics.state_equation import CONTROL, StateEquation
 

@@ -10,14 +10,14 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
-from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.validate import one_state
 from robot_dyn.integrate.differences import of_fourth_order
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import without_rounding
-from robot_dyn.validate import one_state
 
 _STEPS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of Richardson's extrapolated central difference: error O(h⁴) and u/h
 _AT_REST = 1e-9  # of the acceleration without actuation

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.primitives import below
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.values import aligned
 
 _FIRST = np.zeros(1, np.int64)
 

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.convex import PASSES, newton
 from robot_dyn.effects.effect import Conservative
 from robot_dyn.effects.set_valued import SetValued, impulses_of, in_a_step
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.convex import PASSES, newton
+from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError
 from robot_dyn.integrate.time_stepping import problem_rows
-from robot_dyn.linear_algebra import NotPositiveDefiniteError
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
 

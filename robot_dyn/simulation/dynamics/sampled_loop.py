@@ -17,10 +17,10 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import RobotDynError, call
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import RobotDynError, call
 from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.simulation.dynamics.fastest_motion import jacobian
 from robot_dyn.simulation.dynamics.stability import NO_BOUND, STILL, Growth, Stability, first_unstable, growth, lengths

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.integrator import System
 
 _BAND = 1e-3  # of |λ|: no eigenvalue further from 1 is taken for one at 1, however defective it is

@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Bound, Conservative, Stateful, numbered
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.plant import Plant, carrying, in_mode
 from robot_dyn.effects.set_valued import Mode
-from robot_dyn.errors import RobotDynError, call
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import RobotDynError, call
+from robot_dyn.foundations.values import Caching
 from robot_dyn.queries.dynamics import acceleration
-from robot_dyn.values import Caching
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup.event import Event

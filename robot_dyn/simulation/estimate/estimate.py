@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.coefficients import with_values
+from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.diagnostics.missed_events import cut_alike, stepped_over

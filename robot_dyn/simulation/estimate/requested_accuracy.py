@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, LEAST_RTOL, STIFF, Adaptive
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.simulation.dynamics.fastest_motion import fastest

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.bernstein import rate_coefficients, value
 from robot_dyn.integrate.primitives import between, evaluate
 from robot_dyn.simulation.dynamics.loop_state import Functions, Rules, Runs

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy, evaluate
 
 FASTEST = 1e6  # [rad/s] or [m/s]: a method that cuts its steps would follow an exploding state without end

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 
 CHATTER = 20  # events of one threshold, in next to no time
 _ROOM = 64  # rows before the loop returns

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.bernstein import NONE, coefficients, first_below, rate_coefficients
 from robot_dyn.simulation.dynamics.loop_state import Functions, Runs
 from robot_dyn.simulation.events.crossings import LOOKS, NEAR, ROUNDING, Switches, gap, has_functions, values

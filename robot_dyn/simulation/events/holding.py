@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.effects.settling import Settling
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import evaluate
 from robot_dyn.simulation.events.event_log import EventLog
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.effects.settling import Settling, least_value, settle
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy
 from robot_dyn.simulation.events.event_log import What, note
 from robot_dyn.simulation.events.holding import Holding, Laws, bodies, intervals, take, touched

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.effects.settling import settle
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy
 from robot_dyn.simulation.dynamics.loop_state import Ended, Runs
 from robot_dyn.simulation.events.crossings import ROUNDING, Switches, same_sides

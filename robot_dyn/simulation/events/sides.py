@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.simulation.dynamics.loop_state import Runs
 from robot_dyn.simulation.events.crossings import Switches
 from robot_dyn.simulation.events.event_log import EventLog, What, may_chatter, note

@@ -7,17 +7,17 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant, in_mode
-from robot_dyn.errors import EffectError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import EffectError
+from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.integrate.bernstein import room
 from robot_dyn.simulation.dynamics.state_equation import CONTROLLER, StateEquation
 from robot_dyn.simulation.events.crossings import LOOKS, ROUNDING, Switches
 from robot_dyn.simulation.events.mode_change import guards
 from robot_dyn.simulation.events.modes import Modes
 from robot_dyn.simulation.events.occurrence import Occurrence
-from robot_dyn.threshold import Threshold
 
 _MOST = 256  # equations that are cached, each of the sides of all thresholds
 Quantity = tuple[int, bool]  # a joint, and whether it is its actuation that passes a level

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, final
 
-from robot_dyn.errors import shown
-from robot_dyn.extras import needs
-from robot_dyn.files import Kind, file_path, save, target
+from robot_dyn.foundations.errors import shown
+from robot_dyn.foundations.extras import needs
+from robot_dyn.foundations.files import Kind, file_path, save, target
 from robot_dyn.simulation.columns import EXTRA, Column
 from robot_dyn.simulation.export import csv_table, mcap_log, netcdf, parquet
 from robot_dyn.simulation.results.run_file import RunFileError

@@ -21,8 +21,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from robot_dyn.errors import QueryError
-from robot_dyn.extras import needs
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.extras import needs
 from robot_dyn.simulation.columns import EXTRA, Column, attributes
 from robot_dyn.simulation.results.run_file import RunFileError
 from robot_dyn.simulation.results.trajectory import Trajectory

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import BinaryIO
 
-from robot_dyn.extras import needs
+from robot_dyn.foundations.extras import needs
 from robot_dyn.simulation.columns import EXTRA, Column, attributes, by_heading
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.result import Rollouts

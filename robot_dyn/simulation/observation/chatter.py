@@ -14,7 +14,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy
 
 _REVERSALS = 10  # in a row, at least; well-sampled motion has fewer

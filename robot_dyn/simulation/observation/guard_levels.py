@@ -8,11 +8,11 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.actuator import EffortLimit
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.joint_limit import JointStopSpring
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.observation.remarks import Kind
 

@@ -10,7 +10,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.simulation.observation.guard_levels import NO_LEVELS, GuardLevels
 from robot_dyn.simulation.observation.observation import Observation, Observed, observe, observed
 

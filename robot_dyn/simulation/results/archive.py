@@ -18,7 +18,7 @@ from typing import BinaryIO, final
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError, shorten
+from robot_dyn.foundations.errors import RobotDynError, shorten
 
 DIGEST = "sha256"  # the member that holds it; it covers all others
 _MOST_MEMBERS = 10_000

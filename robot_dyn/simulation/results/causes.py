@@ -13,7 +13,7 @@ import numpy as np
 from robot_dyn.codegen.trace import right_angles
 from robot_dyn.effects.causes import Causes, by_cause, exerted_torques
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.results.samples import Columns
 

@@ -8,7 +8,7 @@ from typing import Annotated, final
 
 import numpy as np
 
-from robot_dyn.values import Layout, Value, read_only
+from robot_dyn.foundations.values import Layout, Value, read_only
 
 
 class Verdict(StrEnum):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.display import legend, page, plot, side_by_side, text
+from robot_dyn.foundations.display import legend, page, plot, side_by_side, text
 from robot_dyn.queries.units import units
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.trajectory import Trajectory

@@ -11,7 +11,7 @@ from typing import Annotated, final
 
 import numpy as np
 
-from robot_dyn.values import Layout, Value, read_only
+from robot_dyn.foundations.values import Layout, Value, read_only
 
 _OPEN = 1e-3  # a residual, as a part of the energy exchanged
 _ROUNDING = 1e-12  # of the energies, whose differences are the residual

@@ -21,7 +21,7 @@ from robot_dyn.codegen.trace.right_angles import written_out
 from robot_dyn.description import catalog
 from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Payload
-from robot_dyn.errors import DescriptionError, QueryError, shorten
+from robot_dyn.foundations.errors import DescriptionError, QueryError, shorten
 from robot_dyn.model.findings import reservations
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.setup.settings import settings_of

@@ -14,8 +14,9 @@ from typing import Any, Generic, TypeVar, final
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError, shorten
-from robot_dyn.files import Kind, file_path, reading, save, target
+from robot_dyn.foundations.errors import RobotDynError, shorten
+from robot_dyn.foundations.files import Kind, file_path, reading, save, target
+from robot_dyn.foundations.validate import integer
 from robot_dyn.simulation.results.archive import DIGEST, Archive, ArchiveError, Header, write
 from robot_dyn.simulation.results.provenance import packed, unpacked
 from robot_dyn.simulation.results.serialise import (
@@ -30,7 +31,6 @@ from robot_dyn.simulation.results.serialise import (
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.size import LONGEST_S
-from robot_dyn.validate import integer
 
 FORMAT = 5
 ROLLOUTS_FORMAT = "rollouts 4"

@@ -13,7 +13,7 @@ import numpy as np
 
 from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.run.recording import Recording

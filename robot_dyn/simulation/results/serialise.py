@@ -15,9 +15,9 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError, shorten
+from robot_dyn.foundations.errors import RobotDynError, shorten
+from robot_dyn.foundations.values import Layout
 from robot_dyn.simulation.results.archive import ArchiveError, Header
-from robot_dyn.values import Layout
 
 Arrays = dict[str, np.ndarray]
 _ABSENT: Any = object()  # in the plain data; None is a value

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robot_dyn.errors import escaped
+from robot_dyn.foundations.errors import escaped
 from robot_dyn.queries.units import units
 from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.observation.remarks import lines as lines_of

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol, final, runtime_check
 
 import numpy as np
 
-from robot_dyn.errors import QueryError, shown
+from robot_dyn.foundations.errors import QueryError, shown
+from robot_dyn.foundations.values import Derived, Layout, read_only
 from robot_dyn.simulation.columns import attributes, by_heading, data_frame, data_set
 from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.observation.remarks import Remark
@@ -17,7 +18,6 @@ from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.results.samples import root_mean_square
 from robot_dyn.simulation.run.outcome import Outcome
-from robot_dyn.values import Derived, Layout, read_only
 
 if TYPE_CHECKING:
     from robot_dyn.effects.causes import Causes
@@ -29,7 +29,7 @@ _CONTRADICTS, _ROUNDING = 100.0, 1e-12
 
 @runtime_checkable
 class Theorem(Protocol):
-    """What is proven of a motion, as `rd.studies.Proof`."""
+    """What is proven of a motion, as `rd.tools.proof.Proof`."""
 
     joint_names: tuple[str, ...]
 
@@ -199,13 +199,13 @@ class Trajectory(Derived):
         """Decimal digits of q that a theorem confirms: −log₁₀ of the largest possible error, in [rad] or [m].
 
         Args:
-            proof: Of the same motion, as `rd.studies.prove` returns it; samples after its end are left out.
+            proof: Of the same motion, as `rd.tools.proof.prove` returns it; samples after its end are left out.
 
         Raises:
             QueryError: If it is of other joints, or its motion starts elsewhere.
         """
         if not isinstance(proof, Theorem):
-            raise QueryError(f"proof: give one, as rd.studies.prove(setup), got {shown(proof)}")
+            raise QueryError(f"proof: give one, as rd.tools.proof.prove(setup), got {shown(proof)}")
         if proof.joint_names != self.joint_names:
             raise QueryError(f"proof is of the joints {', '.join(proof.joint_names)}; give one of this motion")
         if self.t[0] == 0 and not proof.contains(0.0, self.q[0], self.v[0]):

@@ -14,10 +14,10 @@ from typing import cast, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64
 from robot_dyn.codegen.trace.right_angles import robot_of
-from robot_dyn.coefficients import with_values
 from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.arithmetic import FLOAT64
+from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why, rules_of, runs_of

@@ -8,7 +8,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.coefficients import with_values
+from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.simulation.compiled.build import with_numbers
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.compiled.engine_choice import checked, compiled_for

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, final
 
 import numpy as np
 
-from robot_dyn.coefficients import with_values
 from robot_dyn.effects.dry_friction import DryFriction
+from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.values import Layout, Value, read_only
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, jumps
 from robot_dyn.simulation.diagnostics.step_remarks import KINDS, Units, against, of_reference, of_steps, units_of
@@ -20,7 +21,6 @@ from robot_dyn.simulation.observation.remarks import Kind, Remark
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_square, tracking_of
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import Layout, Value, read_only
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.rollouts.result import Rollouts

@@ -10,7 +10,9 @@ from typing import Annotated, Any, final, overload
 
 import numpy as np
 
-from robot_dyn.errors import QueryError, escaped
+from robot_dyn.foundations.errors import QueryError, escaped
+from robot_dyn.foundations.validate import integer
+from robot_dyn.foundations.values import NOT_STORED, Layout, Value, read_only
 from robot_dyn.simulation.columns import attributes, by_heading, data_frame, data_set
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
@@ -21,8 +23,6 @@ from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
 from robot_dyn.simulation.rollouts.overview import Overview, of_some, overview
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.validate import integer
-from robot_dyn.values import NOT_STORED, Layout, Value, read_only
 
 _SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved", "numbers")  # by all runs
 

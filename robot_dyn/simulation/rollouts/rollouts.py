@@ -17,12 +17,13 @@ import numpy as np
 
 from robot_dyn.codegen.parameters import CONTROLLER, names_of, parameters, sweepable_parameters, with_parameters
 from robot_dyn.codegen.threads import thread_count
-from robot_dyn.coefficients import rebuilt
 from robot_dyn.description.edits import Edits
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
-from robot_dyn.errors import QueryError, nearest, shown
+from robot_dyn.foundations.coefficients import rebuilt
+from robot_dyn.foundations.errors import QueryError, nearest, shown
+from robot_dyn.foundations.validate import choice, instance, integer, joint_values, numbers, truth
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
@@ -40,7 +41,6 @@ from robot_dyn.simulation.setup.checks import check_stops
 from robot_dyn.simulation.setup.options import Options, setup_of, takes_options
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_BYTES
-from robot_dyn.validate import choice, instance, integer, joint_values, numbers, truth
 
 LARGEST_NUMBER = 2**53  # of a run
 RECORDS = ("q", "v", "u", "energy", "work")

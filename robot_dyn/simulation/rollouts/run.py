@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.acting import acting, at_stop, wrenches
 from robot_dyn.simulation.results.ledger import Ledger

@@ -8,15 +8,15 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
 from robot_dyn.codegen.parameters import sweepable_parameters
 from robot_dyn.control.digital_loop.block import SIGNAL
 from robot_dyn.control.digital_loop.loop import SIGNALS
 from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import coefficient_unit, joint_types_of
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import Value, read_only
 
 
 @final

@@ -9,16 +9,16 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.codegen.parameters import CONTROLLER, Part, joined, parameters, rows, split
-from robot_dyn.coefficients import with_values
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.threshold import smooth
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import LockStep, lock_step
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_CUT
-from robot_dyn.threshold import smooth
 
 
 @final

@@ -13,7 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.values import cached
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, rules_of, runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.occurrence import Occurrence
@@ -25,7 +26,6 @@ from robot_dyn.simulation.run.recording import Path, Recording, Records, records
 from robot_dyn.simulation.run.watch import DivergedError, Watch
 from robot_dyn.simulation.setup.segment_table import SegmentTable
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import cached
 
 _PAUSE_S = 0.1  # between looks at the keyboard
 

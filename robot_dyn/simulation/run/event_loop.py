@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.bernstein import NONE
 from robot_dyn.integrate.primitives import between, copy
 from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step, shortened

@@ -12,7 +12,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError, is_mistake
+from robot_dyn.foundations.errors import RobotDynError, is_mistake
+from robot_dyn.foundations.values import cached, copied
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.bernstein import room
@@ -39,7 +40,6 @@ from robot_dyn.simulation.setup.schedule import nodes
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import samples as most_samples
-from robot_dyn.values import cached, copied
 
 _SAMPLES = 1000  # of a run without a record period
 _GROWS = "y grows without bound, or tolerances are too tight"

@@ -13,8 +13,8 @@ from typing import cast, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import FLOAT64, Array
-from robot_dyn.errors import RobotDynError, is_mistake
+from robot_dyn.foundations.arithmetic import FLOAT64, Array
+from robot_dyn.foundations.errors import RobotDynError, is_mistake
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now
 from robot_dyn.simulation.events.payload_events import PayloadEvents

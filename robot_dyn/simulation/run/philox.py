@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 
 _WORD = np.uint64
 _ROUNDS = 10

@@ -10,7 +10,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy, evaluate
 from robot_dyn.simulation.dynamics.loop_state import Functions, Now, Rules, Runs, erase_ended
 from robot_dyn.simulation.events.occurrence import Occurrence

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import in_mode
 from robot_dyn.effects.set_valued import Mode
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.primitives import evaluate
 from robot_dyn.simulation.dynamics.bodies import bodies

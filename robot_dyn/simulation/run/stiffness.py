@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.adaptive import EXPLICIT, STIFF
 from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest
 from robot_dyn.simulation.dynamics.state_equation import StateEquation

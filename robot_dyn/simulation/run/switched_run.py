@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.convex import not_found
-from robot_dyn.errors import NotFiniteError, OverflowedError, RobotDynError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.convex import not_found
+from robot_dyn.foundations.errors import NotFiniteError, OverflowedError, RobotDynError
+from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.integrate.step_control import At
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now
 from robot_dyn.simulation.events.crossings import Switches
@@ -26,7 +27,6 @@ from robot_dyn.simulation.run.driver import Driver
 from robot_dyn.simulation.run.outcome import Accumulation
 from robot_dyn.simulation.run.watch import DivergedError
 from robot_dyn.simulation.setup.setup import STEP_S
-from robot_dyn.threshold import Threshold
 
 
 class SwitchedRun(Driver):

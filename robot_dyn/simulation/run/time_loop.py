@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import below, copy, evaluate, sizes
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, Runs, Why, erase_ended
 from robot_dyn.simulation.observation.observation import Observation, observe, observe_actuation, observe_motion

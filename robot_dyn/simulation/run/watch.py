@@ -7,14 +7,14 @@ from typing import TypeVar, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
-from robot_dyn.errors import RobotDynError, is_mistake
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import RobotDynError, is_mistake
+from robot_dyn.foundations.values import cached
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.simulation.dynamics.fastest_motion import fastest
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import cached
 
 LARGEST = 1e100  # limit on Σ |y|; products of larger numbers overflow
 _PACED = 2000  # steps between checks of the pace of an adaptive method

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
-from robot_dyn.errors import ControlError, EffectError, OverflowedError, QueryError, call, shown
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.errors import ControlError, EffectError, OverflowedError, QueryError, call, shown
+from robot_dyn.foundations.validate import Kind, float64, number
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.setup.size import MOST_CUT
-from robot_dyn.validate import Kind, float64, number
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup.setup import Setup

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from inspect import signature
 from typing import Any, final
 
-from robot_dyn.errors import QueryError, shown
-from robot_dyn.validate import instance, truth
+from robot_dyn.foundations.errors import QueryError, shown
+from robot_dyn.foundations.validate import instance, truth
 
 _DIRECTIONS = (-1, 0, 1)
 

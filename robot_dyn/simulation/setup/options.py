@@ -12,10 +12,10 @@ from inspect import signature
 from typing import Any, TypedDict
 
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError, nearest
+from robot_dyn.foundations.errors import QueryError, nearest
+from robot_dyn.foundations.signatures import takes
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.signatures import takes
 from robot_dyn.simulation.setup.setup import Setup, no_step
 
 

@@ -15,7 +15,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 
 LEAST_STEPS = 3  # on a segment: fewer leave no room for a longer step
 ULPS = 4  # times that differ by no more units in the last place are one

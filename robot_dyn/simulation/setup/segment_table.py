@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.values import cached
 from robot_dyn.simulation.setup.schedule import paced
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.values import cached
 
 _MOST_CACHED = 1000  # segments: to compute more of them takes little of the time of their run, to cache them memory
 BOUNDS = 2  # numbers of p before the reference: time is held between them, so that switches act as between them

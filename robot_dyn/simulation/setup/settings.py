@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.coefficients import declared
 from robot_dyn.control.reference import PiecewisePolynomial, Reference
 from robot_dyn.description.edits import Payload
+from robot_dyn.foundations.coefficients import declared
 from robot_dyn.queries.units import coefficient_unit
 from robot_dyn.simulation.setup.explanation import pace
 

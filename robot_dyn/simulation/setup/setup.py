@@ -9,11 +9,13 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array, Ball
 from robot_dyn.control.control_law import ControlLaw
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError, shown
+from robot_dyn.foundations.arithmetic import Array, Ball
+from robot_dyn.foundations.errors import QueryError, shown
+from robot_dyn.foundations.validate import choice, duration, instance, integer, one_state, truth
+from robot_dyn.foundations.values import Caching, Value
 from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.simulation.dynamics.declarations import is_value, undeclared
@@ -23,8 +25,6 @@ from robot_dyn.simulation.setup.event import Event
 from robot_dyn.simulation.setup.explanation import explanation_of
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
 from robot_dyn.simulation.setup.size import MOST_CUT, check_segments
-from robot_dyn.validate import choice, duration, instance, integer, one_state, truth
-from robot_dyn.values import Caching, Value
 
 ENGINES = ("auto", "interpreted", "compiled")
 STEP_S = 1e-3  # of a method of fixed step, unless given

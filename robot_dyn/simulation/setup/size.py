@@ -9,8 +9,8 @@ from math import inf, ulp
 from sys import float_info
 from typing import TYPE_CHECKING
 
-from robot_dyn.errors import QueryError
-from robot_dyn.validate import LEAST_EXACT
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.validate import LEAST_EXACT
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup.setup import Setup

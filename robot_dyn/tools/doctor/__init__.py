@@ -1,9 +1,16 @@
 """The doctor of URDF files: what is wrong or doubtful in one, and what can be repaired.
 
-check, report                     the whole check; findings as text
+    check    the findings of a file, and its repairs (Checkup)
+
+checkup, report                   the whole check; findings as text
 document, finding                 the file; findings and changes
 spelling, literals, names         findings in the text
 limits, axes, proportions         findings in its joints and lengths
 masses, gravity_load              findings in the numbers of the robot
 shapes, estimate                  the same against the shapes of links
+command                           the command `check`
 """
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]

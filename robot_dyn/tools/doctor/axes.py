@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from robot_dyn.studies.doctor.document import Document
-from robot_dyn.studies.doctor.finding import Finding, Severity
+from robot_dyn.tools.doctor.document import Document
+from robot_dyn.tools.doctor.finding import Finding, Severity
 
 
 def missing_axes(document: Document) -> Iterator[Finding]:

@@ -9,14 +9,15 @@ from typing import final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.answer import Answer, Block
 from robot_dyn.description import catalog, description
 from robot_dyn.description.packages import searched
-from robot_dyn.errors import DescriptionError
+from robot_dyn.foundations.answer import Answer, Block
+from robot_dyn.foundations.errors import DescriptionError
+from robot_dyn.foundations.result import UNREPORTED, reported
+from robot_dyn.foundations.validate import truth
 from robot_dyn.model.robot import Robot
-from robot_dyn.result import UNREPORTED, reported
 from robot_dyn.shapes.masses import Masses
-from robot_dyn.studies.doctor import (
+from robot_dyn.tools.doctor import (
     axes,
     gravity_load,
     limits,
@@ -28,10 +29,9 @@ from robot_dyn.studies.doctor import (
     shapes,
     spelling,
 )  # fmt: skip
-from robot_dyn.studies.doctor.document import Document
-from robot_dyn.studies.doctor.estimate import missing_inertials
-from robot_dyn.studies.doctor.finding import Finding, Severity
-from robot_dyn.validate import truth
+from robot_dyn.tools.doctor.document import Document
+from robot_dyn.tools.doctor.estimate import missing_inertials
+from robot_dyn.tools.doctor.finding import Finding, Severity
 
 _OF_TEXT = (
     spelling.misspelt, literals.decimal_commas, literals.line_breaks, literals.angles_in_degrees,
@@ -80,7 +80,7 @@ class Checkup(Answer):
         yield from (f"  {report.sentence(each)}" for each in report.grouped(self.findings))
 
     def _repr_html_(self) -> str:
-        from robot_dyn.display import page, table
+        from robot_dyn.foundations.display import page, table
 
         rows = ((x.severity.value, x.where, x.line, x.what, x.remedy) for x in self.findings)
         return page(self.sentence, table(("", "where", "line", "what", "remedy"), rows) if self.findings else "")

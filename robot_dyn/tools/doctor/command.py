@@ -14,12 +14,12 @@ from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import Force, Json, PackageDir, Xacro, app, progress
 from robot_dyn.cli.terminal import say, say_json, to_stderr
 from robot_dyn.description.packages import package_folders
-from robot_dyn.errors import QueryError, RobotDynError
-from robot_dyn.files import Kind, save
+from robot_dyn.foundations.errors import QueryError, RobotDynError
+from robot_dyn.foundations.files import Kind, save
 
 if TYPE_CHECKING:
-    from robot_dyn.studies.doctor.check import Checkup
-    from robot_dyn.studies.doctor.finding import Finding
+    from robot_dyn.tools.doctor.checkup import Checkup
+    from robot_dyn.tools.doctor.finding import Finding
 
 _URDF = Kind("a URDF", ".urdf", b"<?xml")
 
@@ -28,7 +28,7 @@ class RepairError(RobotDynError):
     """A repaired file that cannot be written."""
 
 
-@app.command()
+@app.command(rich_help_panel="Files", short_help="Check URDF files, and repair what can be repaired.")
 def check(
     files: Annotated[
         list[str],
@@ -59,8 +59,8 @@ def check(
     as_json: Json = False,
 ) -> None:
     """Check URDF files: inertias, units, limits, names, shapes; exit code 1 if errors are left."""
-    from robot_dyn.result import plain
-    from robot_dyn.studies.doctor.finding import Severity
+    from robot_dyn.foundations.result import plain
+    from robot_dyn.tools.doctor.finding import Severity
 
     estimated = {"--mass": mass or None, "--total-mass": total_mass, "--density": density}
     for option, value in (estimated | {"--units": units or None}).items():
@@ -72,7 +72,7 @@ def check(
     masses = arguments.assignments("--mass", mass, "link") if mass else None
     expansion = None if xacro is None else arguments.expansion(xacro)
     checkups = [
-        rd.check(
+        rd.tools.doctor.check(
             file,
             package_dirs=package_dir or (),
             mass=masses,
@@ -109,7 +109,7 @@ def _target(file: str, force: bool) -> Path:
 
 def _lines(file: str, checkup: Checkup, written: str | None, every: bool) -> Iterator[str]:
     """A file, its findings, and what was written."""
-    from robot_dyn.studies.doctor.report import counted, grouped, sentence
+    from robot_dyn.tools.doctor.report import counted, grouped, sentence
 
     yield checkup.sentence.replace(checkup.source, file, 1)
     for group in grouped(checkup.findings):

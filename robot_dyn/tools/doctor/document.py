@@ -11,8 +11,8 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.description.markup import parse
 from robot_dyn.description.urdf import other_format
-from robot_dyn.errors import DescriptionError
-from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+from robot_dyn.foundations.errors import DescriptionError
+from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 
 _NOT_IN_M = ("limit", "dynamics", "calibration", "safety_controller")
 

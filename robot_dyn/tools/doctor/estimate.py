@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 from robot_dyn.description.description import Description
 from robot_dyn.shapes.estimate import Estimate, estimates, shapes_of_lacking
 from robot_dyn.shapes.masses import Masses
-from robot_dyn.studies.doctor.document import Document
-from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.document import Document
+from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 
 if TYPE_CHECKING:
-    from robot_dyn.studies.doctor.shapes import Shape
+    from robot_dyn.tools.doctor.shapes import Shape
 
 
 def missing_inertials(

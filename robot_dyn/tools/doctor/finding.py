@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, final
 
-from robot_dyn.errors import shorten
-from robot_dyn.result import UNREPORTED
+from robot_dyn.foundations.errors import shorten
+from robot_dyn.foundations.result import UNREPORTED
 
 
 class Severity(Enum):

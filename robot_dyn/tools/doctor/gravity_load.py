@@ -12,8 +12,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from robot_dyn.model.robot import Robot
-from robot_dyn.studies.doctor.document import Document
-from robot_dyn.studies.doctor.finding import Finding, Severity
+from robot_dyn.tools.doctor.document import Document
+from robot_dyn.tools.doctor.finding import Finding, Severity
 
 _CAUSES = {"mass_density", "inertia_small", "mass_ratio", "com_outside", "origin_far", "length_long"}
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import Any
 
-from robot_dyn.studies.doctor.document import Document, parsed
-from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.document import Document, parsed
+from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 
 _UNITS = {"effort": "N m or N", "velocity": "rad/s or m/s"}
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from math import degrees, isfinite, pi
 from typing import Any
 
-from robot_dyn.studies.doctor.document import Document, parsed
-from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.document import Document, parsed
+from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 
 NUMBERS = {
     "origin": ("xyz", "rpy"), "mass": ("value",), "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),

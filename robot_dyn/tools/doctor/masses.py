@@ -15,8 +15,8 @@ from robot_dyn.description.inertia import implausibility
 from robot_dyn.description.structure import Structure, structure
 from robot_dyn.model import findings as doctor
 from robot_dyn.model.robot import Robot
-from robot_dyn.studies.doctor.document import Document
-from robot_dyn.studies.doctor.finding import Finding, Severity
+from robot_dyn.tools.doctor.document import Document
+from robot_dyn.tools.doctor.finding import Finding, Severity
 
 _QUOTED = r"""(?:'[^']*'|"[^"]*")"""  # a name, which may hold colons and semicolons
 _SENTENCE = re.compile(rf"((?:link|joint)s? {_QUOTED}(?:, {_QUOTED})*)(?:: | )(.*?); (.*)", re.DOTALL)

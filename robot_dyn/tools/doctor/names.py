@@ -6,8 +6,8 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 
-from robot_dyn.studies.doctor.document import Document
-from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.document import Document
+from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 
 _EXPRESSION = re.compile(r"\$[{(][^})]*[})]")
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.description.structure import BEYOND, GIMBAL, SEVERAL, TOOL
-from robot_dyn.studies.doctor.document import Document, parsed
-from robot_dyn.studies.doctor.finding import Finding, Severity
+from robot_dyn.tools.doctor.document import Document, parsed
+from robot_dyn.tools.doctor.finding import Finding, Severity
 
 _FAR = 100.0
 _MOVING = ("revolute", "continuous", "prismatic")

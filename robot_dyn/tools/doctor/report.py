@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from robot_dyn.studies.doctor.finding import Finding, Severity
+from robot_dyn.tools.doctor.finding import Finding, Severity
 
 _PLACES = 3
 

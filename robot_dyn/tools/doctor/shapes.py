@@ -18,9 +18,9 @@ import numpy as np
 from robot_dyn.description.inertia import MassProperties, combined
 from robot_dyn.description.structure import StatedLink, structure
 from robot_dyn.model.robot import Robot
-from robot_dyn.studies.doctor.document import Document
-from robot_dyn.studies.doctor.finding import Change, Finding, Severity
-from robot_dyn.studies.doctor.literals import NUMBERS
+from robot_dyn.tools.doctor.document import Document
+from robot_dyn.tools.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.literals import NUMBERS
 from robot_dyn.view.geometry.visuals import Piece, solids
 
 _SLACK = 1.1  # of a shape's extent: collision shapes leave out screws

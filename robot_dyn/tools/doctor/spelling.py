@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 from typing import Any
 
-from robot_dyn.studies.doctor.document import Document
-from robot_dyn.studies.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.document import Document
+from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 
 _SHAPES = {"box": {"size"}, "cylinder": {"radius", "length"}, "sphere": {"radius"}, "mesh": {"filename", "scale"}}
 CHILDREN: dict[str, set[str]] = {  # of URDF, and what ROS, Gazebo and Drake add

@@ -11,16 +11,16 @@ from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.app import Csv, Dark, Force, Json, Plot, app, bar
 from robot_dyn.cli.outcome import give, outputs
 from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.results.trajectory import Trajectory
-    from robot_dyn.studies.motor_budget.result import MotorBudget
+    from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 
 _RUNS = ".toml", ".npz"
 
 
-@app.command()
+@app.command(rich_help_panel="Ask for its dynamics", short_help="Say whether motors suffice for a motion, and why.")
 @takes_robot
 def budget(
     what: Annotated[
@@ -89,14 +89,14 @@ def budget(
     With --fastest it is 1 if one is too small for the given motion or for the fastest one.
     Torque and speed peaks, rms torque, power, energy, and the torque at which dry friction breaks away.
     """
-    from robot_dyn.studies.motor_budget.result import MotorBudget
+    from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 
     paths = outputs(MotorBudget, output, csv, [each for each in (what, plan, limits) if each], force)
     if share is not None and not fastest:
         raise QueryError("--share is of the fastest motion: add --fastest, or leave it out")
     if time is not None and period is not None:
         raise QueryError("--time and --period both give the times: leave one of them out")
-    motors = None if limits is None else rd.plan.read_motors(limits)
+    motors = None if limits is None else rd.tools.motors.read_motors(limits)
     of_robots = {
         "PLAN.csv": plan, "--payload": payload, "--effects": effects, "--max-payload": max_payload,
         "--fastest": fastest, "--unit": unit, "--period": period, "--time": time, "--joint": joint,
@@ -106,16 +106,16 @@ def budget(
     if what.lower().endswith(_RUNS):
         if given := [name for name, value in of_robots.items() if value]:
             raise QueryError(f"{given[0]}: is for a robot with a plan; a scene or a run has its own, so leave it out")
-        found = rd.budget(_run(what), motors=motors)
+        found = rd.tools.motors.budget(_run(what), motors=motors)
     else:
         if plan is None:
             raise QueryError(f"{what}: give its motion as well, a CSV file with a column t [s] and one for each joint")
         robot = options.load(what)
         times = time if period is None else period
-        motion = rd.plan.from_samples(robot, plan, time=times, joints=_columns(joint), unit=unit, ends=ends)
+        motion = rd.control.from_samples(robot, plan, time=times, joints=_columns(joint), unit=unit, ends=ends)
         bodies = [arguments.payload(each) for each in payload or ()] or None
         with bar(what="asking for the torque"):
-            found = rd.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)
+            found = rd.tools.motors.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)
     more = _more(found, max_payload, fastest, 1.0 if share is None else share)
     judged = [found, more["fastest"].budget] if fastest else [found]
     give(found, paths, as_json, dark, judged[-1], **more)

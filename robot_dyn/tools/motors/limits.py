@@ -8,12 +8,12 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.coefficients import check_coefficients, coefficient, declared
 from robot_dyn.effects.actuator import EffortLimit
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import EffectError, PlanError
-from robot_dyn.plan.motors import Motors
-from robot_dyn.validate import instance
+from robot_dyn.foundations.coefficients import check_coefficients, coefficient, declared
+from robot_dyn.foundations.errors import EffectError, PlanError
+from robot_dyn.foundations.validate import instance
+from robot_dyn.tools.motors.motors_file import Motors
 
 _SAME_ROTOR = 0.01  # difference of inertias, in their size
 
@@ -57,7 +57,7 @@ def limits_of(plant: Plant, motors: Motors | None, effort: Any, velocity: Any, a
     """
     robot: Any = plant.dynamics
     if motors is not None:
-        instance("motors", motors, Motors, "read them with rd.plan.read_motors(path)", error=PlanError)
+        instance("motors", motors, Motors, "read them with rd.tools.motors.read_motors(path)", error=PlanError)
         _check_rotors(motors, robot)
         effort = motors.peak if effort is None else effort
         velocity = (motors.speed or None) if velocity is None else velocity

@@ -18,8 +18,8 @@ from math import inf, pi
 from pathlib import Path
 from typing import Any, final
 
-from robot_dyn.errors import PlanError, nearest, shorten
-from robot_dyn.files import read
+from robot_dyn.foundations.errors import PlanError, nearest, shorten
+from robot_dyn.foundations.files import read
 
 _MOST_BYTES = 2**20
 _HEAD = re.compile(r"\s*([a-z_ ]+?)\s*(?:\[(.*?)\])?\s*")

@@ -11,7 +11,7 @@ from robot_dyn.cli.app import Json, Scene, app, bar
 from robot_dyn.cli.terminal import say, say_json
 
 
-@app.command()
+@app.command(rich_help_panel="Trust it", short_help="Prove where the arm of a scene will be.")
 def prove(
     scene: Scene,
     until: Annotated[
@@ -24,7 +24,7 @@ def prove(
     """Prove where the arm of a scene will be: balls that hold q and v; exit code 1 if not up to the end."""
     setup = rd.read_scene(scene)
     with bar(setup.duration_s if until is None else until, "proving") as advance:
-        proof = rd.studies.prove(setup, until, bits, budget_s=budget, on_progress=advance)
+        proof = rd.tools.proof.prove(setup, until, bits, budget_s=budget, on_progress=advance)
     say_json(proof) if as_json else say(proof)
     if not proof.proven:
         raise typer.Exit(1)

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from robot_dyn.arithmetic import Ball
-from robot_dyn.errors import QueryError, shown
+from robot_dyn.foundations.arithmetic import Ball
+from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.proof.enclosure.balls import upper
-from robot_dyn.studies.proof.enclosure.lohner import box
-from robot_dyn.studies.proof.enclosure.step import State
-from robot_dyn.studies.proof.motion import Motion
+from robot_dyn.tools.proof.enclosure.balls import upper
+from robot_dyn.tools.proof.enclosure.lohner import box
+from robot_dyn.tools.proof.enclosure.step import State
+from robot_dyn.tools.proof.motion import Motion
 
 
 def start(names: tuple[str, ...], given: tuple[Any, Any], widths: tuple[float, float]) -> State:

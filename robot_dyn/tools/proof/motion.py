@@ -12,10 +12,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.arithmetic import Array
 from robot_dyn.codegen.trace.base_parameters import regrouped
 from robot_dyn.codegen.trace.origins import slid
-from robot_dyn.coefficients import with_values
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.independent_joint import PD
@@ -24,13 +22,15 @@ from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.spring import Spring
-from robot_dyn.errors import ProofError
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.errors import ProofError
 from robot_dyn.lagrange.linkage import Linkage, linkage
 from robot_dyn.lagrange.recursions.newton_euler import newton_euler
 from robot_dyn.lagrange.tree import tree
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.proof.term import Literals
+from robot_dyn.tools.proof.term import Literals
 
 _EFFECTS = (ViscousFriction, RegularisedCoulombFriction, Spring)
 _CONTROLLERS = (PD, ComputedTorque, PDGravity, FeedForward)

@@ -8,9 +8,9 @@ from typing import Any, final
 
 from flint import arb, ctx
 
-from robot_dyn.studies.proof.enclosure.balls import Ball, horner
-from robot_dyn.studies.proof.enclosure.polynomial import derivatives
-from robot_dyn.studies.proof.enclosure.step import State, Step
+from robot_dyn.tools.proof.enclosure.balls import Ball, horner
+from robot_dyn.tools.proof.enclosure.polynomial import derivatives
+from robot_dyn.tools.proof.enclosure.step import State, Step
 
 Packed = tuple[int, int, int, int]
 

@@ -10,17 +10,17 @@ from typing import Any
 
 from flint import ctx
 
-from robot_dyn.arithmetic import Ball
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.arithmetic import Ball
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.validate import duration, function, instance, integer, number
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.proof.enclosure.balls import NotProvenError
-from robot_dyn.studies.proof.enclosure.step import State, effort, proven_step
-from robot_dyn.studies.proof.hypotheses import assumed, start
-from robot_dyn.studies.proof.motion import Motion, motion
-from robot_dyn.studies.proof.node import Node, node_of
-from robot_dyn.studies.proof.tape import Tape
-from robot_dyn.studies.proof.theorem import Proof
-from robot_dyn.validate import duration, function, instance, integer, number
+from robot_dyn.tools.proof.enclosure.balls import NotProvenError
+from robot_dyn.tools.proof.enclosure.step import State, effort, proven_step
+from robot_dyn.tools.proof.hypotheses import assumed, start
+from robot_dyn.tools.proof.motion import Motion, motion
+from robot_dyn.tools.proof.node import Node, node_of
+from robot_dyn.tools.proof.tape import Tape
+from robot_dyn.tools.proof.theorem import Proof
 
 _LEAST_BITS, _MOST_BITS = 40, 4096
 _LONGEST_S = 4096.0  # so that times are exact

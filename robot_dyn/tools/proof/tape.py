@@ -16,10 +16,10 @@ from flint import arb, ctx
 
 from robot_dyn.codegen.program import Kind, Program
 from robot_dyn.codegen.trace.from_casadi import program_of
-from robot_dyn.errors import ProofError
+from robot_dyn.foundations.errors import ProofError
 from robot_dyn.lagrange.recursions.composite_body import composite_body
-from robot_dyn.studies.proof.motion import Bodies, Motion
-from robot_dyn.studies.proof.term import Literals, expressions
+from robot_dyn.tools.proof.motion import Bodies, Motion
+from robot_dyn.tools.proof.term import Literals, expressions
 
 
 @final

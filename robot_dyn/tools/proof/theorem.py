@@ -10,15 +10,15 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
-from robot_dyn.arithmetic import Array, Ball
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.arithmetic import Array, Ball
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.result import UNREPORTED, reported
+from robot_dyn.foundations.validate import number, numbers
+from robot_dyn.foundations.values import Value
 from robot_dyn.queries.units import units
-from robot_dyn.result import UNREPORTED, reported
-from robot_dyn.studies.proof.hypotheses import numbers_of
-from robot_dyn.studies.proof.node import Node, Packed, on_the_way, unpacked
-from robot_dyn.validate import number, numbers
-from robot_dyn.values import Value
+from robot_dyn.tools.proof.hypotheses import numbers_of
+from robot_dyn.tools.proof.node import Node, Packed, on_the_way, unpacked
 
 TRUSTED = (
     "the ball arithmetic of Arb (python-flint)",
@@ -30,7 +30,7 @@ TRUSTED = (
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Proof(Answer, Value):
-    """A theorem about the flow, of the numbers that a file and a setup state; `rd.studies.prove` makes it.
+    """A theorem about the flow, of the numbers that a file and a setup state; `rd.tools.proof.prove` makes it.
 
     Attributes:
         robot: Name of the arm.
@@ -182,7 +182,7 @@ class Proof(Answer, Value):
 
     @property
     def drawing(self) -> str:
-        from robot_dyn.display import plot
+        from robot_dyn.foundations.display import plot
 
         t, radius = self.radii
         if self.steps < 2:

@@ -1,10 +1,17 @@
 """Stress tests: worst configurations, limits that runs confirm, and runs judged against better ones.
 
-stress, result, finding  the study, its result, and what it is made of
+    stress   what breaks first on an arm (Stress)
+
+search, result, finding  the search, its result, and what it is made of
 work, shrink             pieces of work within a time; states of few digits
 worst, lost_digits       worst configurations; digits lost at the worst states
 steps, gains, loads      limits of step, gain, speed and payload
 confirm                  runs on both sides of a limit
 scenes, runs             random scenes, and their runs judged
 text                     what it says
+command                  the command `stress`
 """
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -14,7 +14,7 @@ from robot_dyn.cli.outcome import give
 from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 
 
-@app.command()
+@app.command(rich_help_panel="Trust it", short_help="Look for what breaks first on an arm.")
 @takes_robot
 def stress(
     robot: Name,
@@ -36,14 +36,14 @@ def stress(
 
     Ctrl-C ends it and keeps what was found.
     """
-    from robot_dyn.studies.figure import ResultError
-    from robot_dyn.studies.save import JSON
+    from robot_dyn.report.figure import ResultError
+    from robot_dyn.report.save import JSON
 
     inputs = [robot] if os.path.isfile(robot) else []
     paths = [arguments.output(output, JSON, ResultError, inputs, force)] if output else []
     arm = options.load(robot)
     with bar(budget, "starting") as spent:
-        result = rd.studies.stress(arm, samples=samples, runs=runs, seed=seed, budget_s=budget, on_progress=spent)
+        result = rd.tools.stress.stress(arm, samples=samples, runs=runs, seed=seed, budget_s=budget, on_progress=spent)
     give(result, paths, as_json)
     if not result.ok:
         raise typer.Exit(1)

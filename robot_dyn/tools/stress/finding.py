@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import final
 
-from robot_dyn.result import UNREPORTED, reported
+from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.simulation.setup.setup import Setup
 
 

@@ -11,25 +11,25 @@ from __future__ import annotations
 
 import numpy as np
 
+from robot_dyn.accuracy.certificate.implementation import evaluate
+from robot_dyn.accuracy.certificate.worst_case_search import Batch
 from robot_dyn.control.computed_torque import PDGravity
 from robot_dyn.control.reference import hold
 from robot_dyn.description.edits import Payload
 from robot_dyn.effects.actuator import EffortLimit
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import CORIOLIS_TORQUE, N
+from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.observation.remarks import Kind
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
-from robot_dyn.studies.certificate.implementation import evaluate
-from robot_dyn.studies.certificate.worst_case_search import Batch
-from robot_dyn.studies.stress_test.confirm import BEYOND, WITHIN
-from robot_dyn.studies.stress_test.finding import Limit
-from robot_dyn.studies.stress_test.work import Work
-from robot_dyn.studies.stress_test.worst import Gains, State, listed, worst
-from robot_dyn.studies.time_budget import Budget
+from robot_dyn.tools.stress.confirm import BEYOND, WITHIN
+from robot_dyn.tools.stress.finding import Limit
+from robot_dyn.tools.stress.work import Work
+from robot_dyn.tools.stress.worst import Gains, State, listed, worst
 
 _LOOKS = 50  # states at which the tip is looked for
 _HOLD_S = 0.05  # of a run that holds a payload

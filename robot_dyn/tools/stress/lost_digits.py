@@ -10,17 +10,17 @@ from math import log10
 
 import numpy as np
 
+from robot_dyn.accuracy.certificate.certificate import Held
+from robot_dyn.accuracy.certificate.digit_count import DigitCount
+from robot_dyn.accuracy.certificate.implementation import Implementation, implementations
+from robot_dyn.accuracy.certificate.worst_case_search import Batch
 from robot_dyn.lagrange.digits import digits_of
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, Quantity
-from robot_dyn.studies.certificate.certificate import Held
-from robot_dyn.studies.certificate.digit_count import DigitCount
-from robot_dyn.studies.certificate.implementation import Implementation, implementations
-from robot_dyn.studies.certificate.worst_case_search import Batch
-from robot_dyn.studies.stress_test.finding import WorstCase
-from robot_dyn.studies.stress_test.work import Work
-from robot_dyn.studies.stress_test.worst import KEPT, listed, shrunk_state
-from robot_dyn.studies.time_budget import Budget
+from robot_dyn.report.time_budget import Budget
+from robot_dyn.tools.stress.finding import WorstCase
+from robot_dyn.tools.stress.work import Work
+from robot_dyn.tools.stress.worst import KEPT, listed, shrunk_state
 
 _OF_FLOAT64 = -log10(2.0**-53)
 _ROUNDS, _MOST_TRIES = 3, 60

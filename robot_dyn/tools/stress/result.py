@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import final
 
-from robot_dyn.answer import Block
-from robot_dyn.result import reported
-from robot_dyn.studies.result import Result
-from robot_dyn.studies.stress_test.finding import JudgedRun, Limit, WorstCase
-from robot_dyn.studies.stress_test.text import stress_tables
+from robot_dyn.foundations.answer import Block
+from robot_dyn.foundations.result import reported
+from robot_dyn.report.result import Result
+from robot_dyn.tools.stress.finding import JudgedRun, Limit, WorstCase
+from robot_dyn.tools.stress.text import stress_tables
 
 
 @final
@@ -48,7 +48,7 @@ class Stress(Result):
 
     @property
     def drawing(self) -> str:
-        from robot_dyn.display import levels
+        from robot_dyn.foundations.display import levels
 
         steps = {f"{each.what} {each.joint}": each.value for each in self.limits if each.of == "step"}
         return levels("largest step that is stable [s]", steps, inf)

@@ -11,20 +11,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError
+from robot_dyn.accuracy.certificate.worst_case_search import Batch
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
+from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
-from robot_dyn.studies.certificate.worst_case_search import Batch
-from robot_dyn.studies.stress_test.confirm import LEAST, says
-from robot_dyn.studies.stress_test.finding import JudgedRun
-from robot_dyn.studies.stress_test.scenes import scenes
-from robot_dyn.studies.stress_test.shrink import shrunk
-from robot_dyn.studies.stress_test.work import Work
-from robot_dyn.studies.time_budget import Budget
+from robot_dyn.tools.stress.confirm import LEAST, says
+from robot_dyn.tools.stress.finding import JudgedRun
+from robot_dyn.tools.stress.scenes import scenes
+from robot_dyn.tools.stress.shrink import shrunk
+from robot_dyn.tools.stress.work import Work
 
 _BETTER = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-11, 1e-13))
 _ROUNDING = 1e-12  # of 1 + |q|: below it neither can tell

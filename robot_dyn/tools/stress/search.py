@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.accuracy.certificate.worst_case_search import random_states
+from robot_dyn.foundations.validate import function, instance, integer, number
 from robot_dyn.model.robot import Robot
-from robot_dyn.studies.certificate.worst_case_search import random_states
-from robot_dyn.studies.environment import environment
-from robot_dyn.studies.stress_test.finding import JudgedRun, Limit, WorstCase
-from robot_dyn.studies.stress_test.gains import gain_limit
-from robot_dyn.studies.stress_test.loads import payload_limit, speed_limit
-from robot_dyn.studies.stress_test.lost_digits import lost_digits
-from robot_dyn.studies.stress_test.result import Stress
-from robot_dyn.studies.stress_test.runs import judged_runs
-from robot_dyn.studies.stress_test.steps import held, step_limits
-from robot_dyn.studies.stress_test.work import Work
-from robot_dyn.studies.stress_test.worst import BY_PD, HELD, pd_gains, worst_configurations
-from robot_dyn.studies.time_budget import Budget
-from robot_dyn.validate import function, instance, integer, number
+from robot_dyn.report.environment import environment
+from robot_dyn.report.time_budget import Budget
+from robot_dyn.tools.stress.finding import JudgedRun, Limit, WorstCase
+from robot_dyn.tools.stress.gains import gain_limit
+from robot_dyn.tools.stress.loads import payload_limit, speed_limit
+from robot_dyn.tools.stress.lost_digits import lost_digits
+from robot_dyn.tools.stress.result import Stress
+from robot_dyn.tools.stress.runs import judged_runs
+from robot_dyn.tools.stress.steps import held, step_limits
+from robot_dyn.tools.stress.work import Work
+from robot_dyn.tools.stress.worst import BY_PD, HELD, pd_gains, worst_configurations
 
 _LEAST_SAMPLES, _MOST_SAMPLES, _MOST_RUNS = 100, 10**6, 10**5
 

@@ -12,24 +12,24 @@ from math import isfinite
 
 import numpy as np
 
+from robot_dyn.accuracy.advice import Advice, advice_about, at_rest
 from robot_dyn.control.computed_torque import PDGravity
 from robot_dyn.control.reference import hold
 from robot_dyn.effects.friction import ViscousFriction
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.gauss import Gauss
 from robot_dyn.integrate.implicit import SinglyDiagonallyImplicit
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.model.robot import Robot
+from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.dynamics.fastest_motion import jacobian
 from robot_dyn.simulation.dynamics.stability import step_map
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.advice import Advice, advice_about, at_rest
-from robot_dyn.studies.stress_test.confirm import BEYOND, WITHIN, pushed, run_from_near
-from robot_dyn.studies.stress_test.finding import Limit
-from robot_dyn.studies.stress_test.work import Work
-from robot_dyn.studies.time_budget import Budget
+from robot_dyn.tools.stress.confirm import BEYOND, WITHIN, pushed, run_from_near
+from robot_dyn.tools.stress.finding import Limit
+from robot_dyn.tools.stress.work import Work
 
 _TIMES = 400.0  # of the run, 1/|λ| of the fastest motion
 _STEPS = 10  # of a method whose stages are iterated

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from robot_dyn.answer import Block, Table
-from robot_dyn.studies.stress_test.finding import JudgedRun, Limit, WorstCase
+from robot_dyn.foundations.answer import Block, Table
+from robot_dyn.tools.stress.finding import JudgedRun, Limit, WorstCase
 
 if TYPE_CHECKING:
-    from robot_dyn.studies.stress_test.result import Stress
+    from robot_dyn.tools.stress.result import Stress
 
 
 def stress_tables(result: Stress) -> Iterator[Block]:

@@ -9,18 +9,18 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from robot_dyn.accuracy.certificate.implementation import evaluate
+from robot_dyn.accuracy.certificate.worst_case_search import Batch, Search
 from robot_dyn.control.independent_joint import gains_from
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import OverflowedError
+from robot_dyn.foundations.errors import OverflowedError
 from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import M, N
-from robot_dyn.studies.certificate.implementation import evaluate
-from robot_dyn.studies.certificate.worst_case_search import Batch, Search
-from robot_dyn.studies.stress_test.finding import WorstCase
-from robot_dyn.studies.stress_test.shrink import shrunk
-from robot_dyn.studies.stress_test.work import Work
-from robot_dyn.studies.time_budget import Budget
+from robot_dyn.report.time_budget import Budget
+from robot_dyn.tools.stress.finding import WorstCase
+from robot_dyn.tools.stress.shrink import shrunk
+from robot_dyn.tools.stress.work import Work
 
 FASTEST = "fastest motion"
 HELD = ("steps", "gain")  # limits that are looked for where the motion is fastest under a PD

@@ -1,21 +1,21 @@
 # The public names of this room and where they live: type checkers read this file, and __init__.py does.
-from robot_dyn.errors import SweepError as SweepError
-from robot_dyn.sweeps.distributions.by_name import choice as choice
-from robot_dyn.sweeps.distributions.by_name import lognormal as lognormal
-from robot_dyn.sweeps.distributions.by_name import normal as normal
-from robot_dyn.sweeps.distributions.by_name import triangular as triangular
-from robot_dyn.sweeps.distributions.by_name import uniform as uniform
-from robot_dyn.sweeps.estimate import Estimate as Estimate
-from robot_dyn.sweeps.plan.figures import final as final
-from robot_dyn.sweeps.plan.figures import peak as peak
-from robot_dyn.sweeps.plan.figures import rms_error as rms_error
-from robot_dyn.sweeps.plan.from_scene import from_scene as from_scene
-from robot_dyn.sweeps.plan.runs import Run as Run
-from robot_dyn.sweeps.plan.samples import samples as samples
-from robot_dyn.sweeps.plan.sweep import Sweep as Sweep
-from robot_dyn.sweeps.result import SweepResult as SweepResult
-from robot_dyn.sweeps.run_sweep import read as read
-from robot_dyn.sweeps.run_sweep import run as run
-from robot_dyn.sweeps.sensitivity import Sensitivity as Sensitivity
+from robot_dyn.foundations.errors import SweepError as SweepError
+from robot_dyn.tools.sweeps.distributions.by_name import choice as choice
+from robot_dyn.tools.sweeps.distributions.by_name import lognormal as lognormal
+from robot_dyn.tools.sweeps.distributions.by_name import normal as normal
+from robot_dyn.tools.sweeps.distributions.by_name import triangular as triangular
+from robot_dyn.tools.sweeps.distributions.by_name import uniform as uniform
+from robot_dyn.tools.sweeps.estimate import Estimate as Estimate
+from robot_dyn.tools.sweeps.plan.figures import final as final
+from robot_dyn.tools.sweeps.plan.figures import peak as peak
+from robot_dyn.tools.sweeps.plan.figures import rms_error as rms_error
+from robot_dyn.tools.sweeps.plan.from_scene import from_scene as from_scene
+from robot_dyn.tools.sweeps.plan.runs import Run as Run
+from robot_dyn.tools.sweeps.plan.samples import samples as samples
+from robot_dyn.tools.sweeps.plan.sweep import Sweep as Sweep
+from robot_dyn.tools.sweeps.result import SweepResult as SweepResult
+from robot_dyn.tools.sweeps.run_sweep import read as read
+from robot_dyn.tools.sweeps.run_sweep import run as run
+from robot_dyn.tools.sweeps.sensitivity import Sensitivity as Sensitivity
 
 __all__: list[str]

@@ -10,16 +10,16 @@ import typer
 
 from robot_dyn.cli.app import Json, app, bar
 from robot_dyn.cli.terminal import say, say_json, to_stderr
-from robot_dyn.errors import SweepError, nearest
+from robot_dyn.foundations.errors import SweepError, nearest
 
 if TYPE_CHECKING:
-    from robot_dyn.sweeps.plan.sweep import Sweep
-    from robot_dyn.sweeps.result import SweepResult
+    from robot_dyn.tools.sweeps.plan.sweep import Sweep
+    from robot_dyn.tools.sweeps.result import SweepResult
 
 ACTIONS = ("run", "status", "verify", "report", "export")
 
 
-@app.command()
+@app.command(rich_help_panel="Run it", short_help="Run a scene many times, with what varies, into a folder.")
 def sweep(
     what: Annotated[
         str, typer.Argument(metavar="SCENE.toml|ACTION", help=f"A scene to sweep; or {', '.join(ACTIONS)} of a FOLDER.")
@@ -62,7 +62,7 @@ def sweep(
     Ctrl-C drops the chunks under way, and the folder keeps the others. `sweep run FOLDER` resumes it, `status` says
     what is left, `verify` reads all files, `report` writes a page, `export` a table as .csv or .parquet.
     """
-    from robot_dyn import sweeps as sw
+    from robot_dyn.tools import sweeps as sw
 
     verified: list[str] = []
     options: dict[str, Any] = {"threads": threads, "cluster": cluster, "share": share}
@@ -100,8 +100,8 @@ def sweep(
 
 def _stated(scene: str, given: dict[str, Any], vary: list[str], figure: list[str]) -> Sweep:
     """The sweep of a scene and of options, which take the place of what its table states."""
-    from robot_dyn import sweeps as sw
-    from robot_dyn.sweeps.plan.texts import assignment, distribution_of, figure_of, samples_of_text
+    from robot_dyn.tools import sweeps as sw
+    from robot_dyn.tools.sweeps.plan.texts import assignment, distribution_of, figure_of, samples_of_text
 
     varies = [assignment("--vary", each) for each in vary]
     figures = [assignment("--figure", each) for each in figure]
@@ -118,7 +118,7 @@ def _stated(scene: str, given: dict[str, Any], vary: list[str], figure: list[str
 
 def _run(stated: Sweep, folder: str, options: dict[str, Any]) -> SweepResult:
     """Fill the folder, with a bar of the time left."""
-    from robot_dyn import sweeps as sw
+    from robot_dyn.tools import sweeps as sw
 
     to_stderr(f"{stated.runs} runs, {stated.bytes_expected / 2**20:.3g} MiB on disk")
     began, first = perf_counter(), [-1]

@@ -8,8 +8,8 @@ from hashlib import sha256
 
 import numpy as np
 
-from robot_dyn.sweeps.folder.folder import Folder
-from robot_dyn.sweeps.folder.rows import FINISHED
+from robot_dyn.tools.sweeps.folder.folder import Folder
+from robot_dyn.tools.sweeps.folder.rows import FINISHED
 
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from robot_dyn.errors import SweepError, nearest
-from robot_dyn.sweeps.expression import Expression, Truth
-from robot_dyn.sweeps.folder.folder import Folder
-from robot_dyn.sweeps.folder.rows import FINISHED
-from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep
+from robot_dyn.foundations.errors import SweepError, nearest
+from robot_dyn.tools.sweeps.expression import Expression, Truth
+from robot_dyn.tools.sweeps.folder.folder import Folder
+from robot_dyn.tools.sweeps.folder.rows import FINISHED
+from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, Sweep
 
 
 def happened(sweep: Sweep, folder: Folder, text: str) -> Truth:

@@ -10,13 +10,13 @@ from typing import BinaryIO
 
 import numpy as np
 
-from robot_dyn.errors import SweepError
-from robot_dyn.extras import needs
-from robot_dyn.files import Kind, save, target
-from robot_dyn.sweeps.folder.folder import Folder, read_all
-from robot_dyn.sweeps.folder.rows import TEXTS
-from robot_dyn.sweeps.plan.specification import specification
-from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep, heading
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations.extras import needs
+from robot_dyn.foundations.files import Kind, save, target
+from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
+from robot_dyn.tools.sweeps.folder.rows import TEXTS
+from robot_dyn.tools.sweeps.plan.specification import specification
+from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, Sweep, heading
 
 _CSV, _PARQUET = Kind("a table", ".csv"), Kind("a table", ".parquet", b"PAR1")
 

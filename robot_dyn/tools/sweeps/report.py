@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.answer import html_of
-from robot_dyn.display import page, side_by_side, table, text
-from robot_dyn.errors import SweepError
-from robot_dyn.files import Kind, save, target
-from robot_dyn.studies.figure import PAGE, ink, inline, styled
-from robot_dyn.sweeps.plan.sweep import OUTCOMES, heading
+from robot_dyn.foundations.answer import html_of
+from robot_dyn.foundations.display import page, side_by_side, table, text
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations.files import Kind, save, target
+from robot_dyn.report.figure import PAGE, ink, inline, styled
+from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading
 
 if TYPE_CHECKING:
-    from robot_dyn.sweeps.result import SweepResult
+    from robot_dyn.tools.sweeps.result import SweepResult
 
 _KIND = Kind("a page", ".html", b"<!doctype html>")
 _BINS, _CELLS, _MOST_CROSSES = 60, 24, 500

@@ -9,24 +9,24 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block
-from robot_dyn.errors import SweepError, nearest
+from robot_dyn.foundations.answer import Answer, Block
+from robot_dyn.foundations.errors import SweepError, nearest
+from robot_dyn.foundations.result import UNREPORTED, reported
+from robot_dyn.foundations.validate import choice, integer
 from robot_dyn.queries.units import joint_types_of
-from robot_dyn.result import UNREPORTED, reported
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.sweeps import counts
-from robot_dyn.sweeps.event import happened
-from robot_dyn.sweeps.folder.folder import Folder, read_all
-from robot_dyn.sweeps.folder.rows import FINISHED, TEXTS, digest_of
-from robot_dyn.sweeps.plan.specification import specification
-from robot_dyn.sweeps.plan.sweep import OUTCOMES, Sweep, heading
-from robot_dyn.sweeps.plan.work import Work
-from robot_dyn.validate import choice, integer
+from robot_dyn.tools.sweeps import counts
+from robot_dyn.tools.sweeps.event import happened
+from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
+from robot_dyn.tools.sweeps.folder.rows import FINISHED, TEXTS, digest_of
+from robot_dyn.tools.sweeps.plan.specification import specification
+from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, Sweep, heading
+from robot_dyn.tools.sweeps.plan.work import Work
 
 if TYPE_CHECKING:
-    from robot_dyn.sweeps.estimate import Estimate
-    from robot_dyn.sweeps.sensitivity import Sensitivity
+    from robot_dyn.tools.sweeps.estimate import Estimate
+    from robot_dyn.tools.sweeps.sensitivity import Sensitivity
 
 _SHOWN = 5  # reasons, and worst runs
 
@@ -81,7 +81,7 @@ class SweepResult(Answer):
             probabilities: Of the quantiles, each in (0, 1).
             level: Of the intervals.
         """
-        from robot_dyn.sweeps import statistics
+        from robot_dyn.tools.sweeps import statistics
 
         found = statistics.quantiles(self._figure(figure), probabilities, level, self._replicate)
         return tuple(self._named(each, figure) for each in found)
@@ -98,7 +98,7 @@ class SweepResult(Answer):
         Raises:
             SweepError: If the event is unknown in a run, of which there is no figure.
         """
-        from robot_dyn.sweeps import statistics
+        from robot_dyn.tools.sweeps import statistics
 
         self._check_complete()
         truth, replicate = happened(self.sweep, self.folder, event), self._replicate
@@ -118,13 +118,13 @@ class SweepResult(Answer):
 
     def mean(self, figure: str, level: float = 0.95, given: str | None = None) -> Estimate:
         """Mean of a figure with its interval, of all runs; `given` "finished" or "known" as of `probability`."""
-        from robot_dyn.sweeps import statistics
+        from robot_dyn.tools.sweeps import statistics
 
         return self._named(statistics.mean(self._values(figure, given), level, self._replicate, given=given), figure)
 
     def sensitivity(self, figure: str, level: float = 0.95, given: str | None = None) -> Sensitivity:
         """Which of what varies matters: first and total Sobol' indices of design "saltelli", else of given data."""
-        from robot_dyn.sweeps import sensitivity
+        from robot_dyn.tools.sweeps import sensitivity
 
         y, names, design = self._values(figure, given), self.sweep.dimensions, self.sweep.rows
         if isinstance(self.sweep.design, str) and self.sweep.design == "saltelli":
@@ -141,7 +141,7 @@ class SweepResult(Answer):
         it is "known".
         """
         count = integer("count", count, least=1, most=self.sweep.runs, error=SweepError)
-        from robot_dyn.sweeps.statistics import checked_given
+        from robot_dyn.tools.sweeps.statistics import checked_given
 
         x = self._figure(figure)
         keep = np.isfinite(x) if checked_given(given) == "known" else self._given(given)
@@ -167,7 +167,7 @@ class SweepResult(Answer):
         Raises:
             SweepError: If it cannot be written.
         """
-        from robot_dyn.sweeps.export import export
+        from robot_dyn.tools.sweeps.export import export
 
         self._check_complete()
         return export(self.sweep, self.folder, path)
@@ -178,7 +178,7 @@ class SweepResult(Answer):
         Raises:
             SweepError: If it cannot be written.
         """
-        from robot_dyn.sweeps.report import save_report
+        from robot_dyn.tools.sweeps.report import save_report
 
         return save_report(self, path)
 

@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.codegen.threads import thread_count
-from robot_dyn.errors import SceneError, SweepError, shown
-from robot_dyn.files import file_path
-from robot_dyn.sweeps.engines.share import share as share_of
-from robot_dyn.sweeps.engines.threads import Threads
-from robot_dyn.sweeps.folder.chunk_file import Columns
-from robot_dyn.sweeps.folder.folder import Folder, begin, folder_of, has_specification, read_specification
-from robot_dyn.sweeps.plan.pilot import pilot
-from robot_dyn.sweeps.plan.specification import Specification, processor, specification, sweep_of, versions
-from robot_dyn.sweeps.plan.sweep import Sweep
-from robot_dyn.sweeps.plan.work import Work
-from robot_dyn.sweeps.result import SweepResult
-from robot_dyn.validate import integer
+from robot_dyn.foundations.errors import SceneError, SweepError, shown
+from robot_dyn.foundations.files import file_path
+from robot_dyn.foundations.validate import integer
+from robot_dyn.tools.sweeps.engines.share import share as share_of
+from robot_dyn.tools.sweeps.engines.threads import Threads
+from robot_dyn.tools.sweeps.folder.chunk_file import Columns
+from robot_dyn.tools.sweeps.folder.folder import Folder, begin, folder_of, has_specification, read_specification
+from robot_dyn.tools.sweeps.plan.pilot import pilot
+from robot_dyn.tools.sweeps.plan.specification import Specification, processor, specification, sweep_of, versions
+from robot_dyn.tools.sweeps.plan.sweep import Sweep
+from robot_dyn.tools.sweeps.plan.work import Work
+from robot_dyn.tools.sweeps.result import SweepResult
 
 Progress = Callable[[int, int], object]
 _SCAN_S = 1.0  # between looks into the folder
@@ -76,7 +76,7 @@ def run(
 
     with suppress(KeyboardInterrupt):
         if cluster is not None:
-            from robot_dyn.sweeps.engines.cluster import Cluster, client_of
+            from robot_dyn.tools.sweeps.engines.cluster import Cluster, client_of
 
             with client_of(cluster) as client:
                 Cluster(client, known).run(missing, tell)

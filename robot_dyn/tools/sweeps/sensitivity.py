@@ -16,12 +16,12 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps.estimate import Estimate, text
-from robot_dyn.sweeps.replicates import Groups, groups_of, jackknife
-from robot_dyn.sweeps.statistics import check_figure, check_finished, check_level
-from robot_dyn.validate import numbers
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations.validate import numbers
+from robot_dyn.tools.sweeps.estimate import Estimate, text
+from robot_dyn.tools.sweeps.replicates import Groups, groups_of, jackknife
+from robot_dyn.tools.sweeps.statistics import check_figure, check_finished, check_level
 
 _RANDOM_GROUPS = 16
 _RUNS_OF_A_BIN, _MOST_BINS = 64, 32

@@ -17,16 +17,16 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.errors import SweepError, shown
-from robot_dyn.sweeps.estimate import Estimate
-from robot_dyn.sweeps.replicates import (
+from robot_dyn.foundations.errors import SweepError, shown
+from robot_dyn.foundations.validate import float64, integer, number, numbers
+from robot_dyn.tools.sweeps.estimate import Estimate
+from robot_dyn.tools.sweeps.replicates import (
     Groups,
     groups_of,
     half_width_of_mean,
     half_width_of_share,
     student,
 )
-from robot_dyn.validate import float64, integer, number, numbers
 
 FEW = 5
 """Events below which intervals of probabilities are said to be conservative."""

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from robot_dyn.foundations.validate import choice
 from robot_dyn.shapes.triangles import Mesh, welded
-from robot_dyn.validate import choice
 from robot_dyn.view.geometry.visuals import Drawing, drawing
 
 CELLS = 32  # of the longest side of a mesh

@@ -15,9 +15,9 @@ from numpy import ndarray
 
 from robot_dyn.description.inertia import implausibility
 from robot_dyn.description.structure import structure
+from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.model.robot import Robot
 from robot_dyn.shapes.triangles import Mesh
-from robot_dyn.spatial import homogeneous
 from robot_dyn.view.geometry.shapes import box, ellipsoid
 
 _THIN = 1e-3  # of the longest edge: what an edge of length 0 is drawn with

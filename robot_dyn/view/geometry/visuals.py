@@ -16,6 +16,7 @@ import numpy as np
 from numpy import ndarray
 
 from robot_dyn.description.markup import parse
+from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.model.findings import estimated_links
 from robot_dyn.model.robot import Robot
 from robot_dyn.shapes import elements, mesh_files, meshes
@@ -23,7 +24,6 @@ from robot_dyn.shapes.addresses import find_file, shown
 from robot_dyn.shapes.mesh_files import MeshError
 from robot_dyn.shapes.meshes import WHITE, Part, Rgba
 from robot_dyn.shapes.triangles import Mesh
-from robot_dyn.spatial import homogeneous
 from robot_dyn.view.geometry.inertia_boxes import inertia_boxes, inertia_ellipsoid, off_centre
 from robot_dyn.view.geometry.shapes import PRIMITIVES
 

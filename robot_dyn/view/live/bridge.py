@@ -18,7 +18,7 @@ import umsgpack
 import zmq
 import zmq.asyncio
 
-from robot_dyn.errors import shorten
+from robot_dyn.foundations.errors import shorten
 from robot_dyn.view.commands import Command, as_message
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import QueryError, nearest, shown
+from robot_dyn.foundations.errors import QueryError, nearest, shown
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import tracking_of

@@ -12,7 +12,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.trajectory import Trajectory

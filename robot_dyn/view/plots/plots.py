@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from robot_dyn import files
 from robot_dyn.description import description
-from robot_dyn.errors import DescriptionError, QueryError
+from robot_dyn.foundations import files
+from robot_dyn.foundations.errors import DescriptionError, QueryError
+from robot_dyn.foundations.validate import choice, instance, number, shaped
 from robot_dyn.simulation.observation.remarks import lines
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.validate import choice, instance, number, shaped
 from robot_dyn.view.plots.batch import BATCH_PLOTS, BatchView
 from robot_dyn.view.plots.figure import PAPER, THEMES, Style
 from robot_dyn.view.plots.parts import PLOTS, PlotError, View

@@ -20,8 +20,8 @@ from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import Any, final
 
-from robot_dyn.errors import VideoError, shorten
-from robot_dyn.files import why
+from robot_dyn.foundations.errors import VideoError, shorten
+from robot_dyn.foundations.files import why
 
 _PATIENCE_S = 120.0  # for an answer; a machine with a slow disk takes tens of seconds to start a browser
 _END_S = 5.0  # for the browser to end when it is asked to

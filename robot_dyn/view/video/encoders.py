@@ -10,9 +10,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.errors import VideoError
-from robot_dyn.extras import needs
-from robot_dyn.files import why
+from robot_dyn.foundations.errors import VideoError
+from robot_dyn.foundations.extras import needs
+from robot_dyn.foundations.files import why
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -12,7 +12,7 @@ from time import monotonic, sleep
 
 import numpy as np
 
-from robot_dyn.errors import VideoError
+from robot_dyn.foundations.errors import VideoError
 from robot_dyn.view.video.browser import Browser
 
 _ROUNDING = 1e-9  # of a frame: T fps is a whole number up to this

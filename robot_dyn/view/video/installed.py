@@ -7,8 +7,8 @@ import shutil
 import sys
 from pathlib import Path
 
-from robot_dyn.errors import VideoError
-from robot_dyn.files import file_path
+from robot_dyn.foundations.errors import VideoError
+from robot_dyn.foundations.files import file_path
 
 _NAMES = (
     "google-chrome", "google-chrome-stable", "chromium", "chromium-browser", "chrome", "microsoft-edge",

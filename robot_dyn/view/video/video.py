@@ -9,9 +9,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from robot_dyn.errors import VideoError
-from robot_dyn.files import Kind, save, target
-from robot_dyn.validate import function, integer, truth
+from robot_dyn.foundations.errors import VideoError
+from robot_dyn.foundations.files import Kind, save, target
+from robot_dyn.foundations.validate import function, integer, truth
 from robot_dyn.view.video import encoders
 from robot_dyn.view.video.browser import browser
 from robot_dyn.view.video.frames import frame_times, frames, load

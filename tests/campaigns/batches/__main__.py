@@ -1,4 +1,4 @@
-"""`python -m tests.batches --scenes 300 --seed 1`: compare batches with single runs; exit code 1 if one differs."""
+"""`python -m tests.campaigns.batches --scenes 300 --seed 1`: compare batches with single runs; exit code 1 if not."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections import Counter
 
-from tests.batches.judge import judge
+from tests.campaigns.batches.judge import judge
 
 
 def main() -> int:

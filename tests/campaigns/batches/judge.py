@@ -16,7 +16,7 @@ import robot_dyn as rd
 from robot_dyn.codegen.parameters import with_parameters
 from robot_dyn.simulation.diagnostics.step_remarks import KINDS
 from robot_dyn.simulation.observation.remarks import Kind, Remark
-from tests.batches.scenes import Batch, batch
+from tests.campaigns.batches.scenes import Batch, batch
 
 UNITS = 8  # of rounding, by which a start is pushed
 MOST = 100.0  # some thousand steps round, in two engines that sum in other orders, where a push is one rounding

@@ -1,4 +1,4 @@
-"""`python -m tests.estimates --scenes 600 --seed 1`: judge error estimates; exit code 1 if one misleads.
+"""`python -m tests.campaigns.estimates --scenes 600 --seed 1`: judge error estimates; exit code 1 if one misleads.
 
 Or if the order is said to be seen, and the estimate is not 0.3 to 10 of the error, in more than one of a hundred runs.
 
@@ -15,10 +15,10 @@ from concurrent.futures import ProcessPoolExecutor
 from statistics import fmean
 
 from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError
-from tests.estimates.asked import Answer, answer
-from tests.estimates.held import FAMILIES, meet
-from tests.estimates.judge import FAR, LEAST, MOST, judge
-from tests.estimates.switching import scene_of_all
+from tests.campaigns.estimates.asked import Answer, answer
+from tests.campaigns.estimates.held import FAMILIES, meet
+from tests.campaigns.estimates.judge import FAR, LEAST, MOST, judge
+from tests.campaigns.estimates.switching import scene_of_all
 
 
 def one(task: tuple[int, int]) -> dict:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.coefficients import with_values
-from tests.estimates.scenes import arms
+from robot_dyn.foundations.coefficients import with_values
+from tests.campaigns.estimates.scenes import arms
 
 METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8")
 _FAR, _LEAST = 30.0, 1e-4  # times as far from the motion as with half the length, and [rad] or [m] more: blown up

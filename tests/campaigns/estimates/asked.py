@@ -8,8 +8,8 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError
-from tests.estimates.scenes import Scene, arms, scene
-from tests.estimates.truth import truth
+from tests.campaigns.estimates.scenes import Scene, arms, scene
+from tests.campaigns.estimates.truth import truth
 
 FAMILIES = ("smooth", "impact", "friction", "sampled", "stiff")
 _OF = {"smooth": 0, "friction": 2, "impact": 3, "sampled": 4, "stiff": 0}  # places among the families of `scene`

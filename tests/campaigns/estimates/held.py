@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 import robot_dyn as rd
-from tests.estimates.asked import Answer
-from tests.estimates.nonsmooth import nonsmooth_truth, time_of_event
-from tests.estimates.scenes import Scene, arms
+from tests.campaigns.estimates.asked import Answer
+from tests.campaigns.estimates.nonsmooth import nonsmooth_truth, time_of_event
+from tests.campaigns.estimates.scenes import Scene, arms
 
 FAMILIES = ("rigid", "dry")
 EVENTS = 150  # of a scene, at most

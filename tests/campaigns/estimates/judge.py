@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import robot_dyn as rd
-from tests.estimates.scenes import Scene, scene
-from tests.estimates.truth import truth
+from tests.campaigns.estimates.scenes import Scene, scene
+from tests.campaigns.estimates.truth import truth
 
 LEAST = 0.3  # an estimate below this part of the true error misleads
 MOST = 3.0  # an estimate beyond this multiple of it is of little use

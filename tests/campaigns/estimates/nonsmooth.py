@@ -22,7 +22,7 @@ from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
 import robot_dyn as rd
-from tests.estimates.truth import _control, _force
+from tests.campaigns.estimates.truth import _control, _force
 
 _LOOKS = np.linspace(0, 1, 9)[1:]  # of a step: where guards are looked at
 _AT_STOP, _STILL, _RESTS = 4e-15, 1e-11, 1e-7  # [rad], [rad/s]; and [s] that bounces still to come may take

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 import robot_dyn as rd
-from tests.estimates.scenes import METHODS, Scene, arms, scene
+from tests.campaigns.estimates.scenes import METHODS, Scene, arms, scene
 
 FAMILIES = ("bristles", "stops")
 _OF_ALL = 8  # scenes, the last two of which are of these families

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.foreign.files import ARM, XACRO, Foreign, arm, inside
+from tests.campaigns.foreign.files import ARM, XACRO, Foreign, arm, inside
 
 LEFT = ("left out", "expand")
 MACRO = '<xacro:macro name="leg" params="side"><link name="leg"/><joint name="hip" type="floating"/></xacro:macro>'

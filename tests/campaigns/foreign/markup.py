@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 
-from tests.foreign.files import ARM, Foreign, inside
+from tests.campaigns.foreign.files import ARM, Foreign, inside
 
 V1 = '<?xml version="1.0"?>'
 LATE = (("<?xml …?> does not stand first", "remove what is before"),)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.foreign.files import ARM, Foreign, arm, inside
+from tests.campaigns.foreign.files import ARM, Foreign, arm, inside
 from tests.hostile.kinds import BODY, LIMIT, MOMENTS, PARENT, POINT, joint
 
 SAFETY = '<safety_controller k_velocity="-1" soft_lower_limit="nan"/>'

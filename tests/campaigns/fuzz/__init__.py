@@ -2,5 +2,5 @@
 
 A fuzzer module has `seeds(folder)`, which makes whole inputs, `mutate(rng, seed)`, which damages one, and
 `attempt(mutant, folder)`, which gives it to the library: it returns what came of it ("accepted" or "refused"), and
-whatever else it raises is a finding. By hand: python -m tests.fuzz run_files --cases 20000 --seed 1
+whatever else it raises is a finding. By hand: python -m tests.campaigns.fuzz run_files --cases 20000 --seed 1
 """

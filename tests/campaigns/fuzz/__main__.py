@@ -1,4 +1,4 @@
-"""A campaign by hand: python -m tests.fuzz run_files --cases 20000 --seed 1."""
+"""A campaign by hand: python -m tests.campaigns.fuzz run_files --cases 20000 --seed 1."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tests.fuzz.campaign import FUZZERS, limit_memory, run
+from tests.campaigns.fuzz.campaign import FUZZERS, limit_memory, run
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("fuzzer", choices=FUZZERS)

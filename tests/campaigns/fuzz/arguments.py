@@ -13,7 +13,7 @@ from unittest import mock
 import numpy as np
 
 from robot_dyn.scene.starters import starter
-from tests.fuzz.bytes import WORDS
+from tests.campaigns.fuzz.bytes import WORDS
 
 CODES = (0, 1, 2)
 LINES = (

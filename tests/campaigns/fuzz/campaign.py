@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError, RobotDynWarning
+from robot_dyn.foundations.errors import RobotDynError, RobotDynWarning
 
 FUZZERS = ("urdf", "run_files", "scenes", "arguments", "queries", "cache")
 CASES = int(os.environ.get("ROBOT_DYN_FUZZ_CASES", "60"))  # of each of six fuzzers in the suite
@@ -30,7 +30,7 @@ class HangError(BaseException):
 
 def run(name: str, cases: int, seed: int, folder: Path, limit_s: int = 30) -> tuple[Counter[str], list[str]]:
     """How many cases were accepted and refused, and a text for each that did neither."""
-    fuzzer = importlib.import_module(f"tests.fuzz.{name}")
+    fuzzer = importlib.import_module(f"tests.campaigns.fuzz.{name}")
     seeds = fuzzer.seeds(folder)
     counts, findings = Counter[str](), list[str]()
     for case in range(cases):

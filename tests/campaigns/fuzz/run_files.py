@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.errors import RobotDynError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.scene.starters import starter
 from robot_dyn.simulation.export.export import export
 from robot_dyn.simulation.results import archive
 from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.view.document import document
 from robot_dyn.view.plots.plots import PLOTS, PlotError, _view
-from tests.fuzz.bytes import WORDS, damage
+from tests.campaigns.fuzz.bytes import WORDS, damage
 
 ODD = [None, True, -1, 0.5, 10**400, float("nan"), "", "x", "\ud800", "\x1b[31m", [], {}, [[]], {"a": 1}]
 HEADERS = [b"(0,)", b"(-1,)", b"(10**9,)", b"(99999999999999999,)", b"(", b"'<f9'", b"'|O'", b"'<f4'", b"True", b"\0"]

@@ -8,7 +8,7 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn.scene.starters import starter, starters
-from tests.fuzz.bytes import damage, damage_text
+from tests.campaigns.fuzz.bytes import damage, damage_text
 
 # Parts that no starter has; `double_pendulum` is left out of none, so that every kind meets a small robot too.
 MORE = """robot = "cart_pole"

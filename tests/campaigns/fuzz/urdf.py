@@ -12,11 +12,11 @@ import numpy as np
 from lxml import etree
 
 import robot_dyn as rd
-from robot_dyn.errors import OverflowedError, SingularError
-from robot_dyn.studies.doctor.literals import NUMBERS as NUMBERS_OF
+from robot_dyn.foundations.errors import OverflowedError, SingularError
+from robot_dyn.tools.doctor.literals import NUMBERS as NUMBERS_OF
 from robot_dyn.view.geometry.visuals import drawing
 from tests.broken_files import SOUND
-from tests.fuzz.bytes import damage, damage_text
+from tests.campaigns.fuzz.bytes import damage, damage_text
 
 TEXTBOOK = Path(__file__).parents[2] / "urdf"
 NUMBERS = ["0", "-1", "1e-320", "1e13", "nan", "inf", "1e-30", "3", "", "0 0", "1 2 3", "٣", "0x10", "1_0", "9" * 400]
@@ -91,7 +91,7 @@ def _change(rng: np.random.Generator, root: etree._Element) -> None:
 def attempt(mutant: bytes, folder: Path) -> str:
     path = folder / "mutant.urdf"
     path.write_bytes(mutant)
-    rd.check(path)
+    rd.tools.doctor.check(path)
     robot = rd.load(str(path))
     if len(mutant) % 4 == 0:
         drawing(robot, inertia=True)

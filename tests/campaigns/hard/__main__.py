@@ -1,4 +1,4 @@
-"""`python -m tests.hard --seed 20261122 --write`: run all hard cases, and write the report to build/hard_cases.
+"""`python -m tests.campaigns.hard --seed 20261122 --write`: run all hard cases; the report is in build/hard_cases.
 
 Exit code 1 if a figure is wrong without a word. With --family and --case, only those are run, and the report keeps the
 others as they were; without --full, the short cases.
@@ -15,10 +15,10 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from time import process_time
 
-from robot_dyn.errors import ModelWarning
-from tests.hard.case import Row
-from tests.hard.families import FAMILIES
-from tests.hard.report import Result, summarise, write
+from robot_dyn.foundations.errors import ModelWarning
+from tests.campaigns.hard.case import Row
+from tests.campaigns.hard.families import FAMILIES
+from tests.campaigns.hard.report import Result, summarise, write
 
 BUILD = Path(__file__).parents[2] / "build" / "hard_cases"
 

@@ -1,7 +1,7 @@
 """Chains that cost digits: long, stretched, of masses and lengths far apart, of axes that coincide, far from the base.
 
-Each is the text of a URDF whose decimals are exact, so that balls of them are the truth. `python -m tests.hard.chains`
-writes them into urdf/hard.
+Each is the text of a URDF whose decimals are exact, so that balls of them are the truth.
+`python -m tests.campaigns.hard.chains` writes them into urdf/hard.
 """
 
 from __future__ import annotations

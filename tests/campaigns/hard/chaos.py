@@ -26,8 +26,8 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
-from tests.hard import double_pendulum
-from tests.hard.case import Case, Row
+from tests.campaigns.hard import double_pendulum
+from tests.campaigns.hard.case import Case, Row
 
 TITLE = "Chaos"
 PERIOD = 0.01  # [s] between samples

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.arithmetic import midpoint, radius
-from robot_dyn.errors import DescriptionError, PrecisionWarning, SingularError
+from robot_dyn.foundations.arithmetic import midpoint, radius
+from robot_dyn.foundations.errors import DescriptionError, PrecisionWarning, SingularError
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import (
     acceleration_norm,
@@ -31,8 +31,8 @@ from robot_dyn.lagrange.scale import (
     unit_diagonal_condition,
 )
 from robot_dyn.queries.quantity import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
-from tests.hard.case import Case, Row
-from tests.hard.chains import CHAINS, FOLDER, LONG, file_of
+from tests.campaigns.hard.case import Case, Row
+from tests.campaigns.hard.chains import CHAINS, FOLDER, LONG, file_of
 
 TITLE = "Conditioning"
 U = 2.0**-53
@@ -76,7 +76,7 @@ def errors(
     robot: rd.Robot, engines: dict[str, Any], at: list[dict[str, np.ndarray]], queries: tuple[Quantity, ...] = QUERIES
 ) -> Iterator[Error]:
     """Of each implementation and quantity at each state; of forward dynamics where an engine has it."""
-    own, truth = rd.Lagrangian(robot), rd.Lagrangian(robot, rd.studies.Ball(BITS))
+    own, truth = rd.Lagrangian(robot), rd.Lagrangian(robot, rd.accuracy.Ball(BITS))
     for state in at:
         size, absolute = magnitudes(own.linkage, state["q"]), {key: np.abs(x) for key, x in state.items()}
         exact = {each.name: each.ask(truth, state) for each in QUERIES}

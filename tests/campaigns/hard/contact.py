@@ -5,11 +5,10 @@
 The truth shares no line with the library's runs: SciPy's DOP853 near rounding over Pinocchio, cut at every switch; of
 dry friction and rigid stops in modes that are found by trying all combinations. It is run twice, with other tolerances
 and steps: below their distance, and below 1e-12 of the motion, nothing is judged. An estimate may be 0.3 of the error,
-as stated in tests/estimates. A set-valued scene ends at its event number 150, if there are as many: bounces that kick
-each other off their stops go on by thousands; or where two joints come to rest and friction of rest, above that of
-sliding, leaves it open which of them goes on: the law has several solutions there; or at 20 events within 1e-6 s, where
-the truth cannot follow. The residual of the convex problems
-is on the scale of the terms added, where a Cholesky solution of n ≤ 7 joints leaves 3e-15; that of time stepping is
+as stated in tests/campaigns/estimates. A set-valued scene ends at its event number 150, if there are as many: bounces
+that kick each other off their stops go on by thousands; or where two joints come to rest and friction of rest, above
+that of sliding, leaves it open which of them goes on: the law has several solutions there; or at 20 events
+within 1e-6 s, where the truth cannot follow. The residual of the convex problems is on the scale of the terms added, where a Cholesky solution of n ≤ 7 joints leaves 3e-15; that of time stepping is
 asked again from outside, with M and loads by Pinocchio alone. The kinetic energy behind an impact is at most that
 before it, but for 4 n u |v|ᵀ|M||v|: n + 3 roundings of each product. The energy that nothing accounts for is at most
 1e-3 of that exchanged, or the summary says it. In time stepping stops add none at all, but for the rounding of 400
@@ -28,14 +27,14 @@ from unittest.mock import patch
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.convex import active_set, residual
 from robot_dyn.effects import settling
-from tests.estimates.held import cut, held_scene
-from tests.estimates.judge import LEAST, Judgement, judged
-from tests.estimates.nonsmooth import Bodies, nonsmooth_truth
-from tests.estimates.scenes import Scene, scene
-from tests.estimates.truth import truth
-from tests.hard.case import Case, Row
+from robot_dyn.foundations.convex import active_set, residual
+from tests.campaigns.estimates.held import cut, held_scene
+from tests.campaigns.estimates.judge import LEAST, Judgement, judged
+from tests.campaigns.estimates.nonsmooth import Bodies, nonsmooth_truth
+from tests.campaigns.estimates.scenes import Scene, scene
+from tests.campaigns.estimates.truth import truth
+from tests.campaigns.hard.case import Case, Row
 
 TITLE = "Friction, stops, impacts"
 U = 2.0**-53

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from tests.hard import (
+from tests.campaigns.hard import (
     chaos,
     conditioning,
     contact,
@@ -18,7 +18,7 @@ from tests.hard import (
     tools,
     world,
 )
-from tests.hard.case import Family
+from tests.campaigns.hard.case import Family
 
 _ALL = (
     conditioning, far_out, long_runs, stiffness, contact, singularity, sampled_control, chaos, tools, world, peers,

@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.arithmetic import midpoint
 from robot_dyn.codegen.trace.right_angles import completed
-from robot_dyn.errors import NotFiniteError, RobotDynError
+from robot_dyn.foundations.arithmetic import midpoint
+from robot_dyn.foundations.errors import NotFiniteError, RobotDynError
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import diagonal_scale, floored, scaled
 from robot_dyn.queries.quantity import INVERSE_DYNAMICS, M, N, Quantity
-from tests.hard.case import Case, Row
-from tests.hard.conditioning import SUMS, U
+from tests.campaigns.hard.case import Case, Row
+from tests.campaigns.hard.conditioning import SUMS, U
 
 TITLE = "Range"
 BITS = 1400  # 1e160² beside 1e-160
@@ -45,7 +45,7 @@ def loaded(name: str) -> rd.Robot:
 def implementations(robot: rd.Robot) -> Implementations:
     """Of a robot whose right angles are written out in full."""
     engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}
-    return Implementations(robot, engines, rd.Lagrangian(robot, rd.studies.Ball(BITS)))
+    return Implementations(robot, engines, rd.Lagrangian(robot, rd.accuracy.Ball(BITS)))
 
 
 def error(of: Implementations, implementation: str, quantity: Quantity, state: dict[str, np.ndarray]) -> float:

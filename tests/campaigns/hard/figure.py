@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from robot_dyn.studies.figure import styled
+from robot_dyn.report.figure import styled
 from robot_dyn.view.plots.figure import THEMES
-from tests.hard.case import Row
+from tests.campaigns.hard.case import Row
 
 LEAST, MOST = 1e-6, 1e3  # what lies beyond is drawn at the edge
 COLOURS = THEMES["light"]

@@ -25,7 +25,7 @@ from functools import cache, partial
 import numpy as np
 
 import robot_dyn as rd
-from tests.hard.case import Case, Row
+from tests.campaigns.hard.case import Case, Row
 
 TITLE = "Long runs"
 U, STARTS, SAMPLES = 2.0**-53, 16, 200

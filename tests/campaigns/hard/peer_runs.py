@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.studies.work_precision_diagram.peers.arm_motion import PeerError
-from tests.hard.case import OURS, Case, Row
-from tests.hard.chains import planar, text
-from tests.hard.other_engines import Drake, MuJoCo, PyBullet, installed
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError
+from tests.campaigns.hard.case import OURS, Case, Row
+from tests.campaigns.hard.chains import planar, text
+from tests.campaigns.hard.other_engines import Drake, MuJoCo, PyBullet, installed
 
 TITLE = "The peers: runs"
 LEAST = 0.3  # part of the true error that an estimate has to be

@@ -17,18 +17,18 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.errors import RobotDynError
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError
+from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, M
-from robot_dyn.studies.work_precision_diagram.peers.arm_motion import PeerError
-from tests.hard.case import OURS, Case, Row
-from tests.hard.chains import CHAINS, LONG
-from tests.hard.conditioning import SOLVED, SUMS, errors, states
-from tests.hard.other_engines import installed
+from tests.campaigns.hard.case import OURS, Case, Row
+from tests.campaigns.hard.chains import CHAINS, LONG
+from tests.campaigns.hard.conditioning import SOLVED, SUMS, errors, states
+from tests.campaigns.hard.other_engines import installed
 
 TITLE = "The peers: queries"
 SAYS = "says:"
 WORDS = (
-    "import sys; from tests.hard import peers;"
+    "import sys; from tests.campaigns.hard import peers;"
     " print(peers.SAYS + peers.words(int(sys.argv[1]), sys.argv[2], int(sys.argv[3])))"
 )
 Program = tuple[str, Callable[[rd.Robot], Any]]

@@ -11,10 +11,10 @@ from inspect import cleandoc
 from pathlib import Path
 from typing import final
 
-from robot_dyn.studies.environment import environment
-from tests.hard.case import Row
-from tests.hard.families import FAMILIES
-from tests.hard.figure import save
+from robot_dyn.report.environment import environment
+from tests.campaigns.hard.case import Row
+from tests.campaigns.hard.families import FAMILIES
+from tests.campaigns.hard.figure import save
 
 PICTURE = "pictures/hard_cases.png"
 VERDICTS = "holds", "said", "silent"

@@ -21,7 +21,7 @@ import numpy as np
 import robot_dyn as rd
 from robot_dyn.simulation.dynamics.sampled_loop import linearised
 from robot_dyn.simulation.observation.remarks import Kind, lines
-from tests.hard.case import Case, Row
+from tests.campaigns.hard.case import Case, Row
 from tests.loops import growth
 
 TITLE = "Sampled control"

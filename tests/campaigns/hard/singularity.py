@@ -23,9 +23,9 @@ import robot_dyn as rd
 from robot_dyn.control.cartesian import CartesianReference, line
 from robot_dyn.control.operational_space import POSE, POSITION
 from robot_dyn.control.orientation import orientation_error
+from robot_dyn.foundations.spatial import rotation
 from robot_dyn.simulation.observation.remarks import Kind, lines
-from robot_dyn.spatial import rotation
-from tests.hard.case import Case, Row
+from tests.campaigns.hard.case import Case, Row
 
 TITLE = "Kinematic singularity"
 U = 2.0**-53

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.errors import RobotDynError
-from tests.hard.case import Case, Row
-from tests.hard.stiff_motion import SAMPLES, Motion, damper, dry, of_arm, spring, stop
+from robot_dyn.foundations.errors import RobotDynError
+from tests.campaigns.hard.case import Case, Row
+from tests.campaigns.hard.stiff_motion import SAMPLES, Motion, damper, dry, of_arm, spring, stop
 
 TITLE = "Stiffness"
 ASKED, TIMES, LEAST = 1e-6, 10.0, 0.3

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.hard.case import Case, Row
-from tests.hard.chains import CHAINS, FOLDER, LONG, file_of
-from tests.hard.families import FAMILIES
-from tests.hard.figure import draw
-from tests.hard.report import Result, rows, summarise, write
+from tests.campaigns.hard.case import Case, Row
+from tests.campaigns.hard.chains import CHAINS, FOLDER, LONG, file_of
+from tests.campaigns.hard.families import FAMILIES
+from tests.campaigns.hard.figure import draw
+from tests.campaigns.hard.report import Result, rows, summarise, write
 
 SEED = 1
 ROOT = Path(__file__).parents[2]
@@ -78,7 +78,7 @@ def test_some_case_of_each_family_is_not_long() -> None:
 
 
 def test_the_files_are_those_that_the_script_makes() -> None:
-    """`python -m tests.hard.chains` writes urdf/hard."""
+    """`python -m tests.campaigns.hard.chains` writes urdf/hard."""
     for name, written in (CHAINS | LONG).items():
-        assert file_of(name).read_text().replace("\n", "") == written, "run python -m tests.hard.chains"
+        assert file_of(name).read_text().replace("\n", "") == written, "run python -m tests.campaigns.hard.chains"
     assert len(list(FOLDER.iterdir())) == len(CHAINS | LONG)

@@ -32,13 +32,13 @@ from robot_dyn.lagrange.scale import (
     unit_diagonal_condition,
 )
 from robot_dyn.queries.quantity import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
-from tests.hard.case import Case, Row
-from tests.hard.conditioning import U
+from tests.campaigns.hard.case import Case, Row
+from tests.campaigns.hard.conditioning import U
 
 TITLE = "The tools"
 ASKED = (M, C, N, CORIOLIS_TORQUE, INVERSE_DYNAMICS, FORWARD_DYNAMICS)
 BATCH, TILE, STEPS = 37, 70, 200
-DIGEST = "import sys; from tests.hard.tools import digest; print(digest(*sys.argv[1:]))"
+DIGEST = "import sys; from tests.campaigns.hard.tools import digest; print(digest(*sys.argv[1:]))"
 
 
 def states(n: int, seed: int) -> dict[str, np.ndarray]:

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import QueryError
+from robot_dyn.foundations.errors import QueryError
 from robot_dyn.shapes.masses import Masses
-from robot_dyn.studies.doctor.check import checked
-from robot_dyn.studies.doctor.finding import Severity
+from robot_dyn.tools.doctor import check
+from robot_dyn.tools.doctor.checkup import checked
+from robot_dyn.tools.doctor.finding import Severity
 from tests.broken_files import BROKEN, LINKS, SOUND
 from tests.cli.test_command_documents import PROMISE
 from tests.command import run
@@ -126,7 +127,7 @@ def test_a_closed_surface_without_volume_has_no_density(tmp_path: Path) -> None:
     file.write_text(SOUND.replace('<box size="0.05 0.07 0.12"/>', '<mesh filename="flat.stl"/>'))
     with warnings.catch_warnings(record=True) as seen:  # as an error it would be caught with those of the hull
         warnings.simplefilter("always")
-        assert {each.kind for each in rd.check(file).findings} <= {"com_outside"}
+        assert {each.kind for each in check(file).findings} <= {"com_outside"}
     assert [str(each.message) for each in seen] == []
 
 
@@ -139,10 +140,10 @@ def test_what_is_no_urdf_is_a_finding(text: bytes) -> None:
 
 def test_known_files_of_the_catalog() -> None:
     """UR5's wrists have inertias that their shapes have at no density; kinova's and planar_2r's numbers are sound."""
-    found = {(each.kind, each.where) for each in rd.check("ur5").findings if each.severity is Severity.ERROR}
+    found = {(each.kind, each.where) for each in check("ur5").findings if each.severity is Severity.ERROR}
     assert found == {("inertia_shape", f"link 'wrist_{k}_link'") for k in (1, 2, 3)}
-    assert rd.check("kinova").ok
-    assert rd.check("planar_2r").ok
+    assert check("kinova").ok
+    assert check("planar_2r").ok
 
 
 @pytest.mark.parametrize(
@@ -266,8 +267,8 @@ def test_a_xacro_file_is_checked_as_what_it_expands_to(tmp_path: Path, monkeypat
     head = '<robot name="rig" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="m" default="2.0"/>'
     text = SOUND.replace('<robot name="rig">', head).replace('<mass value="2.0"/>', '<mass value="$(arg m)"/>')
     Path("rig.urdf.xacro").write_text(text, encoding="utf-8")
-    assert not rd.check("rig.urdf.xacro").loads
-    assert rd.check("rig.urdf.xacro", xacro={}).findings == ()
+    assert not check("rig.urdf.xacro").loads
+    assert check("rig.urdf.xacro", xacro={}).findings == ()
     told = run("check", "rig.urdf.xacro", "--xacro", "m=2000", "--fix", "--units")
     assert told.returncode == 0
     assert 'its mass of "2000" kg' in told.stdout

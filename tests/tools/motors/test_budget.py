@@ -1,4 +1,4 @@
-"""rd.budget: against Pinocchio's inverse dynamics on a model of its own, closed forms and energy; payloads, runs."""
+"""Budgets of motors: against Pinocchio's inverse dynamics on its own model, closed forms and energy; payloads, runs."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import EditError, EffectError, MissingExtraError, PlanError, QueryError
-from robot_dyn.studies.motor_budget.cells import GAUSS, KRONROD, X
-from robot_dyn.studies.motor_budget.pace import least_pace
+from robot_dyn.foundations.errors import EditError, EffectError, MissingExtraError, PlanError, QueryError
+from robot_dyn.tools.motors import budget
+from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, X
+from robot_dyn.tools.motors.motor_budget.pace import least_pace
 from tests.cli.test_command_documents import PROMISE, names
 from tests.command import document, refusal
 from tests.command import run as ran
@@ -31,7 +32,7 @@ POINTS = np.array(  # pick, lift, carry, place
     ]
 )
 TIMES = [0.0, 0.6, 1.1, 1.7]
-PLAN = rd.plan.from_samples(UR5, POINTS, time=TIMES)
+PLAN = rd.control.from_samples(UR5, POINTS, time=TIMES)
 LOAD = rd.Payload("wrist_3_link", 5.0, (0.12, 0.03, 0.05))
 FRICTION = [rd.effects.ViscousFriction(1.5), rd.effects.DryFriction([4.0, 5.0, 3.0, 1.0, 1.0, 1.0], 6.0)]
 ROD = rd.load("simple_pendulum")  # one joint
@@ -51,7 +52,7 @@ def with_appended_body(armature: float) -> tuple[Any, Any]:
 
 def test_a_pick_and_place_with_5_kg_asks_for_the_torque_of_pinocchio() -> None:
     """At 1000 times to 1e-12 of the largest torque; and no peak at 20 000 other times is above that of the budget."""
-    found = rd.budget(PLAN, UR5.with_(armature=0.3), payload=LOAD)
+    found = budget(PLAN, UR5.with_(armature=0.3), payload=LOAD)
     model, data = with_appended_body(0.3)
     split = found.demand.split
     rows = np.linspace(0, len(split.t) - 1, 1000).astype(int)
@@ -73,7 +74,7 @@ def test_a_pick_and_place_with_5_kg_asks_for_the_torque_of_pinocchio() -> None:
 @pytest.mark.parametrize("plant", [UR5, rd.Plant(UR5, [*FRICTION, rd.effects.Spring(3.0, POINTS[0])])])
 def test_causes_add_up_to_the_torque_and_their_parts_to_its_rms(plant) -> None:
     """To 1e-12 of the largest torque."""
-    found = rd.budget(PLAN, plant, payload=LOAD)
+    found = budget(PLAN, plant, payload=LOAD)
     split = found.demand.split
     assert np.abs(split.unexplained).max() <= 1e-12 * np.abs(split.tau).max()
     for each in found.joints:
@@ -84,7 +85,7 @@ def test_causes_add_up_to_the_torque_and_their_parts_to_its_rms(plant) -> None:
 def test_a_joint_without_load_has_the_closed_forms_of_the_quintic() -> None:
     """I a with a = Δ/T² (60 s − 180 s² + 120 s³): peak 10/√3, rms √(120/7); energy ½ I (15/8 Δ/T)², all of it back."""
     delta, T = 1.3, 0.8
-    (joint,) = rd.budget(rd.control.quintic([0.2], [0.2 + delta], T), FREE).joints
+    (joint,) = budget(rd.control.quintic([0.2], [0.2 + delta], T), FREE).joints
     assert joint.peak == pytest.approx(INERTIA * 10 / np.sqrt(3) * delta / T**2, rel=1e-9)
     assert joint.rms == pytest.approx(INERTIA * np.sqrt(120 / 7) * delta / T**2, rel=1e-9)
     assert joint.speed == pytest.approx(15 / 8 * delta / T, rel=1e-9) and joint.speed_at == pytest.approx(T / 2)
@@ -99,14 +100,14 @@ def test_both_sides_of_a_jump_of_the_acceleration_count() -> None:
     motion = rd.control.PiecewisePolynomial(
         [0.0, T, 1.5 * T], [[[0.0], [0.0], [A / 2]], [[A / 2 * T**2], [A * T], [-A]]]
     )
-    (joint,) = rd.budget(motion, FREE).joints
+    (joint,) = budget(motion, FREE).joints
     assert joint.peak == pytest.approx(2 * INERTIA * A, rel=1e-12)
     assert joint.rms == pytest.approx(INERTIA * A * np.sqrt(2.0), rel=1e-12)
 
 
 def test_the_work_of_the_motors_is_the_change_of_potential_energy_and_what_friction_takes() -> None:
     """∫ τ v dt = ΔV + ∫ b v² dt + f ∫ |v| dt, of each sum; the integrals of the motion by the trapezoidal rule."""
-    found = rd.budget(PLAN, rd.Plant(UR5, FRICTION), payload=LOAD)
+    found = budget(PLAN, rd.Plant(UR5, FRICTION), payload=LOAD)
     t = np.linspace(0.0, TIMES[-1], 200_001)
     q, v, _ = PLAN.reference.at(t)
     loaded = UR5.with_(payload=LOAD)
@@ -122,12 +123,12 @@ def test_a_joint_breaks_away_against_its_load_and_static_friction() -> None:
     plant = rd.Plant(ROD, [rd.effects.DryFriction(0.5, 4.0)])
     motion = rd.control.quintic([0.7], [0.9], 5.0)
     load = float(ROD.N(np.array([0.7]))[0])
-    (joint,) = rd.budget(motion, plant, effort=100.0).joints
+    (joint,) = budget(motion, plant, effort=100.0).joints
     assert load > 0 and joint.static_friction == 4.0 and joint.breakaway_at == 0.0
     assert joint.breakaway == pytest.approx(load + 4.0, rel=1e-9)
-    found = rd.budget(motion, plant, effort=(joint.breakaway + joint.peak) / 2)
+    found = budget(motion, plant, effort=(joint.breakaway + joint.peak) / 2)
     assert joint.peak < joint.breakaway and not found.fits and "to break away" in found.sentence
-    (resting,) = rd.budget(rd.control.hold([0.7]), plant, effort=100.0).joints
+    (resting,) = budget(rd.control.hold([0.7]), plant, effort=100.0).joints
     assert np.isnan(resting.breakaway) and resting.peak == pytest.approx(load, rel=1e-12)
 
 
@@ -145,29 +146,32 @@ def test_the_rotor_of_a_motor_acts_as_armature_where_the_arm_has_none(tmp_path: 
         "joint,peak [N m],continuous [N m],speed [rpm],gear_ratio,rotor_inertia [kg m^2],at\n"
         + f"{ROD.joint_names[0]},2,1,3000,50,1e-4,motor\n"
     )
-    motors, motion = rd.plan.read_motors(file), rd.control.quintic([0.2], [1.5], 0.8)
-    (bare,), (joint,) = rd.budget(motion, FREE).joints, rd.budget(motion, FREE, motors=motors).joints
+    motors, motion = rd.tools.motors.read_motors(file), rd.control.quintic([0.2], [1.5], 0.8)
+    (bare,), (joint,) = (
+        budget(motion, FREE).joints,
+        budget(motion, FREE, motors=motors).joints,
+    )
     assert joint.peak == pytest.approx(bare.peak * (1 + 0.25 / INERTIA), rel=1e-9)
     assert (joint.peak_limit, joint.continuous_limit) == (100.0, 50.0)
     assert joint.speed_limit == pytest.approx(3000 * np.pi / 30 / 50)
     assert joint.headroom["continuous"] == pytest.approx(1 - joint.rms / 50)
     with pytest.raises(PlanError, match=r"the rotor of .* the arm has 0\.5"):
-        rd.budget(motion, FREE.with_(armature=0.5), motors=motors)
+        budget(motion, FREE.with_(armature=0.5), motors=motors)
 
 
 def test_a_limit_that_is_passed_is_named_with_the_cause_that_asks_for_it() -> None:
-    found = rd.budget(PLAN, UR5, payload=LOAD, effort={"shoulder_lift_joint": 60.0}, continuous=90.0, velocity=0.9)
+    found = budget(PLAN, UR5, payload=LOAD, effort={"shoulder_lift_joint": 60.0}, continuous=90.0, velocity=0.9)
     small = {each.joint: each.too_small for each in found.joints if each.too_small}
     assert small["shoulder_lift_joint"][0] == "peak" and not found.fits
     assert all(kinds[-1] == "speed" for kinds in small.values() if "speed" in kinds)
     lift = found.joints[1]
     assert f"shoulder_lift_joint needs {lift.peak:.4g} of 60 N m" in found.sentence and "for gravity" in found.sentence
     assert any("no limit of peak torque is known of shoulder_pan_joint" in each for each in found.findings)
-    free = rd.budget(rd.control.quintic([0.0], [1.0], 1.0), FREE, effort=np.inf, velocity=np.inf)
+    free = budget(rd.control.quintic([0.0], [1.0], 1.0), FREE, effort=np.inf, velocity=np.inf)
     assert free.fits and "no limit is known" in free.sentence
-    some = rd.budget(PLAN, UR5)  # its file states no continuous torque
+    some = budget(PLAN, UR5)  # its file states no continuous torque
     assert "the motors suffice where limits are known; " in some.sentence
-    every = rd.budget(PLAN, UR5, continuous=100.0)
+    every = budget(PLAN, UR5, continuous=100.0)
     assert "the motors suffice; " in every.sentence
 
 
@@ -175,19 +179,17 @@ def test_a_limit_that_is_passed_is_named_with_the_cause_that_asks_for_it() -> No
 def test_the_largest_payload_is_that_of_budgets_with_many_masses(continuous) -> None:
     """Every mass up to it fits, none of those beyond; with it a limit is reached to 1e-9."""
     plant, com = rd.Plant(UR5, FRICTION), (0.1, 0.02, 0.08)
-    found = rd.budget(PLAN, plant, continuous=continuous).max_payload("wrist_3_link", com)
+    found = budget(PLAN, plant, continuous=continuous).max_payload("wrist_3_link", com)
     assert found.mass is not None and found.least == 0.0
     assert found.limit in (("continuous torque",) if np.ndim(continuous) else ("peak torque", "break-away torque"))
     assert found.largest_share == pytest.approx(1.0, abs=1e-9)
     tolerated = 1.01  # the budget tolerates a thousandth of the limit, some 2e-3 of the mass
     for factor, fits in ((0.5, True), (0.999, True), (2.0, False)):
-        loaded = rd.budget(
+        loaded = budget(
             PLAN, plant, payload=rd.Payload("wrist_3_link", factor * found.mass, com), continuous=continuous
         )
         assert loaded.fits == fits, factor
-    beyond = rd.budget(
-        PLAN, plant, payload=rd.Payload("wrist_3_link", tolerated * found.mass, com), continuous=continuous
-    )
+    beyond = budget(PLAN, plant, payload=rd.Payload("wrist_3_link", tolerated * found.mass, com), continuous=continuous)
     assert [each.joint for each in beyond.joints if each.too_small] == [found.joint]
 
 
@@ -199,8 +201,8 @@ def test_the_payload_of_a_held_rod_balances_its_weight(side: int, kind: str) -> 
     N = float(ROD.N(np.array([q]))[0])
     per_mass = float(ROD.with_(payload=rd.Payload("bar", 1.0, (0.0, 0.0, -side * x))).N(np.array([q]))[0]) - N
     assert abs(per_mass) == pytest.approx(9.80665 * x * np.sin(q), rel=1e-9)
-    budget = rd.budget(rd.control.hold([q]), ROD, **({"effort": np.inf} | {kind: limit}))
-    found = budget.max_payload("bar", (0.0, 0.0, -side * x))
+    judged = budget(rd.control.hold([q]), ROD, **({"effort": np.inf} | {kind: limit}))
+    found = judged.max_payload("bar", (0.0, 0.0, -side * x))
     least, most = sorted(((limit - N) / per_mass, (-limit - N) / per_mass))
     if most < 0:
         assert found.mass is None and found.joint == ROD.joint_names[0]
@@ -211,8 +213,8 @@ def test_the_payload_of_a_held_rod_balances_its_weight(side: int, kind: str) -> 
 def test_the_largest_payload_counts_what_is_carried_already() -> None:
     """The same place: the mass in all is that of the arm without it."""
     motion, com = rd.control.hold([0.8]), (0.0, 0.0, -0.4)
-    alone = rd.budget(motion, ROD, effort=15.0).max_payload("bar", com)
-    found = rd.budget(motion, ROD, payload=rd.Payload("bar", 0.3, com), effort=15.0).max_payload("bar", com)
+    alone = budget(motion, ROD, effort=15.0).max_payload("bar", com)
+    found = budget(motion, ROD, payload=rd.Payload("bar", 0.3, com), effort=15.0).max_payload("bar", com)
     assert found.mass is not None and alone.mass is not None and (alone.carried, found.carried) == (0.0, 0.3)
     assert found.mass + found.carried == pytest.approx(alone.mass, rel=1e-9)
     assert f"{found.mass:.5g} kg more, {alone.mass:.5g} kg in all" in repr(found) and "more," not in repr(alone)
@@ -220,12 +222,12 @@ def test_the_largest_payload_counts_what_is_carried_already() -> None:
 
 def test_no_payload_fits_where_speed_is_passed_and_any_where_nothing_limits() -> None:
     motion = rd.control.quintic([0.2], [0.9], 0.5)
-    fast = rd.budget(motion, ROD, effort=100.0, velocity=1.0).max_payload("bar")
+    fast = budget(motion, ROD, effort=100.0, velocity=1.0).max_payload("bar")
     assert fast.mass is None and fast.limit == "speed" and "no payload" in repr(fast)
-    free = rd.budget(motion, ROD, effort=np.inf, velocity=np.inf).max_payload("bar")
+    free = budget(motion, ROD, effort=np.inf, velocity=np.inf).max_payload("bar")
     assert free.mass == np.inf and "no limit" in repr(free)
     with pytest.raises(EditError, match="no frame 'nowhere'"):
-        rd.budget(motion, ROD, effort=9.0).max_payload("nowhere")
+        budget(motion, ROD, effort=9.0).max_payload("nowhere")
 
 
 def test_an_effect_that_knows_the_mass_of_the_arm_has_no_closed_form_and_says_so() -> None:
@@ -235,7 +237,7 @@ def test_an_effect_that_knows_the_mass_of_the_arm_has_no_closed_form_and_says_so
 
     plant = rd.Plant(ROD, [Heavy()])
     with pytest.raises(QueryError, match="not affine in the mass"):
-        rd.budget(rd.control.quintic([0.3], [0.9], 1.0), plant, effort=50.0).max_payload("bar", (0.0, 0.0, -0.4))
+        budget(rd.control.quintic([0.3], [0.9], 1.0), plant, effort=50.0).max_payload("bar", (0.0, 0.0, -0.4))
 
 
 def followed(plant: rd.Plant, **options: Any) -> rd.Trajectory:
@@ -249,7 +251,7 @@ def test_the_budget_of_a_run_is_that_of_what_its_control_did() -> None:
     """Energies against the ledger, O(Δt²) between samples; peaks are those of all steps; causes add up."""
     plant = rd.Plant(UR5.with_(payload=LOAD), FRICTION[:1])
     run = followed(plant)
-    found, planned = rd.budget(run), rd.budget(PLAN, plant)
+    found, planned = budget(run), budget(PLAN, plant)
     given = sum(each.energy - each.regenerated for each in found.joints)
     assert given == pytest.approx(run.ledger.work["control"][-1], rel=1e-4)
     assert run.extremes is not None
@@ -259,15 +261,15 @@ def test_the_budget_of_a_run_is_that_of_what_its_control_did() -> None:
         assert a.peak == pytest.approx(b.peak, rel=0.05) and a.rms == pytest.approx(b.rms, rel=0.05)
     split = found.demand.split
     assert np.abs(split.unexplained).max() <= 1e-12 * np.abs(split.tau).max()
-    motion = rd.plan.from_samples(UR5, run.table(), ends="measured")
-    for a, b in zip(rd.budget(motion, plant).joints, found.joints, strict=True):
+    motion = rd.control.from_samples(UR5, run.table(), ends="measured")
+    for a, b in zip(budget(motion, plant).joints, found.joints, strict=True):
         assert a.peak == pytest.approx(b.peak, rel=1e-3)
 
 
 def test_a_run_whose_actuation_was_cut_at_the_limit_needs_a_larger_motor() -> None:
     limit = [150.0, 60.0, 150.0, 28.0, 28.0, 28.0]
     run = followed(rd.Plant(UR5.with_(payload=LOAD), [rd.effects.EffortLimit(limit)]), duration_s=0.6)
-    cut, larger = rd.budget(run, effort=limit), rd.budget(run)
+    cut, larger = budget(run, effort=limit), budget(run)
     assert not cut.fits and "peak" in cut.joints[1].too_small and "where it was cut" in cut.sentence
     assert "peak" not in larger.joints[1].too_small and any("effort limit reached" in each for each in larger.findings)
 
@@ -276,19 +278,27 @@ def test_what_has_no_budget_is_refused() -> None:
     run = rd.simulate(rd.Plant(ROD), [0.4], duration_s=0.05)
     lugre = rd.effects.LuGreFriction(100.0, 1.0, 0.1, 1.0, 1.5, 0.1)
     for call, error, message in (
-        (lambda: rd.budget(PLAN), QueryError, "a plan does not know its arm"),
-        (lambda: rd.budget(PLAN, ROD), QueryError, "of 6 joints, shoulder_pan_joint.*has 1"),
-        (lambda: rd.budget(PLAN.reference, ROD), QueryError, "of 6 joints; .* has 1"),
-        (lambda: rd.budget(POINTS, UR5), QueryError, "motion: give a plan"),  # pyright: ignore
-        (lambda: rd.budget(PLAN, UR5, motors="motors.csv"), PlanError, "read them with"),  # pyright: ignore
-        (lambda: rd.budget(PLAN, UR5, effort=-1.0), PlanError, "effort"),
-        (lambda: rd.budget(PLAN, UR5, continuous={"elbow": 1.0}), PlanError, "elbow"),
-        (lambda: rd.budget(PLAN, rd.Plant(UR5, [lugre])), EffectError, "lugre_friction has states.*give the run"),
-        (lambda: rd.budget(run, ROD), QueryError, "has its own plant"),
-        (lambda: rd.budget(run, payload=LOAD), QueryError, "has its own payload"),
-        (lambda: rd.budget(run).max_payload("bar"), QueryError, "this budget is of a run: give its motion"),
-        (lambda: rd.budget(run).fastest(), QueryError, "this budget is of a run"),
-        (lambda: rd.budget(replace(run, t=run.t[:1], v=run.v[:1])), QueryError, "one sample"),
+        (lambda: budget(PLAN), QueryError, "a plan does not know its arm"),
+        (lambda: budget(PLAN, ROD), QueryError, "of 6 joints, shoulder_pan_joint.*has 1"),
+        (lambda: budget(PLAN.reference, ROD), QueryError, "of 6 joints; .* has 1"),
+        (lambda: budget(POINTS, UR5), QueryError, "motion: give a plan"),  # pyright: ignore
+        (lambda: budget(PLAN, UR5, motors="motors.csv"), PlanError, "read them with"),  # pyright: ignore
+        (lambda: budget(PLAN, UR5, effort=-1.0), PlanError, "effort"),
+        (lambda: budget(PLAN, UR5, continuous={"elbow": 1.0}), PlanError, "elbow"),
+        (
+            lambda: budget(PLAN, rd.Plant(UR5, [lugre])),
+            EffectError,
+            "lugre_friction has states.*give the run",
+        ),
+        (lambda: budget(run, ROD), QueryError, "has its own plant"),
+        (lambda: budget(run, payload=LOAD), QueryError, "has its own payload"),
+        (
+            lambda: budget(run).max_payload("bar"),
+            QueryError,
+            "this budget is of a run: give its motion",
+        ),
+        (lambda: budget(run).fastest(), QueryError, "this budget is of a run"),
+        (lambda: budget(replace(run, t=run.t[:1], v=run.v[:1])), QueryError, "one sample"),
     ):
         with pytest.raises(error, match=message):
             call()
@@ -303,7 +313,7 @@ def test_the_fastest_motion_keeps_path_stops_and_pauses_and_passes_no_limit() ->
     pause[0, 0] = POINTS[2]
     table = np.concatenate([there.coefficients, pause, back.coefficients])
     plant = rd.Plant(UR5, FRICTION[:1])
-    found = rd.budget(rd.control.PiecewisePolynomial(breaks, table), plant, payload=LOAD)
+    found = budget(rd.control.PiecewisePolynomial(breaks, table), plant, payload=LOAD)
     fast = found.fastest()
     assert fast.strokes == 2 and fast.before == pytest.approx(3.9) and 0.4 < fast.duration < 2.0
     t = np.linspace(0, fast.duration, 10_000)
@@ -325,13 +335,13 @@ def test_the_fastest_motion_keeps_path_stops_and_pauses_and_passes_no_limit() ->
 def test_the_fastest_motion_is_slowed_down_until_it_keeps_continuous_torque() -> None:
     """As little as that needs, to 1e-3 of the time; a limit below the weight has no pace, and is said."""
     lasting = np.array([150.0, 60.0, 60.0, 28.0, 28.0, 28.0])
-    found = rd.budget(PLAN, UR5, payload=LOAD, continuous=lasting)
-    fast, free = found.fastest(), rd.budget(PLAN, UR5, payload=LOAD).fastest()
+    found = budget(PLAN, UR5, payload=LOAD, continuous=lasting)
+    fast, free = found.fastest(), budget(PLAN, UR5, payload=LOAD).fastest()
     assert free.slowed == 1.0 and fast.slowed > 1.0
     assert fast.duration == pytest.approx(fast.slowed * free.duration, rel=1e-12)
     used = max(each.rms / each.continuous_limit for each in fast.budget.joints)
     assert used == pytest.approx(1.0, abs=1e-6) and fast.budget.fits and "slowed down by" in repr(fast)
-    held = rd.budget(PLAN, UR5, payload=LOAD, continuous=lasting / 3).fastest()
+    held = budget(PLAN, UR5, payload=LOAD, continuous=lasting / 3).fastest()
     assert held.slowed == 1.0 and "too small: shoulder_lift_joint" in repr(held)
     assert "no pace fits: shoulder_lift_joint needs" in held.no_pace and held.no_pace in repr(held)
 
@@ -373,7 +383,7 @@ def test_the_least_pace_keeps_the_limits_of_all_joints() -> None:
     arm = rd.load("ur10")
     limit = np.array([150.0, 150.0, 60.0, 20.0, 20.0, 20.0])
     points = np.radians([[0, -90, 90, -90, -90, 0], [50, -60, 90, -120, -90, 20], [100, -80, 100, -100, -90, 0]])
-    motion = rd.plan.from_samples(arm, points, time=[0.0, 0.3, 0.6], unit="rad").reference
+    motion = rd.control.from_samples(arm, points, time=[0.0, 0.3, 0.6], unit="rad").reference
     loaded = arm.with_(payload=rd.Payload("tool0", 5.0, (0.0, 0.0, 0.1)))
     model: Any = pin.buildModelFromXML(arm.description.text.decode())
     frame = model.frames[model.getFrameId("tool0")]
@@ -395,8 +405,8 @@ def test_the_least_pace_keeps_the_limits_of_all_joints() -> None:
 @toppra
 def test_the_given_motion_is_the_answer_where_it_fits_and_none_that_is_faster_does() -> None:
     """Close to what it needs as continuous torque; with a share of the peak torques that it passes, it is not."""
-    needs = rd.budget(PLAN, UR5, payload=LOAD)
-    given = rd.budget(PLAN, UR5, payload=LOAD, continuous=[1.001 * each.rms + 0.01 for each in needs.joints])
+    needs = budget(PLAN, UR5, payload=LOAD)
+    given = budget(PLAN, UR5, payload=LOAD, continuous=[1.001 * each.rms + 0.01 for each in needs.joints])
     fast = given.fastest()
     assert (
         fast.given and fast.budget is given and fast.duration == fast.before and fast.plan.reference is PLAN.reference
@@ -409,7 +419,7 @@ def test_the_given_motion_is_the_answer_where_it_fits_and_none_that_is_faster_do
 def test_a_budget_needs_no_extra_and_the_fastest_motion_says_which(monkeypatch) -> None:
     for name in ("toppra", "ruckig", "pandas", "xarray", "pyarrow", "mcap"):
         monkeypatch.setitem(sys.modules, name, None)
-    found = rd.budget(PLAN, UR5)
+    found = budget(PLAN, UR5)
     assert found.fits and found.max_payload("wrist_3_link").mass
     for name in [each for each in sys.modules if each.startswith("toppra.")]:
         monkeypatch.delitem(sys.modules, name)
@@ -420,7 +430,7 @@ def test_a_budget_needs_no_extra_and_the_fastest_motion_says_which(monkeypatch) 
 def test_a_budget_loads_no_drawing() -> None:
     code = (
         "import sys, robot_dyn as rd; arm = rd.load('simple_pendulum')\n"
-        "print(rd.budget(rd.control.quintic([0.0], [1.0], 1.0), arm, effort=9.0).fits)\n"
+        "print(budget(rd.control.quintic([0.0], [1.0], 1.0), arm, effort=9.0).fits)\n"
         "print([x for x in ('matplotlib', 'toppra', 'ruckig', 'pandas') if x in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -456,7 +466,7 @@ def test_the_document_of_the_command_has_the_keys_of_its_page(files: Path) -> No
     assert all(each.keys() == promised_keys(of_joints=True).keys() for each in found["joints"])
     assert found["max_payload"].keys() == names(keys["max_payload"].partition(": ")[2])
     assert found["joints"][1]["headroom"].keys() == {"peak", "continuous", "speed"}
-    own = rd.budget(rd.plan.from_samples(UR5, files / "plan.csv"), UR5).max_payload("wrist_3_link", (0.1, 0.0, 0.05))
+    own = budget(rd.control.from_samples(UR5, files / "plan.csv"), UR5).max_payload("wrist_3_link", (0.1, 0.0, 0.05))
     assert found["max_payload"]["mass"] == pytest.approx(own.mass, rel=1e-12)
 
 

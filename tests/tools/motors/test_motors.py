@@ -1,4 +1,4 @@
-"""rd.plan.read_motors: columns, units, and the side of the gear."""
+"""rd.tools.motors.read_motors: columns, units, and the side of the gear."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _file(folder: Path, text: str) -> Path:
 
 def test_values_at_the_motor_and_at_the_joint_agree(tmp_path: Path) -> None:
     """Torque times the ratio, speed divided by it, the rotor's inertia times its square."""
-    motors = rd.plan.read_motors(
+    motors = rd.tools.motors.read_motors(
         _file(
             tmp_path,
             "joint,peak [N m],continuous [N m],speed [rpm],gear_ratio,rotor_inertia [kg cm^2],at\n"
@@ -48,16 +48,16 @@ def test_values_at_the_motor_and_at_the_joint_agree(tmp_path: Path) -> None:
 )
 def test_a_file_that_does_not_say_what_it_means_is_refused(tmp_path: Path, text: str, said: str) -> None:
     with pytest.raises(rd.RobotDynError, match=said):
-        rd.plan.read_motors(_file(tmp_path, text))
+        rd.tools.motors.read_motors(_file(tmp_path, text))
 
 
 def test_a_rotor_that_the_arm_lacks_is_refused_and_one_that_it_has_is_taken(tmp_path: Path) -> None:
     pytest.importorskip("toppra")
-    motors = rd.plan.read_motors(
+    motors = rd.tools.motors.read_motors(
         _file(tmp_path, "joint,peak [N m],gear_ratio,rotor_inertia [kg m^2],at\nelbow_joint,90,100,1e-4,joint\n")
     )
     robot, points = rd.load("ur5"), np.array([[0.1] * 6, [0.5] * 6])
     limits = {"velocity": 3.0, "effort": 150.0}
     with pytest.raises(rd.RobotDynError, match="with_"):
-        rd.plan.path(robot, points, motors=motors, **limits)
-    assert rd.plan.path(robot.with_(armature=motors.armature), points, motors=motors, **limits).largest <= 1.001
+        rd.tools.motors.path(robot, points, motors=motors, **limits)
+    assert rd.tools.motors.path(robot.with_(armature=motors.armature), points, motors=motors, **limits).largest <= 1.001

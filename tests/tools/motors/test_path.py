@@ -1,4 +1,4 @@
-"""rd.plan.path: time-optimal motions against closed forms, phase-plane integration and the inverse dynamics."""
+"""rd.tools.motors.path: time-optimal motions against closed forms, phase-plane integration and the inverse dynamics."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
-from robot_dyn.errors import MissingExtraError, PlanError
-from robot_dyn.plan.geometric_path import in_time, through
+from robot_dyn.foundations.errors import MissingExtraError, PlanError
+from robot_dyn.tools.motors.planning.geometric_path import in_time, through
 
 LIMITS = {"effort": 20.0, "velocity": 3.0}  # for arms whose files state none
 WAY = np.array(  # the fourth and fifth joint reverse at one place
@@ -45,7 +45,7 @@ def test_no_torque_is_above_its_limit_and_nearly_always_one_limit_binds(name: st
         "regularised": [rd.effects.RegularisedCoulombFriction(0.05 * robot.effort_limit)],
     }[friction]
     plant = rd.Plant(robot, effects)
-    found = rd.plan.path(plant, _way_points(robot, seed=3))
+    found = rd.tools.motors.path(plant, _way_points(robot, seed=3))
     q, v, a = found.reference.at((np.arange(10_000) + 0.3) * found.duration / 10_000)
     torque = np.abs(plant.inverse_dynamics(0.0, q, v, a)) / robot.effort_limit
     speed = np.abs(v) / robot.velocity_limit
@@ -60,7 +60,7 @@ def test_one_joint_between_two_points_takes_twice_the_square_root_of_distance_ov
     """Double integrator: T = 2 √(d I / τ)."""
     robot = rd.load("simple_pendulum").with_(gravity=WITHOUT_GRAVITY)
     inertia = float(robot.M(np.array([0.3]))[0, 0])
-    found = rd.plan.path(robot, [[0.2], [1.7]], effort=2.5)
+    found = rd.tools.motors.path(robot, [[0.2], [1.7]], effort=2.5)
     assert found.duration == pytest.approx(2 * np.sqrt(1.5 * inertia / 2.5), rel=1e-4)
 
 
@@ -85,7 +85,7 @@ def test_one_joint_with_viscous_friction_takes_the_time_of_its_linear_equation()
         middle = (low + high) / 2
         low, high = (middle, high) if motion(middle)[1] < distance else (low, middle)
     plant = rd.Plant(robot, [rd.effects.ViscousFriction(b)])
-    found = rd.plan.path(plant, [[-1.0], [-1.0 + distance]], effort=tau)
+    found = rd.tools.motors.path(plant, [[-1.0], [-1.0 + distance]], effort=tau)
     assert found.duration == pytest.approx(motion(low)[0], rel=2e-3)
     assert found.duration > motion(low)[0]  # nothing is faster than the optimum
 
@@ -113,7 +113,7 @@ def test_a_planar_arm_takes_the_time_of_the_phase_plane() -> None:
     inside = slice(1, -1)
     rate = path.end * 6 * (r - r**2)[inside] / np.sqrt(x[inside])
     duration = np.concatenate([[rate[0]], rate, [rate[-1]]])
-    found = rd.plan.path(robot, ends, effort=limits)
+    found = rd.tools.motors.path(robot, ends, effort=limits)
     assert found.duration == pytest.approx(float(np.trapezoid(duration, r)), rel=1e-3)
 
 
@@ -143,7 +143,7 @@ def test_a_run_follows_the_plan_that_leaves_a_share_of_the_limits() -> None:
     """
     arm = rd.load("ur5").with_(payload=rd.Payload("tool0", 2.0))
     plant = rd.Plant(arm, [rd.effects.ViscousFriction(0.2 * arm.effort_limit / arm.velocity_limit)])
-    found = rd.plan.path(plant, WAY, share=0.95, velocity=0.98 * arm.velocity_limit)
+    found = rd.tools.motors.path(plant, WAY, share=0.95, velocity=0.98 * arm.velocity_limit)
     gains = [4000.0] * 3 + [800.0] * 3, [160.0] * 3 + [16.0] * 3
     controller = rd.control.FeedForward(arm, found.reference, *gains)
     run = rd.simulate(
@@ -167,7 +167,7 @@ def test_a_run_follows_the_plan_that_leaves_a_share_of_the_limits() -> None:
 def test_more_torque_is_faster_and_the_path_is_the_same() -> None:
     robot = rd.load("ur5")
     points = _way_points(robot, seed=8)
-    slow, fast = (rd.plan.path(robot, points, share=share) for share in (0.6, 1.0))
+    slow, fast = (rd.tools.motors.path(robot, points, share=share) for share in (0.6, 1.0))
     assert fast.duration < slow.duration
     passed = fast.reference.at(np.linspace(0, fast.duration, 20_000))[0]
     for point in points:
@@ -179,7 +179,7 @@ def test_a_polynomial_counts_as_a_path_alone() -> None:
     robot = rd.load("planar_2r")
     slow = rd.control.PiecewisePolynomial([0.0, 100.0], [[[0.1, 0.2], [0.01, -0.02], [1e-5, 3e-5]]])
     once = rd.control.PiecewisePolynomial([5.0, 6.0], [[[0.1, 0.2], [1.0, -2.0], [0.1, 0.3]]])
-    first, second = (rd.plan.path(robot, each, effort=60.0) for each in (slow, once))
+    first, second = (rd.tools.motors.path(robot, each, effort=60.0) for each in (slow, once))
     assert first.duration == pytest.approx(second.duration, rel=1e-4)
 
 
@@ -195,7 +195,7 @@ def test_a_polynomial_counts_as_a_path_alone() -> None:
 def test_what_depends_on_time_or_has_states_is_refused_by_name(effect: rd.effects.Effect, named: str) -> None:
     plant = rd.Plant(rd.load("ur5"), [effect])
     with pytest.raises(PlanError, match=named):
-        rd.plan.path(plant, np.array([[0.1] * 6, [0.5] * 6]))
+        rd.tools.motors.path(plant, np.array([[0.1] * 6, [0.5] * 6]))
 
 
 @pytest.mark.parametrize(
@@ -214,7 +214,7 @@ def test_what_depends_on_time_or_has_states_is_refused_by_name(effect: rd.effect
 )
 def test_a_path_that_cannot_be_planned_says_why(name: str, points: list[list[float]], options: dict, said: str) -> None:
     with pytest.raises(rd.RobotDynError, match=said):
-        rd.plan.path(rd.load(name), np.array(points), **options)
+        rd.tools.motors.path(rd.load(name), np.array(points), **options)
 
 
 def test_without_its_extra_it_says_the_line_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -228,13 +228,13 @@ def test_without_its_extra_it_says_the_line_that_installs_it(monkeypatch: pytest
 
     monkeypatch.setattr(sys, "meta_path", [Nothing(), *sys.meta_path])
     with pytest.raises(MissingExtraError, match=r"pip install 'robot-dyn\[plan\]'"):
-        rd.plan.path(rd.load("ur5"), np.array([[0.1] * 6, [0.5] * 6]))
+        rd.tools.motors.path(rd.load("ur5"), np.array([[0.1] * 6, [0.5] * 6]))
 
 
 @toppra
 def test_a_plan_tells_which_limit_binds_when(tmp_path: Path) -> None:
     robot = rd.load("ur5")
-    found = rd.plan.path(robot, _way_points(robot, seed=3))
+    found = rd.tools.motors.path(robot, _way_points(robot, seed=3))
     text = repr(found)
     assert f"{found.duration:.6g} s" in text
     assert "shoulder_pan_joint" in text
@@ -248,6 +248,6 @@ def test_a_plan_tells_which_limit_binds_when(tmp_path: Path) -> None:
 def test_joints_that_reverse_at_one_place_are_planned() -> None:
     """In proportion, so that the roots of their slopes differ by rounding: that is no cell of the grid."""
     robot = rd.load("ur5")
-    found = rd.plan.path(rd.Plant(robot, [rd.effects.DryFriction(5.0)]), WAY)
+    found = rd.tools.motors.path(rd.Plant(robot, [rd.effects.DryFriction(5.0)]), WAY)
     assert found.largest <= 1.001 and found.at_limits >= 0.98
     assert np.diff(found.reference.breaks).min() > 1e-9 * found.duration

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.errors import MissingExtraError, PlanError
+from robot_dyn.foundations.errors import MissingExtraError, PlanError
 
 ARM = rd.load("ur5")
 
@@ -28,7 +28,7 @@ def test_the_motion_is_that_of_ruckig() -> None:
     rng = np.random.default_rng(0)
     for case in range(40):
         given = random_case(rng, case)
-        plan = rd.plan.point_to_point(ARM, **given, start_s=0.5)
+        plan = rd.tools.motors.point_to_point(ARM, **given, start_s=0.5)
         asked, trajectory = ruckig.InputParameter(6), ruckig.Trajectory(6)
         asked.current_position, asked.target_position = given["q0"], given["q1"]
         asked.current_velocity, asked.target_velocity = given["v0"], given["v1"]
@@ -47,7 +47,7 @@ def test_limits_hold_at_ten_thousand_times_and_accelerations_are_continuous() ->
     rng = np.random.default_rng(1)
     for case in (1, 2, 4):
         given = random_case(rng, case)
-        plan = rd.plan.point_to_point(ARM, **given)
+        plan = rd.tools.motors.point_to_point(ARM, **given)
         t = np.linspace(plan.reference.start, plan.reference.end, 10_000)
         _, v, a = plan.reference.at(t)
         assert (np.abs(v) <= plan.limits["velocity"] * (1 + 1e-12)).all()
@@ -83,7 +83,7 @@ def test_of_one_joint_the_duration_is_that_of_the_closed_form(D: float, a: float
     pytest.importorskip("ruckig")
     q0, q1 = np.full(6, 0.2), np.full(6, 0.2)
     q1[2] += D * 0.9
-    plan = rd.plan.point_to_point(ARM, q0, q1, acceleration=a, jerk=j)
+    plan = rd.tools.motors.point_to_point(ARM, q0, q1, acceleration=a, jerk=j)
     assert abs(plan.duration - shortest(0.9 * D, ARM.velocity_limit[2], a, j)) < 1e-9
 
 
@@ -99,13 +99,13 @@ def test_nothing_connects(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket, "create_connection", refuse)
     with pytest.raises(AssertionError, match="it connects"):
         socket.create_connection(("localhost", 9))
-    assert rd.plan.point_to_point(ARM, np.zeros(6), np.ones(6), acceleration=3.0, jerk=20.0).duration > 0
+    assert rd.tools.motors.point_to_point(ARM, np.zeros(6), np.ones(6), acceleration=3.0, jerk=20.0).duration > 0
 
 
 def test_a_run_follows_it() -> None:
     pytest.importorskip("ruckig")
     arm = rd.load("planar_2r")
-    plan = rd.plan.point_to_point(arm, [0.1, 0.2], [0.7, -0.3], velocity=1.0, acceleration=3.0, jerk=20.0)
+    plan = rd.tools.motors.point_to_point(arm, [0.1, 0.2], [0.7, -0.3], velocity=1.0, acceleration=3.0, jerk=20.0)
     controller = rd.control.ComputedTorque(arm, plan.reference, kp=100.0, kd=20.0)
     run = rd.simulate(arm, q0=[0.1, 0.2], duration_s=plan.duration, controller=controller)
     np.testing.assert_allclose(run.q[-1], [0.7, -0.3], atol=1e-8)  # the exact model; the method's tolerance is 1e-10
@@ -124,7 +124,7 @@ def test_a_run_follows_it() -> None:
 def test_what_cannot_be_planned_is_told(change: dict[str, Any], message: str) -> None:
     pytest.importorskip("ruckig")
     with pytest.raises(PlanError, match=message):
-        rd.plan.point_to_point(
+        rd.tools.motors.point_to_point(
             **{"arm": ARM, "q0": np.zeros(6), "q1": np.ones(6), "acceleration": 3.0, "jerk": 20.0} | change
         )
 
@@ -132,4 +132,4 @@ def test_what_cannot_be_planned_is_told(change: dict[str, Any], message: str) ->
 def test_without_ruckig_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ruckig", None)
     with pytest.raises(MissingExtraError, match=r"ruckig is not installed: pip install 'robot-dyn\[plan\]'"):
-        rd.plan.point_to_point(ARM, np.zeros(6), np.ones(6), acceleration=3.0, jerk=20.0)
+        rd.tools.motors.point_to_point(ARM, np.zeros(6), np.ones(6), acceleration=3.0, jerk=20.0)

@@ -17,22 +17,22 @@ from flint import arb, arb_series, ctx
 import robot_dyn as rd
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.codegen.trace.right_angles import completed
-from robot_dyn.coefficients import with_values
 from robot_dyn.control.reference import polynomial
-from robot_dyn.errors import ProofError, QueryError
+from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.errors import ProofError, QueryError
 from robot_dyn.lagrange.exact import RoundedLiterals
-from robot_dyn.studies.proof.enclosure import step as steps
-from robot_dyn.studies.proof.enclosure import tube as tubes
-from robot_dyn.studies.proof.enclosure.balls import Inverse, NotProvenError, between, exact, largest, matrix, upper
-from robot_dyn.studies.proof.enclosure.linearised import on_a_set
-from robot_dyn.studies.proof.enclosure.lohner import box
-from robot_dyn.studies.proof.enclosure.polynomial import Polynomial, defect, taylor
-from robot_dyn.studies.proof.motion import Motion
-from robot_dyn.studies.proof.node import packed, unpacked
-from robot_dyn.studies.proof.prove import _precision
-from robot_dyn.studies.proof.tape import Tape, straight_line
+from robot_dyn.tools.proof.enclosure import step as steps
+from robot_dyn.tools.proof.enclosure import tube as tubes
+from robot_dyn.tools.proof.enclosure.balls import Inverse, NotProvenError, between, exact, largest, matrix, upper
+from robot_dyn.tools.proof.enclosure.linearised import on_a_set
+from robot_dyn.tools.proof.enclosure.lohner import box
+from robot_dyn.tools.proof.enclosure.polynomial import Polynomial, defect, taylor
+from robot_dyn.tools.proof.motion import Motion
+from robot_dyn.tools.proof.node import packed, unpacked
+from robot_dyn.tools.proof.proven_run import _precision
+from robot_dyn.tools.proof.tape import Tape, straight_line
+from tests.accuracy.extrapolation import BITS, motion
 from tests.long import long
-from tests.studies.extrapolation import BITS, motion
 
 FINGERS = {"panda_finger_joint1": 0.0}
 GENERAL_Q = ["0.31", "-0.42", "0.53", "-0.64", "0.75", "-0.86", "0.97"]
@@ -44,26 +44,26 @@ def arm(name: str) -> rd.Robot:
     return robot.with_(lock=FINGERS) if name == "panda" else robot
 
 
-def proof(robot: rd.Robot, until_s: float, bits: int = 53, effects: Any = (), **options: Any) -> rd.studies.Proof:
+def proof(robot: rd.Robot, until_s: float, bits: int = 53, effects: Any = (), **options: Any) -> rd.tools.proof.Proof:
     """From the general start of decimals."""
     n = robot.n
     start = {"q0": GENERAL_Q[:n], "v0": GENERAL_V[:n]}
     setup = rd.Setup(rd.Plant(robot, effects), np.zeros(n), controller=options.pop("controller", None))
-    return rd.studies.prove(setup, until_s, bits, **(start | options))
+    return rd.tools.proof.prove(setup, until_s, bits, **(start | options))
 
 
 def truth(robot: rd.Robot, until_s: float, count: int, columns: int = 14, **more: Any) -> tuple[Any, Any, float]:
-    plant = rd.Plant(rd.Lagrangian(robot, rd.studies.Ball(BITS)), more.pop("effects", ()))
+    plant = rd.Plant(rd.Lagrangian(robot, rd.accuracy.Ball(BITS)), more.pop("effects", ()))
     return motion(plant, GENERAL_Q[: robot.n], GENERAL_V[: robot.n], until_s, count, columns, **more)
 
 
 def off(x: Any, by: np.ndarray, factor: float) -> np.ndarray:
     """Numbers that lie so many radii off."""
-    with rd.studies.Ball(BITS).scope():
+    with rd.accuracy.Ball(BITS).scope():
         return np.array([a + factor * arb(float(r)) for a, r in zip(x, by, strict=True)], dtype=object)
 
 
-def holds(made: rd.studies.Proof, t: float, q: Any, v: Any) -> None:
+def holds(made: rd.tools.proof.Proof, t: float, q: Any, v: Any) -> None:
     """The truth is inside, and nothing two radii off."""
     assert made.proven, made.why_not
     assert made.contains(t, q, v)
@@ -111,12 +111,12 @@ def test_the_tape_is_the_closed_form_in_balls_at_random_states(name: str) -> Non
     robot, bits = arm(name), 300
     tape, rng = Tape(Motion(robot, (), None)), np.random.default_rng(1)
     own, rounded = (
-        rd.Lagrangian(robot, rd.studies.Ball(bits)),
-        rd.Lagrangian(robot, RoundedLiterals(rd.studies.Ball(bits))),
+        rd.Lagrangian(robot, rd.accuracy.Ball(bits)),
+        rd.Lagrangian(robot, RoundedLiterals(rd.accuracy.Ball(bits))),
     )
     for _ in range(3):
         q, v, a = rng.uniform(-2, 2, (3, robot.n))
-        with rd.studies.Ball(bits).scope():
+        with rd.accuracy.Ball(bits).scope():
             made = tape.residual(arb(0), *([arb(x) for x in each.tolist()] for each in (q, v, a)))
             mass = tape.mass([arb(x) for x in q.tolist()])
         exactly, off_by_rounding = own.inverse_dynamics(q, v, a), rounded.inverse_dynamics(q, v, a)
@@ -133,10 +133,14 @@ def test_derivatives_of_the_tape_hold_differences_of_the_closed_form(name: str) 
     On a set of width 1e-3, at points anywhere in it: that is what the mean value theorem needs.
     """
     robot, n = arm(name), arm(name).n
-    tape, own, rng = Tape(Motion(robot, (), None)), rd.Lagrangian(robot, rd.studies.Ball(400)), np.random.default_rng(2)
+    tape, own, rng = (
+        Tape(Motion(robot, (), None)),
+        rd.Lagrangian(robot, rd.accuracy.Ball(400)),
+        np.random.default_rng(2),
+    )
     q, v = rng.uniform(-1, 1, (2, n))
     a = own.forward_dynamics(q, v, 0 * q)
-    with rd.studies.Ball(100).scope():
+    with rd.accuracy.Ball(100).scope():
         x = [[arb(y) for y in known.tolist()] for known in (q, v)]
         inverse, width = Inverse.of(tape.mass(x[0])), 2.0**-10
         zero = [arb(0)] * n
@@ -146,7 +150,7 @@ def test_derivatives_of_the_tape_hold_differences_of_the_closed_form(name: str) 
         about_a = tape.residual(arb(0), *x, [y.mid() for y in a])
         assert all(upper(r) < 1e-20 for r in about_a)
     for _ in range(3):
-        with rd.studies.Ball(400).scope():
+        with rd.accuracy.Ball(400).scope():
             y = np.array([arb(z) for z in np.concatenate([q, v]) + rng.uniform(-width, width, 2 * n)], dtype=object)
             for j in range(2 * n):
                 ahead, behind = y.copy(), y.copy()
@@ -178,7 +182,7 @@ def test_a_theorem_says_which_numbers_it_is_about() -> None:
 def test_a_polynomial_need_not_be_right() -> None:
     """Spoilt coefficients make a larger defect, and the truth stays in the balls."""
     robot, h = arm("planar_2r"), Fraction(1, 2**8)
-    tape, plant = Tape(Motion(robot, (), None)), rd.Plant(rd.Lagrangian(robot, rd.studies.Ball(BITS)))
+    tape, plant = Tape(Motion(robot, (), None)), rd.Plant(rd.Lagrangian(robot, rd.accuracy.Ball(BITS)))
     start_q, start_v = ["0.5", "-0.25"], ["0.75", "1.5"]
     q, v, _ = motion(plant, start_q, start_v, float(h), 1, 12)
     sizes = []
@@ -217,7 +221,7 @@ def test_nothing_that_is_not_finite_passes_as_a_bound() -> None:
 
 def test_a_velocity_beyond_a_float64_proves_nothing_and_warns_of_nothing() -> None:
     setup = rd.Setup(rd.Plant(arm("cart_pole")), [0.3, -0.4], duration_s=0.001)
-    made = rd.studies.prove(setup, v0=[0.7, 10**390], budget_s=1.0)
+    made = rd.tools.proof.prove(setup, v0=[0.7, 10**390], budget_s=1.0)
     assert made.until_s == 0.0
     assert made.why_not == "the Jacobian is not finite"
 
@@ -227,7 +231,7 @@ def test_solutions_of_all_matrices_of_balls_are_bounded() -> None:
     rng, n, width = np.random.default_rng(3), 4, 0.01
     F = rng.normal(size=(n, n))
     middle = F @ F.T + np.eye(n)
-    with rd.studies.Ball(100).scope():
+    with rd.accuracy.Ball(100).scope():
         M = matrix([[arb(x, width) for x in row] for row in middle.tolist()])
         inverse = Inverse.of([M[i, j] for i in range(n) for j in range(n)])
         more, r = inverse.contraction(M), [arb(x) for x in (1.0, 2.0, 0.5, 3.0)]
@@ -255,7 +259,7 @@ def test_a_constant_that_was_rounded_is_refused() -> None:
     for function in (0.1 * x, x**0.5 + x**3.5, ca.fmax(x, 0), ca.fabs(x)):
         with pytest.raises(ProofError):
             straight_line(program_of(ca.Function("f", [x], [function])))
-    with rd.studies.Ball(60).scope():
+    with rd.accuracy.Ball(60).scope():
         (y,) = straight_line(program_of(ca.Function("f", [x], [ca.tanh(x)])))([arb_series([0.5, 1], 3)])
         assert y[0].overlaps(arb(0.5).tanh()) and y[1].overlaps(1 - arb(0.5).tanh() ** 2)
 
@@ -294,7 +298,7 @@ def test_precision_and_length_of_series_are_left_as_they_were() -> None:
 
 
 def test_proofs_in_several_threads_are_those_of_one() -> None:
-    made: dict[int, rd.studies.Proof] = {}
+    made: dict[int, rd.tools.proof.Proof] = {}
 
     def work(bits: int) -> None:
         made[bits] = proof(arm("planar_2r"), 0.05, bits)
@@ -310,7 +314,7 @@ def test_proofs_in_several_threads_are_those_of_one() -> None:
 
 def test_balls_are_kept_exactly() -> None:
     for bits in (53, 200):
-        with rd.studies.Ball(bits).scope():
+        with rd.accuracy.Ball(bits).scope():
             for x in (arb("0.1"), arb(0), arb("-3e-40") ** 5, arb(2) ** 70, arb(1, 1e-30), arb("0.1").sqrt()):
                 again = unpacked(packed(x))
                 assert again.mid() == x.mid() and x.rad() <= again.rad() <= x.rad() * (1 + 1e-8)
@@ -326,7 +330,7 @@ def test_a_box_of_starts_holds_the_motion_from_its_corners(q0: list[str], v0: li
     robot, wide, h = arm("planar_2r"), 1e-4, 0.1
     made = proof(robot, h, q0=q0, v0=v0, width_q=wide, width_v=wide)
     assert made.proven and wide < made.radius_q.max() < 3 * wide
-    plant = rd.Plant(rd.Lagrangian(robot, rd.studies.Ball(BITS)))
+    plant = rd.Plant(rd.Lagrangian(robot, rd.accuracy.Ball(BITS)))
     reach = 0.0
     for signs in ((1, 1, 1, 1), (1, -1, 1, -1), (-1, 1, -1, 1), (-1, -1, 1, 1)):
         start = np.array([*map(float, q0), *map(float, v0)]) + 0.999 * wide * np.array(signs)
@@ -363,7 +367,7 @@ def test_steps_end_at_floats_and_cover_the_time() -> None:
 def test_a_run_is_confirmed_to_the_digits_that_it_has() -> None:
     robot, q, v = arm("planar_2r"), np.array([0.31, -0.42]), np.array([0.71, 1.12])
     setup = rd.Setup(rd.Plant(robot), q, v, duration_s=0.1, engine="interpreted")
-    made, run = rd.studies.prove(setup), rd.simulate(setup)
+    made, run = rd.tools.proof.prove(setup), rd.simulate(setup)
     digits = run.proven_digits(made)
     assert 9 < digits < 16
     for error in (1e-3, 1e-6):
@@ -429,7 +433,7 @@ def test_what_switches_is_refused_by_name(name: str, parts: dict[str, Any]) -> N
 def test_starts_that_are_no_numbers_are_refused(wrong: dict[str, Any]) -> None:
     setup = rd.Setup(rd.Plant(rd.load("planar_2r")), [0.1, 0.2])
     with pytest.raises(QueryError):
-        rd.studies.prove(setup, **wrong)
+        rd.tools.proof.prove(setup, **wrong)
 
 
 class ExactReference:
@@ -464,13 +468,13 @@ def test_the_truth_is_inside_with_what_acts_on_the_arm(name: str) -> None:
     robot, until_s, n = arm(known), 0.015625, arm(known).n
     torque, controller = None, None
     if name == "payload":
-        exact_plant = rd.Plant(rd.Lagrangian(robot.with_(payload=effects[0].payload), rd.studies.Ball(BITS)))
+        exact_plant = rd.Plant(rd.Lagrangian(robot.with_(payload=effects[0].payload), rd.accuracy.Ball(BITS)))
     else:
-        exact_plant = rd.Plant(rd.Lagrangian(robot, rd.studies.Ball(BITS)), effects)
+        exact_plant = rd.Plant(rd.Lagrangian(robot, rd.accuracy.Ball(BITS)), effects)
     if control is not None:
         wrong = robot.with_(mass_scale=0.875)
         controller = control(wrong)
-        own = with_values(control(rd.Lagrangian(wrong, rd.studies.Ball(BITS))), {"reference": ExactReference(PLAN)})
+        own = with_values(control(rd.Lagrangian(wrong, rd.accuracy.Ball(BITS))), {"reference": ExactReference(PLAN)})
         torque = lambda t, q, v: own.torque(t, q, v, q[:0])  # noqa: E731
     q, v, doubt = motion(exact_plant, GENERAL_Q[:n], GENERAL_V[:n], until_s, 1, 8, torque)
     made = proof(robot, until_s, 53, effects, controller=controller)
@@ -486,7 +490,7 @@ def test_a_reference_may_pass_from_one_polynomial_to_another() -> None:
     robot = arm("planar_2r")
     setup = rd.Setup(rd.Plant(robot), [0.31, -0.42], duration_s=0.08, controller=rd.control.PD(plan, 100.0, 10.0))
     made, run = (
-        rd.studies.prove(setup),
+        rd.tools.proof.prove(setup),
         rd.simulate(replace(setup, integrator=rd.integrate.Adaptive("DOP853", 1e-13, 1e-14))),
     )
     assert made.proven and {0.01, float(plan.end), 0.08} <= {node.t for node in made.nodes}
@@ -501,7 +505,7 @@ def test_random_starts_are_proven_to_twelve_digits(name: str, count: int) -> Non
     failed = 0
     for _ in range(count):
         q, v = rng.uniform(-2, 2, (2, robot.n))
-        made = rd.studies.prove(rd.Setup(rd.Plant(robot), q, v), until_s, budget_s=600.0)
+        made = rd.tools.proof.prove(rd.Setup(rd.Plant(robot), q, v), until_s, budget_s=600.0)
         failed += not (made.proven and made.radius_q.max() <= 1e-12)
     assert not failed
 

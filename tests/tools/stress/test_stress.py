@@ -14,17 +14,17 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.accuracy.certificate.worst_case_search import random_states
 from robot_dyn.integrate.methods import FIXED_STEP
+from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.studies.certificate.worst_case_search import random_states
-from robot_dyn.studies.stress_test import confirm, runs, steps
-from robot_dyn.studies.stress_test.finding import JudgedRun
-from robot_dyn.studies.stress_test.loads import payload_limit
-from robot_dyn.studies.stress_test.scenes import FAMILIES, scenes
-from robot_dyn.studies.stress_test.stress import stressed
-from robot_dyn.studies.stress_test.work import Work
-from robot_dyn.studies.stress_test.worst import BY_PD, FASTEST, pd_gains, worst, worst_configurations
-from robot_dyn.studies.time_budget import Budget
+from robot_dyn.tools.stress import confirm, runs, steps
+from robot_dyn.tools.stress.finding import JudgedRun
+from robot_dyn.tools.stress.loads import payload_limit
+from robot_dyn.tools.stress.scenes import FAMILIES, scenes
+from robot_dyn.tools.stress.search import stressed
+from robot_dyn.tools.stress.work import Work
+from robot_dyn.tools.stress.worst import BY_PD, FASTEST, pd_gains, worst, worst_configurations
 from tests.cli.test_command_documents import promised
 from tests.command import refusal, run
 from tests.hostile.kinds import AXIS, LIMIT
@@ -38,8 +38,8 @@ FOREVER = 1e9  # [s]: what is found is not to depend on the load of the machine
 
 
 @cache
-def made(name: str) -> rd.studies.Stress:
-    return rd.studies.stress(rd.load(name), samples=300, runs=1, seed=2, budget_s=FOREVER)
+def made(name: str) -> rd.tools.stress.Stress:
+    return rd.tools.stress.stress(rd.load(name), samples=300, runs=1, seed=2, budget_s=FOREVER)
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -95,7 +95,7 @@ def test_a_limit_that_is_too_long_is_refuted(monkeypatch) -> None:
         return replace(advice, limits={name: 1.1 * x for name, x in advice.limits.items()})
 
     monkeypatch.setattr(steps, "advice_about", wrong)
-    result = rd.studies.stress(rd.load("pendulum"), samples=200, runs=0, budget_s=FOREVER)
+    result = rd.tools.stress.stress(rd.load("pendulum"), samples=200, runs=0, budget_s=FOREVER)
     refuted = {each.what for each in result.limits if each.confirmed is False}
     assert {"explicit_euler", "midpoint", "rk4", "order_8"} <= refuted
     assert not result.ok and len(result.failures) == len(refuted) and "is refuted" in result.failures[0]
@@ -155,12 +155,12 @@ def test_states_repeat_the_worst_that_was_found(name: str) -> None:
             setup = rd.Setup(rd.Plant(robot, effects), state["q"], controller=held, duration_s=1e-4)
             assert abs(rd.advise(setup).fastest.eigenvalue) == pytest.approx(each.minimal, rel=0.06)
         elif each.note.startswith("Pinocchio"):
-            again = rd.studies.certify(robot, **state, samples=100, repeats=1).of(each.what.split()[-1], "Pinocchio")
+            again = rd.accuracy.certify(robot, **state, samples=100, repeats=1).of(each.what.split()[-1], "Pinocchio")
             rough = 0.1 if "inverse" in each.what else 1e-9  # on the root mean square of 100 states
             assert -np.log10(2.0**-53) - again.given == pytest.approx(each.minimal, rel=rough)
 
 
-def pd_of(result: rd.studies.Stress) -> tuple[np.ndarray, np.ndarray]:
+def pd_of(result: rd.tools.stress.Stress) -> tuple[np.ndarray, np.ndarray]:
     """Gains of the PD by which steps are judged."""
     law = next(each.setups[0].controller for each in result.limits if each.of == "step" and each.what == "rk4")
     return law.kp, law.kd
@@ -181,7 +181,7 @@ def test_setups_repeat_what_confirmed_a_limit(name: str) -> None:
 def test_a_joint_without_inertia_is_named_and_the_rest_is_told() -> None:
     with pytest.warns(rd.ModelWarning, match="has no mass"):
         robot = rd.load("massless_tip")
-    result = rd.studies.stress(robot, samples=100, runs=1, budget_s=FOREVER)
+    result = rd.tools.stress.stress(robot, samples=100, runs=1, budget_s=FOREVER)
     assert "runs: joint 'pointer_joint' carries no inertia" in result.left_out
     assert {each.of for each in result.limits} == {"speed", "payload"} and not result.runs
     assert {each.what for each in result.worst} == {"gravity torque / effort limit", "digits lost in inverse_dynamics"}

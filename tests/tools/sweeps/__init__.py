@@ -1,1 +1,1 @@
-"""Tests of `robot_dyn.sweeps`."""
+"""Tests of `robot_dyn.tools.sweeps`."""

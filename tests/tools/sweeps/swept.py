@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from robot_dyn import sweeps as sw
+from robot_dyn.tools import sweeps as sw
 
 SCENE = """
 robot = "planar_2r"

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps import designs
-from robot_dyn.sweeps.designs.base import REPLICATES
-from robot_dyn.sweeps.designs.halton import scipy_halton
-from robot_dyn.sweeps.designs.latin import ROUNDS, permuted
-from robot_dyn.sweeps.designs.sobol import scipy_sobol
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.tools.sweeps import designs
+from robot_dyn.tools.sweeps.designs.base import REPLICATES
+from robot_dyn.tools.sweeps.designs.halton import scipy_halton
+from robot_dyn.tools.sweeps.designs.latin import ROUNDS, permuted
+from robot_dyn.tools.sweeps.designs.sobol import scipy_sobol
 from tests.long import long
 
 LARGE = {

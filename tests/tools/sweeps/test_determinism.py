@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn import sweeps as sw
-from robot_dyn.sweeps.plan.work import Work
-from tests.sweeps.swept import SCENE, scene, swept
+from robot_dyn.tools import sweeps as sw
+from robot_dyn.tools.sweeps.plan.work import Work
+from tests.tools.sweeps.swept import SCENE, scene, swept
 
 NOISE = '\n[[control.position]]\nkind = "noise"\ndeviation_rad = 0.01\n'
 NOISY = SCENE.replace('kind = "pd"\n', 'kind = "pd"\nperiod_s = 0.005\n') + NOISE

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps import distributions as ds
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.tools.sweeps import distributions as ds
 
 Q = np.array([0.3, -1.1, 0.7])
 MADE: dict[str, tuple[Any, Any]] = {  # each with its distribution in SciPy

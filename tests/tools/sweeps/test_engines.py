@@ -14,15 +14,15 @@ from typing import Any
 
 import pytest
 
-from robot_dyn import sweeps as sw
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps.engines import cluster
-from robot_dyn.sweeps.engines.cluster import Cluster, client_of
-from robot_dyn.sweeps.engines.share import share
-from robot_dyn.sweeps.engines.threads import Threads
-from robot_dyn.sweeps.plan.work import Stopped, Work
-from robot_dyn.sweeps.run_sweep import begun
-from tests.sweeps.swept import swept
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.tools import sweeps as sw
+from robot_dyn.tools.sweeps.engines import cluster
+from robot_dyn.tools.sweeps.engines.cluster import Cluster, client_of
+from robot_dyn.tools.sweeps.engines.share import share
+from robot_dyn.tools.sweeps.engines.threads import Threads
+from robot_dyn.tools.sweeps.plan.work import Stopped, Work
+from robot_dyn.tools.sweeps.run_sweep import begun
+from tests.tools.sweeps.swept import swept
 
 
 class Future:

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps.expression import Expression
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.tools.sweeps.expression import Expression
 
 NAN = float("nan")
 COLUMNS = {

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_dyn import sweeps as sw
-from robot_dyn.errors import SweepError
-from tests.sweeps.swept import VARY, swept
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.tools import sweeps as sw
+from tests.tools.sweeps.swept import VARY, swept
 
 pytest.importorskip("zarr")
 pytest.importorskip("xarray")

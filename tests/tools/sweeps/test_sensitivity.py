@@ -11,9 +11,9 @@ import pytest
 from SALib.analyze import pawn, rbd_fast, sobol
 from scipy.stats import f_oneway
 
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps import designs, sensitivity
-from robot_dyn.sweeps.designs.base import Design
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.tools.sweeps import designs, sensitivity
+from robot_dyn.tools.sweeps.designs.base import Design
 
 NAMES = ("x1", "x2", "x3")
 PROBLEM = {"num_vars": 3, "names": list(NAMES), "bounds": [[0.0, 1.0]] * 3}

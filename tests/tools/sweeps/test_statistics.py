@@ -12,10 +12,10 @@ import pytest
 from scipy.special import ndtri
 from scipy.stats import binom, binomtest, quantile_test, ttest_1samp
 
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps import designs, statistics
-from robot_dyn.sweeps.estimate import Estimate
-from robot_dyn.sweeps.replicates import groups_of, jackknife
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.tools.sweeps import designs, statistics
+from robot_dyn.tools.sweeps.estimate import Estimate
+from robot_dyn.tools.sweeps.replicates import groups_of, jackknife
 
 N = 1600
 X = np.random.default_rng(5).gamma(2.0, size=N)

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib.util import find_spec
 
-from robot_dyn.errors import shorten
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest
+from robot_dyn.accuracy.work_precision_diagram.peers import drake, heyoka, mujoco, scipy
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError
+from robot_dyn.foundations.errors import shorten
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest
-from robot_dyn.studies.work_precision_diagram.peers import drake, heyoka, mujoco, scipy
-from robot_dyn.studies.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError
 
 # By the module that each needs.
 PEERS: dict[str, Callable[[ArmMotion], list[MethodUnderTest]]] = {

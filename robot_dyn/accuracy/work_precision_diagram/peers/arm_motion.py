@@ -14,6 +14,7 @@ from typing import Any, final
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import Run, switches
 from robot_dyn.control.independent_joint import PD
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
@@ -22,7 +23,6 @@ from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.studies.work_precision_diagram.method_under_test import Run, switches
 
 _SAME = 1e-9  # of the largest entry of M, N and τ: two programs with the same arm agree to rounding
 _STATES = 3

@@ -11,13 +11,13 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest, Run, step_ladder
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, desired_motion
+from robot_dyn.accuracy.work_precision_diagram.peers.mujoco_model import joint_places, mujoco_model
 from robot_dyn.control.independent_joint import PD
 from robot_dyn.effects.friction import ViscousFriction
 from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
-from robot_dyn.studies.time_budget import Limit
-from robot_dyn.studies.work_precision_diagram.method_under_test import MethodUnderTest, Run, step_ladder
-from robot_dyn.studies.work_precision_diagram.peers.arm_motion import ArmMotion, desired_motion
-from robot_dyn.studies.work_precision_diagram.peers.mujoco_model import joint_places, mujoco_model
+from robot_dyn.report.time_budget import Limit
 
 _METHODS = {  # name of the option, order, evaluations of the equation of motion in a step
     "RK4": ("mjINT_RK4", 4, 4), "Euler": ("mjINT_EULER", 1, 1), "implicitfast": ("mjINT_IMPLICITFAST", 1, 1),

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError, bare_urdf
 from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
 from robot_dyn.model.robot import Robot
-from robot_dyn.studies.work_precision_diagram.peers.arm_motion import PeerError, bare_urdf
 
 STEP_S = 1e-3
 

@@ -1,6 +1,6 @@
 """What a motion asks of motors, and whether they suffice: torque, speed, power and energy of each joint, by cause.
 
-budget            rd.budget: of a plan or a run, against limits
+budget            rd.tools.motors.budget: of a plan or a run, against limits
 result            the answer: what each joint needs, headroom, causes
 demand            torque and speed at the times of a plan, or at the samples of a run
 cells             a motion in cells in which it is smooth, with a rule of integration

@@ -16,7 +16,7 @@ from robot_dyn.effects.causes import Causes, causes
 from robot_dyn.effects.effect import numbered
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.set_valued import SetValued
-from robot_dyn.studies.motor_budget.cells import Cells
+from robot_dyn.tools.motors.motor_budget.cells import Cells
 
 _RESTS = 1e-9  # of the largest velocity of a joint
 

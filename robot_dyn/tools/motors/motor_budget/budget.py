@@ -9,27 +9,27 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from robot_dyn.control.extremes import extremes
+from robot_dyn.control.plan import Plan
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.actuator import EffortLimit
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import PlanError, QueryError, shown
+from robot_dyn.foundations.errors import PlanError, QueryError, shown
+from robot_dyn.foundations.validate import instance
 from robot_dyn.model.robot import Robot
-from robot_dyn.plan.extremes import extremes
-from robot_dyn.plan.limits import Limits, limits_of
-from robot_dyn.plan.motors import Motors
-from robot_dyn.plan.path_plan import PathPlan
-from robot_dyn.plan.plan import Plan
 from robot_dyn.queries.units import of_joint
+from robot_dyn.report.environment import environment
 from robot_dyn.simulation.observation.remarks import Kind, lines
 from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.studies.environment import environment
-from robot_dyn.studies.motor_budget.breakaway import breakaway, static_friction
-from robot_dyn.studies.motor_budget.demand import Demand, of_motion, of_run
-from robot_dyn.studies.motor_budget.joint_budget import JointBudget, joint_budgets
-from robot_dyn.studies.motor_budget.result import MotorBudget
-from robot_dyn.validate import instance
+from robot_dyn.tools.motors.limits import Limits, limits_of
+from robot_dyn.tools.motors.motor_budget.breakaway import breakaway, static_friction
+from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, of_run
+from robot_dyn.tools.motors.motor_budget.joint_budget import JointBudget, joint_budgets
+from robot_dyn.tools.motors.motor_budget.result import MotorBudget
+from robot_dyn.tools.motors.motors_file import Motors
+from robot_dyn.tools.motors.planning.path_plan import PathPlan
 
 _DRIVES = "series_elastic", "rigid_backlash"  # whose motors turn at other speeds than their joints
 _BEYOND = 1e-9  # of a position limit, that rounding may pass
@@ -54,10 +54,10 @@ def budget(
     without losses of motor and gear. A rotor inertia of `motors` acts as armature where the arm has none.
 
     Args:
-        motion: A plan of `rd.plan`, a `PiecewisePolynomial`, or a run of `rd.simulate`.
+        motion: A plan, a `PiecewisePolynomial`, or a run of `rd.simulate`.
         plant: The arm, or a plant with effects; of a run it is known.
         payload: What a plan's arm carries, a `Payload` or several.
-        motors: Of `rd.plan.read_motors`: peak and continuous torques, speeds and rotors.
+        motors: Of `rd.tools.motors.read_motors`: peak and continuous torques, speeds and rotors.
         effort: Peak torques, one number, by joint name or (n,), in [N m] or [N]; those of the motors or, without them,
             of the robot's file unless given.
         velocity: Speed limits, likewise, in [rad/s] or [m/s].
@@ -72,21 +72,21 @@ def budget(
     Source: Siciliano et al. 2009, sec. 5.2; Armstrong-Hélouvry 1991 for breaking away.
     """
     if motors is not None:
-        instance("motors", motors, Motors, "read them with rd.plan.read_motors(path)", error=PlanError)
+        instance("motors", motors, Motors, "read them with rd.tools.motors.read_motors(path)", error=PlanError)
     given = _Given(motors, effort, velocity, continuous)
     if isinstance(motion, Trajectory):
         if plant is not None or payload is not None:
             raise QueryError(
                 f"a run has its own {'plant' if plant is not None else 'payload'}: leave it out and simulate again, or"
-                " give its motion, rd.budget(rd.plan.from_samples(arm, run.table(), ends='measured'), plant, payload=…)"
+                " give its motion, budget(rd.control.from_samples(arm, run.table(), ends='measured'), plant, payload=…)"
             )
         return _of_run(motion, given)
     if not isinstance(motion, PiecewisePolynomial | Plan | PathPlan):
-        raise QueryError(
-            f"motion: give a plan of rd.plan, a PiecewisePolynomial, or a run of rd.simulate, got {shown(motion)}"
-        )
+        raise QueryError(f"motion: give a plan, a PiecewisePolynomial, or a run of rd.simulate, got {shown(motion)}")
     if plant is None:
-        raise QueryError("plant: a plan does not know its arm; give it, rd.budget(plan, arm), or a plant with effects")
+        raise QueryError(
+            "plant: a plan does not know its arm; give it, rd.tools.motors.budget(plan, arm), or a plant with effects"
+        )
     return _of_plan(motion, _loaded(plant, payload, motors), given)
 
 

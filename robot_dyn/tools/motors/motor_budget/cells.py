@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn.control.reference import PiecewisePolynomial, polynomial
 from robot_dyn.effects.plant import Plant
-from robot_dyn.plan.geometric_path import turning_points
+from robot_dyn.tools.motors.planning.geometric_path import turning_points
 
 FEWEST = 400  # cells of a motion
 _NEAR = 1e-12  # of a cell: places at its ends are as far inside, where friction has its sign

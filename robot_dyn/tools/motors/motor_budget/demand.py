@@ -12,15 +12,15 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.control.extremes import extremes
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.causes import Causes, causes, exerted_torques
 from robot_dyn.effects.effect import Stateful
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import EffectError, QueryError
-from robot_dyn.plan.extremes import extremes
+from robot_dyn.foundations.errors import EffectError, QueryError
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.studies.motor_budget.cells import GAUSS, KRONROD, Cells, X, cells
+from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, Cells, X, cells
 
 _PEAKS = 4  # local maxima of a quantity that are looked at more closely
 _ROUNDS, _POINTS = 7, 9  # of doing so, and points of each: every round is 4 times closer

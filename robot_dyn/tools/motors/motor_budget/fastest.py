@@ -1,8 +1,8 @@
 """The path of a motion at its limits: from stop to stop as fast as they allow; pauses keep their length.
 
-Between two stops the path is taken through places at equal distances along it, and `rd.plan.path` moves along it. A
-stop stays one, since the path may have a corner there. What then needs more than the continuous torque is slowed down
-as a whole, by the least factor that keeps it. If the given motion fits and this one does not, or is no faster, the
+Between two stops the path is taken through places at equal distances along it, and `rd.tools.motors.path` moves along
+it. A stop stays one, since the path may have a corner there. What then needs more than the continuous torque is slowed
+down as a whole, by the least factor that keeps it. If the given motion fits and this one does not, or is no faster, the
 given one is the answer.
 """
 
@@ -15,21 +15,21 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block
+from robot_dyn.control.plan import Plan
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import PlanError
-from robot_dyn.plan.geometric_path import through
-from robot_dyn.plan.limits import Limits
-from robot_dyn.plan.path_at_limits import path
-from robot_dyn.plan.plan import Plan
+from robot_dyn.foundations.answer import Answer, Block
+from robot_dyn.foundations.errors import PlanError
+from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.queries.units import of_joint
-from robot_dyn.result import UNREPORTED, reported
-from robot_dyn.studies.motor_budget.budget import budget
-from robot_dyn.studies.motor_budget.cells import at_rest_exactly
-from robot_dyn.studies.motor_budget.joint_budget import TOLERANCE
-from robot_dyn.studies.motor_budget.pace import Pace, at_pace, least_pace
-from robot_dyn.studies.motor_budget.result import MotorBudget, case_of
+from robot_dyn.tools.motors.limits import Limits
+from robot_dyn.tools.motors.motor_budget.budget import budget
+from robot_dyn.tools.motors.motor_budget.cells import at_rest_exactly
+from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
+from robot_dyn.tools.motors.motor_budget.pace import Pace, at_pace, least_pace
+from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
+from robot_dyn.tools.motors.planning.geometric_path import through
+from robot_dyn.tools.motors.planning.path_at_limits import path
 
 _RESTS = 1e-3  # of the largest velocity of a joint: slower is a stop
 _TIMES, _PLACES = 4000, 80  # of the motion, and of a path between two stops

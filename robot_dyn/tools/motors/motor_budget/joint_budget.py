@@ -9,11 +9,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.plan.limits import Limits
+from robot_dyn.foundations.result import reported
 from robot_dyn.queries.units import of_joint
-from robot_dyn.result import reported
-from robot_dyn.studies.motor_budget.breakaway import Breakaway
-from robot_dyn.studies.motor_budget.demand import Demand
+from robot_dyn.tools.motors.limits import Limits
+from robot_dyn.tools.motors.motor_budget.breakaway import Breakaway
+from robot_dyn.tools.motors.motor_budget.demand import Demand
 
 TOLERANCE = 1e-3  # of a limit, by which plans at their limits may pass it
 KINDS: Mapping[str, str] = {"peak": "peak torque", "continuous": "continuous torque", "speed": "speed"}

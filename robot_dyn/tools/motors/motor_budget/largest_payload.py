@@ -17,16 +17,16 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.description.edits import Payload
 from robot_dyn.description.urdf import LARGEST
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError
-from robot_dyn.plan.limits import Limits
-from robot_dyn.studies.motor_budget.breakaway import breakaway
-from robot_dyn.studies.motor_budget.demand import Demand, of_motion, torques
-from robot_dyn.studies.motor_budget.joint_budget import TOLERANCE
+from robot_dyn.foundations.answer import Answer, Block
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.tools.motors.limits import Limits
+from robot_dyn.tools.motors.motor_budget.breakaway import breakaway
+from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, torques
+from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
 
 _ROUNDS = 12
 _CLOSE = 1e-9  # of a limit, by which a peak between the times may pass it

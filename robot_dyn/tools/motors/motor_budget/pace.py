@@ -19,8 +19,8 @@ from numpy.polynomial import chebyshev
 
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
-from robot_dyn.studies.motor_budget.demand import root_mean_squares
-from robot_dyn.studies.motor_budget.joint_budget import TOLERANCE
+from robot_dyn.tools.motors.motor_budget.demand import root_mean_squares
+from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
 
 _OCTAVES = 7  # of u: λ up to 128
 _DEGREE, _DENSE = 4, 201  # of the polynomial, and places of it among which the least share is sought

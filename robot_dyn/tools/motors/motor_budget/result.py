@@ -7,20 +7,22 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING, Any, ClassVar, final
 
-from robot_dyn.answer import Block, Table, number_or_dash
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import QueryError
-from robot_dyn.plan.limits import Limits
+from robot_dyn.foundations.answer import Block, Table, number_or_dash
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.queries.units import of_joint, without_rounding
-from robot_dyn.result import UNREPORTED, reported
-from robot_dyn.studies.motor_budget.demand import Demand
-from robot_dyn.studies.motor_budget.joint_budget import KINDS, JointBudget
-from robot_dyn.studies.result import Result
+from robot_dyn.report.result import Result
+from robot_dyn.tools.motors.limits import Limits
+from robot_dyn.tools.motors.motor_budget.demand import Demand
+from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
 
 if TYPE_CHECKING:
-    from robot_dyn.studies.motor_budget.fastest import FastestMotion
-    from robot_dyn.studies.motor_budget.largest_payload import LargestPayload
+    from matplotlib.figure import Figure
+
+    from robot_dyn.tools.motors.motor_budget.fastest import FastestMotion
+    from robot_dyn.tools.motors.motor_budget.largest_payload import LargestPayload
 
 
 @final
@@ -93,6 +95,11 @@ class MotorBudget(Result):
         """A row for each joint."""
         return (vars(each) | {"unit": of_joint("N m", each.type)} for each in self.joints)
 
+    def draw(self, theme: str = "light") -> Figure:
+        from robot_dyn.tools.motors.motor_budget.diagram import draw
+
+        return draw(self, theme)
+
     def tables(self) -> Iterator[Block]:
         yield f"limits: {self.limits}"
         yield f"{self.resolution}; integrals by two rules differ by {self.error:.1g} of them"
@@ -157,7 +164,7 @@ class MotorBudget(Result):
             QueryError: If the budget is of a run, whose control would change as well.
             EditError: If there is no such link.
         """
-        from robot_dyn.studies.motor_budget.largest_payload import largest_payload
+        from robot_dyn.tools.motors.motor_budget.largest_payload import largest_payload
 
         return largest_payload(*case_of(self, "the largest payload"), link=link, com=com)
 
@@ -177,7 +184,7 @@ class MotorBudget(Result):
             PlanError: If an effect depends on time, or no motion is within the limits.
             MissingExtraError: Without toppra.
         """
-        from robot_dyn.studies.motor_budget.fastest import fastest
+        from robot_dyn.tools.motors.motor_budget.fastest import fastest
 
         return fastest(self, share)
 
@@ -187,7 +194,7 @@ def case_of(found: MotorBudget, what: str) -> tuple[Plant, PiecewisePolynomial, 
     if found.case is None:
         raise QueryError(
             f"{what} is of a plan, this budget is of a run: give its motion,"
-            " rd.budget(rd.plan.from_samples(arm, run.table(), ends='measured'), plant)"
+            " rd.tools.motors.budget(rd.control.from_samples(arm, run.table(), ends='measured'), plant)"
         )
     return found.case
 

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn import validate
 from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.errors import PlanError
+from robot_dyn.foundations import validate
+from robot_dyn.foundations.errors import PlanError
 
 _MOST_POINTS = 2000
 _SLOWEST = 1e-3  # of |q'|, in the path's mean: where it vanishes, s is no measure of the way

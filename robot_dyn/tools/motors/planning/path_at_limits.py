@@ -7,17 +7,26 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.control.plan import Plan
 from robot_dyn.control.reference import PiecewisePolynomial, hold
 from robot_dyn.effects.plant import Plant
-from robot_dyn.errors import PlanError
-from robot_dyn.plan.geometric_path import geometric_path, in_time, turning_points
-from robot_dyn.plan.limits import Limits, limits_of
-from robot_dyn.plan.motors import Motors
-from robot_dyn.plan.path_plan import BINDS, Judgement, PathPlan, bindings, elsewhere, judged, judged_times, phases
-from robot_dyn.plan.plan import Plan
-from robot_dyn.plan.plannable import check_effects, check_limited, check_positions, why_not
-from robot_dyn.plan.time_scaling import Effects, Speed, cells, fastest, imposed
-from robot_dyn.validate import number
+from robot_dyn.foundations.errors import PlanError
+from robot_dyn.foundations.validate import number
+from robot_dyn.tools.motors.limits import Limits, limits_of
+from robot_dyn.tools.motors.motors_file import Motors
+from robot_dyn.tools.motors.planning.geometric_path import geometric_path, in_time, turning_points
+from robot_dyn.tools.motors.planning.path_plan import (
+    BINDS,
+    Judgement,
+    PathPlan,
+    bindings,
+    elsewhere,
+    judged,
+    judged_times,
+    phases,
+)
+from robot_dyn.tools.motors.planning.plannable import check_effects, check_limited, check_positions, why_not
+from robot_dyn.tools.motors.planning.time_scaling import Effects, Speed, cells, fastest, imposed
 
 _CELLS, _MOST_CELLS = 200, 8000  # of the grid, besides breaks of the path
 _ROUNDS = 40
@@ -59,7 +68,7 @@ def path(
             them, of the robot's file unless given.
         velocity: Velocity limits, likewise, in [rad/s] or [m/s].
         acceleration: Acceleration limits, likewise, in [rad/s²] or [m/s²]; none unless given.
-        motors: Of `rd.plan.read_motors`: peak torques and speeds.
+        motors: Of `rd.tools.motors.read_motors`: peak torques and speeds.
 
     Raises:
         PlanError: If points or limits are not allowed, the path leaves the joint limits, an effect depends on time or

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.control.extremes import extremes
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.actuator import EffortLimit
 from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Bound, Force, Stateful
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
-from robot_dyn.errors import PlanError
-from robot_dyn.plan.extremes import extremes
-from robot_dyn.plan.limits import Limits
+from robot_dyn.foundations.errors import PlanError
+from robot_dyn.tools.motors.limits import Limits
 
 _TIMES = 0.1234, 7.891  # at which torques must be the same
 _ROUNDING = 1e-9

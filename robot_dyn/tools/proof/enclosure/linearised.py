@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from robot_dyn.studies.proof.enclosure.balls import (
+from robot_dyn.tools.proof.enclosure.balls import (
     Ball,
     Inverse,
     Matrix,
@@ -20,8 +20,8 @@ from robot_dyn.studies.proof.enclosure.balls import (
     matrix,
     upper,
 )
-from robot_dyn.studies.proof.enclosure.polynomial import coefficient
-from robot_dyn.studies.proof.tape import Tape
+from robot_dyn.tools.proof.enclosure.polynomial import coefficient
+from robot_dyn.tools.proof.tape import Tape
 
 
 def jacobian(tape: Tape, inverse: Inverse, given: Sequence[Any], length: int = 1) -> list[Matrix]:

@@ -15,7 +15,7 @@ from typing import final
 import numpy as np
 from flint import arb, arb_mat, ctx
 
-from robot_dyn.studies.proof.enclosure.balls import (
+from robot_dyn.tools.proof.enclosure.balls import (
     Ball,
     Inverse,
     Matrix,
@@ -27,10 +27,10 @@ from robot_dyn.studies.proof.enclosure.balls import (
     norm,
     upper,
 )
-from robot_dyn.studies.proof.enclosure.linearised import jacobian
-from robot_dyn.studies.proof.enclosure.polynomial import Polynomial, series
-from robot_dyn.studies.proof.enclosure.tube import Tube
-from robot_dyn.studies.proof.tape import Tape
+from robot_dyn.tools.proof.enclosure.linearised import jacobian
+from robot_dyn.tools.proof.enclosure.polynomial import Polynomial, series
+from robot_dyn.tools.proof.enclosure.tube import Tube
+from robot_dyn.tools.proof.tape import Tape
 
 _ORDERS = 3, 6  # of Y: the second where the first does not know it to a thousandth
 _ENOUGH = 1e-3

@@ -19,8 +19,8 @@ from typing import Any, final
 
 from flint import arb, arb_series, ctx
 
-from robot_dyn.studies.proof.enclosure.balls import Ball, Inverse, dot, finer, horner, matrix, upper
-from robot_dyn.studies.proof.tape import Tape
+from robot_dyn.tools.proof.enclosure.balls import Ball, Inverse, dot, finer, horner, matrix, upper
+from robot_dyn.tools.proof.tape import Tape
 
 Coefficients = tuple[tuple[Ball, ...], ...]  # of each joint, ascending
 

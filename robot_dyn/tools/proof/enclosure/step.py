@@ -10,7 +10,7 @@ from typing import final
 import numpy as np
 from flint import arb
 
-from robot_dyn.studies.proof.enclosure.balls import (
+from robot_dyn.tools.proof.enclosure.balls import (
     Ball,
     Inverse,
     NotProvenError,
@@ -21,11 +21,11 @@ from robot_dyn.studies.proof.enclosure.balls import (
     largest,
     upper,
 )
-from robot_dyn.studies.proof.enclosure.linearised import jacobian
-from robot_dyn.studies.proof.enclosure.lohner import ErrorSet, carried, fundamental
-from robot_dyn.studies.proof.enclosure.polynomial import Polynomial, defect, taylor
-from robot_dyn.studies.proof.enclosure.tube import Tube, logarithmic_norm, tube
-from robot_dyn.studies.proof.tape import Tape
+from robot_dyn.tools.proof.enclosure.linearised import jacobian
+from robot_dyn.tools.proof.enclosure.lohner import ErrorSet, carried, fundamental
+from robot_dyn.tools.proof.enclosure.polynomial import Polynomial, defect, taylor
+from robot_dyn.tools.proof.enclosure.tube import Tube, logarithmic_norm, tube
+from robot_dyn.tools.proof.tape import Tape
 
 _GRID = 2**40  # steps end at multiples of 1/grid, so that times are floats
 _LONGEST_S = 1.0

@@ -14,10 +14,10 @@ from typing import final
 
 from flint import arb, ctx
 
-from robot_dyn.studies.proof.enclosure.balls import Ball, Inverse, Matrix, NotProvenError, between, largest, upper
-from robot_dyn.studies.proof.enclosure.linearised import on_a_set
-from robot_dyn.studies.proof.enclosure.polynomial import Defect, Polynomial
-from robot_dyn.studies.proof.tape import Tape
+from robot_dyn.tools.proof.enclosure.balls import Ball, Inverse, Matrix, NotProvenError, between, largest, upper
+from robot_dyn.tools.proof.enclosure.linearised import on_a_set
+from robot_dyn.tools.proof.enclosure.polynomial import Defect, Polynomial
+from robot_dyn.tools.proof.tape import Tape
 
 _PARTS = 4  # of a step
 _WIDER = 3  # times the initial bound of e

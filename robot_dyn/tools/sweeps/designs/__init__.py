@@ -8,7 +8,7 @@ saltelli                A, B and AB_i on Sobol' rows, for sensitivity indices
 grid, table             points that are not random: all combinations of levels; rows of one's own
 """
 
-from robot_dyn.sweeps.designs.base import Design
-from robot_dyn.sweeps.designs.by_name import design
+from robot_dyn.tools.sweeps.designs.base import Design
+from robot_dyn.tools.sweeps.designs.by_name import design
 
 __all__ = ["Design", "design"]

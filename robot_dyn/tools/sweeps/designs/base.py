@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robot_dyn.errors import SweepError
-from robot_dyn.validate import integer
-from robot_dyn.values import Value
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations.validate import integer
+from robot_dyn.foundations.values import Value
 
 REPLICATES = 16
 """Independent scramblings of a design, from which intervals come: Student's t with 15 degrees of freedom."""

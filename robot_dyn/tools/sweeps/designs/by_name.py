@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps.designs.base import Design
-from robot_dyn.sweeps.designs.grid import Grid
-from robot_dyn.sweeps.designs.halton import Halton
-from robot_dyn.sweeps.designs.latin import Latin
-from robot_dyn.sweeps.designs.random_rows import RandomRows
-from robot_dyn.sweeps.designs.saltelli import Saltelli
-from robot_dyn.sweeps.designs.sobol import Sobol
-from robot_dyn.sweeps.designs.table import Table
-from robot_dyn.validate import choice, integer
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations.validate import choice, integer
+from robot_dyn.tools.sweeps.designs.base import Design
+from robot_dyn.tools.sweeps.designs.grid import Grid
+from robot_dyn.tools.sweeps.designs.halton import Halton
+from robot_dyn.tools.sweeps.designs.latin import Latin
+from robot_dyn.tools.sweeps.designs.random_rows import RandomRows
+from robot_dyn.tools.sweeps.designs.saltelli import Saltelli
+from robot_dyn.tools.sweeps.designs.sobol import Sobol
+from robot_dyn.tools.sweeps.designs.table import Table
 
 DESIGNS: Mapping[str, type[Design]] = {
     "random": RandomRows,

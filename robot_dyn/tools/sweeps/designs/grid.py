@@ -7,7 +7,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.sweeps.designs.base import Design, check_count
+from robot_dyn.tools.sweeps.designs.base import Design, check_count
 
 
 @final

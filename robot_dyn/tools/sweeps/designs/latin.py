@@ -18,8 +18,8 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.sweeps.designs.base import REPLICATES, Replicated, check_multiple, source
-from robot_dyn.sweeps.designs.random_rows import philox_key, uniform
+from robot_dyn.tools.sweeps.designs.base import REPLICATES, Replicated, check_multiple, source
+from robot_dyn.tools.sweeps.designs.random_rows import philox_key, uniform
 
 ROUNDS = 12  # an even number: the halves have their sizes again; 8 favour some permutations of 5 points
 _BELOW_ONE = np.nextafter(1.0, 0.0)

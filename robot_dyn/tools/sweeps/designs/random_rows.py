@@ -11,7 +11,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.sweeps.designs.base import Design, source
+from robot_dyn.tools.sweeps.designs.base import Design, source
 
 _WORDS = 4  # numbers that Philox makes of one value of its counter
 

@@ -15,8 +15,8 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.sweeps.designs.base import REPLICATES, Design, check_power
-from robot_dyn.sweeps.designs.sobol import Sobol
+from robot_dyn.tools.sweeps.designs.base import REPLICATES, Design, check_power
+from robot_dyn.tools.sweeps.designs.sobol import Sobol
 
 
 @final

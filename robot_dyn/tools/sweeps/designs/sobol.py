@@ -17,8 +17,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps.designs.base import REPLICATES, Replicated, check_power, source
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.tools.sweeps.designs.base import REPLICATES, Replicated, check_power, source
 
 BITS = 53
 _LOW = 6  # bits of the number of a point within a block

@@ -7,9 +7,9 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps.designs.base import Design
-from robot_dyn.validate import numbers
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations.validate import numbers
+from robot_dyn.tools.sweeps.designs.base import Design
 
 
 @final

@@ -10,8 +10,8 @@ of_scipy     frozen distributions of scipy.stats, by name and numbers
 by_name      these functions; `distribution` of any object, `from_dict` of stored ones
 """
 
-from robot_dyn.sweeps.distributions.base import Distribution
-from robot_dyn.sweeps.distributions.by_name import (
+from robot_dyn.tools.sweeps.distributions.base import Distribution
+from robot_dyn.tools.sweeps.distributions.by_name import (
     choice,
     distribution,
     from_dict,

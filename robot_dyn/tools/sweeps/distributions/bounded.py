@@ -7,7 +7,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from robot_dyn.sweeps.distributions.base import Distribution
+from robot_dyn.tools.sweeps.distributions.base import Distribution
 
 
 @final

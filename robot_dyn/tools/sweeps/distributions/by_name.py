@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from robot_dyn.errors import SweepError, nearest, shown
-from robot_dyn.sweeps.distributions.base import Distribution
-from robot_dyn.sweeps.distributions.bounded import Triangular, Uniform
-from robot_dyn.sweeps.distributions.choices import Choice
-from robot_dyn.sweeps.distributions.gaussian import LogNormal, Normal
-from robot_dyn.sweeps.distributions.of_scipy import OfSciPy
+from robot_dyn.foundations.errors import SweepError, nearest, shown
+from robot_dyn.tools.sweeps.distributions.base import Distribution
+from robot_dyn.tools.sweeps.distributions.bounded import Triangular, Uniform
+from robot_dyn.tools.sweeps.distributions.choices import Choice
+from robot_dyn.tools.sweeps.distributions.gaussian import LogNormal, Normal
+from robot_dyn.tools.sweeps.distributions.of_scipy import OfSciPy
 
 KINDS: Mapping[str, type[Distribution]] = {
     kind.name: kind for kind in (Uniform, Normal, LogNormal, Triangular, Choice, OfSciPy)

@@ -7,9 +7,9 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps.distributions.base import Distribution
-from robot_dyn.validate import numbers
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations.validate import numbers
+from robot_dyn.tools.sweeps.distributions.base import Distribution
 
 
 @final

@@ -7,8 +7,8 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps.distributions.base import MOST, Distribution
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.tools.sweeps.distributions.base import MOST, Distribution
 
 
 @final

@@ -8,9 +8,9 @@ from typing import Any, ClassVar, final
 
 import numpy as np
 
-from robot_dyn.errors import SweepError, shown
-from robot_dyn.sweeps.distributions.base import LEAST, MOST, Distribution, said
-from robot_dyn.validate import numbers
+from robot_dyn.foundations.errors import SweepError, shown
+from robot_dyn.foundations.validate import numbers
+from robot_dyn.tools.sweeps.distributions.base import LEAST, MOST, Distribution, said
 
 
 @final

@@ -20,11 +20,11 @@ from queue import Empty, Queue
 from typing import Any, final
 from urllib.parse import urlsplit
 
-from robot_dyn.errors import RobotDynError, SweepError, shown
-from robot_dyn.extras import needs
-from robot_dyn.sweeps.folder.files import write
-from robot_dyn.sweeps.folder.folder import Folder
-from robot_dyn.sweeps.plan.specification import versions
+from robot_dyn.foundations.errors import RobotDynError, SweepError, shown
+from robot_dyn.foundations.extras import needs
+from robot_dyn.tools.sweeps.folder.files import write
+from robot_dyn.tools.sweeps.folder.folder import Folder
+from robot_dyn.tools.sweeps.plan.specification import versions
 
 _WINDOW = 3  # tasks a thread of a worker
 _ATTEMPTS = 20  # rounds without a new file, after which a chunk is held to end its worker
@@ -230,7 +230,7 @@ def _answer(ticket: Ticket) -> str:
 @lru_cache(maxsize=1)
 def _work(ticket: Ticket) -> Any:
     """The folder, the work and the times of samples of a sweep, made once in a worker."""
-    from robot_dyn.sweeps.run_sweep import opened
+    from robot_dyn.tools.sweeps.run_sweep import opened
 
     _check(ticket)
     folder, work = opened(Path(ticket.folder))

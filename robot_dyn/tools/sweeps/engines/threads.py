@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Iterable
 from typing import final
 
-from robot_dyn.sweeps.plan.work import Stopped
+from robot_dyn.tools.sweeps.plan.work import Stopped
 
 _LOOK_S = 0.2
 

@@ -12,11 +12,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import SweepError
-from robot_dyn.extras import needs
-from robot_dyn.files import reading
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations.extras import needs
+from robot_dyn.foundations.files import reading
 from robot_dyn.simulation.results.archive import Archive, ArchiveError, write
-from robot_dyn.sweeps.folder.rows import TEXTS, Rows
+from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows
 
 _FOOTER = "footer"
 _REMEDY = "run the sweep again, after removing this file"

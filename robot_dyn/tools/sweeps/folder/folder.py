@@ -19,12 +19,12 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import SweepError
-from robot_dyn.files import read, why
-from robot_dyn.sweeps.folder.chunk_file import FORMAT, Columns, Format
-from robot_dyn.sweeps.folder.files import Exclusive, Files, make_folder, remove_abandoned, write
-from robot_dyn.sweeps.folder.rows import TEXTS, Rows
-from robot_dyn.sweeps.folder.samples import SampleStore
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations.files import read, why
+from robot_dyn.tools.sweeps.folder.chunk_file import FORMAT, Columns, Format
+from robot_dyn.tools.sweeps.folder.files import Exclusive, Files, make_folder, remove_abandoned, write
+from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows
+from robot_dyn.tools.sweeps.folder.samples import SampleStore
 
 MOST_FILES = 20_000  # of a folder
 _MOST_TEXT, _MOST_TABLE = 2**26, 2**34

@@ -16,13 +16,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from robot_dyn.control.cartesian import CartesianReference
-from robot_dyn.errors import SweepError, nearest, shown
+from robot_dyn.foundations.errors import SweepError, nearest, shown
+from robot_dyn.foundations.validate import choice
+from robot_dyn.foundations.values import Value
 from robot_dyn.queries.units import joint_types_of, units
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.sweeps.imported import digest_of, imported, path_of
-from robot_dyn.sweeps.plan.runs import Runs
-from robot_dyn.validate import choice
-from robot_dyn.values import Value
+from robot_dyn.tools.sweeps.imported import digest_of, imported, path_of
+from robot_dyn.tools.sweeps.plan.runs import Runs
 
 _ROWS = {"q": 0, "v": 1, "u": 2}  # of what is observed of a run
 _RECORDS = ("q", "v", "u", "energy", "work")

@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from robot_dyn.errors import SweepError
-from robot_dyn.sweeps.imported import imported
-from robot_dyn.sweeps.plan.sweep import Sweep
-from robot_dyn.sweeps.plan.texts import distribution_of, figure_of, samples_of_text
-
-_READER = "robot_dyn.scene.sweep:sweep_table"  # a room above, named as users' functions are
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.scene.scene import read_both
+from robot_dyn.tools.sweeps.plan.sweep import Sweep
+from robot_dyn.tools.sweeps.plan.texts import distribution_of, figure_of, samples_of_text
 
 
 def from_scene(path: str | Path, **changes: Any) -> Sweep:
@@ -24,7 +22,8 @@ def from_scene(path: str | Path, **changes: Any) -> Sweep:
         SceneError: If the scene cannot be read.
         SweepError: If it states no sweep, or one that is not allowed.
     """
-    table = imported(_READER)(path) or {}
+    stated_table = getattr(read_both(path)[0], "sweep", None)
+    table = {} if stated_table is None else stated_table.model_dump(exclude_unset=True)
     vary = {name: distribution_of(text) for name, text in table.pop("vary", {}).items()}
     figures = {name: figure_of(name, text, imports=False) for name, text in table.pop("figures", {}).items()}
     stated = {"vary": vary, "figures": figures} | table

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from time import process_time
 
-from robot_dyn.errors import SweepError
+from robot_dyn.foundations.errors import SweepError
 from robot_dyn.simulation.rollouts.lock_step import LANES
-from robot_dyn.sweeps.folder.rows import RAISED
-from robot_dyn.sweeps.plan.sweep import Sweep
-from robot_dyn.sweeps.plan.work import Work
+from robot_dyn.tools.sweeps.folder.rows import RAISED
+from robot_dyn.tools.sweeps.plan.sweep import Sweep
+from robot_dyn.tools.sweeps.plan.work import Work
 
 _RUNS = 64
 _CHUNK_S = 2.0

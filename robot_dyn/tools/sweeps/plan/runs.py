@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.simulation.results.samples import tracking_of
-from robot_dyn.values import Value, read_only
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.results.trajectory import Trajectory

@@ -7,9 +7,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.errors import SweepError
-from robot_dyn.validate import choice, integer, truth
-from robot_dyn.values import Value
+from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations.validate import choice, integer, truth
+from robot_dyn.foundations.values import Value
 
 RECORDED = ("q", "v", "u")
 

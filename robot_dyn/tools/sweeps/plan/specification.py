@@ -14,14 +14,14 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.codegen.store.keys import processor_of_code, version_of
-from robot_dyn.errors import SweepError, shorten
+from robot_dyn.foundations.errors import SweepError, shorten
 from robot_dyn.simulation.setup.settings import settings_of
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.sweeps import distributions
-from robot_dyn.sweeps.imported import digest_of
-from robot_dyn.sweeps.plan import figures
-from robot_dyn.sweeps.plan.samples import samples
-from robot_dyn.sweeps.plan.sweep import Sweep
+from robot_dyn.tools.sweeps import distributions
+from robot_dyn.tools.sweeps.imported import digest_of
+from robot_dyn.tools.sweeps.plan import figures
+from robot_dyn.tools.sweeps.plan.samples import samples
+from robot_dyn.tools.sweeps.plan.sweep import Sweep
 
 FORMAT = 2
 _PLACES = ("scene",)  # that may differ: where the scene lies

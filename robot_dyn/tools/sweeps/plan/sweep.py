@@ -10,19 +10,19 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.answer import Answer, Block, Table
-from robot_dyn.errors import QueryError, RobotDynError, SweepError, shown
+from robot_dyn.foundations.answer import Answer, Block, Table
+from robot_dyn.foundations.errors import QueryError, RobotDynError, SweepError, shown
+from robot_dyn.foundations.validate import integer
+from robot_dyn.foundations.values import Caching, Value
 from robot_dyn.queries.units import joint_types_of, unit
 from robot_dyn.simulation.rollouts.sweepable import sweepable
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.sweeps.designs import Design, design
-from robot_dyn.sweeps.distributions import Distribution, distribution
-from robot_dyn.sweeps.folder.rows import TEXTS
-from robot_dyn.sweeps.imported import imported, path_of
-from robot_dyn.sweeps.plan.figures import Figure, figure
-from robot_dyn.sweeps.plan.samples import Samples, samples_of
-from robot_dyn.validate import integer
-from robot_dyn.values import Caching, Value
+from robot_dyn.tools.sweeps.designs import Design, design
+from robot_dyn.tools.sweeps.distributions import Distribution, distribution
+from robot_dyn.tools.sweeps.folder.rows import TEXTS
+from robot_dyn.tools.sweeps.imported import imported, path_of
+from robot_dyn.tools.sweeps.plan.figures import Figure, figure
+from robot_dyn.tools.sweeps.plan.samples import Samples, samples_of
 
 READER = "robot_dyn.scene.scene:read_scene"  # of scenes, a room above: it is named as users' functions are
 STARTS = ("q0", "v0")

@@ -10,12 +10,12 @@ from collections.abc import Callable, Mapping
 from inspect import signature
 from typing import Any
 
-from robot_dyn.errors import SweepError, nearest, shorten
-from robot_dyn.sweeps import distributions
-from robot_dyn.sweeps.distributions import Distribution
-from robot_dyn.sweeps.plan import figures
-from robot_dyn.sweeps.plan.figures import Figure, figure
-from robot_dyn.sweeps.plan.samples import RECORDED, Samples, samples
+from robot_dyn.foundations.errors import SweepError, nearest, shorten
+from robot_dyn.tools.sweeps import distributions
+from robot_dyn.tools.sweeps.distributions import Distribution
+from robot_dyn.tools.sweeps.plan import figures
+from robot_dyn.tools.sweeps.plan.figures import Figure, figure
+from robot_dyn.tools.sweeps.plan.samples import RECORDED, Samples, samples
 
 _MOST = 10_000  # characters
 _DISTRIBUTIONS: Mapping[str, Callable[..., Distribution]] = {

@@ -12,7 +12,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.errors import RobotDynError, SweepError, because
+from robot_dyn.foundations.errors import RobotDynError, SweepError, because
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.batch import Batch, parts_of_run
 from robot_dyn.simulation.rollouts.lock_step import LANES
@@ -21,10 +21,10 @@ from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.rollouts import batch_of, manners, run_batch
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import MOST_BYTES
-from robot_dyn.sweeps.folder.rows import DIVERGED, FINISHED, RAISED, Rows
-from robot_dyn.sweeps.folder.samples import check_times
-from robot_dyn.sweeps.plan.runs import Runs, taken
-from robot_dyn.sweeps.plan.sweep import STARTS, Sweep, samples_of_run
+from robot_dyn.tools.sweeps.folder.rows import DIVERGED, FINISHED, RAISED, Rows
+from robot_dyn.tools.sweeps.folder.samples import check_times
+from robot_dyn.tools.sweeps.plan.runs import Runs, taken
+from robot_dyn.tools.sweeps.plan.sweep import STARTS, Sweep, samples_of_run
 
 _PART_BYTES = 2**23  # that the runs of a part record; memory does not grow with the chunk, and allocators reuse blocks
 Look = Callable[[float], object]

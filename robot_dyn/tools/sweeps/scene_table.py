@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
 from robot_dyn.scene.schema import Part
-
-if TYPE_CHECKING:
-    from robot_dyn.scene.scene import Scene
 
 
 class SweepTable(Part):
@@ -33,11 +29,3 @@ class SweepTable(Part):
     """Of the design."""
     samples: str | None = None
     """Samples that are kept: `q`, `v` or `u` of all runs, or `samples('q', 'v', every=10, failed=True)`."""
-
-
-def sweep_table(path: str | Path) -> dict[str, Any] | None:
-    """The table `[sweep]` of a scene file as values by key; None without one. SceneError as of `read_scene`."""
-    from robot_dyn.scene.scene import read_both
-
-    scene: Scene = read_both(path)[0]
-    return None if scene.sweep is None else scene.sweep.model_dump(exclude_unset=True)

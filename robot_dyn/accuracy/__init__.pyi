@@ -1,0 +1,16 @@
+# The public names of this room and where they live: type checkers read this file, and __init__.py does.
+from robot_dyn.accuracy.advice import Advice as Advice
+from robot_dyn.accuracy.certificate.certificate import Certificate as Certificate
+from robot_dyn.accuracy.certificate.certify import certify as certify
+from robot_dyn.accuracy.costs.cost import Cost as Cost
+from robot_dyn.accuracy.costs.cost import cost as cost
+from robot_dyn.accuracy.run_difference import RunDifference as RunDifference
+from robot_dyn.accuracy.work_precision_diagram.work_precision import WorkPrecision as WorkPrecision
+from robot_dyn.accuracy.work_precision_diagram.work_precision import work_precision as work_precision
+from robot_dyn.cross_check.compare import Comparison as Comparison
+from robot_dyn.foundations.arithmetic import Ball as Ball
+from robot_dyn.foundations.arithmetic import midpoint as midpoint
+from robot_dyn.foundations.arithmetic import radius as radius
+from robot_dyn.report.save import save_result as save_result
+
+__all__: list[str]

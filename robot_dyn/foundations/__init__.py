@@ -1,0 +1,8 @@
+"""Foundations: arithmetic, spatial algebra, checks of arguments, errors, values, files and what shows an answer.
+
+arithmetic, linear_algebra, spatial   numbers of any arithmetic; small dense systems; rigid-body transforms
+convex, saturation, threshold         the convex problem of dry friction and stops; limits; levels at which laws switch
+coefficients, validate, signatures    declared coefficients; checks of arguments; signatures of options
+values, result, answer, display       value objects; results as data, as lines and tables, as HTML
+errors, files, extras, public         errors; safe reading and writing; optional packages; public names of a room
+"""

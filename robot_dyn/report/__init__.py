@@ -1,0 +1,8 @@
+"""What measured results share: their base, their figure, the writer of their files, versions and times.
+
+result            the base of results: a sentence, tables, what was left out
+figure            the sheet of their figures
+save              save_result: figure, CSV or JSON by the suffix
+environment       versions and processor
+timing            times of calls that take turns; time_budget: how long a measurement may take
+"""

@@ -1,0 +1,15 @@
+"""Tools: products of their own, which use the library as a user would.
+
+    doctor   what is wrong in a URDF file, and repairs
+    motors   plans, and whether the motors suffice for them
+    sweeps   many runs of a scene under uncertain parameters
+    proof    theorems about where an arm will be
+    stress   what breaks first on an arm
+
+No other folder of the package imports a tool, and no tool imports another. Their commands and scene tables are entry
+points (`robot_dyn.commands`, `robot_dyn.scene_tables` in pyproject.toml), imported when they are used.
+"""
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]

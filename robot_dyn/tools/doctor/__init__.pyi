@@ -1,0 +1,5 @@
+# The public names of this tool and where they live: type checkers read this file, and __init__.py does.
+from robot_dyn.tools.doctor.checkup import Checkup as Checkup
+from robot_dyn.tools.doctor.checkup import check as check
+
+__all__: list[str]

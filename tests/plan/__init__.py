@@ -1,1 +1,0 @@
-"""Tests of `robot_dyn.plan`."""
