@@ -71,7 +71,8 @@ LAX = {  # arguments that may be infinite or unknown, or of any shape
 SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
 
 
-ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.plan, rd.studies, rd.tools.sweeps)
+TOOLS = (rd.tools.doctor, rd.tools.motors, rd.tools.proof, rd.tools.stress, rd.tools.sweeps)
+ROOMS = (rd, rd.effects, rd.control, rd.integrate, rd.accuracy, *TOOLS)
 
 SHOWS = {"blocks", "tables", "to_json"}  # methods of answers, which take no argument
 OF_EXTRAS = {"to_pandas", "to_xarray", "samples"}  # take none either, and need packages that may be absent

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from importlib.metadata import entry_points
 
 import pytest
 
@@ -10,29 +11,37 @@ from robot_dyn.cli.app import app
 from robot_dyn.cli.groups import GROUPS
 from tests.command import said
 
-LINES = {name: line for lines in GROUPS.values() for name, line in lines.items()}
+CORE = [name for lines in GROUPS.values() for name in lines]
+TOOLS = sorted(command.name for command in entry_points(group="robot_dyn.commands"))
 
 
-def commands() -> list[str]:
+def commands() -> dict[str, tuple[str, str]]:
+    """Group and line of each command, in the order of the help."""
     said("--help")  # loads them
-    return [each.name or each.callback.__name__ for each in app.registered_commands]  # pyright: ignore
+    return {
+        command.name or command.callback.__name__: (str(command.rich_help_panel), str(command.short_help))  # pyright: ignore
+        for command in app.registered_commands
+    }
 
 
 def test_every_command_is_in_one_group() -> None:
-    assert commands() == [*LINES]
-    assert sum(map(len, GROUPS.values())) == len(LINES)
+    """Those of the core in the order of GROUPS, those of tools behind them in the group that they state."""
+    groups = [group for group, _ in commands().values()]
+    assert groups == sorted(groups, key=[*GROUPS].index)
+    assert [name for name in commands() if name in CORE] == CORE
+    assert sorted({*commands()} - {*CORE}) == TOOLS
 
 
 def test_help_has_the_groups_and_a_line_for_each_command() -> None:
     shown = [line.strip("│ \n") for line in said("--help").splitlines()]
     titles = [re.sub(r"[^\w ]", "", line).strip() for line in shown if line.startswith("╭")]
     assert titles == ["Options", *GROUPS]
-    width = max(map(len, LINES))
-    for name, line in LINES.items():
+    width = max(map(len, commands()))
+    for name, (_, line) in commands().items():
         assert f"{name:<{width}}  {line}" in shown, name
 
 
-@pytest.mark.parametrize("name", LINES)
+@pytest.mark.parametrize("name", [*CORE, *TOOLS])
 def test_what_takes_no_value_has_no_type_in_help(name: str) -> None:
     text = said(name, "--help")
     assert re.search(r"--help\s+-h\s+Show this", text) and "bool" not in text

@@ -53,7 +53,7 @@ def test_an_edit_of_a_plot_changes_no_key() -> None:
     traced = {path.relative_to(ROOT).as_posix() for path in traced_sources()}
     assert {
         "effects/friction.py",
-        "arithmetic.py",
+        "foundations/arithmetic.py",
         "simulation/dynamics/state_equation.py",
         "codegen/trace/symbolic.py",
     } <= traced

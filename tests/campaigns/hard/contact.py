@@ -7,13 +7,14 @@ dry friction and rigid stops in modes that are found by trying all combinations.
 and steps: below their distance, and below 1e-12 of the motion, nothing is judged. An estimate may be 0.3 of the error,
 as stated in tests/campaigns/estimates. A set-valued scene ends at its event number 150, if there are as many: bounces
 that kick each other off their stops go on by thousands; or where two joints come to rest and friction of rest, above
-that of sliding, leaves it open which of them goes on: the law has several solutions there; or at 20 events
-within 1e-6 s, where the truth cannot follow. The residual of the convex problems is on the scale of the terms added, where a Cholesky solution of n ≤ 7 joints leaves 3e-15; that of time stepping is
-asked again from outside, with M and loads by Pinocchio alone. The kinetic energy behind an impact is at most that
-before it, but for 4 n u |v|ᵀ|M||v|: n + 3 roundings of each product. The energy that nothing accounts for is at most
-1e-3 of that exchanged, or the summary says it. In time stepping stops add none at all, but for the rounding of 400
-steps, each 20 u of what is exchanged: 1e-12. Its error there falls to a quarter with the step, order 1; the median over
-50 scenes may be 0.4 of it, since impacts fall anywhere within steps; of fewer it tells nothing.
+that of sliding, leaves it open which of them goes on: the law has several solutions there; or at 20 events within 1e-6
+s, where the truth cannot follow. The residual of the convex problems is on the scale of the terms added, where a
+Cholesky solution of n ≤ 7 joints leaves 3e-15; that of time stepping is asked again from outside, with M and loads by
+Pinocchio alone. The kinetic energy behind an impact is at most that before it, but for 4 n u |v|ᵀ|M||v|: n + 3
+roundings of each product. The energy that nothing accounts for is at most 1e-3 of that exchanged, or the summary says
+it. In time stepping stops add none at all, but for the rounding of 400 steps, each 20 u of what is exchanged: 1e-12.
+Its error there falls to a quarter with the step, order 1; the median over 50 scenes may be 0.4 of it, since impacts
+fall anywhere within steps; of fewer it tells nothing.
 """
 
 from __future__ import annotations
