@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf, nan
-from typing import TYPE_CHECKING, Any, ClassVar, final
+from typing import Any, ClassVar, final
 
 import numpy as np
 
@@ -24,9 +24,6 @@ from robot_dyn.simulation.comparison.differing_settings import (
 )
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @final
@@ -72,6 +69,7 @@ class RunDifference(Result):
         interrupted: False.
     """
 
+    diagram: ClassVar[str] = "robot_dyn.accuracy.run_difference_figure"
     columns: ClassVar[tuple[str, ...]] = ("joint", "quantity", "unit", "rms", "largest", "at")
     robot: str
     names: tuple[str, str]
@@ -107,11 +105,6 @@ class RunDifference(Result):
     def rows(self) -> Iterator[Mapping[str, Any]]:
         """A row for each quantity of each joint."""
         return (vars(each) for each in self.joints)
-
-    def draw(self, theme: str = "light") -> Figure:
-        from robot_dyn.accuracy.run_difference_figure import draw
-
-        return draw(self, theme)
 
     def tables(self) -> Iterator[Block]:
         where = "interpolated between their samples" if self.interpolated else "common samples"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +49,15 @@ def sheet(width: float, height: float, result: Result, caption: str, theme: str)
     figure.text(left, 1 - _TOP / height, lines(heading), fontsize=12, weight="bold", va="top", **ink(colours))
     figure.text(left, 1 - below / height, lines(caption), fontsize=8.5, va="top", linespacing=1.4, **ink(colours))
     return figure, colours
+
+
+def drawn(result: Result, theme: str = "light") -> Figure:
+    """Draw a result by the module that its class names.
+
+    Raises:
+        ResultError: If there is nothing to draw.
+    """
+    return import_module(result.diagram).draw(result, theme)
 
 
 def inline(figure: Figure) -> str:

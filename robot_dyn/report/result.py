@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.foundations.errors import RobotDynError
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class Result(Answer):
@@ -17,12 +14,14 @@ class Result(Answer):
 
     Attributes:
         columns: Of the table; those that a row lacks are empty, and what else it has is left out.
+        diagram: Module whose function `draw(result, theme)` draws it; empty without a figure.
         left_out: What was left out, and why.
         environment: Versions and processor.
         interrupted: Whether the study was ended by the user.
     """
 
     columns: ClassVar[tuple[str, ...]] = ()
+    diagram: ClassVar[str] = ""
     left_out: tuple[str, ...]
     environment: dict[str, str]
     interrupted: bool
@@ -48,27 +47,11 @@ class Result(Answer):
         yield from (f"left out: {each}" for each in self.left_out)
         yield ", ".join(f"{name} {value}" for name, value in self.environment.items())
 
-    def draw(self, theme: str = "light") -> Figure:
-        """Draw the result as a figure; a subclass without a figure does not define it.
-
-        Args:
-            theme: For "light" or "dark" paper, or "page" for an HTML page.
-
-        Raises:
-            ResultError: If there is nothing to draw.
-        """
-        raise NotImplementedError
-
-    @classmethod
-    def drawn(cls) -> bool:
-        """Return True if results of this class have a figure."""
-        return cls.draw is not Result.draw
-
     @property
     def drawing(self) -> str:
-        from robot_dyn.report.figure import inline
+        from robot_dyn.report.figure import drawn, inline
 
         try:
-            return inline(self.draw("page")) if self.drawn() else ""
+            return inline(drawn(self, "page")) if self.diagram else ""
         except RobotDynError:  # there is nothing to draw
             return ""

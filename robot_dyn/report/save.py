@@ -9,7 +9,7 @@ from pathlib import Path
 from robot_dyn.foundations import files
 from robot_dyn.foundations.result import json_text
 from robot_dyn.foundations.validate import choice, instance
-from robot_dyn.report.figure import ResultError
+from robot_dyn.report.figure import ResultError, drawn
 from robot_dyn.report.result import Result
 from robot_dyn.view.plots.figure import THEMES
 from robot_dyn.view.plots.plots import PICTURES
@@ -46,13 +46,13 @@ def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Pa
     elif path.suffix.lower() == JSON.suffix:
         stream.write(json_text(result).encode())
     else:
-        result.draw(theme).savefig(stream, format=path.suffix[1:].lower(), dpi=120)
+        drawn(result, theme).savefig(stream, format=path.suffix[1:].lower(), dpi=120)
     return files.save(path, lambda file: file.write(stream.getvalue()), ResultError)
 
 
 def kinds(of: type[Result]) -> tuple[files.Kind, ...]:
     """The files that a result of a class can be."""
-    return (*(PICTURES if of.drawn() else ()), *((table_kind(of),) if of.columns else ()), JSON)
+    return (*(PICTURES if of.diagram else ()), *((table_kind(of),) if of.columns else ()), JSON)
 
 
 def table_kind(of: type[Result]) -> files.Kind:

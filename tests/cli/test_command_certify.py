@@ -50,5 +50,5 @@ def test_mistakes_are_told_in_one_line_before_the_work(tmp_path, monkeypatch, gi
     monkeypatch.chdir(tmp_path)
     (tmp_path / "old.csv").write_text("quantity,implementation")
     if "--csv" in given or "-o" in given:
-        monkeypatch.setattr(rd.studies, "certify", None)
+        monkeypatch.setattr(rd.accuracy, "certify", None)
     assert re.fullmatch(message, refusal(["certify", "pendulum", *given]))

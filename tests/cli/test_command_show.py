@@ -60,7 +60,7 @@ def test_the_price_needs_no_other_program(monkeypatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise RobotDynError("no reference")
 
-    monkeypatch.setattr(rd.studies, "work_precision", refuse)
+    monkeypatch.setattr(rd.accuracy, "work_precision", refuse)
     assert list(demo._price(swing))[2:] == ["left out: no reference"]
 
 

@@ -85,7 +85,7 @@ def test_mistakes_are_told_in_one_line_before_the_work(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "old.csv").write_text(TABLES[command])
     if given == "no.toml" or "--csv" in given or "-o" in given:
-        monkeypatch.setattr(rd.studies, {"accuracy": "work_precision"}.get(command, command), None)
+        monkeypatch.setattr(rd.accuracy, {"accuracy": "work_precision"}.get(command, command), None)
     assert re.fullmatch(message, refusal([command, *given.split()]))
 
 

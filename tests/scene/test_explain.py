@@ -58,7 +58,7 @@ def test_the_model_of_a_controller_and_the_span_of_its_reference_are_named() -> 
     plant = rd.Plant(arm.with_(payload=rd.Payload("tool0", 2.0)))
     plan = rd.control.quintic(q, q + 0.4, duration_s=1.5, start_s=0.5)
 
-    def explained(model: rd.Robot) -> rd.studies.Result:
+    def explained(model: rd.Robot) -> Result:
         controller = rd.control.ComputedTorque(model, plan, 100.0, 20.0)
         return rd.explain(rd.Setup(plant, q, duration_s=2.5, controller=controller))
 

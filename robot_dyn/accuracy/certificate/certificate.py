@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import log10, nan
-from typing import TYPE_CHECKING, Any, ClassVar, final
+from typing import Any, ClassVar, final
 
 from robot_dyn.accuracy.certificate.text import DECIMALS, certificate_tables
 from robot_dyn.foundations.answer import Block
@@ -14,9 +14,6 @@ from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.validate import choice
 from robot_dyn.queries.units import format_duration
 from robot_dyn.report.result import Result
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @final
@@ -95,6 +92,7 @@ class Certificate(Result):
         interrupted: Whether the user interrupted the computation.
     """
 
+    diagram: ClassVar[str] = "robot_dyn.accuracy.certificate.diagram"
     columns: ClassVar[tuple[str, ...]] = (
         "quantity", "implementation", "given", "typical", "samples", "random", "searched", "time_s", "repeats",
         "repeatable",
@@ -110,11 +108,6 @@ class Certificate(Result):
     environment: dict[str, str]
     seed: int
     interrupted: bool = False
-
-    def draw(self, theme: str = "light") -> Figure:
-        from robot_dyn.accuracy.certificate.diagram import draw
-
-        return draw(self, theme)
 
     def tables(self) -> Iterator[Block]:
         return certificate_tables(self)

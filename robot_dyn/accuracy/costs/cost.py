@@ -26,7 +26,7 @@ from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 _MOST_REPEATS = 1000
 
@@ -47,6 +47,7 @@ class Cost(Result):
         interrupted: Whether it was ended by the user.
     """
 
+    diagram: ClassVar[str] = "robot_dyn.accuracy.costs.diagram"
     columns: ClassVar[tuple[str, ...]] = (
         "group", "what", "per", *(f"{of}_{key}" for of in ("first", "second") for key in Version.__annotations__),
         "instructions_ratio", "time_ratio", "time_ratio_spread", "time_between_s",
@@ -59,11 +60,6 @@ class Cost(Result):
     budget_s: float
     spent_s: float
     interrupted: bool = False
-
-    def draw(self, theme: str = "light") -> Figure:
-        from robot_dyn.accuracy.costs.diagram import draw
-
-        return draw(self, theme)
 
     def tables(self) -> Iterator[Block]:
         return cost_tables(self)

@@ -42,7 +42,7 @@ from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 # In this order, should the budget end: first what is most used and what costs least.
 _FIRST = ("DOP853", "rk4", "order_8", "explicit_euler", "Rosenbrock", "gauss_6", "gauss_4", "midpoint")
@@ -72,6 +72,7 @@ class WorkPrecision(Result):
         past_horizon: Of chaotic motion, energy and the way back over all of the duration, by method; else nothing.
     """
 
+    diagram: ClassVar[str] = "robot_dyn.accuracy.work_precision_diagram.diagram"
     columns: ClassVar[tuple[str, ...]] = (
         "method", "engine", "events", "by", "setting", "steps", "evaluations", "error", "energy", "time_s", "repeats",
         "believed", "repeatable", "on_front",
@@ -88,11 +89,6 @@ class WorkPrecision(Result):
     spent_s: float
     interrupted: bool = False
     past_horizon: tuple[PastHorizon, ...] = ()
-
-    def draw(self, theme: str = "light") -> Figure:
-        from robot_dyn.accuracy.work_precision_diagram.diagram import draw
-
-        return draw(self, theme)
 
     def tables(self) -> Iterator[Block]:
         return work_precision_tables(self)

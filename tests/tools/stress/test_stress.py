@@ -315,7 +315,7 @@ def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
 
 def test_document_has_the_keys_that_are_promised_and_no_infinity(tmp_path, monkeypatch) -> None:
     whole = made("pendulum")
-    monkeypatch.setattr(rd.studies, "stress", lambda *arguments, **options: whole)
+    monkeypatch.setattr(rd.tools.stress, "stress", lambda *arguments, **options: whole)
     done = run("stress", "pendulum", "--json", "-o", tmp_path / "found")
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))
@@ -333,7 +333,7 @@ def test_document_has_the_keys_that_are_promised_and_no_infinity(tmp_path, monke
 def test_failures_are_told_loudly(monkeypatch) -> None:
     whole = made("pendulum")
     wrong = replace(whole, limits=tuple(replace(each, confirmed=False) for each in whole.limits[-1:]))
-    monkeypatch.setattr(rd.studies, "stress", lambda *arguments, **options: wrong)
+    monkeypatch.setattr(rd.tools.stress, "stress", lambda *arguments, **options: wrong)
     done = run("stress", "pendulum")
     assert done.returncode == 1 and "\nFAILURE: gain PD" in done.stdout
 

@@ -19,8 +19,6 @@ from robot_dyn.tools.motors.motor_budget.demand import Demand
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from robot_dyn.tools.motors.motor_budget.fastest import FastestMotion
     from robot_dyn.tools.motors.motor_budget.largest_payload import LargestPayload
 
@@ -43,6 +41,7 @@ class MotorBudget(Result):
         case: The plant, the motion and the limits of torque and speed, and of continuous torque, of a plan; else None.
     """
 
+    diagram: ClassVar[str] = "robot_dyn.tools.motors.motor_budget.diagram"
     columns: ClassVar[tuple[str, ...]] = (
         "joint", "unit", "peak", "peak_at", "peak_limit", "rms", "continuous_limit", "speed", "speed_at", "speed_limit",
         "power", "mean_power", "energy", "regenerated", "breakaway",
@@ -94,11 +93,6 @@ class MotorBudget(Result):
     def rows(self) -> Iterator[Mapping[str, Any]]:
         """A row for each joint."""
         return (vars(each) | {"unit": of_joint("N m", each.type)} for each in self.joints)
-
-    def draw(self, theme: str = "light") -> Figure:
-        from robot_dyn.tools.motors.motor_budget.diagram import draw
-
-        return draw(self, theme)
 
     def tables(self) -> Iterator[Block]:
         yield f"limits: {self.limits}"
