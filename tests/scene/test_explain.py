@@ -10,6 +10,7 @@ import pytest
 from lxml import html
 
 import robot_dyn as rd
+from robot_dyn.report.result import Result
 from robot_dyn.scene.starters import starter, starters
 from tests.command import document, said
 
