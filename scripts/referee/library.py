@@ -50,9 +50,9 @@ def panda(**edits: Any) -> Any:
     return arm("panda", lock={"panda_finger_joint1": 0.0}, **edits)
 
 
-def payload(frame: str, mass: float, com: Sequence[float] = (0.0, 0.0, 0.0)) -> Any:
+def payload(frame: str, mass: float, com: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Any:
     """Return a payload that is fixed to a frame."""
-    return rd.Payload(frame, mass, tuple(com))
+    return rd.Payload(frame, mass, com)
 
 
 def plant(robot: Any, *effects: Any) -> Any:
@@ -349,7 +349,7 @@ def environment(cache: Path | None = None) -> dict[str, str]:
 
 def versions() -> dict[str, str]:
     """Return what the results depend on besides the tree."""
-    import pinocchio
+    import pinocchio  # pyright: ignore[reportMissingImports]
     import scipy
 
     return {
