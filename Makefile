@@ -31,6 +31,7 @@ check: .venv/installed
 	$(BIN)/ruff check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/python scripts/words.py
 
 # the site, in build/docs/README.html: a warning, a link that leads nowhere or a cell that raises is an error
 docs: .venv/installed

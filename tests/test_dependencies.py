@@ -28,7 +28,9 @@ def imported(folder: str) -> dict[str, str]:
             if isinstance(node, ast.ImportFrom) and not node.level and node.module:
                 names = [node.module]
             found |= {name.partition(".")[0]: str(path.relative_to(ROOT)) for name in names}
-    own = {"robot_dyn", "tests", "benchmarks", "site_parts", *(path.stem for path in (ROOT / folder).iterdir())}
+    own = {"robot_dyn", "tests", "site_parts"} | {path.stem for path in (ROOT / folder).iterdir()}
+    if folder == "tests":
+        own |= {path.stem for path in (ROOT / "scripts").iterdir()}
     return {name: path for name, path in found.items() if name not in own | set(sys.stdlib_module_names)}
 
 
