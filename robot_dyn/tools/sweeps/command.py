@@ -49,7 +49,10 @@ def sweep(
         str | None, typer.Option(help="Workers of Dask in place of threads: local:2, or tls://host:8786.")
     ] = None,
     share: Annotated[str | None, typer.Option(metavar="3/16", help="The part of one job of an array.")] = None,
-    scene: Annotated[str | None, typer.Option(help="Of a folder: where its scene lies now, if it was moved.")] = None,
+    scene: Annotated[
+        str | None,
+        typer.Option(help="Of a folder: where its scene lies now, or the function module:function that makes it."),
+    ] = None,
     chunk: Annotated[int | None, typer.Option(help="Runs of a file; about 2 s of work unless given.")] = None,
     probability: Annotated[
         list[str] | None,
@@ -63,6 +66,7 @@ def sweep(
     what is left, `verify` reads all files, `report` writes a page, `export` a table as .csv or .parquet.
     """
     from robot_dyn.tools import sweeps as sw
+    from robot_dyn.tools.sweeps.plan.texts import assignment
 
     verified: list[str] = []
     options: dict[str, Any] = {"threads": threads, "cluster": cluster, "share": share}
@@ -79,7 +83,7 @@ def sweep(
             )
         if folder is None:
             raise SweepError(f"{what}: of which folder? robot-dyn sweep {what} FOLDER")
-        result = sw.read(folder, scene)
+        result = sw.read(folder, scene, dict(assignment("--figure", each) for each in figure or []))
         if what == "run":
             result = _run(result.sweep, folder, options)
         elif what == "verify":

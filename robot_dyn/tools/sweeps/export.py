@@ -71,7 +71,7 @@ def _parquet(sweep: Sweep, tables: Iterator[Mapping[str, np.ndarray]], stream: B
 
 def _about(sweep: Sweep) -> str:
     """The specification as JSON, with the name of the scene in place of its path."""
-    return json.dumps(specification(sweep).data | {"scene": Path(sweep.scene).name}, ensure_ascii=False)
+    return json.dumps(specification(sweep).data | {"scene": Path(sweep.source).name}, ensure_ascii=False)
 
 
 def _about_columns(sweep: Sweep) -> dict[str, dict[str, str]]:

@@ -1,18 +1,60 @@
-"""Functions that a specification names by import path, as "my_figures:settling", with the digest of their module."""
+"""Functions by import path, such as "my_figures:settling", with the digest of their module.
+
+A folder may come from somebody else, so nothing that it names is imported unless its reader names it too. The digest
+of the file is compared before the import, and no place from which Python imports may lie in the folder.
+"""
 
 from __future__ import annotations
 
+import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from hashlib import sha256
 from importlib import import_module
+from importlib.machinery import PathFinder
 from pathlib import Path
-from typing import Any
+from typing import Any, final
 
 from robot_dyn.foundations.errors import SweepError, shown
 
 _PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
+
+
+@final
+@dataclass(frozen=True)
+class Named:
+    """What the reader of a folder names, so that it may be imported.
+
+    Attributes:
+        scene: Scene file, or import path of a function; None for the scene that the folder names.
+        figures: Import paths of functions, by name of figure.
+    """
+
+    scene: str | None = None
+    figures: Mapping[str, str] = field(default_factory=dict)
+
+
+NOTHING = Named()
+
+
+def named(scene: Any, figures: Any) -> Named:
+    """Return the scene and figures that a reader of a folder names.
+
+    Raises:
+        SweepError: If the scene is neither a file nor a function, or a figure is not a function.
+    """
+    if figures is not None and not (isinstance(figures, Mapping) and all(isinstance(name, str) for name in figures)):
+        raise SweepError(f"figures: give functions by name of figure, as {{'settling': …}}, got {shown(figures)}")
+    if isinstance(scene, Path):
+        scene = str(scene)
+    elif scene is not None and not (isinstance(scene, str) and scene.lower().endswith(".toml")):
+        try:
+            scene = path_of(scene)
+        except SweepError as error:
+            raise SweepError(f"scene: give the path of a scene file, or a function ({error})") from None
+    return Named(scene, {name: path_of(function) for name, function in (figures or {}).items()})
 
 
 def path_of(function: Any) -> str:
@@ -59,7 +101,63 @@ def imported(path: str) -> Callable[..., Any]:
 def digest_of(path: str) -> str:
     """The SHA-256 of the file of the module of an import path."""
     module = _module(path.partition(":")[0])
-    file = getattr(module, "__file__", None)
+    return _digest(path, getattr(module, "__file__", None))
+
+
+def check_named(path: str, digest: Any, folder: Path | None) -> None:
+    """Compare the file of a function with the digest that a folder states, before the function is imported.
+
+    Raises:
+        SweepError: If the file is missing, lies in the folder or has another digest, or Python would import from there.
+    """
+    if not isinstance(digest, str):
+        raise SweepError(f"{path}: the folder states no function here; leave it out, or name the scene file it states")
+    if folder is not None:
+        check_places(folder, str(Path.cwd()))
+    file = _file_of(path.partition(":")[0])
+    if file is None:
+        raise SweepError(f"{path} cannot be imported: no such file in the working directory or on PYTHONPATH")
+    if folder is not None and _lies_in(file, folder):
+        raise SweepError(f"{path}: {file} lies in the folder, from which nothing is imported; move it elsewhere")
+    if (found := _digest(path, file)) != digest:
+        raise SweepError(
+            f"{path}: {file} is not the file of the sweep (SHA-256 {found[:12]}…, not {digest[:12]}…), and is not"
+            " imported; restore it, or begin the sweep in a new folder"
+        )
+
+
+def check_places(folder: Path, *more: str) -> None:
+    """Raise SweepError if Python imports from a folder of results, such as from a working directory that is one."""
+    for place in (*sys.path, *more):
+        if isinstance(place, str) and _lies_in(place or os.curdir, folder):
+            raise SweepError(
+                f"{folder}: Python imports modules from {place or 'the working directory'}, which lies in this folder,"
+                " so its files would run as code: change to another working directory, or remove it from PYTHONPATH"
+            )
+
+
+def _lies_in(place: str, folder: Path) -> bool:
+    real, inside = os.path.realpath(folder), os.path.realpath(place)
+    return inside == real or inside.startswith(os.path.join(real, ""))
+
+
+def _file_of(name: str) -> str | None:
+    """The file of a module, found without importing it or the packages that it is in."""
+    if name in sys.modules:
+        return getattr(sys.modules[name], "__file__", None)
+    places: list[str] | None = [*sys.path, str(Path.cwd())]
+    spec = None
+    above = ""
+    for part in name.split("."):
+        above = f"{above}.{part}" if above else part
+        spec = None if places is None else PathFinder.find_spec(above, places)
+        if spec is None:
+            return None
+        places = None if spec.submodule_search_locations is None else list(spec.submodule_search_locations)
+    return spec.origin if spec is not None and spec.has_location else None
+
+
+def _digest(path: str, file: str | None) -> str:
     if file is None or not Path(file).is_file():
         raise SweepError(f"{path}: its module has no file, so that a change of it would not be seen; write it to one")
     return sha256(Path(file).read_bytes()).hexdigest()
@@ -67,7 +165,7 @@ def digest_of(path: str) -> str:
 
 def _module(name: str) -> Any:
     here = str(Path.cwd())
-    if here in sys.path or "" in sys.path:
+    if here in sys.path or "" in sys.path or name.partition(".")[0] == "robot_dyn":
         return import_module(name)
     sys.path.append(here)
     try:

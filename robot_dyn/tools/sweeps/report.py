@@ -14,7 +14,7 @@ from robot_dyn.foundations.display import page, side_by_side, table, text
 from robot_dyn.foundations.errors import SweepError
 from robot_dyn.foundations.files import Kind, save, target
 from robot_dyn.report.figure import PAGE, ink, inline, styled
-from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading
+from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading, is_scene
 
 if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.result import SweepResult
@@ -94,7 +94,9 @@ def _of_figure(result: SweepResult, name: str, x: np.ndarray) -> Iterator[str]:
 
 def _repeat(result: SweepResult, run: int) -> str:
     """The line that repeats a run."""
-    return f"sw.read({str(result.path)!r}).run({run})"
+    scene = result.sweep.source
+    named = "" if is_scene(scene) else f", scene={scene!r}"  # a function is called only if it is named
+    return f"sw.read({str(result.path)!r}{named}).run({run})"
 
 
 def _histogram(name: str, x: np.ndarray) -> str:

@@ -13,7 +13,6 @@ from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.foundations.errors import SweepError, nearest
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.foundations.validate import choice, integer
-from robot_dyn.queries.units import joint_types_of
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.tools.sweeps import counts
@@ -159,7 +158,7 @@ class SweepResult(Answer):
             raise SweepError("no samples are kept: give the Sweep samples='q', or sw.samples('q', every=100)")
         self._check_complete()
         self.folder.check_samples(bits=False)
-        return self.folder.samples.open(joint_types_of(self.sweep.setup.plant.dynamics))
+        return self.folder.samples.open(self.sweep.joint_types)
 
     def export(self, path: str | Path) -> Path:
         """Write the table of all runs to a .csv or .parquet file, whole or not at all.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from shutil import disk_usage
@@ -20,8 +20,16 @@ from robot_dyn.tools.sweeps.engines.share import share as share_of
 from robot_dyn.tools.sweeps.engines.threads import Threads
 from robot_dyn.tools.sweeps.folder.chunk_file import Columns
 from robot_dyn.tools.sweeps.folder.folder import Folder, begin, folder_of, has_specification, read_specification
+from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places, named
 from robot_dyn.tools.sweeps.plan.pilot import pilot
-from robot_dyn.tools.sweeps.plan.specification import Specification, processor, specification, sweep_of, versions
+from robot_dyn.tools.sweeps.plan.specification import (
+    Specification,
+    names_of,
+    processor,
+    specification,
+    sweep_of,
+    versions,
+)
 from robot_dyn.tools.sweeps.plan.sweep import Sweep
 from robot_dyn.tools.sweeps.plan.work import Work
 from robot_dyn.tools.sweeps.result import SweepResult
@@ -67,6 +75,8 @@ def run(
         )
     if cluster is not None and (share is not None or threads is not None):
         raise SweepError("cluster: its scheduler shares out the chunks; leave out share and threads")
+    check_places(path)
+    sweep.setup, work.record  # noqa: B018  refused if a folder names functions that its reader has not named
     known = begun(sweep, path, chunk)
     known.prepare()
     tell, t = _Progress(known, on_progress), None if known.samples is None else known.samples.times()
@@ -79,7 +89,7 @@ def run(
             from robot_dyn.tools.sweeps.engines.cluster import Cluster, client_of
 
             with client_of(cluster) as client:
-                Cluster(client, known).run(missing, tell)
+                Cluster(client, known, names_of(sweep)).run(missing, tell)
         else:
 
             def make(number: int, look: Callable[[float], object]) -> None:
@@ -91,31 +101,40 @@ def run(
     return SweepResult(sweep, known)
 
 
-def read(folder: str | Path, scene: str | Path | None = None) -> SweepResult:
-    """What the folder of a sweep holds.
+def read(
+    folder: str | Path, scene: str | Path | Callable[..., Any] | None = None, figures: Mapping[str, Any] | None = None
+) -> SweepResult:
+    """Return what the folder of a sweep holds.
+
+    Functions that the folder names are imported only if you name them too; tables and statistics need none of them.
+    Before the import, the file of each is compared with the SHA-256 that the folder states.
 
     Args:
         folder: It may have been moved.
-        scene: Where its scene lies now; where it was unless given.
+        scene: Where the scene file lies now, None where it was. Of a sweep whose scene is a function: the function,
+            or its import path "my_arm:setup", to repeat runs or to resume.
+        figures: Functions, or their import paths, by name of figure, to resume a sweep with figures of your own.
 
     Raises:
-        SweepError: If it holds none, or its scene is not there, or has changed since.
+        SweepError: If it holds none; if its scene is missing, or it or a named function has changed since; if Python
+            imports from the folder.
     """
-    known, work = opened(file_path(folder, SweepError), scene)
+    path = file_path(folder, SweepError)
+    known, work = opened(path, named(scene, figures))
     return SweepResult(work.sweep, known)
 
 
-def opened(path: Path, scene: str | Path | None = None) -> tuple[Folder, Work]:
+def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Work]:
     """The folder of a sweep, and its work; arguments and errors as of `read`."""
+    check_places(path)
     text, table = read_specification(path)
     where = str(path / "sweep.json")
     try:
         stored = Specification(json.loads(text))
     except ValueError as error:
         raise SweepError(f"{where}: is not JSON ({error})") from None
-    data = stored.data if scene is None else stored.data | {"scene": scene}
     try:
-        sweep = sweep_of(data, table, where)
+        sweep = sweep_of(stored.data, table, where, names, path)
     except SceneError as error:
         raise SweepError(f"{where}: {error}; sw.read(folder, scene=…), --scene, where it lies now") from None
     stored.check_same(specification(sweep).with_chunk(stored.chunk), where)

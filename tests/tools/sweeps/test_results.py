@@ -262,7 +262,9 @@ def test_a_module_that_changed_is_refused(tmp_path: Path, module: Path) -> None:
     sw.run(sweep, tmp_path / "out")
     module.write_text(MODULE + "\n# changed\n")
     with pytest.raises(SweepError, match=r"figures\.mine\.sha256 is"):
-        sw.read(tmp_path / "out")
+        sw.run(sweep, tmp_path / "out")
+    with pytest.raises(SweepError, match="is not the file of the sweep"):
+        sw.read(tmp_path / "out", figures={"mine": "figures_of_a_test:last"})
 
 
 def test_a_figure_that_raises_makes_its_run_one_that_raised(tmp_path: Path, module: Path) -> None:

@@ -24,6 +24,7 @@ from robot_dyn.foundations.errors import RobotDynError, SweepError, shown
 from robot_dyn.foundations.extras import needs
 from robot_dyn.tools.sweeps.folder.files import write
 from robot_dyn.tools.sweeps.folder.folder import Folder
+from robot_dyn.tools.sweeps.imported import NOTHING, Named
 from robot_dyn.tools.sweeps.plan.specification import versions
 
 _WINDOW = 3  # tasks a thread of a worker
@@ -48,12 +49,16 @@ class Ticket:
         digest: Of the specification in it.
         token: Name of a file in the folder, and its content.
         versions: Of the driver.
+        scene: What the driver names, as in `Named`.
+        figures: Same.
     """
 
     folder: str
     digest: str
     token: str
     versions: tuple[tuple[str, str], ...]
+    scene: str | None = None
+    figures: tuple[tuple[str, str], ...] = ()
 
 
 @contextmanager
@@ -130,13 +135,15 @@ class Cluster:
     Args:
         client: Of the cluster.
         folder: That is filled.
+        names: Scene and functions that workers may import.
     """
 
-    def __init__(self, client: Any, folder: Folder) -> None:
+    def __init__(self, client: Any, folder: Folder, names: Named = NOTHING) -> None:
         self._client, self._folder = client, folder
         path = folder.path.absolute()
         token = f".token-{os.urandom(8).hex()}"
-        self._ticket = Ticket(str(path), folder.digest, token, tuple(versions().items()))
+        figures = tuple(names.figures.items())
+        self._ticket = Ticket(str(path), folder.digest, token, tuple(versions().items()), names.scene, figures)
 
     def run(self, chunks: Callable[[], list[int]], look: Callable[[], object]) -> None:
         """Make the chunks that the folder lacks; `look` is called meanwhile.
@@ -233,7 +240,7 @@ def _work(ticket: Ticket) -> Any:
     from robot_dyn.tools.sweeps.run_sweep import opened
 
     _check(ticket)
-    folder, work = opened(Path(ticket.folder))
+    folder, work = opened(Path(ticket.folder), Named(ticket.scene, dict(ticket.figures)))
     if folder.digest != ticket.digest:
         raise SweepError(f"{ticket.folder}: holds another sweep here than at the driver; give one that all hosts share")
     return folder, work, None if folder.samples is None else folder.samples.times()

@@ -156,27 +156,44 @@ class UserFigure(Figure):
 
     name: ClassVar[str] = "function"
     path: str
+    stated: tuple[str, str] | None = None
+    """In a folder that was read without naming the function: SHA-256 of its module, and unit. It is not imported."""
+
+    @property
+    def function(self) -> Any:
+        """The function; SweepError if a folder names it and its reader has not."""
+        if self.stated is not None:
+            raise SweepError(
+                f"the folder names the function {self.path} as a figure, which is called only if you name it:"
+                f" sw.read(folder, figures={{NAME: {self.path!r}}}), or --figure NAME={self.path}"
+            )
+        return imported(self.path)
 
     @property
     def record(self) -> tuple[str, ...]:
-        needed = getattr(imported(self.path), "record", ("q", "v"))
+        needed = getattr(self.function, "record", ("q", "v"))
         return tuple(choice(f"record of {self.path}", each, _RECORDS, error=SweepError) for each in needed)
 
     def unit(self, setup: Setup) -> str:
-        return str(getattr(imported(self.path), "unit", ""))
+        return self._unit
+
+    @property
+    def _unit(self) -> str:
+        return str(getattr(self.function, "unit", "")) if self.stated is None else self.stated[1]
 
     def of(self, runs: Runs) -> np.ndarray:
-        function = imported(self.path)
+        function = self.function
         batch = getattr(function, "batch", None)
         if batch is not None:
             return np.asarray(batch(runs), dtype=float)
         return np.array([_number(self.path, function(run)) for run in runs])
 
     def to_dict(self) -> dict[str, Any]:
-        return {"figure": self.path, "sha256": digest_of(self.path)}
+        digest = digest_of(self.path) if self.stated is None else self.stated[0]
+        return {"figure": self.path, "sha256": digest, "unit": self._unit}
 
     def check(self, runs: Runs) -> None:
-        function = imported(self.path)
+        function = self.function
         if getattr(function, "batch", None) is None:
             return
         single = np.array([_number(self.path, function(run)) for run in runs])
@@ -222,14 +239,22 @@ def figure(name: str, given: Any) -> Figure:
     return user
 
 
-def from_dict(stored: Mapping[str, Any]) -> Figure:
-    """The figure of a dictionary that `to_dict` made; SweepError if it has another form."""
+def from_dict(stored: Mapping[str, Any], may_import: bool = False) -> Figure:
+    """The figure of a dictionary that `to_dict` made; SweepError if it has another form.
+
+    Args:
+        stored: The dictionary.
+        may_import: Whether a function may be imported, since the reader of the folder named it.
+    """
     given = dict(stored) if isinstance(stored, Mapping) else {}
     kind = given.pop("figure", None)
     if not isinstance(kind, str):
         raise SweepError(f'a stored figure is a table with the key "figure", got {shown(stored)}')
     if ":" in kind:
-        return UserFigure(path_of(kind))
+        digest, unit = given.get("sha256"), given.get("unit")
+        if not isinstance(digest, str) or not isinstance(unit, str):
+            raise SweepError(f'figure {kind}: a stored function has the keys "sha256" and "unit"')
+        return UserFigure(path_of(kind), None if may_import else (digest, unit))
     if kind not in FIGURES:
         raise SweepError(f"no figure {shown(kind)}; {nearest(kind, FIGURES)}")
     try:

@@ -9,21 +9,24 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
+from pathlib import Path
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.codegen.store.keys import processor_of_code, version_of
-from robot_dyn.foundations.errors import SweepError, shorten
+from robot_dyn.foundations.errors import SweepError, nearest, shorten, shown
 from robot_dyn.simulation.setup.settings import settings_of
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.tools.sweeps import distributions
-from robot_dyn.tools.sweeps.imported import digest_of
+from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_named, digest_of
 from robot_dyn.tools.sweeps.plan import figures
+from robot_dyn.tools.sweeps.plan.figures import Figure, UserFigure
 from robot_dyn.tools.sweeps.plan.samples import samples
-from robot_dyn.tools.sweeps.plan.sweep import Sweep
+from robot_dyn.tools.sweeps.plan.stated import StatedScene, stated_scene
+from robot_dyn.tools.sweeps.plan.sweep import Sweep, is_scene
 
-FORMAT = 2
+FORMAT = 3
 _PLACES = ("scene",)  # that may differ: where the scene lies
 
 
@@ -83,11 +86,10 @@ def specification(sweep: Sweep) -> Specification:
     """The specification of a sweep, without the size of its chunks."""
     given = isinstance(sweep.design, str)
     table = {} if given else {"table_sha256": sha256(np.ascontiguousarray(sweep.design, float).tobytes()).hexdigest()}
-    source = {} if sweep.scene.lower().endswith(".toml") else {"function_sha256": digest_of(sweep.scene)}
     data = {
         "format": FORMAT,
-        "scene": sweep.scene,
-        "setup": _setup(sweep.setup) | source,
+        "scene": sweep.source,
+        "setup": _stated_setup(sweep),
         "runs": int(sweep.runs),
         "design": sweep.design if given else "table",
         **table,
@@ -102,23 +104,75 @@ def specification(sweep: Sweep) -> Specification:
     return Specification(json.loads(json.dumps(data)))  # as it is read again
 
 
-def sweep_of(data: Mapping[str, Any], table: np.ndarray | None, where: str) -> Sweep:
-    """The sweep of a specification, with its scene as it is now.
+def sweep_of(
+    data: Mapping[str, Any], table: np.ndarray | None, where: str, named: Named = NOTHING, folder: Path | None = None
+) -> Sweep:
+    """Return the sweep of a specification, with its scene as it is now.
+
+    Functions that the specification names are imported only if `named` has them too.
+
+    Args:
+        data: The specification.
+        table: Rows of the design, if they are stored.
+        where: Its file, for messages.
+        named: What the reader of the folder names.
+        folder: The folder, from which nothing is imported.
 
     Raises:
-        SweepError: If it is not one, or is one of another version.
+        SweepError: If it is not one, or is one of another version; if the file of a named function has changed.
     """
     try:
         if data["format"] != FORMAT:
             raise SweepError(f"{where}: has format {data['format']}, this version reads {FORMAT}")
+        scene = _scene_of(data, named, folder)
         vary = {name: distributions.from_dict(data["vary"][name]) for name in data["order"]}
-        of = {name: figures.from_dict(each) for name, each in data["figures"].items()}
+        of = {name: _figure_of(name, each, named, folder) for name, each in data["figures"].items()}
+        if unknown := named.figures.keys() - {name for name, each in of.items() if isinstance(each, UserFigure)}:
+            raise SweepError(f"{where}: no function is the figure {shown(min(unknown))}; {nearest(min(unknown), of)}")
         design = data["design"] if table is None else table
         kept = data["samples"]
         kept = kept and samples(*kept["names"], every=kept["every"], failed=kept["failed"])
-        return Sweep(data["scene"], data["runs"], vary, of, design, data["seed"], data["storage"], kept)
-    except (KeyError, TypeError, AttributeError) as error:
+        return Sweep(scene, data["runs"], vary, of, design, data["seed"], data["storage"], kept)
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise SweepError(f"{where}: is not the specification of a sweep ({error!r})") from None
+
+
+def _scene_of(data: Mapping[str, Any], named: Named, folder: Path | None) -> str | StatedScene:
+    """The scene that the reader names, or the one of the folder: a file; of a function, what is stated about it."""
+    stored = data["scene"]
+    if named.scene is None:
+        return stored if is_scene(stored) else stated_scene(stored, data["setup"])
+    if not is_scene(named.scene):
+        check_named(named.scene, data["setup"].get("function_sha256"), folder)
+    return named.scene
+
+
+def _figure_of(name: str, stored: Mapping[str, Any], named: Named, folder: Path | None) -> Figure:
+    """The figure that a folder stores; of a function, what is stated about it unless the reader names it."""
+    if name not in named.figures:
+        return figures.from_dict(stored)
+    path = named.figures[name]
+    if stored["figure"] != path:
+        raise SweepError(f"figures: {name} is {shown(stored['figure'])} in the folder, not {path}")
+    check_named(path, stored.get("sha256"), folder)
+    return figures.from_dict(stored, may_import=True)
+
+
+def names_of(sweep: Sweep) -> Named:
+    """The scene and functions that a sweep names, for the processes that run it."""
+    paths = {name: each.path for name, each in sweep.figures.items() if isinstance(each, UserFigure)}
+    return Named(sweep.source, paths)
+
+
+def _stated_setup(sweep: Sweep) -> dict[str, Any]:
+    """What a setup integrates; of a function also what is needed to read results without calling it."""
+    if isinstance(sweep.scene, StatedScene):
+        return dict(sweep.scene.setup)
+    stated = _setup(sweep.setup)
+    if is_scene(sweep.scene):
+        return stated
+    facts = {"units": sweep.units, "joint_types": sweep.joint_types, "bytes_expected": sweep.bytes_expected}
+    return stated | {"function_sha256": digest_of(sweep.scene)} | facts
 
 
 def _setup(setup: Setup) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from robot_dyn.tools.sweeps.folder.rows import TEXTS
 from robot_dyn.tools.sweeps.imported import imported, path_of
 from robot_dyn.tools.sweeps.plan.figures import Figure, figure
 from robot_dyn.tools.sweeps.plan.samples import Samples, samples_of
+from robot_dyn.tools.sweeps.plan.stated import StatedScene
 
 READER = "robot_dyn.scene.scene:read_scene"  # of scenes, a room above: it is named as users' functions are
 STARTS = ("q0", "v0")
@@ -37,7 +38,8 @@ class Sweep(Answer, Value, Caching):
     """Runs 0, …, N − 1 of a setup. Run i is a function of this value and i alone: start, parameters and noise.
 
     Attributes:
-        scene: A scene file, or the import path of a function that returns a `Setup`, such as "my_arm:setup".
+        scene: A scene file, or the import path of a function that returns a `Setup`, such as "my_arm:setup". In a
+            sweep that was read from a folder without naming its function: what the folder states about it.
         runs: N.
         vary: Distributions by name: a parameter of `rollouts(params=…)`, "q0" or "v0". A frozen distribution of
             scipy.stats is one.
@@ -54,7 +56,7 @@ class Sweep(Answer, Value, Caching):
         SceneError: If the scene cannot be read.
     """
 
-    scene: str
+    scene: str | StatedScene
     runs: int
     vary: dict[str, Distribution]
     figures: dict[str, Figure] = field(default_factory=dict)
@@ -85,8 +87,10 @@ class Sweep(Answer, Value, Caching):
 
     @cached_property
     def setup(self) -> Setup:
-        """What runs, without what varies."""
-        made = imported(READER)(self.scene) if _is_scene(self.scene) else imported(self.scene)()
+        """What runs, without what varies; SweepError if a folder names a function that its reader has not named."""
+        if isinstance(self.scene, StatedScene):
+            self.scene.refuse()
+        made = imported(READER)(self.scene) if is_scene(self.scene) else imported(self.scene)()
         if not isinstance(made, Setup):
             raise SweepError(f"{self.scene}: returned {shown(made)}; return a robot_dyn.Setup")
         return made
@@ -108,12 +112,26 @@ class Sweep(Answer, Value, Caching):
     @cached_property
     def units(self) -> dict[str, str]:
         """Of each column that has one: of what varies, of figures, and of "ended"."""
-        types = joint_types_of(self.setup.plant.dynamics)
+        if isinstance(self.scene, StatedScene):
+            return dict(self.scene.units)
+        types = self.joint_types
         of = {each.name: each.unit for each in sweepable(self.setup).parameters}
         of |= {f"{name}[{k}]": unit(name[0], kind) for name in STARTS for k, kind in enumerate(types)}
         varied = {name: of.get(name, of.get(name.rpartition("[")[0], "")) for name in self.columns}
         figures = {name: each.unit(self.setup) for name, each in self.figures.items()}
         return {name: each for name, each in (varied | figures | {"ended": "s"}).items() if each}
+
+    @property
+    def source(self) -> str:
+        """Absolute path of the scene, or import path of its function."""
+        return self.scene.path if isinstance(self.scene, StatedScene) else self.scene
+
+    @property
+    def joint_types(self) -> tuple[str, ...]:
+        """Types of the joints, "revolute", "continuous" or "prismatic"."""
+        if isinstance(self.scene, StatedScene):
+            return self.scene.joint_types
+        return tuple(joint_types_of(self.setup.plant.dynamics))
 
     @property
     def dimensions(self) -> tuple[str, ...]:
@@ -131,6 +149,8 @@ class Sweep(Answer, Value, Caching):
 
     def _check_names(self) -> None:
         """Raise SweepError if what varies has no name or not the size that the setup knows."""
+        if isinstance(self.scene, StatedScene):
+            return  # they were checked when the folder was begun
         from robot_dyn.simulation.rollouts.rollouts import batch_of
 
         n = self.setup.plant.dynamics.n
@@ -149,6 +169,8 @@ class Sweep(Answer, Value, Caching):
     @cached_property
     def bytes_expected(self) -> int:
         """What its rows and samples take on disk, at most but for footers and texts."""
+        if isinstance(self.scene, StatedScene):
+            return self.scene.bytes_expected
         rows = 8 * (len(self.columns) + len(self.figures) + 1) + 1 + 4 * len(TEXTS)
         if self.samples is None or self.samples.failed:
             return self.runs * rows
@@ -157,12 +179,12 @@ class Sweep(Answer, Value, Caching):
 
     @property
     def title(self) -> str:
-        return f"Sweep of {Path(self.scene).name}"
+        return f"Sweep of {Path(self.source).name}"
 
     def blocks(self) -> Iterator[Block]:
         design = self.design if isinstance(self.design, str) else "a table"
         size = f"{self.bytes_expected / 2**20:.3g} MiB"
-        yield f"{self.runs} runs of {Path(self.scene).name}, design {design}, seed {self.seed}; on disk {size}"
+        yield f"{self.runs} runs of {Path(self.source).name}, design {design}, seed {self.seed}; on disk {size}"
         rows = ((self._varies(name), _text(each.to_dict())) for name, each in self.vary.items())
         yield Table(("varies", "distribution"), tuple(rows), wrap=True)
         if self.figures:
@@ -191,7 +213,7 @@ def samples_of_run(setup: Setup) -> int:
 def _text(stored: Mapping[str, Any]) -> str:
     """A distribution or figure as users write it."""
     (_, name), *given = stored.items()
-    of = [f"{key}={value!r}" for key, value in given if value is not None and key != "sha256"]
+    of = [f"{key}={value!r}" for key, value in given if value is not None]
     return name if ":" in str(name) else f"{name}({', '.join(of)})"
 
 
@@ -199,18 +221,21 @@ def _width(of: Distribution) -> int:
     return of.shape[0] if of.shape else 1
 
 
-def _is_scene(source: str) -> bool:
+def is_scene(source: str) -> bool:
+    """Return True for the path of a scene file, False for an import path."""
     return source.lower().endswith(".toml")
 
 
-def _source(given: Any) -> str:
-    """The absolute path of a scene, or an import path."""
+def _source(given: Any) -> str | StatedScene:
+    """The absolute path of a scene, or an import path; a stated scene as it is."""
+    if isinstance(given, StatedScene):
+        return given
     if isinstance(given, Setup):
         raise SweepError(
             "scene: a Setup cannot be made again in another process; give a scene file, or a function that returns the"
             " setup, by import path such as 'my_arm:setup'"
         )
-    if isinstance(given, Path) or (isinstance(given, str) and _is_scene(given)):
+    if isinstance(given, Path) or (isinstance(given, str) and is_scene(given)):
         return str(Path(given).absolute())
     try:
         return path_of(given)
