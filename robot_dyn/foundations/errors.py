@@ -20,7 +20,19 @@ def escaped(text: str) -> str:
     return "".join(visible)
 
 
-class RobotDynError(Exception):
+class PortableError(Exception):
+    """An error that survives `pickle` and `copy` with its message and attributes, and so passes between processes."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Rebuild the error from its message and attributes: `__init__` of a subclass may take other arguments."""
+        return _rebuilt, (type(self), self.args), self.__dict__
+
+
+def _rebuilt(kind: type[PortableError], args: tuple[Any, ...]) -> PortableError:
+    return kind.__new__(kind, *args)  # which sets args
+
+
+class RobotDynError(PortableError):
     """Base of every error this library raises; its message has no control characters of the file that it is about.
 
     Attributes:

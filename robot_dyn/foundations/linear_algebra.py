@@ -17,6 +17,7 @@ from contextvars import ContextVar
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array, sqrt
+from robot_dyn.foundations.errors import PortableError
 
 _SWEEPS = 8  # of Jacobi's method: it converges quadratically, six rows in six sweeps
 
@@ -56,7 +57,7 @@ def _turned(x: Array, y: Array, c: Array, s: Array) -> tuple[Array, Array]:
     return c * x - s * y, s * x + c * y
 
 
-class NotPositiveDefiniteError(Exception):
+class NotPositiveDefiniteError(PortableError):
     """Internal: a pivot of a factorisation is not positive; the caller names the joint of `row`.
 
     `decided` says whether that is certain, or its sign is lost in rounding.

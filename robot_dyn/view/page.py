@@ -47,6 +47,9 @@ class Page:
     def __post_init__(self) -> None:
         object.__setattr__(self, "document", MappingProxyType(dict(self.document)))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Page, (dict(self.document),)
+
     @cached_property
     def text(self) -> str:
         """Its HTML."""

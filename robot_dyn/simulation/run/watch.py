@@ -8,7 +8,7 @@ from typing import TypeVar, final
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.errors import RobotDynError, is_mistake
+from robot_dyn.foundations.errors import PortableError, RobotDynError, is_mistake
 from robot_dyn.foundations.values import cached
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
 from robot_dyn.simulation.dynamics.fastest_motion import fastest
@@ -24,7 +24,7 @@ _STEEP = 1e-3  # in q or v: an effect that bends over a smaller range makes the 
 T = TypeVar("T")
 
 
-class DivergedError(Exception):
+class DivergedError(PortableError):
     """Internal: the run cannot continue past `t`; the message is advice to the user."""
 
     def __init__(self, t: float, advice: str) -> None:

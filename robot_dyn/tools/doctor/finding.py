@@ -28,7 +28,7 @@ class Change:
     """A change of one element.
 
     Attributes:
-        element: The element of the document.
+        element: The element of the document; None in copies and after `pickle`, which leave the document out.
         key: The attribute that is changed; "" for the name of the element itself.
         value: What it is then.
         renames: The attribute that `key` was called before, if it is renamed.
@@ -51,6 +51,9 @@ class Change:
         elif self.renames:
             text = f"{self.renames} of <{tag}> is now called {self.key}"
         object.__setattr__(self, "text", text)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"element": None}
 
     def apply(self) -> None:
         """Apply the change to the element."""
