@@ -13,9 +13,9 @@ outcome.py       what studies print and write
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
-
-from robot_dyn.cli.interrupts import guard, ignore
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -24,8 +24,26 @@ if TYPE_CHECKING:
 _TOPICS = "query", "simulate", "show", "cost", "diff", "demo", "cache", "export"
 
 
+def _end(*_: object) -> None:
+    """End the process: nothing has begun that would have to be undone."""
+    os.write(2, b"robot-dyn: interrupted\n")
+    os._exit(130)
+
+
+def _is_command() -> bool:
+    """Return True if this process was started as robot-dyn, and is not a child that imports its main module again."""
+    program = os.path.basename(sys.argv[0]) if sys.argv else ""
+    return program.removesuffix(".exe") in ("robot-dyn", "__main__.py") and "multiprocessing" not in sys.modules
+
+
+if _is_command() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, _end)  # until main() has imported more
+
+
 def main() -> None:
     """Entry point: run the command; report errors in one line."""
+    from robot_dyn.cli.interrupts import guard, ignore
+
     guard()
     try:
         code = _run()

@@ -115,7 +115,4 @@ def output(
     force: bool,
 ) -> Path:
     """The path of a file to write, checked before the work is done as `files.target`; one that exists needs force."""
-    path = target(path, kinds, error, inputs)
-    if path.exists() and not force:
-        raise error(f"{path}: exists; add --force to replace it, or give another path")
-    return path
+    return target(path, kinds, error, inputs, force)

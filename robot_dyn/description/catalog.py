@@ -41,7 +41,7 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
         CatalogError: If the robot is not found; names the nearest robots or the places tried.
     """
     start = name_or_path.decode(errors="replace") if isinstance(name_or_path, bytes) else name_or_path
-    if isinstance(start, str) and start.lstrip("\ufeff \t\r\n").startswith("<"):
+    if isinstance(start, str) and start.lstrip("\ufeff \t\r\n").startswith("<") and not _is_path(start):
         raise CatalogError("this is the text of a URDF, not its name or path; give it to Robot.from_text")
     if not isinstance(name_or_path, str | Path) or not str(name_or_path).strip():
         raise CatalogError(f"give the name of a robot or the path of a URDF file, got {shown(name_or_path)}")
@@ -60,6 +60,14 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
         why = getattr(error, "strerror", error)
         raise CatalogError(f"no file {shorten(text)!r}: {why}; give the path of a URDF file") from None
     raise CatalogError(f"no robot {shorten(text)!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
+
+
+def _is_path(text: str) -> bool:
+    """Return True for a path of an existing file, and for a text that can be no XML."""
+    try:
+        return ">" not in text or Path(text).exists()
+    except (OSError, ValueError):  # too long for a path, or a NUL
+        return False
 
 
 def abbreviated(path: str | Path) -> str:

@@ -42,12 +42,21 @@ def target(
     kinds: Kind | tuple[Kind, ...],
     error: type[RobotDynError],
     inputs: Iterable[str | Path] = (),
+    force: bool = True,
 ) -> Path:
     """Check the path of a file before the work is done; return it, with the suffix of the first kind if it has none.
 
+    Args:
+        path: Where to write.
+        kinds: Kinds of file that are allowed.
+        error: Type of the errors.
+        inputs: Files and folders that are read, none of which may be replaced, even with `force`.
+        force: Whether a file of its kind may be replaced.
+
     Raises:
         RobotDynError: Of type `error`, if the suffix is wrong; if the folder is missing or not writable; if anything
-            but a file of its kind has that path; or if it is one of `inputs`, even through a link.
+            but a file of its kind has that path, or any file unless `force`; or if it is one of `inputs` or in one of
+            them, even through a link.
     """
     kinds = kinds if isinstance(kinds, tuple) else (kinds,)
     try:
@@ -62,6 +71,8 @@ def target(
             suffixes = ", ".join(kind.suffix for kind in kinds)
             raise error(f"{path}: {path.suffix!r} is not the suffix of {kinds[0].name}; end the name with {suffixes}")
         _check(path, Path(os.path.realpath(path)), kind, error, inputs)
+        if path.exists() and not force:
+            raise error(f"{path}: exists; add --force to replace it (in Python force=True), or give another path")
     except (OSError, TypeError, ValueError) as cause:  # ValueError: a NUL in the path
         raise error(f"{path}: cannot be written ({why(cause)}); give another path") from None
     return path
@@ -76,6 +87,8 @@ def _check(path: Path, real: Path, kind: Kind, error: type[RobotDynError], input
     for other in map(Path, inputs):
         if os.path.realpath(other) == str(real) or (real.exists() and other.exists() and real.samefile(other)):
             raise error(f"{path}: is the same file as {other}, which would be lost; give another path")
+        if real.is_relative_to(os.path.realpath(other)):
+            raise error(f"{path}: is in {other}, which is read; give a path in another folder")
     if not real.exists():
         if not os.access(real.parent, os.W_OK | os.X_OK):
             raise error(f"{path}: the folder {real.parent} is not writable; give a path in another one")
@@ -85,6 +98,35 @@ def _check(path: Path, real: Path, kind: Kind, error: type[RobotDynError], input
         raise error(f"{path}: is write-protected; change its permissions, or give another path")
     if start and start != kind.start:
         raise error(f"{path}: is not {kind.name}, so it is not replaced; remove it, or give another path")
+
+
+def check_folder(path: Path, error: type[RobotDynError]) -> None:
+    """Check that files can be written into a folder, or that it can be made, before the work is done.
+
+    Raises:
+        RobotDynError: Of type `error`, if the path is not a folder; if it, or the folder above it, is not writable.
+    """
+    try:
+        real = Path(os.path.realpath(path))
+        there = next(each for each in (real, *real.parents) if os.path.lexists(each))
+        if not there.is_dir():
+            raise error(f"{path}: {there} is not a folder; give another path")
+        if not os.access(there, os.W_OK | os.X_OK) or _is_read_only(there):
+            raise error(f"{path}: the folder {there} is not writable; give a path in another one")
+    except (OSError, ValueError) as cause:  # ValueError: a NUL in the path
+        raise error(f"{shown(str(path))}: cannot be written ({why(cause)}); give another path") from None
+
+
+def _is_read_only(folder: Path) -> bool:
+    """Return True if the system refuses a new file for another reason than permissions, such as a read-only disk."""
+    handle, name = -1, folder / f".{os.urandom(8).hex()}.unfinished"
+    try:
+        handle = os.open(name, _NEW, 0o600)
+    except OSError:
+        return True
+    os.close(handle)
+    name.unlink()
+    return False
 
 
 def save(path: Path, write: Callable[[BinaryIO], object], error: type[RobotDynError]) -> Path:
@@ -225,10 +267,30 @@ def _refuse_irregular(path: Path, mode: int, error: type[RobotDynError], remedy:
 
 
 def file_path(value: Any, error: type[RobotDynError]) -> Path:
-    """The path of a file."""
+    """Return the path of a file or folder."""
     if not isinstance(value, str | os.PathLike):
         raise error(f"path: give the path of a file, got {shown(value)}")
-    return Path(value)
+    try:
+        path = Path(value)
+    except TypeError as cause:  # of bytes
+        raise error(f"path: give a text, got {shown(value)} ({cause})") from None
+    if "\0" in str(path):
+        raise error(f"path: {shown(str(path))} has an embedded null character; give another path")
+    return path
+
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # OWASP, CSV injection
+
+
+def table_cell(value: Any) -> Any:
+    """Return a cell of a CSV table; a text that spreadsheets would compute as a formula begins with an apostrophe."""
+    if not isinstance(value, str) or not value.startswith(_FORMULA):
+        return value
+    try:
+        float(value)
+    except ValueError:
+        return f"'{value}"
+    return value
 
 
 def why(cause: Exception) -> str:

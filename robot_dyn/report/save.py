@@ -65,5 +65,5 @@ def table(result: Result) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, result.columns, extrasaction="ignore")
     writer.writeheader()
-    writer.writerows(result.rows)
+    writer.writerows({key: files.table_cell(x) for key, x in row.items()} for row in result.rows)
     return text.getvalue()

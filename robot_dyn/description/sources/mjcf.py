@@ -274,7 +274,9 @@ class _Reader:
 
     def inertial(self, link: Any, body: int) -> None:
         model, R = self.model, self.of.rotation(self.model.body_iquat[body])
-        inertia, element = R * model.body_inertia[body] @ R.T, etree.SubElement(link, "inertial")
+        with np.errstate(all="ignore"):  # what is infinite is refused when the text is read
+            inertia = R * model.body_inertia[body] @ R.T
+        element = etree.SubElement(link, "inertial")
         etree.SubElement(element, "origin", xyz=_words(model.body_ipos[body]), rpy="0 0 0")
         etree.SubElement(element, "mass", value=repr(float(model.body_mass[body])))
         keys = {f"i{a}{b}": (i, k) for i, a in enumerate("xyz") for k, b in enumerate("xyz") if k >= i}

@@ -5,8 +5,11 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
+import numpy as np
+
+from robot_dyn.foundations.files import table_cell
 from robot_dyn.simulation.columns import Column, by_heading
 
 _ROWS = 4096  # of a block: as Python's numbers they take ten times the memory of arrays
@@ -18,7 +21,12 @@ def write(_: object, columns: Iterable[Column], stream: BinaryIO) -> None:
     values = list(table.values())
     text = io.TextIOWrapper(stream, encoding="utf-8", newline="")
     lines = csv.writer(text)
-    lines.writerow(table)
+    lines.writerow(map(table_cell, table))
     for start in range(0, len(values[0]), _ROWS):
-        lines.writerows(zip(*(each[start : start + _ROWS].tolist() for each in values), strict=True))
+        lines.writerows(zip(*(_cells(each[start : start + _ROWS]) for each in values), strict=True))
     text.detach()
+
+
+def _cells(column: np.ndarray) -> list[Any]:
+    cells = column.tolist()
+    return cells if column.dtype.kind in "fiub" else [table_cell(each) for each in cells]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from robot_dyn.cli.app import Json, app, bar
+from robot_dyn.cli.app import Force, Json, app, bar
 from robot_dyn.cli.terminal import say, say_json, to_stderr
 from robot_dyn.foundations.errors import SweepError, nearest
 
@@ -58,6 +58,7 @@ def sweep(
         list[str] | None,
         typer.Option(metavar="EVENT", help="Say how likely it is, as 'failed | error > 0.1'; repeated."),
     ] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Run a scene many times, with what varies, into a folder; again, it is resumed.
@@ -91,7 +92,8 @@ def sweep(
             verified += [f"{count} chunks by {name}" for name, count in result.processors.items()]
         elif what in ("report", "export"):
             path = Path(output or f"{folder.rstrip('/')}.{'html' if what == 'report' else 'csv'}")
-            written = result.save_report(path) if what == "report" else result.export(path)
+            write = result.save_report if what == "report" else result.export
+            written = write(path, force=force)
             to_stderr(f"written: {written}")
     answers = [result.probability(event) for event in probability or ()] if not result.status["missing"] else []
     if as_json:

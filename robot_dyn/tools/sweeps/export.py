@@ -12,20 +12,26 @@ import numpy as np
 
 from robot_dyn.foundations.errors import SweepError
 from robot_dyn.foundations.extras import needs
-from robot_dyn.foundations.files import Kind, save, target
+from robot_dyn.foundations.files import Kind, file_path, save, table_cell, target
 from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
 from robot_dyn.tools.sweeps.folder.rows import TEXTS
 from robot_dyn.tools.sweeps.plan.specification import specification
 from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, Sweep, heading
 
-_CSV, _PARQUET = Kind("a table", ".csv"), Kind("a table", ".parquet", b"PAR1")
+_CSV, _PARQUET = Kind("a table of runs", ".csv", b"run,"), Kind("a table", ".parquet", b"PAR1")
 
 
-def export(sweep: Sweep, folder: Folder, path: str | Path) -> Path:
+def export(sweep: Sweep, folder: Folder, path: str | Path, force: bool) -> Path:
     """Write the rows of a complete folder to a .csv or .parquet file; SweepError if it cannot be written."""
-    path = target(path, (_CSV, _PARQUET), SweepError)
+    path = target(path, (_CSV, _PARQUET), SweepError, inputs_of(folder, path), force)
     write = partial(_parquet, sweep) if path.suffix.lower() == ".parquet" else _csv
     return save(path, lambda stream: write(_tables(sweep, folder), stream), SweepError)
+
+
+def inputs_of(folder: Folder, path: str | Path) -> list[Path]:
+    """What an export or a report of a folder may not replace: anything in it, even under another name."""
+    chunks = filter(Path.exists, map(folder.file, range(folder.count))) if file_path(path, SweepError).exists() else ()
+    return [folder.path, *chunks]
 
 
 def _tables(sweep: Sweep, folder: Folder) -> Iterator[Mapping[str, np.ndarray]]:
@@ -49,7 +55,7 @@ def _csv(tables: Iterator[Mapping[str, np.ndarray]], stream: BinaryIO) -> None:
 
 
 def _cell(value: object) -> str:
-    text = value if isinstance(value, str) else repr(value)
+    text = table_cell(value) if isinstance(value, str) else repr(value)
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
 
 

@@ -14,6 +14,7 @@ from robot_dyn.foundations.display import page, side_by_side, table, text
 from robot_dyn.foundations.errors import SweepError
 from robot_dyn.foundations.files import Kind, save, target
 from robot_dyn.report.figure import PAGE, ink, inline, styled
+from robot_dyn.tools.sweeps.export import inputs_of
 from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading, is_scene
 
 if TYPE_CHECKING:
@@ -31,9 +32,9 @@ _HEAD = (
 )
 
 
-def save_report(result: SweepResult, path: str | Path) -> Path:
+def save_report(result: SweepResult, path: str | Path, force: bool) -> Path:
     """Write the page; SweepError if the sweep is not complete, or the page cannot be written."""
-    path = target(path, _KIND, SweepError)
+    path = target(path, _KIND, SweepError, inputs_of(result.folder, path), force)
     data = report(result).encode()
     return save(path, lambda stream: stream.write(data), SweepError)
 

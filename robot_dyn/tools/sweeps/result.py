@@ -12,7 +12,7 @@ import numpy as np
 from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.foundations.errors import SweepError, nearest
 from robot_dyn.foundations.result import UNREPORTED, reported
-from robot_dyn.foundations.validate import choice, integer
+from robot_dyn.foundations.validate import choice, integer, truth
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.tools.sweeps import counts
@@ -160,26 +160,37 @@ class SweepResult(Answer):
         self.folder.check_samples(bits=False)
         return self.folder.samples.open(self.sweep.joint_types)
 
-    def export(self, path: str | Path) -> Path:
+    def export(self, path: str | Path, *, force: bool = False) -> Path:
         """Write the table of all runs to a .csv or .parquet file, whole or not at all.
 
+        In a .csv, a text that begins with =, +, -, @, a tab or a line break, and is not a number, gets an apostrophe
+        before it, so that spreadsheets do not compute it.
+
+        Args:
+            path: Where to write; not in the folder of the sweep.
+            force: Whether to replace another table of that name.
+
         Raises:
-            SweepError: If it cannot be written.
+            SweepError: If it cannot be written, or would replace a file.
         """
         from robot_dyn.tools.sweeps.export import export
 
         self._check_complete()
-        return export(self.sweep, self.folder, path)
+        return export(self.sweep, self.folder, path, truth("force", force, error=SweepError))
 
-    def save_report(self, path: str | Path) -> Path:
+    def save_report(self, path: str | Path, *, force: bool = False) -> Path:
         """Write one HTML page: distributions, failures over the two strongest parameters, worst runs.
 
+        Args:
+            path: Where to write; not in the folder of the sweep.
+            force: Whether to replace another report of that name.
+
         Raises:
-            SweepError: If it cannot be written.
+            SweepError: If it cannot be written, or would replace a file.
         """
         from robot_dyn.tools.sweeps.report import save_report
 
-        return save_report(self, path)
+        return save_report(self, path, truth("force", force, error=SweepError))
 
     def run(self, i: int) -> Trajectory:
         """Repeat run i by itself, with all that rollouts record: the same bits.

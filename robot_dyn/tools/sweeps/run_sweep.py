@@ -14,7 +14,7 @@ import numpy as np
 
 from robot_dyn.codegen.threads import thread_count
 from robot_dyn.foundations.errors import SceneError, SweepError, shown
-from robot_dyn.foundations.files import file_path
+from robot_dyn.foundations.files import check_folder, file_path
 from robot_dyn.foundations.validate import integer
 from robot_dyn.tools.sweeps.engines.share import share as share_of
 from robot_dyn.tools.sweeps.engines.threads import Threads
@@ -76,7 +76,8 @@ def run(
     if cluster is not None and (share is not None or threads is not None):
         raise SweepError("cluster: its scheduler shares out the chunks; leave out share and threads")
     check_places(path)
-    sweep.setup, work.record  # noqa: B018  refused if a folder names functions that its reader has not named
+    check_folder(path, SweepError)
+    _ = sweep.setup, work.record  # refused if a folder names functions that its reader has not named
     known = begun(sweep, path, chunk)
     known.prepare()
     tell, t = _Progress(known, on_progress), None if known.samples is None else known.samples.times()

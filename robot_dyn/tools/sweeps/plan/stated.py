@@ -18,14 +18,14 @@ class StatedScene:
         path: Import path of the function.
         setup: The table "setup" of the specification.
         units: Units of columns by name.
-        joint_types: Types of the joints, "revolute", "continuous" or "prismatic".
+        joint_types: Types of the joints, "revolute", "continuous" or "prismatic"; None if unknown.
         bytes_expected: Size of rows and samples on disk.
     """
 
     path: str
     setup: Mapping[str, Any]
     units: Mapping[str, str]
-    joint_types: tuple[str, ...]
+    joint_types: tuple[str | None, ...]
     bytes_expected: int
 
     def refuse(self) -> NoReturn:
@@ -39,6 +39,8 @@ class StatedScene:
 def stated_scene(path: str, setup: Mapping[str, Any]) -> StatedScene:
     """Return the scene of a stored specification; TypeError, KeyError or AttributeError if it is not one."""
     units, types, size = dict(setup["units"]), tuple(setup["joint_types"]), setup["bytes_expected"]
-    if not isinstance(size, int) or not all(isinstance(x, str) for x in (path, *units, *units.values(), *types)):
+    if not isinstance(size, int) or not all(
+        isinstance(x, str) for x in (path, *units, *units.values(), *filter(None, types))
+    ):
         raise TypeError("setup: units, joint_types or bytes_expected")
     return StatedScene(path, dict(setup), units, types, size)

@@ -127,8 +127,8 @@ class Sweep(Answer, Value, Caching):
         return self.scene.path if isinstance(self.scene, StatedScene) else self.scene
 
     @property
-    def joint_types(self) -> tuple[str, ...]:
-        """Types of the joints, "revolute", "continuous" or "prismatic"."""
+    def joint_types(self) -> tuple[str | None, ...]:
+        """Types of the joints, "revolute", "continuous" or "prismatic"; None where the dynamics do not state one."""
         if isinstance(self.scene, StatedScene):
             return self.scene.joint_types
         return tuple(joint_types_of(self.setup.plant.dynamics))
