@@ -289,7 +289,7 @@ def parameter(name: str) -> str:
     return PARAMETERS.get(name, name)
 
 
-_sw = rd.sweeps
+_sw = rd.tools.sweeps
 DISTRIBUTIONS = SimpleNamespace(
     uniform=lambda low, high: _sw.uniform(low=low, high=high),
     normal=lambda mean, sd: _sw.normal(mean=mean, sd=sd),
