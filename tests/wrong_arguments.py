@@ -332,7 +332,7 @@ def examples(folder: Path) -> dict[str, Example]:
             {"p0": [0.1, 0.2, 0.3], "p1": [0.4, 0.2, 0.1], "duration_s": 1.0, "rotation": eye, "rotation_end": eye,
              "start_s": 0.1},
         ),
-        "linearise": (rd.linearise, {"plant": plant, "q": q, "v": v, "u": u, "t": 0.1}),
+        "linearise": (rd.linearise, {"plant": plant, "q": q, "v": v, "u": u, "z": [], "t": 0.1}),
         "list_robots": (rd.list_robots, {}),
         "load": (
             rd.load,

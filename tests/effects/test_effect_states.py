@@ -208,8 +208,6 @@ def test_a_plant_that_is_asked_takes_relaxed_states() -> None:
     np.testing.assert_allclose(plant.torque(0.0, v, v), expected, rtol=1e-14)
     np.testing.assert_array_equal(plant.actuation(v), v)
     np.testing.assert_allclose(rd.Compiled(plant).torque(0.0, v, v), expected, rtol=1e-14)
-    with pytest.raises(rd.RobotDynError, match="actuator_lag has states, which are no part of"):
-        rd.linearise(plant, Q, v=[0.4, 0.3])
     with pytest.raises(rd.RobotDynError, match="no actuation within the limits of the plant holds this state"):
         rd.linearise(rd.Plant(ARM, [rd.effects.EffortLimit(0.01)]), Q)
 

@@ -229,8 +229,6 @@ def test_what_has_no_meaning_is_refused() -> None:
         rd.Setup(
             rd.Plant(ARM, [rd.effects.SeriesElastic({"joint_2": 9.0}, 1.0), rd.effects.SeriesElastic(9.0, 1.0)]), Q
         )
-    with pytest.raises(QueryError, match="linearise: series_elastic has motors of its own"):
-        rd.linearise(rd.Plant(ARM, [rd.effects.SeriesElastic(9.0, 1.0)]), Q)
     with pytest.raises(QueryError, match="series_elastic: time_stepping takes no motors of a drive"):
         rd.Setup(rd.Plant(ARM, [rd.effects.SeriesElastic(9.0, 1.0)]), Q, integrator="time_stepping")
     with pytest.raises(EffectError, match="inertia must be positive"):

@@ -149,3 +149,137 @@ def test_steep_friction_is_linearised_too(scale: float) -> None:
 def test_a_kink_has_no_linearisation() -> None:
     with pytest.raises(rd.RobotDynError, match="no derivative"):
         rd.linearise(rd.Plant(rd.load("pendulum"), [rd.effects.EffortLimit(5.0)]), [0.1], [0.0], [5.0])
+
+
+@pytest.mark.parametrize("velocity", [0.0, 1e-3, 1.0, 30.0])
+@pytest.mark.parametrize("scale", [1e-5, 1e-6, 1e-8])
+def test_thin_layers_of_friction_are_resolved(scale: float, velocity: float) -> None:
+    """∂a/∂v = −f/(v_s I) sech²(v/v_s), I = 1/3; 1e-9 of the slope at rest is 100 times what differences leave."""
+    plant = rd.Plant(PENDULUM, [rd.effects.RegularisedCoulombFriction(0.1, scale)])
+    A, _ = rd.linearise(plant, [0.1], [velocity * scale], [0.0])
+    assert A[1, 1] == pytest.approx(-0.3 / scale / np.cosh(velocity) ** 2, abs=1e-9 * 0.3 / scale)
+
+
+SLIDES = rd.Robot.from_text(
+    "<robot name='slides'><link name='base'/>"
+    + "".join(
+        f"<link name='{name}'><inertial><mass value='2'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/>"
+        f"</inertial></link><joint name='j{name}' type='prismatic'><parent link='{parent}'/><child link='{name}'/>"
+        "<axis xyz='1 0 0'/><limit lower='-9' upper='9' effort='1' velocity='1'/></joint>"
+        for parent, name in (("base", "a"), ("a", "b"))
+    )
+    + "</robot>"
+)
+
+
+@pytest.mark.parametrize("q", [[0.5, 0.3], [1e5, -3e5]])
+@pytest.mark.parametrize("stiffness", [1.0, 1e8, 1e12])
+def test_stiff_springs_and_far_slides_are_linearised(stiffness: float, q: list[float]) -> None:
+    """a₁ = (u₁ − u₂ − K q₁ + k q₂)/m, a₂ = (2 u₂ − u₁ + K q₁ − 2 k q₂)/m: forces of 1e17 N leave 1e-10 of K."""
+    plant = rd.Plant(SLIDES, [rd.effects.Spring([stiffness, 1.0])])
+    A, _ = rd.linearise(plant, q, u=[0.0, 0.0])
+    expected = [[-stiffness / 2, 0.5], [stiffness / 2, -1.0]]
+    np.testing.assert_allclose(A[2:, :2], expected, atol=1e-10 * stiffness * max(1.0, np.abs(q).max()))
+
+
+@pytest.mark.parametrize("distance", [1e-9, -1e-9])
+def test_a_kink_nearby_does_not_change_the_slope(distance: float) -> None:
+    """A stop 1e-9 rad away: the slope is that of the side of the state, −3 (k + m g l/2 cos q); 1e-6 of it is left."""
+    stops = rd.effects.joint_stops(-1.0, 1.0, 1e4, 0.0)
+    A, _ = rd.linearise(rd.Plant(PENDULUM, stops), [1.0 + distance], [0.0], [0.0])
+    stiffness = 1e4 if distance > 0 else 0.0
+    assert A[1, 0] == pytest.approx(-3 * (stiffness + G / 2 * np.cos(1.0)), rel=1e-6)
+
+
+def test_dry_friction_slides_and_is_named_where_it_holds() -> None:
+    """−f sign(v) has no slope while the joint slides, however slowly."""
+    plant = rd.Plant(DOUBLE, [rd.effects.DryFriction([0.0, 1.0])])
+    q, u = [0.3, -0.4], [1.0, 2.0]
+    bare = rd.linearise(DOUBLE, q, [0.0, 1e-9], u)
+    np.testing.assert_allclose(rd.linearise(plant, q, [0.0, 1e-9], u).A[2:, 2:], bare.A[2:, 2:], atol=1e-8)
+    with pytest.raises(QueryError) as refused:
+        rd.linearise(plant, q)
+    assert all(part in str(refused.value) for part in ("dry_friction", "joint_2", "RegularisedCoulombFriction"))
+    assert "joint_1" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("effects", "state", "parts"),
+    [
+        ([rd.effects.EffortLimit(5.0)], ([0.1], [0.0], [5.0]), ("effort_limit", "pivot", "5")),
+        (rd.effects.joint_stops(-1.0, 1.0), ([1.0],), ("joint_stops", "pivot", "1")),
+        ([rd.effects.RigidStops(-1.0, 1.0)], ([1.0],), ("rigid_stops", "pivot")),
+        ([rd.effects.RigidBacklash(1e-3, 1e-4, 100.0)], ([1.0],), ("rigid_backlash", "SeriesElastic")),
+    ],
+)
+def test_what_has_no_derivative_is_named(effects, state, parts) -> None:
+    with pytest.raises(QueryError) as refused:
+        rd.linearise(rd.Plant(PENDULUM, effects), *state)
+    assert all(part in str(refused.value) for part in parts)
+
+
+def test_a_lag_is_a_state_of_its_own() -> None:
+    """The lag has z' = (u − z)/T, and I a = z − (m g l/2) sin q; differences leave 1e-10."""
+    T, q = 0.02, 0.7
+    system = rd.linearise(rd.Plant(PENDULUM, [rd.effects.ActuatorLag(T)]), [q])
+    stiffness = 3 * G / 2 * np.cos(q)
+    expected = [[0.0, 1.0, 0.0], [-stiffness, 0.0, 3.0], [0.0, 0.0, -1 / T]]
+    np.testing.assert_allclose(system.A, expected, atol=1e-9)
+    np.testing.assert_allclose(system.B, [[0.0], [0.0], [1 / T]], atol=1e-9)
+    assert system.state_names == ("q pivot", "v pivot", "actuator_lag state 1") and system.input_names == ("u pivot",)
+    held = G / 2 * np.sin(q)
+    np.testing.assert_allclose([*system.q, *system.v, *system.z, *system.u], [q, 0.0, held, held], rtol=1e-12)
+
+
+def test_series_elastic_joints_have_the_matrix_of_two_masses_and_a_spring() -> None:
+    """I a = k δ + d (θ̇ − v) − m g l/2 sin q, δ̇ = θ̇ − v, n² J θ̈ = u − k δ − d (θ̇ − v) − b θ̇."""
+    k, J, n, d, b, q = 1e4, 1e-4, 100.0, 2.0, 1.0, 0.3
+    drive = rd.effects.SeriesElastic(k, J, n, damping=d, friction=b)
+    system = rd.linearise(rd.Plant(PENDULUM, [drive]), [q])
+    bar, motor, load = 1 / 3, n**2 * J, G / 2 * np.sin(q)
+    expected = [
+        [0.0, 1.0, 0.0, 0.0],
+        [-G / 2 * np.cos(q) / bar, -d / bar, k / bar, d / bar],
+        [0.0, -1.0, 0.0, 1.0],
+        [0.0, d / motor, -k / motor, -(d + b) / motor],
+    ]
+    np.testing.assert_allclose(system.A, expected, atol=1e-9 * k)
+    np.testing.assert_allclose(system.B[:, 0], [0.0, 0.0, 0.0, 1 / motor], atol=1e-10)
+    np.testing.assert_allclose(system.z, [load / k, 0.0], atol=1e-15)
+    np.testing.assert_allclose(system.u, [load], rtol=1e-12)
+
+
+def test_bristles_at_rest_are_a_spring_and_a_damper() -> None:
+    """LuGre, z = 0: z' = v and τ = −σ₀ z − (σ₁ + σ₂) v; deflected bristles have a kink at v = 0, which is named."""
+    plant = rd.Plant(PENDULUM, [rd.effects.LuGreFriction(1e5, 300.0, 0.4, 1.0, 1.5, 1e-3)])
+    A, _ = rd.linearise(plant, [0.3])
+    expected = [[0.0, 1.0, 0.0], [-3 * G / 2 * np.cos(0.3), -3 * 300.4, -3e5], [0.0, 1.0, 0.0]]
+    np.testing.assert_allclose(A, expected, atol=1e-4)
+    with pytest.raises(QueryError, match="lugre_friction"):
+        rd.linearise(plant, [0.3], z=[1e-6])
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        [rd.effects.ActuatorLag(0.05)],
+        [rd.effects.SeriesElastic([300.0, 90.0], 0.02, damping=2.0)],
+        [rd.effects.LuGreFriction(200.0, 3.0, 0.4, 1.0, 1.5, 0.1)],
+        [rd.effects.ActuatorLag([0.05, 0.1]), rd.effects.DahlFriction(50.0, 2.0)],
+    ],
+    ids=["lag", "elastic", "lugre", "lag and dahl"],
+)
+def test_a_small_deviation_with_states_moves_as_the_linearisation_says(effects) -> None:
+    """Under PD, exp((A − B K) t) δ about rest without gravity; the error is of second order in δ, 1e-12, times 1e3."""
+    arm, q, away = DOUBLE.with_(gravity=(0.0, 0.0, 0.0)), np.array([0.4, -0.7]), 1e-6 * np.array([0.6, -1.0, 0.8, 0.3])
+    plant = rd.Plant(arm, effects)
+    system = rd.linearise(plant, q)
+    K = np.zeros((2, len(system.A)))
+    K[:, :2], K[:, 2:4] = 20.0 * np.eye(2), 3.0 * np.eye(2)
+    start = np.concatenate([away, plant.equation_of_motion.start(q + away[:2], away[2:])])
+    run = rd.simulate(
+        plant, q + away[:2], v0=away[2:], duration_s=0.3, controller=rd.control.PD(rd.control.hold(q), 20.0, 3.0),
+        integrator=rd.integrate.Adaptive(rtol=1e-10, atol=1e-13), estimate_error=False,
+    )  # fmt: skip
+    moved = np.concatenate([run.q[-1] - q, run.v[-1], *(states[-1] for states in (run.effect_states or {}).values())])
+    np.testing.assert_allclose(moved, expm(0.3 * (system.A - system.B @ K)) @ start, atol=1e-9)

@@ -1,50 +1,88 @@
-"""Linearisation of a plant about a state: d/dt (δq, δv) = A (δq, δv) + B δu.
+"""Linearisation of a plant about a state: d/dt δx = A δx + B δu with x = (q, v, z), z the states of effects.
 
-A = [[0, 1], [∂a/∂q, ∂a/∂v]],   B = [[0], [M⁻¹]]
+A = ∂f/∂x and B = ∂f/∂u of f = (v, a(t, x, u), ż(t, x, u)), by central differences of fourth order. Each entry is taken
+at the step that errs least: the change from one step to the next shows the truncation, and the magnitudes of the terms
+of a and ż bound their rounding. [Press et al., Numerical Recipes, 3rd ed., 2007, sec. 5.7]
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple, final
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.effects.plant import Plant
+from robot_dyn.effects.effect import Bound, numbered
+from robot_dyn.effects.equation_of_motion import EquationOfMotion
+from robot_dyn.effects.plant import Plant, in_mode
+from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.validate import one_state
-from robot_dyn.integrate.differences import of_fourth_order
+from robot_dyn.foundations.validate import numbers, one_state
+from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import without_rounding
 
-_STEPS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of Richardson's extrapolated central difference: error O(h⁴) and u/h
-_AT_REST = 1e-9  # of the acceleration without actuation
-_ONE_SIDED = 0.01  # of a slope: a larger difference between its two sides is not curvature at the shortest step
-_NO_DERIVATIVE = "the plant has no derivative at this state, such as at an effort limit or a stop; move the state"
-_AGREE = 1e-6  # of the largest slope: two steps that differ by more do not show a derivative
-
-
-class _Matrices(NamedTuple):
-    A: np.ndarray
-    B: np.ndarray
+_STEPS = 0.5 ** np.arange(3, 45)
+_ROUNDING = 4 * np.finfo(float).eps  # of the sum of magnitudes of the terms of a rate
+_AGREE = 1e-6  # part of the largest slope of a column: a larger truncation does not show a derivative
+_HIDDEN = 1e-3  # part of the largest slope that any step shows: a larger rounding hides the derivative
+_DOUBT = 1e5  # times the largest rounding of the rates, per unit: a smaller one of a slope does not hide it
+_ONE_SIDED = 0.01  # part of a slope: a larger difference between its two sides is a kink
+_AT_REST = 1e-9  # part of the sum of magnitudes of the terms of a rate
+_SOLVED = 1e-12  # part of the largest entry of x that the solution of a linear system may miss in any other
+_LAYER = 20  # widths from v = 0 within which steps resolve a layer of friction
+_ITERATIONS = 60
+_NEAR = 1e-6  # of a threshold that is named as the cause of a kink
 
 
 @final
-class Linearisation(Answer, _Matrices):
-    """A and B about one state, a pair that shows its eigenvalues.
+@dataclass(frozen=True, eq=False, repr=False)
+class Linearisation(Answer, Value):
+    """A and B about one state; unpacks as a pair: `A, B = rd.linearise(…)`.
 
     Attributes:
-        A: Of (δq, δv), shape (2n, 2n).
-        B: Of δu, shape (2n, n).
+        A: Matrix of δx, shape (m, m), with x = (q, v, z) and z the states of effects.
+        B: Matrix of δu, shape (m, n).
+        state_names: Names of the m entries of x, such as "q joint_1", "v joint_1", "actuator_lag state 1".
+        input_names: Names of the n entries of u, such as "u joint_1".
+        q: Position, shape (n,), in [rad] or [m].
+        v: Velocity, shape (n,), in [rad/s] or [m/s].
+        z: States of effects, shape (m − 2 n,).
+        u: Actuation, shape (n,), in [N m] or [N].
+        t: Time, in [s].
     """
 
-    __slots__ = ()
+    A: np.ndarray
+    B: np.ndarray
+    state_names: tuple[str, ...]
+    input_names: tuple[str, ...]
+    q: np.ndarray
+    v: np.ndarray
+    z: np.ndarray
+    u: np.ndarray
+    t: float
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        return iter((self.A, self.B))
+
+    def __len__(self) -> int:
+        return 2
+
+    def __getitem__(self, k: int) -> np.ndarray:
+        return (self.A, self.B)[k]
 
     def blocks(self) -> Iterator[Block]:
-        n = self.B.shape[1]
-        yield f"d/dt (δq, δv) = A (δq, δv) + B δu: A ({2 * n}, {2 * n}), B ({2 * n}, {n})"
+        others = self.state_names[2 * len(self.q) :]
+        x = "(δq, δv)" if not others else "δx"
+        yield f"d/dt {x} = A {x} + B δu: A {self.A.shape}, B {self.B.shape}"
+        if others:
+            yield f"x = (q, v, {', '.join(others)})"
         found = [x for x in np.linalg.eigvals(self.A).tolist() if complex(x).imag >= 0]
         rows = sorted((complex(x) for x in found), key=lambda x: (-x.real, x.imag))
         headings = ("growth, real part [1/s]", "± imaginary part [rad/s]")
@@ -53,8 +91,10 @@ class Linearisation(Answer, _Matrices):
         yield Table(headings, tuple(map(tuple, shown.tolist())), 4)
 
 
-def linearise(plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = None, *, t: float = 0.0) -> Linearisation:
-    """A and B about one state.
+def linearise(
+    plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = None, *, z: Array = None, t: float = 0.0
+) -> Linearisation:
+    """Compute A and B of d/dt δx = A δx + B δu about one state, x = (q, v, z).
 
     Args:
         plant: A plant, or a robot without effects.
@@ -62,47 +102,265 @@ def linearise(plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = Non
         v: Velocity, shape (n,), in [rad/s] or [m/s]; 0 by default.
         u: Actuation, shape (n,), in [N m] or [N]; by default the actuation at which the acceleration is 0, so that a
             state at rest is an equilibrium.
+        z: States of the effects that have some, in the order of the plant; by default those at which ż = 0. States
+            that nothing drives at this q and v keep their value at the start of a run, such as bristles at rest.
         t: Time, in [s].
 
     Returns:
-        A, shape (2n, 2n), and B, shape (2n, n); shown as the eigenvalues of A.
+        A, shape (m, m), and B, shape (m, n), with the names of the entries of x and u and the state; shown as the
+        eigenvalues of A.
 
     Raises:
-        QueryError: If an argument is wrong, the acceleration has no derivative at this state, no actuation makes it 0
-            and u is not given, or effects have states of their own.
+        QueryError: If an argument is wrong, the acceleration has no derivative at this state, or no u and z make the
+            rates 0 where they are not given.
     """
-    if not isinstance(plant, Plant):
-        plant = Plant(plant)
-    plant = plant.at(t)
-    if drives := plant.equation_of_motion.drives:
-        name = next(iter(drives.values())).name
-        raise QueryError(f"linearise: {name} has motors of its own, which are no part of (q, v); leave it out")
-    for k in plant.equation_of_motion.states:
-        raise QueryError(f"linearise: {plant.effects[k].name} has states, which are no part of (q, v); leave it out")
+    plant = (plant if isinstance(plant, Plant) else Plant(plant)).at(t)
     names, n = plant.dynamics.joint_names, plant.dynamics.n
     q, v = one_state("q", q, names), one_state("v", np.zeros(n) if v is None else v, names)
-    balanced = u is None
-    u = plant.inverse_dynamics(t, q, v, np.zeros(n)) if balanced else one_state("u", u, names)
-    x = np.concatenate([q, v, u])
-
-    def a(x: np.ndarray) -> np.ndarray:
-        return plant.forward_dynamics(t, x[:n], x[n : 2 * n], x[2 * n :])
-
-    if balanced and np.abs(a(x)).max() > _AT_REST * (1 + np.abs(a(np.concatenate([q, v, 0 * u]))).max()):
-        raise QueryError("linearise: no actuation within the limits of the plant holds this state; give u")
-
-    slopes, rest = of_fourth_order(a, x, _STEPS[0]), list(_STEPS[1:])
-    while rest:  # steep friction needs a short step; the longest one that a shorter one confirms errs least
-        shorter = of_fourth_order(a, x, rest.pop(0))
-        if np.abs(shorter - slopes).max() <= _AGREE * np.abs(shorter).max():
-            break
-        slopes = shorter
+    rates = _Rates(_sliding(plant, q, v).equation_of_motion, t)
+    size = rates.equation.state_size
+    x = np.concatenate([q, v, rates.equation.start(q, v), np.zeros(n)])
+    unknown = np.zeros(len(x), bool)
+    if z is None:
+        unknown[2 * n : 2 * n + size] = True
     else:
-        raise QueryError(_NO_DERIVATIVE)
-    h, here = _STEPS[-1], a(x)
-    for i, step in enumerate(h * np.eye(3 * n)):  # where one-sided slopes differ, though their mean has a value
-        if np.abs(a(x + step) + a(x - step) - 2 * here).max() > _ONE_SIDED * h * np.abs(slopes[:, i]).max() + 1e-9:
-            raise QueryError(_NO_DERIVATIVE)
-    A = np.zeros((2 * n, 2 * n))
-    A[:n, n:], A[n:] = np.eye(n), slopes[:, : 2 * n]
-    return Linearisation(A, np.vstack([np.zeros((n, n)), slopes[:, 2 * n :]]))
+        x[2 * n : 2 * n + size] = numbers("z", z, (size,))
+    if u is None:
+        torque = sum(rates.equation.torques(t, q, v, (n,)), start=np.zeros(n))
+        x[-n:] = rates.equation.inverse_dynamics(q, v, np.zeros(n), torque)
+        unknown[-n:] = True
+    else:
+        x[-n:] = one_state("u", u, names)
+    x = _balanced(rates, x, unknown)
+    slopes = _slopes(rates, x)
+    if (bad := slopes.first_bad) is not None:
+        raise QueryError(
+            f"linearise: the rates have no derivative by {[*rates.state_names, *rates.input_names][bad]!r} at this"
+            f" state: {_cause(rates, x)}; move the state"
+        )
+    A, B = np.zeros((2 * n + size, 2 * n + size)), np.zeros((2 * n + size, n))
+    A[:n, n : 2 * n], A[n:], B[n:] = np.eye(n), slopes.values[:, :-n], slopes.values[:, -n:]
+    q, v, z, u = rates.parts(x)
+    return Linearisation(A, B, rates.state_names, rates.input_names, q, v, z, u, float(t))
+
+
+@final
+@dataclass(frozen=True)
+class _Rates:
+    """The rates (a, ż) at x = (q, v, z, u)."""
+
+    equation: EquationOfMotion
+    t: float
+
+    def parts(self, x: np.ndarray) -> list[np.ndarray]:
+        """Return q, v, z, u."""
+        n = self.equation.dynamics.n
+        return np.split(x, [n, 2 * n, len(x) - n])
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """Return (a, ż), shape (n + size,)."""
+        q, v, z, u = self.parts(x)
+        equation = self.equation
+        u, reached = equation.applied(equation.commanded(u), z)
+        torques = equation.torques(self.t, q, v, (len(q),), z)
+        a = np.asarray(equation.acceleration(q, v, sum(torques, start=equation.on_joints(u))), float)
+        rates = np.zeros(len(z))
+        for place, rate in equation.state_rates(self.t, q, v, u, reached, z, a):
+            rates[place] = rate
+        return np.concatenate([a, rates])
+
+    def magnitudes(self, x: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        """Return the sum of magnitudes of the terms of each rate, which bounds its rounding, (n + size,).
+
+        The terms are M⁻¹ times each torque, and the slopes times x. A torque of the rigid bodies sums forces of all
+        bodies, so that its terms are as large as those of any joint.
+        """
+        q, v, z, u = self.parts(x)
+        equation, rigid = self.equation, self.equation.dynamics
+        u, _ = equation.applied(equation.commanded(u), z)
+        total = np.abs(np.asarray([u, *equation.torques(self.t, q, v, (len(q),), z)], float)).sum(axis=0)
+        total += np.abs(np.asarray([rigid.N(q), rigid.coriolis_torque(q, v)], float)).sum(axis=0).max()
+        terms = np.abs(slopes) @ np.abs(x)
+        terms[: len(q)] += np.abs(np.linalg.inv(np.asarray(rigid.M(q), float))) @ total
+        return terms
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the entries of q, v and z."""
+        joints, equation = self.equation.dynamics.joint_names, self.equation
+        effects = numbered(*(equation.effects[k].name for k in equation.states))
+        sizes = (place.stop - place.start for place in equation.states.values())
+        states = (f"{name} state {k + 1}" for name, size in zip(effects, sizes, strict=True) for k in range(size))
+        return *(f"q {joint}" for joint in joints), *(f"v {joint}" for joint in joints), *states
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the entries of u."""
+        return tuple(f"u {joint}" for joint in self.equation.dynamics.joint_names)
+
+    def longest_steps(self, x: np.ndarray) -> np.ndarray:
+        """Return the longest step by each entry of x: a part of the width of a layer of friction about v = 0."""
+        n, longest = self.equation.dynamics.n, np.full(len(x), np.inf)
+        for effect in self.equation.effects:
+            width = np.broadcast_to(effect.widths[1], n)
+            within = np.abs(x[n : 2 * n]) <= _LAYER * width
+            longest[n : 2 * n] = np.minimum(longest[n : 2 * n], np.where(within, width / 4, np.inf))
+        return longest
+
+
+def _sliding(plant: Plant, q: np.ndarray, v: np.ndarray) -> Plant:
+    """Return the plant in the mode in which no joint is held and each slides in the direction of its velocity.
+
+    Raises:
+        QueryError: If an effect holds a joint or switches between modes at this state; names it.
+    """
+    effects = [effect for effect in plant.effects if isinstance(effect, SetValued)]
+    for effect in effects:
+        if effect in plant.equation_of_motion.drives.values():
+            raise QueryError(
+                f"linearise: {effect.name} switches at each contact of its gear, so that no linear model describes it;"
+                " take a SeriesElastic with the same motors"
+            )
+        interval = effect.at_rest(q)
+        acts = np.less(interval.least, 0) | np.greater(interval.most, 0)
+        joints = ", ".join(plant.dynamics.joint_names[i] for i in np.flatnonzero(acts & (effect.stops | (v == 0))))
+        if joints and effect.stops:
+            raise QueryError(
+                f"linearise: {effect.name}: {joints} is at a stop, where it may bounce; move q off the stop"
+            )
+        if joints:
+            raise QueryError(
+                f"linearise: {effect.name} holds {joints} at rest, where the acceleration has no derivative by v; give"
+                " a velocity other than 0 there, or take RegularisedCoulombFriction instead"
+            )
+    return in_mode(plant, Mode(np.zeros(len(v)), np.sign(v))) if effects else plant
+
+
+def _balanced(rates: _Rates, x: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+    """Return x with unknown u and z at which a = 0, if u is unknown, and ż = 0, by Newton's method.
+
+    Raises:
+        QueryError: If there are none near the start.
+    """
+    n = rates.equation.dynamics.n
+    wanted = np.full(len(x) - 2 * n, True)
+    wanted[:n] = unknown[-n:]
+    wanted[n:] = unknown[2 * n :].any()
+    if not wanted.any():
+        return x
+    slopes = np.zeros((len(wanted), len(x)))
+    for _ in range(_ITERATIONS):
+        residual = rates(x)
+        if _vanishes(rates, x, residual, slopes)[wanted].all():
+            return x
+        slopes = _slopes(rates, x, unknown).values
+        driven = unknown.copy()
+        driven[2 * n : -n] &= (slopes[n:] != 0).any(axis=1)  # a state that nothing drives keeps its value
+        x = x.copy()
+        x[driven] -= np.linalg.lstsq(slopes[np.ix_(wanted, driven)], residual[wanted], rcond=None)[0]
+    if not rates.equation.state_size:
+        raise QueryError("linearise: no actuation within the limits of the plant holds this state; give u")
+    raise QueryError("linearise: no actuation and no states of effects with rates of 0 were found; give u and z")
+
+
+def _vanishes(rates: _Rates, x: np.ndarray, residual: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Return True for each rate that is 0 to the rounding of its terms and of the largest entry of x."""
+    rounding = _AT_REST * rates.magnitudes(x, slopes) + _SOLVED * np.abs(slopes).sum(axis=1) * np.abs(x).max()
+    return np.abs(residual) <= rounding
+
+
+class _Slopes(NamedTuple):
+    """Derivatives of rates, and the number of the first entry of x by which there is none."""
+
+    values: np.ndarray
+    first_bad: int | None
+
+
+def _slopes(rates: _Rates, x: np.ndarray, which: Any = True) -> _Slopes:
+    """Return ∂(a, ż)/∂x, (n + size, m), by the entries of x that are chosen; 0 by the others."""
+    columns = np.flatnonzero(np.broadcast_to(which, x.shape))
+    here, longest = rates(x), rates.longest_steps(x)
+    made = {j: _Column.of(rates, x, j, here, longest[j]) for j in columns.tolist()}
+    values = np.zeros((len(here), len(x)))
+    rounding = _ROUNDING * rates.magnitudes(x, values)
+    for _ in range(2):  # the second time with the rounding that the slopes show
+        for j, column in made.items():
+            values[:, j] = column.best(rounding)[0]
+        rounding = _ROUNDING * rates.magnitudes(x, values)
+    bad = (j for j, column in made.items() if not column.is_smooth(rounding))
+    return _Slopes(values, next(bad, None))
+
+
+@final
+@dataclass(frozen=True)
+class _Column:
+    """Differences of rates by one entry of x, at falling steps.
+
+    Attributes:
+        steps: Their steps, each half of the one before, (k,).
+        slopes: Differences of fourth order, (k, r).
+        bends: Slope on the one side less that on the other, (k, r).
+        rises: Largest change of a rate by each step, (k,), which bounds the rounding that a step adds.
+    """
+
+    steps: np.ndarray
+    slopes: np.ndarray
+    bends: np.ndarray
+    rises: np.ndarray
+
+    @classmethod
+    def of(cls, f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, j: int, here: np.ndarray, most: float) -> _Column:
+        """Return the differences by entry j, with steps up to `most` that change it by more than rounding."""
+        least = 64 * np.spacing(abs(x[j]))
+        steps = np.array([h for h in _STEPS if least <= h <= max(most, _STEPS[-5])])
+        sides, step = [], np.zeros(len(x))
+        for h in steps:
+            step[j] = h
+            sides.append((f(x + step), f(x - step)))
+        up, down = np.array(sides).transpose(1, 0, 2)
+        rise, h = up - down, steps[1:, None]
+        slopes, bends = (8 * rise[1:] - rise[:-1]) / (12 * h), ((up - here) + (down - here))[1:] / h
+        return cls(steps[1:], slopes, bends, np.maximum(np.abs(up - here), np.abs(down - here)).max(axis=1)[1:])
+
+    def best(self, rounding: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the slopes that err least, their truncation, half the jump of the slope, and rounding, each (r,).
+
+        The bend of a smooth rate is h f″ + h³ f⁗/12 + …; two extrapolations leave the jump of the slope.
+
+        Args:
+            rounding: Rounding of the rates at the state, (r,).
+        """
+        truncation = np.abs(np.diff(self.slopes, axis=0))[:-1]
+        bends = 2 * self.bends[1:] - self.bends[:-1]
+        jumps = np.abs(8 * bends[1:] - bends[:-1]) / 14
+        rounded = (rounding + _ROUNDING * self.rises[:-2, None]) / self.steps[:-2, None]
+        k = (truncation + jumps + rounded).argmin(axis=0), np.arange(len(rounding))
+        return self.slopes[k], truncation[k], jumps[k], rounded[k]
+
+    def is_smooth(self, rounding: np.ndarray) -> bool:
+        """Return True if steps agree on a slope, which is the same on both sides."""
+        slopes, truncation, jumps, rounded = self.best(rounding)
+        return not (
+            (truncation > _AGREE * np.abs(slopes).max() + 4 * rounded).any()
+            or (rounded > _HIDDEN * (self.rises / self.steps).max() + _DOUBT * rounding.max()).any()
+            or (jumps > _ONE_SIDED * np.abs(slopes) + 16 * rounded).any()
+        )
+
+
+def _cause(rates: _Rates, x: np.ndarray) -> str:
+    """Return the thresholds of effects that the state lies on, in words."""
+    q, v, z, u = rates.parts(x)
+    equation, found = rates.equation, []
+    _, reached = equation.applied(u, z, range(len(equation.effects)))
+    for k, effect in enumerate(equation.effects):
+        for threshold in effect.thresholds(len(q)):
+            values = v if threshold.of_velocity else q
+            i = threshold.joint
+            if threshold.state is not None:
+                values, i = z[equation.states[k]], threshold.state
+            elif threshold.of_actuation and isinstance(effect, Bound):
+                values = reached[k]
+            if abs(values[i] - threshold.level) <= max(threshold.slack, _NEAR * max(1.0, abs(threshold.level))):
+                joint = equation.dynamics.joint_names[threshold.joint]
+                found.append(f"{effect.name} switches at {threshold.name} {threshold.level:.6g} of {joint}")
+    return " and ".join(dict.fromkeys(found)) or "an effect jumps or has a kink there"
