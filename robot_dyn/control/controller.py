@@ -45,6 +45,10 @@ class Controller(Value, ABC):
         def torque(self, t, q, v, z): ...              # (n,), in [N m] or [N]
         def state_rate(self, t, q, v, z): ...          # ż, (state_size,), in the unit of z per second
 
+    or, for a sampled law that is written from tick to tick, such as an observer,
+
+        def next_state(self, t, q, v, z): ...          # z⁺ after the tick at t, (state_size,); needs a period_s
+
     and the properties `n` and `state_size`. The methods are pure functions, called with
 
         t: time, a number, in [s]
@@ -153,9 +157,25 @@ class Controller(Value, ABC):
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
         """Torque that it commands, shape (n,), in [N m] or [N]."""
 
-    @abstractmethod
     def state_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        """Rate ż of the controller states, shape (state_size,), in the unit of z per [s]."""
+        """Return the rate ż of the controller states, shape (state_size,), in the unit of z per [s].
+
+        A class that defines `next_state` alone has the mean rate over a period, (z⁺ − z) / period.
+
+        Raises:
+            ControlError: If the class defines neither, or defines `next_state` alone and acts continuously.
+        """
+        if not self._from_tick_to_tick:
+            raise ControlError(f"{self.name} has states: define state_rate(t, q, v, z), or next_state and a period_s")
+        if not self.period_s:
+            raise ControlError(f"{self.name} defines next_state alone, a sampled law: give it a period_s")
+        return (self.next_state(t, q, v, z) - z) / self.period_s
+
+    @property
+    def _from_tick_to_tick(self) -> bool:
+        """Whether its states are defined by `next_state` alone."""
+        own = type(self)
+        return own.state_rate is Controller.state_rate and own.next_state is not Controller.next_state
 
     def next_state(self, t: float, q: Array, v: Array, z: Array) -> Array:
         """Return the states of a sampled controller after its tick at t: z⁺ = z + period · ż, shape (state_size,)."""
@@ -191,7 +211,12 @@ class Controller(Value, ABC):
         return self
 
     def at_period(self, period_s: float) -> Controller:
-        """Return the controller with another period, in [s]; 0 for continuous control."""
+        """Return the controller with another period, in [s]; 0 for continuous control.
+
+        A sampled law that defines `next_state` alone has no continuous form: it keeps its period then.
+        """
+        if not period_s and self._from_tick_to_tick:
+            return self
         return with_values(self, {"period_s": period_s})
 
     def small_signal(self) -> Controller:

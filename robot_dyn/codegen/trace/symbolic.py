@@ -61,7 +61,30 @@ class Symbols(np.ndarray):
             return _symbols(np.frompyfunc(select, 3, 1)(*(np.asarray(x) for x in args)))
         if function is np.clip and len(args) == 3 and not options and args[1] is not None is not args[2]:
             return np.minimum(np.maximum(args[0], args[1]), args[2])
-        return _symbols(super().__array_function__(function, kinds, args, options))
+        if function in (np.linalg.solve, np.linalg.inv) and len(args) == 1 + (function is np.linalg.solve):
+            return _solved(*args)
+        try:
+            return _symbols(super().__array_function__(function, kinds, args, options))
+        except TypeError as error:
+            if getattr(function, "__module__", "") != "numpy.linalg":
+                raise
+            raise TypeError(
+                f"np.linalg.{function.__name__} is not traced; take np.linalg.solve or inv of a matrix (m, m), or compute"
+                " it once when the object is built"
+            ) from error
+
+
+def _solved(A: Any, b: Any = None) -> Any:
+    """Return A⁻¹ b of a regular matrix (m, m) and b (m,) or (m, k), or A⁻¹, by QR in symbols."""
+    A, shape = np.asarray(A), np.shape(A)
+    if len(shape) != 2 or shape[0] != shape[1]:
+        raise TypeError(f"np.linalg.solve and inv are traced for one matrix (m, m), got {shape}; write a loop")
+    b = np.eye(len(A)) if b is None else np.asarray(b)
+    if b.ndim not in (1, 2) or len(b) != len(A):
+        raise TypeError(f"np.linalg.solve is traced for b of shape ({len(A)},) or ({len(A)}, k), got {b.shape}")
+    sides = b.reshape(len(A), -1)
+    solved = ca.solve(column(A).reshape((len(A), -1)).T, column(sides.T).reshape(sides.shape))
+    return array_of(ca.densify(solved)).reshape(b.shape).view(Symbols)
 
 
 def _symbols(x: Any) -> Any:
