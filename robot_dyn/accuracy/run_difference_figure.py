@@ -8,7 +8,7 @@ import numpy as np
 
 from robot_dyn.accuracy.run_difference import RunDifference
 from robot_dyn.queries.units import unit
-from robot_dyn.report.figure import Colours, ResultError, key, legend, lines, sheet, styled
+from robot_dyn.report.figure import Colours, ResultError, heading_room, key, legend, lines, sheet, styled
 from robot_dyn.simulation.results.provenance import joint_types
 
 if TYPE_CHECKING:
@@ -31,10 +31,11 @@ def draw(result: RunDifference, theme: str = "light") -> Figure:
         )
     across = 3 if len(names) in (5, 6, 9) else min(_ACROSS, len(names))
     rows = -(-len(names) // across)
-    height = _HEAD + _PAIR * rows + _FOOT
+    head = _HEAD + heading_room(_WIDE, result, theme)
+    height = head + _PAIR * rows + _FOOT
     figure, colours = sheet(_WIDE, height, result, _caption(result), theme)
     grid = figure.add_gridspec(
-        rows, across, left=0.06, right=0.985, top=1 - _HEAD / height, bottom=_FOOT / height, wspace=0.32, hspace=0.35
+        rows, across, left=0.06, right=0.985, top=1 - head / height, bottom=_FOOT / height, wspace=0.32, hspace=0.35
     )
     types = joint_types(result.runs[0])
     for i, name in enumerate(names):

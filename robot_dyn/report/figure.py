@@ -44,7 +44,7 @@ def sheet(width: float, height: float, result: Result, caption: str, theme: str)
         return Figure(figsize=(_PART * width, height), facecolor=PAGE["paper"]), PAGE
     colours = THEMES[theme]
     figure = Figure(figsize=(width, height), facecolor=colours["paper"])
-    heading, left = fill(result.sentence, int(_LETTERS * width)), _LEFT / width
+    heading, left = _heading(result, width), _LEFT / width
     below = _CAPTION + _LINE * heading.count("\n")
     figure.text(left, 1 - _TOP / height, lines(heading), fontsize=12, weight="bold", va="top", **ink(colours))
     figure.text(left, 1 - below / height, lines(caption), fontsize=8.5, va="top", linespacing=1.4, **ink(colours))
@@ -58,6 +58,15 @@ def drawn(result: Result, theme: str = "light") -> Figure:
         ResultError: If there is nothing to draw.
     """
     return import_module(result.diagram).draw(result, theme)
+
+
+def heading_room(width: float, result: Result, theme: str) -> float:
+    """Return the height in [inch] of the lines of a heading after its first one; 0 on a page, which has none."""
+    return 0.0 if theme == "page" else _LINE * _heading(result, width).count("\n")
+
+
+def _heading(result: Result, width: float) -> str:
+    return fill(result.sentence, int(_LETTERS * width))
 
 
 def inline(figure: Figure) -> str:

@@ -17,7 +17,7 @@ from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Remark
-from robot_dyn.simulation.results.acting import acting, at_stop, frame_of, wrenches
+from robot_dyn.simulation.results.acting import acting, at_stop, frame_of, rotors_of, wrenches
 from robot_dyn.simulation.results.causes import broken_away, effect_torques, plant_of
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger
@@ -131,7 +131,8 @@ class Results:
     def about(self) -> dict[str, str]:
         """Texts: where it comes from, its settings, what machine code changed, and those of the setup."""
         edits = edits_of_machine_code(self.setup) if self.compiled else {}
-        known = frame_of(self.setup) | origin(self.setup.plant.dynamics) | settings_text(self.setup)
+        known = frame_of(self.setup) | rotors_of(self.setup) | settings_text(self.setup)
+        known |= origin(self.setup.plant.dynamics)
         return known | edits | self.texts
 
     @property

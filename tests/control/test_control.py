@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import subprocess
 import sys
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -192,3 +193,79 @@ def test_gains_by_joint_name_are_refused(gain) -> None:
     """A controller such as PD knows no names of joints, so that nothing could resolve them later."""
     with pytest.raises(ControlError, match="kp must be real numbers, one or of shape"):
         PD(MOTION, gain, KD)
+
+
+@dataclass(frozen=True, eq=False)
+class Averaging(rd.control.Controller):
+    """A sampled law that defines `next_state` alone: z⁺ = (z + q)/2 and u = −z − 3 v."""
+
+    period_s: float = 0.01
+    n, state_size, thresholds = 2, 2, lambda self: ()
+
+    def torque(self, t, q, v, z):
+        return -z - 3.0 * v
+
+    def next_state(self, t, q, v, z):
+        return (z + q) / 2
+
+
+@dataclass(frozen=True, eq=False)
+class AveragingByRate(Averaging):
+    """The same law by its rate, z⁺ = z + T ż."""
+
+    def state_rate(self, t, q, v, z):
+        return (q - z) / (2 * self.period_s)
+
+    def next_state(self, t, q, v, z):
+        return z + self.period_s * self.state_rate(t, q, v, z)
+
+
+@pytest.mark.parametrize("engine", ["interpreted", "compiled"])
+@pytest.mark.parametrize("in_loop", [False, True])
+def test_a_sampled_law_is_defined_by_its_next_state_alone(engine: str, in_loop: bool) -> None:
+    """Equal to the law by its rate, to rounding of z over 30 ticks."""
+    arm, ends = rd.load("planar_2r"), []
+    for law in (Averaging(), AveragingByRate()):
+        controller = rd.control.Loop(law, actuation_delay=0.5) if in_loop else law
+        run = rd.simulate(arm, [0.1, 0.2], duration_s=0.3, controller=controller, engine=engine, estimate_error=False)
+        ends.append(run.q[-1])
+    np.testing.assert_allclose(*ends, rtol=1e-12)
+
+
+def test_a_sampled_law_without_a_period_is_refused_with_the_remedy() -> None:
+    with pytest.raises(ControlError) as refused:
+        rd.simulate(rd.load("planar_2r"), [0.1, 0.2], duration_s=0.3, controller=Averaging(period_s=0.0))
+    assert "period_s" in str(refused.value) and "next_state" in str(refused.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Solving(rd.control.Stateless):
+    """A law that calls a function of np.linalg."""
+
+    model: rd.Robot
+    function: str = "solve"
+    n, thresholds = 2, lambda self: ()
+
+    def torque(self, t, q, v, z):
+        M, swap = self.model.M(q), np.array([[0.0, 1.0], [2.0, 0.0]])  # M is symmetric, the other needs a pivot
+        if self.function == "solve":
+            return np.linalg.solve(M, np.stack([v, q], axis=1))[:, 0] + np.linalg.solve(swap, v)
+        return np.linalg.inv(M) @ v if self.function == "inv" else np.linalg.det(M) * v
+
+
+@pytest.mark.parametrize("function", ["solve", "inv"])
+def test_linear_systems_within_a_law_are_compiled(function: str) -> None:
+    """Equal to LAPACK's in the interpreted engine, to rounding."""
+    arm, options = rd.load("planar_2r"), {"v0": [1.0, -0.5], "duration_s": 0.1, "integrator": "rk4", "step_s": 1e-3}
+    ends = [
+        rd.simulate(arm, [0.1, 0.2], controller=Solving(arm, function), engine=engine, estimate_error=False, **options)
+        for engine in ("interpreted", "compiled")
+    ]
+    np.testing.assert_allclose(ends[0].q, ends[1].q, atol=1e-13)
+
+
+def test_other_functions_of_linear_algebra_are_named() -> None:
+    arm = rd.load("planar_2r")
+    with pytest.raises(rd.RobotDynError) as refused:
+        rd.rollouts(arm, [[0.1, 0.2]], duration_s=0.1, integrator="rk4", controller=Solving(arm, "det"))
+    assert "np.linalg.det" in str(refused.value) and "np.linalg.solve" in str(refused.value)

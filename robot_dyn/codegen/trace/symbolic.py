@@ -69,8 +69,8 @@ class Symbols(np.ndarray):
             if getattr(function, "__module__", "") != "numpy.linalg":
                 raise
             raise TypeError(
-                f"np.linalg.{function.__name__} is not traced; take np.linalg.solve or inv of a matrix (m, m), or compute"
-                " it once when the object is built"
+                f"np.linalg.{function.__name__} is not traced; take np.linalg.solve or inv of a matrix (m, m), or"
+                " compute it once when the object is built"
             ) from error
 
 

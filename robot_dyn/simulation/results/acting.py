@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from robot_dyn.effects.geared_motor import GearedMotor
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
@@ -86,3 +88,15 @@ def frame_of(setup: Setup) -> dict[str, str]:
     if setup.controller is None or setup.controller.task_frame is None:
         return {}
     return {"frame": link_of(setup.plant.dynamics, setup.controller.task_frame)}
+
+
+def rotors_of(setup: Setup) -> dict[str, str]:
+    """Inertia of each rotor that a drive of the plant simulates, n² J at its joint, as a text of the run."""
+    equation, names = setup.plant.equation_of_motion, setup.plant.dynamics.joint_names
+    geared = [each for each in equation.drives.values() if isinstance(each, GearedMotor)]
+    rotors = {
+        names[i]: float(inertia)
+        for each in geared
+        for i, inertia in zip(each.driven(len(names)), each.reflected(len(names)), strict=True)
+    }
+    return {"rotors": json.dumps(rotors, ensure_ascii=False)} if rotors else {}

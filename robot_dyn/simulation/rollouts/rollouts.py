@@ -29,7 +29,7 @@ from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.build import compiled_equation
 from robot_dyn.simulation.compiled.engine_choice import checked
-from robot_dyn.simulation.results.acting import frame_of
+from robot_dyn.simulation.results.acting import frame_of, rotors_of
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
@@ -176,7 +176,7 @@ def run_batch(
         runs = _side_by_side(batch, passed if cuts else None, most_bytes).run(threads, on_progress)
         if passed is not None and not cuts:
             runs = replace(runs, uncut=passed.names)
-    return replace(runs, about=frame_of(setup) | edits_of_machine_code(setup) | runs.about)
+    return replace(runs, about=frame_of(setup) | rotors_of(setup) | edits_of_machine_code(setup) | runs.about)
 
 
 def _why_one_by_one(setup: Setup) -> str:

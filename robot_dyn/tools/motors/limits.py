@@ -81,12 +81,17 @@ def _stated(robot: Any, kind: str) -> Any:
     return limits
 
 
+def same_rotor(one: float, other: float) -> bool:
+    """Return True if two inertias of a rotor agree to 1 %."""
+    return abs(one - other) <= _SAME_ROTOR * max(one, other)
+
+
 def _check_rotors(motors: Motors, robot: Any) -> None:
     """Raise a PlanError if a rotor is not a part of the arm: its torque would be missing."""
     felt = dict(zip(robot.joint_names, getattr(robot, "armature", np.zeros(robot.n)), strict=True))
     for joint, inertia in motors.armature.items():
         there = float(felt.get(joint, inertia))
-        if abs(inertia - there) > _SAME_ROTOR * max(inertia, there):
+        if not same_rotor(inertia, there):
             raise PlanError(
                 f"{motors.source}: the rotor of {joint!r} is felt as {inertia:.6g} kg m² at the joint, the arm has"
                 f' {there:.6g}; take arm.with_(armature=motors.armature), in a scene kind = "armature"'

@@ -517,3 +517,43 @@ def test_the_command_takes_scenes_and_runs_and_writes_figure_and_table(files: Pa
     done = ran("budget", run, "-o", files / "b.svg", "--csv", files / "b.csv", "--dark")
     assert done.returncode == 0 and (files / "b.svg").read_bytes().startswith(b"<?xml")
     assert (files / "b.csv").read_text(encoding="utf-8").startswith("joint,unit,peak,peak_at,")
+
+
+def test_a_run_that_simulates_its_gears_has_its_own_rotors(tmp_path: Path) -> None:
+    """Rotors that the file states alike change no torque; others, and one that the arm has too, are refused."""
+
+    def motors(inertia: float) -> Any:
+        file = tmp_path / f"motors_{inertia}.csv"
+        file.write_text(
+            "joint,peak [N m],gear_ratio,rotor_inertia [kg m^2],at\n"
+            f"joint_1,200,100,{inertia},joint\njoint_2,60,100,5e-5,joint\n"
+        )
+        return rd.tools.motors.read_motors(file)
+
+    arm = rd.load("planar_2r")
+    gears = rd.effects.SeriesElastic([2000.0, 500.0], [1e-4, 5e-5], 100.0, damping=2.0)
+    options = {"duration_s": 0.2, "controller": rd.control.PD(rd.control.hold([0.5, -0.3]), 200.0, 20.0)}
+    run = rd.simulate(rd.Plant(arm, [gears]), [0.3, -0.5], **options)
+    found, bare = rd.tools.motors.budget(run, motors=motors(1e-4)), rd.tools.motors.budget(run, effort=[200.0, 60.0])
+    assert [x.peak for x in found.joints] == [x.peak for x in bare.joints]
+    assert any("joint_1, joint_2" in finding for finding in found.findings)
+    with pytest.raises(PlanError) as refused:
+        rd.tools.motors.budget(run, motors=motors(2e-4))
+    assert all(part in str(refused.value) for part in ("joint_1", "2 kg m²", "1 kg m²"))
+    twice = rd.simulate(rd.Plant(arm.with_(armature=[1.0, 0.5]), [gears]), [0.3, -0.5], **options)
+    with pytest.raises(PlanError, match="twice"):
+        rd.tools.motors.budget(twice, motors=motors(1e-4))
+
+
+def test_a_verdict_of_many_lines_stands_above_the_axes_of_its_figure() -> None:
+    """Texts at the top of the figure end above the titles of all axes."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    from robot_dyn.tools.motors.motor_budget.diagram import draw
+
+    figure = draw(rd.tools.motors.budget(PLAN, UR5, effort=1.0, velocity=0.1, continuous=0.5))
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    bottom = min(text.get_window_extent(renderer).y0 for text in figure.texts)
+    assert max(axes.get_tightbbox(renderer).y1 for axes in figure.axes) < bottom

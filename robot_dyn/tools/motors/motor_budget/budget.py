@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from math import inf, nan
 from typing import Any, NamedTuple
@@ -23,7 +24,7 @@ from robot_dyn.simulation.observation.remarks import Kind, lines
 from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.tools.motors.limits import Limits, limits_of
+from robot_dyn.tools.motors.limits import Limits, limits_of, same_rotor
 from robot_dyn.tools.motors.motor_budget.breakaway import breakaway, static_friction
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, of_run
 from robot_dyn.tools.motors.motor_budget.joint_budget import JointBudget, joint_budgets
@@ -51,7 +52,8 @@ def budget(
 
     Along a plan τ is that of the inverse dynamics; of a run it is the actuation that was recorded. It is compared with
     peak torque, its root mean square over the motion with continuous torque. Powers are those at the joint, τ v,
-    without losses of motor and gear. A rotor inertia of `motors` acts as armature where the arm has none.
+    without losses of motor and gear. A rotor inertia of `motors` acts as armature where the arm has none. A run that
+    simulates its gears has its own rotors; those of `motors` must be the same, to 1 %.
 
     Args:
         motion: A plan, a `PiecewisePolynomial`, or a run of `rd.simulate`.
@@ -154,6 +156,8 @@ def _of_plan(motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, given:
 
 def _of_run(run: Trajectory, given: _Given) -> MotorBudget:
     demand, robot = of_run(run), robot_of(run)
+    simulated = _simulated_rotors(run, robot)
+    given = given._replace(motors=_with_rotors(given.motors, simulated))
     limits, continuous = given.limits(Plant(robot))
     cut = frozenset(each.joint for each in run.remarks if each.kind == Kind.EFFORT_REACHED)
     found = joint_budgets(demand, limits, continuous, np.full(robot.n, nan), None, cut)
@@ -163,8 +167,43 @@ def _of_run(run: Trajectory, given: _Given) -> MotorBudget:
     left = ["torque at which joints break away: a run does not hold its static friction"]
     if driven := [name for name in run.effect_torques or {} if name.startswith(_DRIVES)]:
         left.append(f"power at the motors of {', '.join(driven)}, which turn at other speeds than their joints")
+    if simulated:
+        findings.append(f"the rotors of {', '.join(simulated)} are those of the run, which simulates its gears")
     what = f"run of {demand.duration:.6g} s"
     return _result(robot, what, demand, tuple(found), given, tuple(findings), tuple(left), None)
+
+
+def _simulated_rotors(run: Trajectory, robot: Robot) -> dict[str, float]:
+    """Return the inertia at its joint of each rotor that the drives of a run simulate.
+
+    Raises:
+        PlanError: If the arm has the same inertia as armature, which counts the rotor twice.
+    """
+    rotors: dict[str, float] = json.loads(run.about.get("rotors", "{}"))
+    for name, armature in zip(robot.joint_names, robot.armature.tolist(), strict=True):
+        if name in rotors and same_rotor(armature, rotors[name]):
+            raise PlanError(
+                f"the rotor of {name!r} is counted twice: the gears of the run simulate {rotors[name]:.6g} kg m² at the"
+                f" joint, and the arm has an armature of {armature:.6g} kg m²; simulate without one of them"
+            )
+    return rotors
+
+
+def _with_rotors(motors: Motors | None, simulated: Mapping[str, float]) -> Motors | None:
+    """Return motors without the rotors that a run simulates itself.
+
+    Raises:
+        PlanError: If a motor states another inertia than the run simulates.
+    """
+    if motors is None:
+        return None
+    for name, stated in motors.armature.items():
+        if name in simulated and not same_rotor(stated, simulated[name]):
+            raise PlanError(
+                f"{motors.source}: the rotor of {name!r} is felt as {stated:.6g} kg m² at the joint, the gears of the"
+                f" run simulate {simulated[name]:.6g} kg m²; correct the file, or simulate with that inertia"
+            )
+    return replace(motors, armature={name: x for name, x in motors.armature.items() if name not in simulated})
 
 
 def _result(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_dyn.queries.units import of_joint
-from robot_dyn.report.figure import Colours, ResultError, ink, key, legend, lines, sheet, styled
+from robot_dyn.report.figure import Colours, ResultError, heading_room, ink, key, legend, lines, sheet, styled
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 from robot_dyn.view.plots.figure import NEAR, shortened
@@ -31,10 +31,11 @@ def draw(result: MotorBudget, theme: str = "light") -> Figure:
     """
     if not 0 < len(result.joints) <= _MOST:
         raise ResultError(f"a budget of {len(result.joints)} joints cannot be drawn, up to {_MOST} can")
+    head = _HEAD + heading_room(_WIDE, result, theme)
     rows, above = -(-len(result.joints) // _ACROSS), _ROW * len(result.joints) + 0.5
-    height = _HEAD + above + _GAP + _CELL * rows + _FOOT
+    height = head + above + _GAP + _CELL * rows + _FOOT
     figure, colours = sheet(_WIDE, height, result, f"Limits: {result.limits}; {result.resolution}.", theme)
-    top = 1 - _HEAD / height
+    top = 1 - head / height
     bars = figure.add_gridspec(1, 2, left=0.14, right=0.985, top=top, bottom=top - above / height, wspace=0.05)
     _used(figure.add_subplot(bars[0]), result, colours)
     _by_cause(figure.add_subplot(bars[1]), result, colours)
