@@ -4,6 +4,11 @@
 
 An arm takes part if the doctor finds no error in it as it stands; what it warns of there is listed as false alarms. A
 fault counts as found if the check has a finding at the link or joint of the fault that it does not have without it.
+
+    PYTHONPATH=scripts python -m benchmarks.planted_faults --repairs 40 ur3 kinova …
+
+repairs each planted fault, and so many pairs of faults for each arm, with and without conversion of units: repairing
+the repaired file must change no byte, and what is left must be what a check of that file finds.
 """
 
 from __future__ import annotations
@@ -193,11 +198,59 @@ def found(checkup: Checkup) -> set[tuple[str, str]]:
     return {(each.kind, each.where) for each in checkup.findings}
 
 
+def unlike(text: bytes, source: str, units: bool) -> list[str]:
+    """How the repaired file breaks its promises: repairs of it change nothing, and its findings are those left."""
+    once = checked(text, source, units=units)
+    if once.repaired is None:
+        return [] if once.left == once.findings and not once.gone else ["left without a repair"]
+    twice = checked(once.repaired, source, units=units)
+    broken = [] if twice.repaired is None else ["repaired again"]
+    left, again = ([str(each) for each in found] for found in (once.left, twice.findings))
+    return broken + ([] if left == again else ["left is not what is found"])
+
+
+def pair(root: Any, names: tuple[str, str], rng: np.random.Generator) -> bytes | None:
+    """The text with two faults at random places, the second after the first; None if one does not apply."""
+    for name in names:
+        try:
+            if (faulty := planted(root, name, rng)) is None:
+                return None
+            root = etree.fromstring(faulty[0])
+        except (ValueError, AttributeError):  # the second fault reads a number that the first one broke
+            return None
+    return faulty[0]
+
+
+def repairs(arms: list[tuple[bytes, str]], faults: list[str], pairs: int) -> None:
+    """Print how many texts were repaired, and each that does not stay repaired."""
+    tried: Counter[str] = Counter()
+    for number, (text, source) in enumerate(arms, start=1):
+        root, rng = etree.fromstring(text), np.random.default_rng(number)
+        single = [(name, faulty and faulty[0]) for name in faults for faulty in [planted(root, name, rng)]]
+        chosen = [tuple(map(str, rng.choice(faults, 2))) for _ in range(pairs)]
+        double = [(" + ".join(names), pair(root, names, rng)) for names in chosen]
+        for kind, texts in (("as it stands", [("", text)]), ("one fault", single), ("two faults", double)):
+            for name, broken in texts:
+                for units in (False, True) if broken is not None else ():
+                    tried[kind] += 1
+                    for why in unlike(broken, source, units):
+                        tried[f"{kind}: {why}"] += 1
+                        print(f"{Path(source).name}: {name}, units={units}: {why}", flush=True)
+        print(f"{number} {Path(source).name}", flush=True)
+    print(*(f"{kind}: {count}" for kind, count in tried.items()), sep="\n")
+
+
 def main() -> None:
     parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument("arms", nargs="+", help="names of the catalog, URDF or xacro files")
     parser.add_argument("--faults", nargs="*", choices=FAULTS, default=[*FAULTS])
+    parser.add_argument(
+        "--repairs", type=int, metavar="PAIRS", help="repair each fault, and so many pairs for each arm"
+    )
     options = parser.parse_args()
+    if options.repairs is not None:
+        repairs([text_of(name) for name in options.arms], options.faults, options.repairs)
+        return
     clean, tried, hit, elsewhere, missed = 0, Counter(), Counter(), Counter(), {}
     alarms: Counter[tuple[str, str]] = Counter()
     with_errors, refused = [], []

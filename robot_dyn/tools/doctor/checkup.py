@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import final
+from typing import Any, NamedTuple, final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -38,6 +39,7 @@ _OF_TEXT = (
     literals.near_right_angles, proportions.far_origins, axes.missing_axes, limits.limits, names.names, names.leftovers,
 )  # fmt: skip
 _ORDER = [*Severity]
+_DECLARATION = ("the XML declaration", "XML version")  # how findings about the first line of a file begin
 
 
 @final
@@ -49,9 +51,10 @@ class Checkup(Answer):
         source: The file.
         loads: Whether it is read as it stands; why not is among the findings.
         findings: The gravest first.
-        repaired: The file with all changes of the findings, each in a comment before its element; None if it is not
-            XML, or nothing can be changed.
-        left: The findings that the repaired file still has; all of them if there is none.
+        repaired: The file with all repairs, each change in a comment before its element: repairing it again changes
+            nothing. None if the file is not XML, or nothing can be repaired.
+        left: The findings of a check of the repaired file, with its lines; `findings` if there is none.
+        gone: The findings that the repaired file no longer has.
         examined: Whether masses, inertias and shapes were checked, which takes a file, or a repaired one, that is read.
     """
 
@@ -60,6 +63,7 @@ class Checkup(Answer):
     findings: tuple[Finding, ...]
     repaired: bytes | None = field(metadata=UNREPORTED)
     left: tuple[Finding, ...] = field(metadata=UNREPORTED)
+    gone: tuple[Finding, ...] = field(default=(), metadata=UNREPORTED)
     examined: bool = field(default=False, metadata=UNREPORTED)
 
     @reported
@@ -128,49 +132,79 @@ def check(
 def checked(
     text: bytes, source: str, package_dirs: tuple[Path, ...] = (), known: Masses | None = None, units: bool = False
 ) -> Checkup:
-    """Check the text of a file."""
+    """Check the text of a file, and repair it until a check finds nothing that it can repair.
+
+    One repair may uncover the next: limits in degrees, once in radians, turn out to be crossed.
+    """
+    first = step = _examined(text, source, package_dirs, known, units)
+    texts = [text]
+    while step.repaired is not None and step.repaired not in texts:
+        texts.append(step.repaired)
+        known = None if step.estimated else known
+        step = _examined(step.repaired, source, package_dirs, known, units)
+    repaired = texts[-1] if len(texts) > 1 else None
+    gone = _gone(first.findings, step.findings)
+    return Checkup(source, first.loads, first.findings, repaired, step.findings, gone, first.examined)
+
+
+class _Examined(NamedTuple):
+    """One check of a text, and one round of repairs; `estimated` is True once masses have been assigned."""
+
+    loads: bool
+    findings: tuple[Finding, ...]
+    repaired: bytes | None
+    examined: bool
+    estimated: bool
+
+
+def _examined(text: bytes, source: str, package_dirs: tuple[Path, ...], known: Masses | None, units: bool) -> _Examined:
     refusal = _refusal(text, source)
     try:
         document = written = Document(text, source)
     except DescriptionError as error:
-        return _refused(source, error)
+        return _Examined(False, (_of_refusal(source, str(error)),), None, False, False)
     found = [_assumed(each) for each in document.assumed]
     found += [finding for find in _OF_TEXT for finding in find(document)]
     explained = any(each.severity is Severity.ERROR for each in found)
     repairs = [each for each in found if each.changes]
-    declared = any("XML" in each for each in document.assumed)  # which is written again
-    if repairs or declared:
+    if repairs or any(each.startswith(_DECLARATION) for each in document.assumed):  # which is written again
         document = _rewritten(document, repairs)
     still = _refusal(document.text, source)
     if refusal is not None and (still is not None or not explained):
         found.append(_of_refusal(source, str(refusal if still is None else still), written))
     robot = None if still is not None else _loaded(document, found)
+    estimated = robot is not None and not repairs
     if robot is not None:
         found += [_assumed(each) for each in robot.description.findings if not _reported(each, found)]
         of, unread = shapes.shapes(robot, package_dirs)
         found += [_of_mesh(each) for each in unread]
-        estimated = [*missing_inertials(document, robot.description, of, known, package_dirs)]
-        found += estimated
-        if made := [each for each in estimated if each.changes]:
-            repairs += made
+        # shapes may stand elsewhere after the next round of repairs, therefore masses wait for the last one
+        missing = [*missing_inertials(document, robot.description, of, known if estimated else None, package_dirs)]
+        found += missing
+        if made := [each for each in missing if each.changes]:
             document = _rewritten(document, made)
             robot = Robot(description.check(document.text, source))
         found += [*masses.masses(document, robot), *shapes.of_one_density(document, robot, of)]
-        later = shapes.doubtful(document, robot, of, package_dirs)
-        found += later
+        doubtful = shapes.doubtful(document, robot, of, package_dirs)
+        found += doubtful
         found += masses.beyond_reach(document, robot, found)
         found += gravity_load.weak_joints(document, robot, found)
-        if made := [each for each in later if each.changes and (units or not each.supposed)]:
-            repairs += made
+        if made := [each for each in doubtful if each.changes and (units or not each.supposed)]:
             document = _rewritten(document, made)
-        assumed = {_assumed(text).what for text in (*document.assumed, *robot.description.findings)}
-        gone = [each for each in found if each.kind == "format" and each.what not in assumed] if estimated else []
-        repairs += gone
     loads = refusal is None and not any(each.kind == "refused" for each in found)
-    return Checkup(
-        source, loads, _gravest_first(found), document.text if repairs or declared else None,
-        _gravest_first(each for each in found if not any(each is mended for mended in repairs)), robot is not None,
-    )  # fmt: skip
+    repaired = None if document is written or document.text == text else document.text
+    return _Examined(loads, _gravest_first(found), repaired, robot is not None, estimated)
+
+
+def _gone(before: Iterable[Finding], after: Iterable[Finding]) -> tuple[Finding, ...]:
+    """The findings of a text that a later one does not have: of each kind and place as many as are fewer."""
+    left, gone = Counter((each.kind, each.where) for each in after), []
+    for finding in before:
+        if left[finding.kind, finding.where]:
+            left[finding.kind, finding.where] -= 1
+        else:
+            gone.append(finding)
+    return tuple(gone)
 
 
 def _gravest_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -184,13 +218,15 @@ def _refused(source: str, error: DescriptionError) -> Checkup:
 
 
 def _without_lines(checkup: Checkup, more: Iterable[Finding]) -> Checkup:
-    """The checkup of an expanded text, whose lines are not those of the file, with the warnings of the expansion."""
+    """The checkup of an expanded text, whose lines are not those of the file, with the warnings of the expansion.
+
+    These are about the xacro file: a check of the repaired file does not find them.
+    """
     more = tuple(more)
-    found, left = (
-        _gravest_first((*(replace(each, line=None) for each in findings), *more))
-        for findings in (checkup.findings, checkup.left)
-    )
-    return replace(checkup, findings=found, left=left)
+    found, gone = ([replace(each, line=None) for each in findings] for findings in (checkup.findings, checkup.gone))
+    found = _gravest_first((*found, *more))
+    left = found if checkup.repaired is None else checkup.left
+    return replace(checkup, findings=found, left=left, gone=tuple(gone))
 
 
 def _refusal(text: bytes, source: str) -> DescriptionError | None:
@@ -241,8 +277,16 @@ def _of_mesh(note: str) -> Finding:
 
 
 def _rewritten(document: Document, findings: Iterable[Finding]) -> Document:
-    """The document with their changes, each in a comment before its element."""
+    """The document with their changes, each in a comment before its element.
+
+    Of two findings that change one attribute the first is repaired; the next round checks what it left.
+    """
+    changed = set[tuple[Any, str]]()
     for finding in findings:
+        places = {place for change in finding.changes for place in change.places}
+        if places & changed:
+            continue
+        changed |= places
         for change in finding.changes:
             comment = etree.Comment(f" robot-dyn check: {_plain(f'{change.text}: {finding.what}')} ")
             comment.tail = _indent(change.element)

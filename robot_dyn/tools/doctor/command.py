@@ -116,8 +116,11 @@ def _lines(file: str, checkup: Checkup, written: str | None, every: bool) -> Ite
         for each in ((finding,) for finding in group) if every else (group,):
             yield f"  {sentence(tuple(each))}{_repairable(each, written)}"
     if written:
-        mended = [each for each in checkup.findings if not any(each is still for still in checkup.left)]
-        yield f"  written to {written}: repaired {counted(mended)}; left {counted(checkup.left) or 'nothing'}"
+        repaired, left = counted(checkup.gone) or "nothing", counted(checkup.left) or "nothing"
+        yield f"  written to {written}: repaired {repaired}; left {left}"
+        before = {(finding.kind, finding.where) for finding in checkup.findings}
+        for group in grouped(finding for finding in checkup.left if (finding.kind, finding.where) not in before):
+            yield f"  found in {written}: {sentence(group)}"
         if folders := _of_packages(Path(file), checkup.repaired or b""):
             yield f"  its meshes are found with {' '.join(f'--package-dir {folder}' for folder in folders)}"
 

@@ -55,6 +55,13 @@ class Change:
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"element": None}
 
+    @property
+    def places(self) -> tuple[tuple[Any, str], ...]:
+        """The attributes that it changes, each with its element; an element is a place of the one around it."""
+        if not self.key:
+            return ((self.element.getparent(), f"<{self.value}>"),)
+        return ((self.element, self.key), *([(self.element, self.renames)] if self.renames else []))
+
     def apply(self) -> None:
         """Apply the change to the element."""
         if not self.key:

@@ -8,6 +8,7 @@ from typing import Any
 
 from robot_dyn.tools.doctor.document import Document, parsed
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
+from robot_dyn.tools.doctor.literals import limits_in_degrees
 
 _UNITS = {"effort": "N m or N", "velocity": "rad/s or m/s"}
 
@@ -52,10 +53,12 @@ def _of_joint(document: Document, joint: Any) -> Iterator[Finding]:
     lower, upper = stated.get("lower", 0.0), stated.get("upper", 0.0)
     if lower > upper:
         exchanged = Change(limit, "lower", limit.get("upper", "0")), Change(limit, "upper", limit.get("lower", "0"))
+        in_degrees = limits_in_degrees(limit)  # 135 … -95: exchanged they would look right and still be too large
         yield document.finding(
             Severity.WARNING, "limits_crossed", joint,
             f'its lower limit "{limit.get("lower", "0")}" is above its upper one "{limit.get("upper", "0")}"',
-            "exchange them", exchanged,
+            "write them in radians, then exchange them" if in_degrees else "exchange them",
+            () if in_degrees else exchanged,
         )  # fmt: skip
     elif lower == upper:
         yield document.finding(

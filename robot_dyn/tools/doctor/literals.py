@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from math import degrees, isfinite, pi
+from collections.abc import Iterable, Iterator
+from math import degrees, isfinite, pi, radians
 from typing import Any
 
 from robot_dyn.tools.doctor.document import Document, parsed
@@ -112,20 +112,43 @@ def _named(angle: float) -> str:
 
 
 def angles_in_degrees(document: Document) -> Iterator[Finding]:
-    """Angles of more than a turn that are whole degrees."""
+    """Angles of more than a turn that are whole degrees; the two limits of a joint have one unit."""
     for element, key, words in numbers(document):
-        angles = key == "rpy" or (key in ("lower", "upper") and element.getparent().get("type") == "revolute")
         values = [x for word in words if isfinite(x := parsed(word))]
-        if not angles or len(values) != len(words) or not any(_TURN * 1.01 < abs(x) <= 720 for x in values):
+        if key != "rpy" or len(values) != len(words) or not _beyond_a_turn(values):
             continue
-        unit = _WHOLE if key == "rpy" else 1.0
-        whole = all(abs(x - unit * round(x / unit)) <= _ROUNDED for x in values)
-        if key != "rpy" and max(map(abs, values)) <= (_FEW if whole else _TURNS):
-            continue
-        meant = " ".join(repr(x * pi / 180) for x in values)
+        whole = _all_whole(values, _WHOLE)
+        meant = " ".join(repr(radians(x)) for x in values)
         yield document.finding(
             Severity.WARNING, "degrees", element,
             f'{key} "{" ".join(words)}" is more than a turn ({degrees(max(values, key=abs)):.0f}°)'
-            + (": degrees are suspected" if whole or key != "rpy" else ""),
+            + (": degrees are suspected" if whole else ""),
             "write radians", (Change(element, key, meant),) if whole else (),
         )  # fmt: skip
+    for limit in document.root.iterfind("joint/limit"):
+        if values := limits_in_degrees(limit):
+            stated = " and ".join(f'{key} "{limit.get(key).strip()}"' for key in values)
+            whole, most = _all_whole(values.values(), 1.0), max(values.values(), key=abs)
+            yield document.finding(
+                Severity.WARNING, "degrees", limit,
+                f"{stated}: more than a turn ({degrees(most):.0f}°): degrees are suspected",
+                "write radians", tuple(Change(limit, key, repr(radians(x))) for key, x in values.items() if whole),
+            )  # fmt: skip
+
+
+def limits_in_degrees(limit: Any) -> dict[str, float]:
+    """The position limits that a <limit> states, if one of them is suspected to be in degrees; otherwise empty."""
+    stated = {key: parsed(limit.get(key)) for key in ("lower", "upper") if limit.get(key) is not None}
+    values = [*stated.values()]
+    if limit.getparent().get("type") != "revolute" or not all(map(isfinite, values)) or not _beyond_a_turn(values):
+        return {}
+    return stated if max(map(abs, values)) > (_FEW if _all_whole(values, 1.0) else _TURNS) else {}
+
+
+def _beyond_a_turn(values: Iterable[float]) -> bool:
+    return any(_TURN * 1.01 < abs(x) <= 720 for x in values)
+
+
+def _all_whole(values: Iterable[float], unit: float) -> bool:
+    """Whether angles are multiples of a unit in degrees, to the digits of radians that were rounded."""
+    return all(abs(x - unit * round(x / unit)) <= _ROUNDED for x in values)

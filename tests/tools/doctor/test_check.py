@@ -252,6 +252,62 @@ def test_what_is_left_is_what_a_check_of_the_repaired_file_finds() -> None:
     assert [(each.kind, each.where) for each in again] == [(each.kind, each.where) for each in made.left]
 
 
+def of_elbow(limit: str) -> bytes:
+    start = SOUND.index("<limit", SOUND.index('<joint name="elbow"'))
+    end = SOUND.index("/>", start)
+    return f'{SOUND[:start]}<limit {limit} effort="40" velocity="3"{SOUND[end:]}'.encode()
+
+
+@pytest.mark.parametrize(
+    ("limit", "repaired"),
+    [
+        ('lower="135" upper="-95"', (np.deg2rad(-95), np.deg2rad(135))),
+        ('lower="-95" upper="135"', (np.deg2rad(-95), np.deg2rad(135))),
+        ('lower="135" upper="-5"', (np.deg2rad(-5), np.deg2rad(135))),  # -5 alone could be in radians
+        ('lower="0" upper="180"', (0.0, np.pi)),
+        (
+            'lower="135.4" upper="-95"',
+            None,
+        ),  # degrees are whole, as a rule: neither is converted, nor are they exchanged
+        ('lower="-1.57" upper="90"', None),  # one of each unit
+        ('lower="2.5" upper="-2.5"', (-2.5, 2.5)),
+    ],
+)
+def test_the_limits_of_a_joint_have_one_unit_and_are_repaired_together(
+    limit: str, repaired: tuple[float, float] | None
+) -> None:
+    text = of_elbow(limit)
+    made = checked(text, "rig.urdf")
+    if repaired is None:
+        assert made.repaired is None
+        assert "degrees" in {each.kind for each in made.left}
+        return
+    assert made.repaired is not None
+    assert made.left == ()
+    assert {id(each) for each in made.gone} == {id(each) for each in made.findings}
+    robot = rd.Robot.from_text(made.repaired)
+    np.testing.assert_allclose([robot.lower[1], robot.upper[1]], repaired, rtol=1e-15)
+
+
+@pytest.mark.parametrize("units", [False, True])
+def test_a_repaired_file_is_repaired_for_good(units: bool) -> None:
+    """Each way to break the file, and 40 pairs of them: repaired again no byte changes, and left is what is found."""
+    rng, names = np.random.default_rng(3), [*BROKEN]
+    pairs = [("decimal comma", "misspelt attribute"), ("misspelt origin", "degrees"), ("g mm²", "mass in grams")]
+    for chosen in ((name,) for name in names), pairs, (tuple(rng.choice(names, 2, replace=False)) for _ in range(40)):
+        for faults in chosen:
+            text = SOUND
+            try:
+                for name in faults:
+                    text = BROKEN[name].change(text)
+            except (AssertionError, ValueError):  # the first change took what the second one breaks
+                continue
+            once = checked(text.encode(), "rig.urdf", units=units)
+            again = checked(text.encode() if once.repaired is None else once.repaired, "rig.urdf", units=units)
+            assert again.repaired is None, faults
+            assert [*map(str, once.left)] == [*map(str, again.findings)], faults
+
+
 def test_the_exit_code_after_a_repair_is_that_of_what_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("arm.urdf").write_text(BROKEN["misspelt origin"].change(BROKEN["no axis"].change(SOUND)), encoding="utf-8")
@@ -275,6 +331,22 @@ def test_a_xacro_file_is_checked_as_what_it_expands_to(tmp_path: Path, monkeypat
     assert "(line" not in told.stdout
     x, y = (rd.Robot.from_text(each).M(Q) for each in (SOUND, Path("rig.fixed.urdf").read_text(encoding="utf-8")))
     assert np.abs(x - y).max() <= 1e-12 * np.abs(x).max()
+
+
+def test_what_is_left_of_a_xacro_file_is_what_a_check_of_the_written_file_finds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One right angle is repaired, a missing axis and a weak joint are left, each counted once."""
+    monkeypatch.chdir(tmp_path)
+    text = BROKEN["weak joint"].change(BROKEN["1.57"].change(BROKEN["no axis"].change(SOUND)))
+    Path("rig.urdf.xacro").write_text(text, encoding="utf-8")
+    made = rd.tools.doctor.check("rig.urdf.xacro", xacro={})
+    assert made.repaired is not None
+    assert {each.kind for each in made.gone} == {"near_right_angle"}
+    Path("rig.fixed.urdf").write_bytes(made.repaired)
+    assert [*map(str, rd.tools.doctor.check("rig.fixed.urdf").findings)] == [*map(str, made.left)]
+    told = run("check", "rig.urdf.xacro", "--xacro", "", "--fix", "--force").stdout
+    assert "repaired 1 warning; left 1 error, 1 warning" in told
 
 
 def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
