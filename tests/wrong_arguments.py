@@ -270,7 +270,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "check": (
             rd.tools.doctor.check,
             {"name_or_path": "planar_2r", "package_dirs": [folder], "mass": None, "total_mass": None,
-             "density": 1000.0, "units": True, "xacro": None},
+             "density": 1000.0, "allow_overlap": False, "units": True, "xacro": None},
         ),
         "circle": (
             rd.control.circle,
@@ -337,7 +337,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "load": (
             rd.load,
             {"name_or_path": urdf, "package_dirs": [folder], "xacro": None, "inertia": "stated", "mass": None,
-             "total_mass": None, "density": None, "download": False, "without": ()},
+             "total_mass": None, "density": None, "allow_overlap": False, "download": False, "without": ()},
         ),
         "load_run": (rd.load_run, {"path": saved, "max_bytes": 2**30}),
         "compare_runs": (rd.compare_runs, {"a": several[0], "b": several[0]}),

@@ -55,6 +55,10 @@ class RobotOptions:
     density: Annotated[
         float | None, typer.Option(metavar="KG/M³", help="Density of links without inertia, from shapes.")
     ] = None
+    allow_overlap: Annotated[
+        bool | None,
+        typer.Option("--allow-overlap", help="Count what closed parts of a mesh share as often as they fill it."),
+    ] = None
     without: Annotated[
         str | None,
         typer.Option(metavar="WHAT,…", help="What is left out of MJCF: tendon, equality, free, ball."),
@@ -81,6 +85,7 @@ class RobotOptions:
                 mass=arguments.assignments("--mass", self.mass, "link") if self.mass else None,
                 total_mass=self.total_mass,
                 density=self.density,
+                allow_overlap=self.allow_overlap or False,
                 without={each.strip() for each in (self.without or "").split(",") if each.strip()},
             )
         return robot.with_(lock=arguments.assignments("--lock", self.lock)) if self.lock else robot

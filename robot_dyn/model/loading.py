@@ -27,6 +27,7 @@ def load(
     mass: Mapping[str, float] | None = None,
     total_mass: float | None = None,
     density: float | None = None,
+    allow_overlap: bool = False,
     download: bool = False,
     without: Iterable[str] = (),
 ) -> Robot:
@@ -45,6 +46,8 @@ def load(
         total_mass: With "from_shapes": mass of the whole robot with its base, in [kg]; what the known masses leave is
             shared by the volume of convex hulls.
         density: With "from_shapes": in [kg/m³], of links whose mass is not known otherwise, in place of `total_mass`.
+        allow_overlap: With "from_shapes": whether the space that several closed parts of a mesh fill counts as often as
+            they do; without it such a mesh is refused, since its mass is not known.
         download: Whether robot_descriptions may download what is not on disk.
         without: What is left out of a file of MJCF, of "tendon", "equality", "free" and "ball"; findings name it. MJCF,
             in a file that ends with .xml or .mjcf, is compiled by MuJoCo, which opens its meshes; needs
@@ -62,8 +65,11 @@ def load(
         ModelWarning: Once, if there are findings about the description; the robot loads all the same.
     """
     choice("inertia", inertia, (STATED, FROM_SHAPES))
-    if inertia == STATED and any(each is not None for each in (mass, total_mass, density)):
-        raise QueryError(f"mass, total_mass and density are for inertia={FROM_SHAPES!r}; add it, or leave them out")
+    given = any(each is not None for each in (mass, total_mass, density)) or truth("allow_overlap", allow_overlap)
+    if inertia == STATED and given:
+        raise QueryError(
+            f"mass, total_mass, density and allow_overlap are for inertia={FROM_SHAPES!r}; add it, or leave them out"
+        )
     package_dirs, without = searched(package_dirs), mjcf.leavable(without)
     if isinstance(name_or_path, str) and name_or_path.startswith(robot_descriptions.PREFIX):
         described = robot_descriptions.find(name_or_path, truth("download", download))
@@ -82,7 +88,7 @@ def load(
         from robot_dyn.shapes.estimate import with_estimates
         from robot_dyn.shapes.masses import Masses
 
-        masses = Masses({} if mass is None else mass, total_mass, density)
+        masses = Masses({} if mass is None else mass, total_mass, density, allow_overlap)
         description = with_estimates(description, masses, package_dirs)
     return Robot(description).announced()
 

@@ -21,6 +21,8 @@ class Loading(Part):
     """With "from_shapes": mass of the whole robot, of which links without a mass share what is left by volume."""
     density_kg_per_m3: Positive | None = None
     """With "from_shapes", in place of `total_mass_kg`: of links whose mass is not known."""
+    allow_overlap: bool = False
+    """With "from_shapes": count what closed parts of a mesh share as often as they fill it; otherwise refuse it."""
     without: tuple[Literal["tendon", "equality", "free", "ball"], ...] = ()
     """What is left out of a file of MJCF."""
 
@@ -28,5 +30,5 @@ class Loading(Part):
         """The robot of a name or path."""
         return load(
             name_or_path, inertia=self.inertia, mass=self.mass_kg, total_mass=self.total_mass_kg,
-            density=self.density_kg_per_m3, without=self.without,
+            density=self.density_kg_per_m3, allow_overlap=self.allow_overlap, without=self.without,
         )  # fmt: skip

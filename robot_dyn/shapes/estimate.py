@@ -80,13 +80,13 @@ def with_estimates(description: Description, masses: Masses, package_dirs: Itera
         DescriptionError: If the shape of such a link cannot be read and the link moves; a link of the base, on which
             no equation depends, is left out with a finding.
     """
-    shapes, unread = shapes_of_lacking(description, package_dirs)
+    shapes, unread = shapes_of_lacking(description, package_dirs, masses.allow_overlap)
     found, left_out = estimates(description, shapes, masses, unread)
     return replace(marked(description, found), findings=tuple(dict.fromkeys((*description.findings, *left_out))))
 
 
 def shapes_of_lacking(
-    description: Description, package_dirs: Iterable[str | Path] = ()
+    description: Description, package_dirs: Iterable[str | Path] = (), allow_overlap: bool = False
 ) -> tuple[dict[str, LinkShape], dict[str, str]]:
     """Shapes of the links without mass or without moments, and why that of a link of the base cannot be read.
 
@@ -95,7 +95,7 @@ def shapes_of_lacking(
     """
     stated = structure(description, Edits())
     lacking = [name for name, link in stated.links.items() if not any(link.moments)]
-    shapes, failed = link_shapes(description, lacking, tuple(package_dirs))
+    shapes, failed = link_shapes(description, lacking, tuple(package_dirs), allow_overlap=allow_overlap)
     for name, why in failed.items():
         if name not in stated.base:
             raise DescriptionError(f"{description.source}: link {name!r}: its inertia cannot be estimated: {why}")
@@ -114,7 +114,7 @@ def estimates(
     masses.check_links(stated.links, measured)
     for name in masses.of:
         if name not in shapes and name not in unread:
-            raise QueryError(f"mass: link {name!r} has no <collision> or <visual> to estimate moments from; add one")
+            raise QueryError(f"mass: link {name!r} has no <collision> or <visual> of some volume; add one")
     without = {name: shape for name, shape in shapes.items() if name not in measured}
     known = masses.shared(without, sum(measured.values()))
     found = [_new(name, shapes[name], *known[name]) for name in known if name in shapes]

@@ -1,12 +1,12 @@
 """The shape of a link as bodies of density 1: of its <collision> elements, else of its <visual> ones.
 
 A box, cylinder or sphere is exact; a closed mesh is the solid within; an open one its convex hull. Elements add up,
-also where they overlap.
+also where they overlap, as the cylinder and the two spheres of a capsule do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -21,16 +21,15 @@ from robot_dyn.shapes import elements, meshes, primitives, surface
 from robot_dyn.shapes.addresses import find_file, shown
 from robot_dyn.shapes.mesh_files import MeshError
 
-_OVERLAP = 1.001  # of the volume of the hull, which no solid exceeds: float32 corners
-
 
 class _Bodies(NamedTuple):
-    """What one element gives, None without a volume; and whether the solid is not a hull in its place."""
+    """What one element gives, None without a volume; whether the solid is not a hull in its place; turned parts."""
 
     solid: MassProperties | None
     hull: MassProperties | None
     shell: MassProperties | None
     closed: bool
+    turned: int = 0
 
 
 @final
@@ -52,7 +51,11 @@ class LinkShape:
 
 
 def link_shapes(
-    description: Description, links: Iterable[str], package_dirs: tuple[str | Path, ...] = ()
+    description: Description,
+    links: Iterable[str],
+    package_dirs: tuple[str | Path, ...] = (),
+    *,
+    allow_overlap: bool = False,
 ) -> tuple[dict[str, LinkShape], dict[str, str]]:
     """The shapes of links of a robot, and why others have none although the file states one.
 
@@ -60,13 +63,14 @@ def link_shapes(
         description: Its file; meshes are searched as in `rd.show`.
         links: Names.
         package_dirs: Searched first.
+        allow_overlap: Whether what closed parts of a mesh share counts as often as they fill it.
 
     Returns:
-        Shape by link, without links for which none is stated, or one without volume; and reason by link.
+        Shape by link, without links for which none is stated, or primitives of length 0; and reason by link.
     """
     root, _ = parse(description.text, description.source)
     stated = {(link.get("name") or "").strip(): link for link in root.iterfind("link")}
-    reader = _Reader(Path(description.source), package_dirs)
+    reader = _Reader(Path(description.source), package_dirs, allow_overlap)
     found, failed = dict[str, LinkShape](), dict[str, str]()
     for name in links:
         reasons = []
@@ -86,19 +90,29 @@ def link_shapes(
 class _Reader:
     """Reads the shapes of one file, each mesh once."""
 
-    def __init__(self, source: Path, package_dirs: tuple[str | Path, ...]) -> None:
+    def __init__(self, source: Path, package_dirs: tuple[str | Path, ...], allow_overlap: bool) -> None:
         self.file = partial(find_file, source=source, package_dirs=package_dirs)
-        self._mesh = cache(_of_mesh)
+        self._mesh = cache(partial(_of_mesh, allow_overlap=allow_overlap))
 
     def shape(self, kind: str, stated: list[Any]) -> LinkShape | None:
-        """The bodies of all elements of a kind together, None without volume; MeshError if one cannot be read."""
+        """The bodies of all elements of a kind together, None if all are of length 0.
+
+        Raises:
+            MeshError: If one cannot be read, or all of them are flat.
+        """
         read = [self.bodies(each) for each in stated]
         solid, hull, shell = (
             [body for bodies in read if (body := getattr(bodies, key)) is not None]
             for key in ("solid", "hull", "shell")
         )
         if not hull:
-            return None
+            flat = next((shape for each in stated if (shape := elements.shape(each)).tag == "mesh"), None)
+            if flat is None:
+                return None
+            raise MeshError(
+                f"mesh {shown(flat.get('filename'))}: is flat and encloses no volume; export a closed surface, use a"
+                " box, or add an <inertial>"
+            )
         return LinkShape(combined(solid), combined(hull), combined(shell), _origin(kind, stated, read))
 
     def bodies(self, element: Any) -> _Bodies:
@@ -107,7 +121,7 @@ class _Reader:
         R, p = placement[:3, :3], placement[:3, 3]
         found = self.mesh(shape) if shape.tag == "mesh" else _of_primitive(shape)
         solid, hull, shell = (None if each is None else each.moved(R, p) for each in found[:3])
-        return _Bodies(solid, hull, shell, found.closed)
+        return _Bodies(solid, hull, shell, found.closed, found.turned)
 
     def mesh(self, element: Any) -> _Bodies:
         address = element.get("filename")
@@ -117,24 +131,17 @@ class _Reader:
             raise MeshError(f"mesh {shown(address)}: {error}") from None
 
 
-def _of_mesh(path: Path, scale: tuple[float, ...]) -> _Bodies:
+def _of_mesh(path: Path, scale: tuple[float, ...], allow_overlap: bool) -> _Bodies:
     """The bodies of a mesh file, all of its materials together."""
-    parts, _ = meshes.read(path, scale)
-    vertices = np.vstack([part.mesh.vertices for part in parts])
-    faces = np.vstack(list(_renumbered(parts)))
-    hull, solid = surface.hull(vertices), surface.solid(vertices, faces)
-    if hull is None or (solid is not None and solid.mass > _OVERLAP * hull.mass):
-        solid = None  # parts that overlap, counted twice
-    shell = None if hull is None else surface.shell(vertices, faces)
-    return _Bodies(solid or hull, hull, shell, solid is not None)
-
-
-def _renumbered(parts: Iterable[meshes.Part]) -> Iterator[np.ndarray]:
-    """The triangles of several meshes, for their corners one after the other."""
-    before = 0
-    for part in parts:
-        yield part.mesh.faces.astype(int) + before
-        before += len(part.mesh.vertices)
+    corners = meshes.corners(path, scale)
+    vertices, faces = corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+    if (hull := surface.hull(vertices)) is None:
+        return _Bodies(None, None, None, False)
+    solid = surface.solid(vertices, faces, allow_overlap=allow_overlap)
+    shell = surface.shell(vertices, faces)
+    if solid is None:
+        return _Bodies(hull, hull, shell, False)
+    return _Bodies(solid.body, hull, shell, True, solid.turned)
 
 
 def _of_primitive(shape: Any) -> _Bodies:
@@ -155,4 +162,6 @@ def _origin(kind: str, stated: list[Any], read: list[_Bodies]) -> str:
         words.append(f"closed {kind} mesh" + "es" * (closed > 1))
     if number := len(of_mesh) - sum(of_mesh):
         words.append(f"open {kind} mesh" + ("es, by their convex hulls" if number > 1 else ", by its convex hull"))
+    if turned := sum(each.turned for each in read):
+        words[-1] += f" ({turned} part{'s' * (turned > 1)} turned, whose faces were inside out)"
     return " and ".join(words)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from robot_dyn.foundations.errors import QueryError, nearest, shown
-from robot_dyn.foundations.validate import number
+from robot_dyn.foundations.validate import number, truth
 from robot_dyn.shapes.link_shapes import LinkShape
 
 
@@ -24,6 +24,8 @@ class Masses:
         of: Mass by link, positive, in [kg].
         total: Mass of the whole robot with its base, in [kg]: what the known masses leave is shared by volume; or None.
         density: In [kg/m³], of links whose mass is not known otherwise; or None.
+        allow_overlap: Whether what closed parts of a mesh share counts as often as they fill it; otherwise such meshes
+            are refused.
 
     Raises:
         QueryError: If a value is not a positive number, both total and density are given, or neither any mass.
@@ -32,12 +34,14 @@ class Masses:
     of: Mapping[str, float]
     total: float | None = None
     density: float | None = None
+    allow_overlap: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.of, Mapping):
             raise QueryError(f"mass must give masses by link, such as {{'link_1': 2.5}}, got {shown(self.of)}")
         of = {link: number(f"mass of link {link!r}", mass, above=0) for link, mass in self.of.items()}
         object.__setattr__(self, "of", of)
+        truth("allow_overlap", self.allow_overlap)
         for name, key in (("total_mass", "total"), ("density", "density")):
             if (value := getattr(self, key)) is not None:
                 object.__setattr__(self, key, number(name, value, above=0))

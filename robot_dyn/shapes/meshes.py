@@ -73,34 +73,75 @@ def read(
     Raises:
         MeshError: If there is no such file, or it is too large, damaged, empty or of another format.
     """
-    kind, missing, factors = path.suffix.lower().removeprefix("."), [], np.array(scale, dtype=float)
-    data = bounded(path)
-    if kind not in FORMATS:
-        raise MeshError(f"its format {path.suffix!r} is not read; convert it to {', '.join(FORMATS)}")
-    try:
-        with (
-            warnings.catch_warnings(action="ignore"),
-            _logged(missing),
-        ):  # of numpy and Pillow, on what is refused below
-            if kind == "stl":
-                corners = _stl(data, missing)
-                del data  # of 1 GB that a large file would take, this is the part that is not needed
-                parts = _uncoloured(corners, factors)
-            else:
-                scene, unit, y_up = _scene(data, kind, path.parent, missing)
-                A = unit * factors[:, None] * (Z_UP if y_up in turned else np.eye(3))
-                parts = tuple(_parts(scene, A, missing, y_up))
-    except MeshError:
-        raise
-    except Exception as error:  # a damaged file makes the readers raise anything
-        raise MeshError(f"is damaged ({type(error).__name__}: {shorten(error, 120)}); export it again") from None
+    missing, factors = [], np.array(scale, dtype=float)
+    kind, data = _content(path)
+    with _reading(missing):
+        if kind == "stl":
+            found = _stl(data, missing)
+            del data  # of 1 GB that a large file would take, this is the part that is not needed
+            parts = _uncoloured(found, factors)
+        else:
+            scene, unit, y_up = _scene(data, kind, path.parent, missing)
+            A = unit * factors[:, None] * (Z_UP if y_up in turned else np.eye(3))
+            parts = tuple(_parts(scene, A, missing, y_up))
     if not parts:
         raise MeshError("holds no triangles; export it again")
     return parts, tuple(dict.fromkeys(missing))
 
 
-def _stl(data: bytes, missing: list[str]) -> ndarray:
-    """Corners (m, 3, 3) float32 of the triangles of an STL file; stated normals are not used.
+def corners(path: Path, scale: Any = (1.0, 1.0, 1.0)) -> ndarray:
+    """Read the corners of the triangles of a mesh file where `read` has them, with all the digits of the file.
+
+    Args:
+        path: The file.
+        scale: Factors along the axes of the shape, after a turn; faces are flipped where it is a mirror image.
+
+    Returns:
+        (m, 3, 3) float64, in [m], without triangles that are not finite.
+
+    Raises:
+        MeshError: See `read`.
+    """
+    missing, factors = [], np.array(scale, dtype=float)
+    kind, data = _content(path)
+    with _reading(missing):
+        if kind == "stl":
+            found = _stl(data, missing, "f8").astype(float) * factors
+            found = found[:, ::-1] if np.prod(factors) < 0 else found
+        else:
+            scene, unit, y_up = _scene(data, kind, path.parent, missing)
+            A = unit * factors[:, None] * (Z_UP if y_up == GLTF else np.eye(3))
+            found = np.concatenate([np.zeros((0, 3, 3)), *(placed for placed, _, _ in _nodes(scene, A))])
+        found = found[np.isfinite(found).all(axis=(1, 2))]
+    if not len(found):
+        raise MeshError("holds no triangles; export it again")
+    return found
+
+
+def _content(path: Path) -> tuple[str, bytes]:
+    """The format of a mesh file, and its bytes."""
+    kind, data = path.suffix.lower().removeprefix("."), bounded(path)
+    if kind not in FORMATS:
+        raise MeshError(f"its format {path.suffix!r} is not read; convert it to {', '.join(FORMATS)}")
+    return kind, data
+
+
+@contextmanager
+def _reading(missing: list[str]) -> Iterator[None]:
+    """Raise MeshError for anything that a reader raises, and silence its warnings."""
+    try:
+        with warnings.catch_warnings(action="ignore"), _logged(missing):  # of numpy and Pillow, on what is refused here
+            yield
+    except MeshError:
+        raise
+    except Exception as error:  # a damaged file makes the readers raise anything
+        raise MeshError(f"is damaged ({type(error).__name__}: {shorten(error, 120)}); export it again") from None
+
+
+def _stl(data: bytes, missing: list[str], text: str = "f4") -> ndarray:
+    """Corners (m, 3, 3) of the triangles of an STL file, float32, or of type `text` if it is text.
+
+    Stated normals are not used.
 
     A normal that is not three numbers is added to `missing`.
 
@@ -116,7 +157,7 @@ def _stl(data: bytes, missing: list[str]) -> ndarray:
         return np.frombuffer(data, _RECORD, count, _HEADER)["corners"].astype("f4")
     if _BAD_NORMAL.search(data):
         missing.append("a normal is not three numbers")
-    corners = np.fromiter((float(word) for match in _VERTEX.finditer(data) for word in match.groups()), "f4")
+    corners = np.fromiter((float(word) for match in _VERTEX.finditer(data) for word in match.groups()), text)
     if len(corners) % 9:
         raise ValueError("a facet has not three corners")
     return corners.reshape(-1, 3, 3)
@@ -195,12 +236,7 @@ def _parts(scene: Any, A: ndarray, missing: list[str], y_up: str | None) -> Iter
     """One part for each material, from all nodes of the scene that wear it, after x ↦ A x with A (3, 3)."""
     groups: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}
     images: dict[int, bytes | None] = {}
-    for node in scene.graph.nodes_geometry:
-        transform, name = scene.graph[node]
-        geometry = scene.geometry[name]
-        if not len(getattr(geometry, "faces", ())):
-            continue  # lines and points
-        corners, normals = _placed(geometry, A @ transform[:3])
+    for corners, normals, geometry in _nodes(scene, A):
         rgba, picture, *columns = _look(geometry)
         if picture is not None and id(picture) not in images:
             try:
@@ -214,6 +250,15 @@ def _parts(scene: Any, A: ndarray, missing: list[str], y_up: str | None) -> Iter
         columns: Any = [None if each[0] is None else np.concatenate(each) for each in zip(*pieces, strict=True)]
         if (mesh := welded(*columns)) is not None:
             yield Part(mesh, rgba, image, y_up)
+
+
+def _nodes(scene: Any, A: ndarray) -> Iterator[tuple[ndarray, ndarray | None, Any]]:
+    """Corners and normals of the triangles of each node after x ↦ A x, with A (3, 3), and its geometry."""
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        geometry = scene.geometry[name]
+        if len(getattr(geometry, "faces", ())):  # not lines and points
+            yield *_placed(geometry, A @ transform[:3]), geometry
 
 
 def _placed(geometry: Any, A: ndarray) -> tuple[ndarray, ndarray | None]:

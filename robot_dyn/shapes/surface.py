@@ -4,47 +4,95 @@
     shell         the same over the surface                                     at 1 kg/m², m is the area
 
 Over a triangle with corners v₁, v₂, v₃ and area A, ∫ x dA = A s/3 and ∫ x xᵀ dA = A (Σ vᵢ vᵢᵀ + s sᵀ)/12, s = Σ vᵢ.
-[Tonon, Explicit exact formulas for the 3-D tetrahedron inertia tensor, 2005, of which this is the plane case]
+Over the tetrahedron on it with its tip at the origin and volume V = det(v₁, v₂, v₃)/6, ∫ x dx = V s/4 and
+∫ x xᵀ dx = V (Σ vᵢ vᵢᵀ + s sᵀ)/20. The origin is the middle of the triangles, so that bodies far from the frame lose
+no digits. [Tonon, Explicit exact formulas for the 3-D tetrahedron inertia tensor, 2005, of which the triangle is the
+plane case]
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, final
 
 import numpy as np
+from numpy import ndarray
 
 from robot_dyn.description.inertia import MassProperties
 from robot_dyn.foundations.errors import QueryError
+from robot_dyn.shapes.closed_parts import closed_parts
+from robot_dyn.shapes.mesh_files import MeshError
 
 _FLAT = 1e-9  # of the cube of its length: the volume of a surface that encloses none
+_ROUNDED = 1.001  # of the volume of the hull, which no solid exceeds: float32 corners
+_NAMED = 3  # overlaps that a message names
+REMEDY = "export their union, or count what they share twice: allow_overlap=True, --allow-overlap"
 
 
-@np.errstate(all="ignore")  # of a surface without volume, which is None
-def solid(vertices: np.ndarray, faces: np.ndarray) -> MassProperties | None:
-    """The solid that triangles enclose, at 1 kg/m³; None if they do not close, or face inward.
+@final
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """The solid that closed surfaces enclose.
+
+    Attributes:
+        body: Its mass properties at 1 kg/m³.
+        parts: The number of its closed parts.
+        turned: The number of parts that were inside out, or had faces that were, and were turned.
+    """
+
+    body: MassProperties
+    parts: int
+    turned: int
+
+
+def solid(vertices: ndarray, faces: ndarray, *, allow_overlap: bool = False) -> Solid | None:
+    """Return the solid that triangles enclose; None if they do not close, or enclose no volume.
+
+    Parts that are inside out are turned over. A part within another one is a cavity if it faces inward.
 
     Args:
         vertices: (k, 3), in [m].
         faces: (m, 3), indices of vertices, counter-clockwise seen from outside.
+        allow_overlap: Whether the space that several parts fill counts as often as they do.
+
+    Raises:
+        MeshError: If parts overlap and `allow_overlap` is False: their mass is not known.
     """
-    surface = _trimesh(vertices, faces)
-    return _properties(surface, vertices) if surface.is_watertight and surface.is_winding_consistent else None
+    if not len(faces) or (closed := closed_parts(np.asarray(vertices, dtype=float)[faces])) is None:
+        return None
+    if closed.overlaps and not allow_overlap:
+        named = "; ".join(f"{closed.place(i)} and {closed.place(j)}" for i, j in closed.overlaps[:_NAMED])
+        more = f", and {len(closed.overlaps) - _NAMED} more pairs" if len(closed.overlaps) > _NAMED else ""
+        raise MeshError(f"{len(closed.corners)} closed parts, of which some overlap ({named}{more}); {REMEDY}")
+    body = _enclosed(closed.corners)
+    if body is None:
+        return None
+    if not allow_overlap and (outer := hull(vertices)) is not None and body.mass > _ROUNDED * outer.mass:
+        raise MeshError(f"its surface overlaps itself: it encloses more than its convex hull; {REMEDY}")
+    return Solid(body, len(closed.corners), len(closed.turned))
 
 
 @np.errstate(all="ignore")
-def hull(points: np.ndarray) -> MassProperties | None:
-    """The convex hull of points, (k, 3) in [m], at 1 kg/m³; None if they lie in a plane."""
+def hull(points: ndarray) -> MassProperties | None:
+    """Return the convex hull of points, (k, 3) in [m], at 1 kg/m³; None if they lie in a plane."""
     from scipy.spatial import QhullError
     from trimesh.convex import convex_hull
 
+    points = np.asarray(points, dtype=float)
+    if not len(points):
+        return None
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
     try:
-        return _properties(convex_hull(np.asarray(points, dtype=float)), points)
+        outer: Any = convex_hull(points - middle)
     except (QhullError, ValueError):
         return None
+    body = _enclosed([np.asarray(outer.vertices)[outer.faces]])
+    return None if body is None else body.moved(np.eye(3), middle)
 
 
-def shell(vertices: np.ndarray, faces: np.ndarray) -> MassProperties | None:
-    """The triangles themselves, at 1 kg/m²; None if they have no area.
+def shell(vertices: ndarray, faces: ndarray) -> MassProperties | None:
+    """Return the triangles themselves, at 1 kg/m²; None if they have no area.
 
     Args:
         vertices: (k, 3), in [m].
@@ -55,25 +103,36 @@ def shell(vertices: np.ndarray, faces: np.ndarray) -> MassProperties | None:
     total = area.sum()
     if not total > 0:
         return None
-    com = area @ v.mean(axis=1) / total
+    middle = v.mean(axis=(0, 1))
+    com = middle + area @ (v - middle).mean(axis=1) / total
     r = v - com
     s = r.sum(axis=1)
     second = (np.einsum("f,fki,fkj->ij", area, r, r) + np.einsum("f,fi,fj->ij", area, s, s)) / 12
     return MassProperties(total, com, np.trace(second) * np.eye(3) - second)
 
 
-def _trimesh(vertices: np.ndarray, faces: np.ndarray) -> Any:
-    """Triangles with equal corners merged."""
-    import trimesh
+@np.errstate(all="ignore")
+def _enclosed(parts: Iterable[ndarray]) -> MassProperties | None:
+    """The mass properties of the space within parts, those of cavities subtracted; None without a volume.
 
-    return trimesh.Trimesh(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=int))
-
-
-def _properties(surface: Any, vertices: np.ndarray) -> MassProperties | None:
-    """The mass properties that trimesh integrates; None without a volume, or of parts inside out that no body has."""
-    if not surface.volume > _FLAT * np.ptp(vertices, axis=0).max() ** 3:
+    Args:
+        parts: Corners of the triangles of each closed part, (m, 3, 3), in [m].
+    """
+    parts = list(parts)
+    if not parts:
         return None
+    low, high = (f([f(part, axis=(0, 1)) for part in parts], axis=0) for f in (np.min, np.max))
+    middle = (low + high) / 2
+    v = np.concatenate([part - middle for part in parts])
+    volumes = np.einsum("fi,fi->f", v[:, 0], np.cross(v[:, 1], v[:, 2])) / 6
+    total = volumes.sum()
+    if not total > _FLAT * float((high - low).max()) ** 3:
+        return None
+    com = volumes @ v.sum(axis=1) / 4 / total
+    s = v.sum(axis=1)
+    second = (np.einsum("f,fki,fkj->ij", volumes, v, v) + np.einsum("f,fi,fj->ij", volumes, s, s)) / 20
+    second -= total * np.outer(com, com)
     try:
-        return MassProperties(surface.volume, surface.center_mass, surface.moment_inertia)
-    except QueryError:
+        return MassProperties(total, com + middle, np.trace(second) * np.eye(3) - second)
+    except QueryError:  # faces that overlap themselves enclose what no body has
         return None

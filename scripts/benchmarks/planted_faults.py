@@ -16,7 +16,7 @@ from __future__ import annotations
 import re
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 from math import degrees
 from pathlib import Path
@@ -209,16 +209,18 @@ def unlike(text: bytes, source: str, units: bool) -> list[str]:
     return broken + ([] if left == again else ["left is not what is found"])
 
 
-def pair(root: Any, names: tuple[str, str], rng: np.random.Generator) -> bytes | None:
+def pair(root: Any, names: Sequence[str], rng: np.random.Generator) -> bytes | None:
     """The text with two faults at random places, the second after the first; None if one does not apply."""
+    text = None
     for name in names:
         try:
             if (faulty := planted(root, name, rng)) is None:
                 return None
-            root = etree.fromstring(faulty[0])
         except (ValueError, AttributeError):  # the second fault reads a number that the first one broke
             return None
-    return faulty[0]
+        text, _ = faulty
+        root = etree.fromstring(text)
+    return text
 
 
 def repairs(arms: list[tuple[bytes, str]], faults: list[str], pairs: int) -> None:
@@ -231,7 +233,9 @@ def repairs(arms: list[tuple[bytes, str]], faults: list[str], pairs: int) -> Non
         double = [(" + ".join(names), pair(root, names, rng)) for names in chosen]
         for kind, texts in (("as it stands", [("", text)]), ("one fault", single), ("two faults", double)):
             for name, broken in texts:
-                for units in (False, True) if broken is not None else ():
+                if broken is None:
+                    continue
+                for units in (False, True):
                     tried[kind] += 1
                     for why in unlike(broken, source, units):
                         tried[f"{kind}: {why}"] += 1
@@ -244,9 +248,7 @@ def main() -> None:
     parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument("arms", nargs="+", help="names of the catalog, URDF or xacro files")
     parser.add_argument("--faults", nargs="*", choices=FAULTS, default=[*FAULTS])
-    parser.add_argument(
-        "--repairs", type=int, metavar="PAIRS", help="repair each fault, and so many pairs for each arm"
-    )
+    parser.add_argument("--repairs", type=int, metavar="PAIRS", help="repair faults, and so many pairs per arm")
     options = parser.parse_args()
     if options.repairs is not None:
         repairs([text_of(name) for name in options.arms], options.faults, options.repairs)

@@ -43,6 +43,7 @@ def test_masses_give_inertias_from_shapes_and_are_told() -> None:
     for given, options in (
         (["--total-mass", "7"], {"total_mass": 7.0}),
         (["--density", "900"], {"density": 900.0}),
+        (["--density", "900", "--allow-overlap"], {"density": 900.0, "allow_overlap": True}),
         (by_link, {"mass": {"one": 2.0, "two": 3.0}}),
     ):
         done = run("query", "rig.urdf", "--q", "0.3,-0.7", "--json", *given)

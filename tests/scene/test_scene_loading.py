@@ -14,6 +14,10 @@ pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 LOAD = {
     "total": ('inertia = "from_shapes"\ntotal_mass_kg = 7.0', {"total_mass": 7.0}),
     "density": ('inertia = "from_shapes"\ndensity_kg_per_m3 = 900.0', {"density": 900.0}),
+    "overlap": (
+        'inertia = "from_shapes"\ndensity_kg_per_m3 = 900.0\nallow_overlap = true',
+        {"density": 900.0, "allow_overlap": True},
+    ),
     "mass": ('inertia = "from_shapes"\nmass_kg = {one = 2.0, two = 3.0}', {"mass": {"one": 2.0, "two": 3.0}}),
 }
 LINK = '<collision><origin xyz="0.2 0.01 0.02"/><geometry><box size="0.4 0.1 0.08"/></geometry></collision>'

@@ -13,7 +13,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.description import catalog, description
 from robot_dyn.description.packages import searched
 from robot_dyn.foundations.answer import Answer, Block
-from robot_dyn.foundations.errors import DescriptionError
+from robot_dyn.foundations.errors import DescriptionError, QueryError
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.foundations.validate import truth
 from robot_dyn.model.robot import Robot
@@ -92,7 +92,7 @@ class Checkup(Answer):
 
 def check(
     name_or_path: str | Path, *, package_dirs: Iterable[str | Path] = (), mass: Mapping[str, float] | None = None,
-    total_mass: float | None = None, density: float | None = None, units: bool = False,
+    total_mass: float | None = None, density: float | None = None, allow_overlap: bool = False, units: bool = False,
     xacro: Mapping[str, str | float | bool] | None = None,
 ) -> Checkup:  # fmt: skip
     """Check a URDF file: its numbers, names, limits and units, and its inertias against the shapes of its links.
@@ -103,6 +103,7 @@ def check(
         mass: Masses by link, in [kg]: links with a shape and no inertial get one among the repairs, as in `load`.
         total_mass: Of the robot, in [kg]: likewise; what the known masses leave is shared by volume.
         density: In [kg/m³]: likewise, in place of total_mass.
+        allow_overlap: With masses: of meshes whose closed parts overlap, as in `load`.
         units: Whether masses, inertias and shapes in units that are suspected are converted among the repairs. Numbers
             that nobody measured look like these as well.
         xacro: Expand the file by xacro first, as `load` does; findings are those of the expanded text, without lines.
@@ -116,7 +117,9 @@ def check(
     package_dirs = searched(package_dirs)
     path, units = catalog.find(name_or_path, package_dirs), truth("units", units)
     nothing = mass is None and total_mass is None and density is None
-    known = None if nothing else Masses({} if mass is None else mass, total_mass, density)
+    if nothing and truth("allow_overlap", allow_overlap):
+        raise QueryError("allow_overlap is for estimates; give mass, total_mass or density, or leave it out")
+    known = None if nothing else Masses({} if mass is None else mass, total_mass, density, allow_overlap)
     if xacro is not None:
         from robot_dyn.description.sources.xacro import expand
 

@@ -49,6 +49,12 @@ def check(
         float | None,
         typer.Option(metavar="KG/M³", help="With --fix: inertias of this density for links without any, from shapes."),
     ] = None,
+    allow_overlap: Annotated[
+        bool,
+        typer.Option(
+            "--allow-overlap", help="With --density: count what parts of a mesh share as often as they fill it."
+        ),
+    ] = False,
     units: Annotated[
         bool, typer.Option("--units", help="With --fix: convert what seems to be in another unit, such as kg mm².")
     ] = False,
@@ -63,7 +69,7 @@ def check(
     from robot_dyn.tools.doctor.finding import Severity
 
     estimated = {"--mass": mass or None, "--total-mass": total_mass, "--density": density}
-    for option, value in (estimated | {"--units": units or None}).items():
+    for option, value in (estimated | {"--allow-overlap": allow_overlap or None, "--units": units or None}).items():
         if value is not None and not fix:
             raise QueryError(f"{option} is for --fix, which writes the changes; add it, or leave {option} out")
     targets = {file: _target(file, force) for file in files} if fix else {}
@@ -78,6 +84,7 @@ def check(
             mass=masses,
             total_mass=total_mass,
             density=density,
+            allow_overlap=allow_overlap,
             units=units,
             xacro=expansion,
         )

@@ -30,7 +30,7 @@ def missing_inertials(
     """
     found = dict[str, Estimate]()
     if masses is not None:
-        shapes, unread = shapes_of_lacking(description, package_dirs)
+        shapes, unread = shapes_of_lacking(description, package_dirs, masses.allow_overlap)
         found = {each.link: each for each in estimates(description, shapes, masses, unread)[0]}
     for name, shape in of.items():
         if name not in found and shape.unit is not None and document.named("link", name).find("inertial") is None:

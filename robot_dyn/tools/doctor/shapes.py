@@ -18,6 +18,8 @@ import numpy as np
 from robot_dyn.description.inertia import MassProperties, combined
 from robot_dyn.description.structure import StatedLink, structure
 from robot_dyn.model.robot import Robot
+from robot_dyn.shapes import surface
+from robot_dyn.shapes.mesh_files import MeshError
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 from robot_dyn.tools.doctor.literals import NUMBERS
@@ -90,18 +92,15 @@ def _shape(pieces: tuple[Piece, ...]) -> Shape:
     return Shape(points, combined(bodies) if bodies else None)
 
 
-@np.errstate(all="ignore")  # a surface without volume, which MassProperties refuses
 def _of_piece(piece: Piece) -> MassProperties | None:
-    """A closed surface as it is, any other by its convex hull."""
-    import trimesh
-
-    surface: Any = trimesh.Trimesh(piece.mesh.vertices.astype(float), piece.mesh.faces.astype(int))
+    """A closed surface as it is; any other, and one whose parts overlap, by its convex hull."""
+    vertices, faces = piece.mesh.vertices.astype(float), piece.mesh.faces.astype(int)
     try:
-        solid = surface if surface.is_watertight and surface.volume > 0 else surface.convex_hull
-        R, p = piece.pose[:3, :3], piece.pose[:3, 3]
-        return MassProperties(solid.volume, solid.center_mass, solid.moment_inertia).moved(R, p)
-    except Exception:  # a flat surface, for which SciPy's hull raises its own errors
-        return None
+        closed = surface.solid(vertices, faces)
+    except MeshError:
+        closed = None
+    body = surface.hull(vertices) if closed is None else closed.body
+    return None if body is None else body.moved(piece.pose[:3, :3], piece.pose[:3, 3])
 
 
 def misfits(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:

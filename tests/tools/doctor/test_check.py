@@ -265,10 +265,7 @@ def of_elbow(limit: str) -> bytes:
         ('lower="-95" upper="135"', (np.deg2rad(-95), np.deg2rad(135))),
         ('lower="135" upper="-5"', (np.deg2rad(-5), np.deg2rad(135))),  # -5 alone could be in radians
         ('lower="0" upper="180"', (0.0, np.pi)),
-        (
-            'lower="135.4" upper="-95"',
-            None,
-        ),  # degrees are whole, as a rule: neither is converted, nor are they exchanged
+        ('lower="135.4" upper="-95"', None),  # not whole: neither converted nor exchanged
         ('lower="-1.57" upper="90"', None),  # one of each unit
         ('lower="2.5" upper="-2.5"', (-2.5, 2.5)),
     ],
