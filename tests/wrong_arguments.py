@@ -40,7 +40,7 @@ FOR_AUTHORS = {
     "Dynamics", "Effect", "EquationOfMotion", "Hold", "Interval", "Mode", "CartesianReference", "ControlLaw",
     "TaskDynamics", "orientation_error", "rotation_vector", "ButcherTableau", "RosenbrockTable", "Surd", "System",
     "RightSide", "Stepper", "Solution", "Status", "IntegrationError", "ExplicitRungeKutta", "SemiImplicitEuler",
-    "Gauss", "LinearlyImplicitEuler", "SinglyDiagonallyImplicit", "Rosenbrock", "TimeStepping",
+    "Gauss", "Rosenbrock", "TimeStepping",
 }  # fmt: skip
 # What time loops and traces call, with numbers that were checked before, or symbols.
 INTERFACES = (Effect, Controller, rd.control.Block, Arithmetic)
@@ -186,7 +186,6 @@ def examples(folder: Path) -> dict[str, Example]:
             {"setup": setup, "until_s": 0.001, "bits": 53, "q0": q, "v0": v, "width_q": 1e-9,
              "width_v": 1e-9, "budget_s": 1.0, "on_progress": print},
         ),
-        "Multirate": (rd.control.Multirate, {"fast": sampled, "slow": rd.control.PD(hold, 1.0, 1.0, 0.02)}),
         "Noise": (rd.control.Noise, {"deviation": [0.1, 0.2]}),
         "Quantisation": (rd.control.Quantisation, {"resolution": [0.1, 0.2]}),
         "RateLimit": (rd.control.RateLimit, {"rate": [0.1, 0.2]}),

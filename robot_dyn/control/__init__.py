@@ -8,7 +8,6 @@
     recorded motions   from_samples: of files, data frames, logs and arrays (Plan)
     motions of a frame line, circle (CartesianReference); inverse_kinematics (InverseKinematics)
     a real loop        Loop with delays and blocks: Quantisation, Differences, LowPass, RateLimit, Noise
-                       Multirate: two rates
     to write one       Controller, Stateless, Block, Reference: base classes
 
 docs/developers/extending.md writes a controller step by step; robot_dyn/control/README.md lists its files.

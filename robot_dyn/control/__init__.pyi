@@ -15,7 +15,6 @@ from robot_dyn.control.digital_loop.block import Quantisation as Quantisation
 from robot_dyn.control.digital_loop.block import RateLimit as RateLimit
 from robot_dyn.control.digital_loop.loop import Loop as Loop
 from robot_dyn.control.digital_loop.low_pass import LowPass as LowPass
-from robot_dyn.control.digital_loop.multirate import Multirate as Multirate
 from robot_dyn.control.independent_joint import PD as PD
 from robot_dyn.control.independent_joint import PID as PID
 from robot_dyn.control.independent_joint import gains_from as gains_from

@@ -3,7 +3,7 @@
     by name            method; `integrator="rk4"` of `rd.simulate` takes the same names
     chosen steps       Adaptive: DOP853, Radau and others, within a tolerance
     fixed steps        ExplicitRungeKutta, SemiImplicitEuler, Gauss
-    stiff, fixed steps LinearlyImplicitEuler, SinglyDiagonallyImplicit, Rosenbrock
+    stiff, fixed steps Rosenbrock
     with impacts       TimeStepping
     to write one       ButcherTableau, RosenbrockTable, Surd: coefficients as data
                        Integrator, PlainMethod: base classes; Stepper, System, RightSide

@@ -5,8 +5,6 @@ from robot_dyn.integrate.controlled_steps import Status as Status
 from robot_dyn.integrate.explicit import ExplicitRungeKutta as ExplicitRungeKutta
 from robot_dyn.integrate.explicit import SemiImplicitEuler as SemiImplicitEuler
 from robot_dyn.integrate.gauss import Gauss as Gauss
-from robot_dyn.integrate.implicit import LinearlyImplicitEuler as LinearlyImplicitEuler
-from robot_dyn.integrate.implicit import SinglyDiagonallyImplicit as SinglyDiagonallyImplicit
 from robot_dyn.integrate.integrator import IntegrationError as IntegrationError
 from robot_dyn.integrate.integrator import Integrator as Integrator
 from robot_dyn.integrate.integrator import PlainMethod as PlainMethod

@@ -12,36 +12,9 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array, midpoint, radius
-from robot_dyn.foundations.errors import OverflowedError
-from robot_dyn.integrate.primitives import GOING, MOST_ITERATIONS, SETTLED, settle
+from robot_dyn.integrate.primitives import MOST_ITERATIONS
 
 _INFLATION = 1.1  # Rump's ε-inflation: more than the rounding, less than 1 / the rate of contraction
-
-
-def fixed_point(update: Callable[[Array], Array], x: Array, y: Array) -> Array | None:
-    """Iterate x ← Φ(x) until no increments shrink any more, by the rule of `settle`.
-
-    Args:
-        update: Φ.
-        x: Start, shape (..., m).
-        y: The state that x is a change of, shape (..., m); taken to be of size 1 at least in some entry.
-
-    Returns:
-        The last iterate; None if increments overflow, or do not stagnate at rounding size within MOST_ITERATIONS.
-    """
-    m = x.shape[-1]
-    Z = x.reshape(-1, m).T[None].copy()
-    least, stale, state = np.full(Z.shape[1:], np.inf), np.zeros(Z.shape[2], np.int64), np.full(Z.shape[2], GOING)
-    for _ in range(MOST_ITERATIONS):
-        try:
-            new = update(x).reshape(-1, m).T[None]
-        except OverflowedError:
-            return None
-        going = settle(Z, new, y.reshape(-1, m).T, least, stale, state, unit_roundoff(x))
-        x = Z[0].T.reshape(x.shape)
-        if not going:
-            return x if (state == SETTLED).all() else None
-    return None
 
 
 def enclose_fixed_point(update: Callable[[Array], Array], x: Array) -> Array | None:

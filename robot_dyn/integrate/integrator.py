@@ -36,13 +36,6 @@ class IntegrationError(RobotDynError):
         self.t = t
 
 
-def singular(method: Integrator, t: Any, h: Any) -> IntegrationError:
-    """The error of a step whose linear systems have no solution."""
-    return IntegrationError(
-        f"{method.name}: 1 − h γ J is singular for the step {float(h)} at t = {float(t)}: take a smaller step", t
-    )
-
-
 @final
 @dataclass(frozen=True, eq=False)
 class System:

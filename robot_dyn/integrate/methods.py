@@ -16,7 +16,6 @@ from robot_dyn.foundations.validate import choice
 from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
 from robot_dyn.integrate.explicit import EXPLICIT_EULER, MIDPOINT, RK4, SemiImplicitEuler, order_8
 from robot_dyn.integrate.gauss import Gauss
-from robot_dyn.integrate.implicit import SDIRK_3, LinearlyImplicitEuler
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
 from robot_dyn.integrate.time_stepping import TimeStepping
@@ -29,8 +28,6 @@ _READY = (
     Gauss(2),
     Gauss(4),
     Gauss(6),
-    LinearlyImplicitEuler(),
-    SDIRK_3,
     ROSENBROCK_5,
     TimeStepping(),
 )

@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.values import aligned
-from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, Stepper, singular
+from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, Stepper
 from robot_dyn.integrate.primitives import combination, copy, evaluate, factor, norm, solve, subtract
 from robot_dyn.integrate.rosenbrock_table import RODAS5P, Numbers, RosenbrockTable
 from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end
@@ -169,7 +169,9 @@ class Rosenbrock(PlainMethod):
         return Linear(K, K[2], U, J, A, exchanged, known, zero, np.full(1, np.nan), y, F, error)
 
     def not_found(self, t: Any, h: Any) -> IntegrationError:
-        return singular(self, t, h)
+        return IntegrationError(
+            f"{self.name}: 1 − h γ J is singular for the step {float(h)} at t = {float(t)}: take a smaller step", t
+        )
 
 
 ROSENBROCK_5 = Rosenbrock("rosenbrock_5", RODAS5P)

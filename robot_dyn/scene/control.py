@@ -13,7 +13,6 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import Block, Differences, Noise, Quantisation, RateLimit, name_of
 from robot_dyn.control.digital_loop.loop import LINES, SIGNALS, Loop
 from robot_dyn.control.digital_loop.low_pass import LowPass
-from robot_dyn.control.digital_loop.multirate import Multirate
 from robot_dyn.control.independent_joint import PD, PID, gains_from
 from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import numbers
@@ -71,26 +70,6 @@ KINDS: dict[str, type[Controller]] = {
 }
 
 
-class Slow(Part):
-    """A second controller with a longer period, whose torque is added; a table of `[control]`."""
-
-    kind: Literal["pd", "pd_gravity", "feed_forward", "computed_torque"]
-    """The control law."""
-    period_s: Positive
-    """Time between samples, a whole number of those of the first."""
-    kp: PerJoint = 0.0
-    """Stiffness, in N m/rad (N/m for a prismatic joint); in 1/s² for computed_torque."""
-    kd: PerJoint = 0.0
-    """Damping, in N m s/rad (N s/m for a prismatic joint); in 1/s for computed_torque."""
-
-    def build(self, model: Robot, desired: Any) -> Controller:
-        """Return the controller, with the model and the reference of the first."""
-        kp, kd = (per_joint(name, getattr(self, name), model) for name in ("kp", "kd"))
-        if self.kind == "pd":
-            return PD(desired, kp, kd, self.period_s)
-        return _WITH_MODEL[self.kind](model, desired, kp, kd, self.period_s)
-
-
 _WITH_MODEL = {"pd_gravity": PDGravity, "feed_forward": FeedForward, "computed_torque": ComputedTorque}
 
 
@@ -121,8 +100,6 @@ class Control(Part):
     """Of operational_space: the link under control."""
     model: Model = Model()
     """The controller's model of the arm; that of the plant by default."""
-    slow: Slow | None = None
-    """A second controller with a longer period, whose torque is added."""
     measurement_delay_periods: NotNegative = 0.0
     """How late position and velocity are measured, in periods."""
     actuation_delay_periods: NotNegative = 0.0
@@ -179,21 +156,12 @@ class Control(Part):
         )  # fmt: skip
 
     def _controller(self, loaded: Robot, robot: Robot, q0: np.ndarray, reference: Reference) -> Controller:
-        """The controllers inside the loop: one or two."""
+        """Return the controller inside the loop."""
         model, desired = self.model.build(loaded, robot), reference.build(robot, q0, self.frame)
         cartesian = isinstance(desired, CartesianReference)
         if cartesian != (self.kind == "operational_space"):
             need = "line or circle" if self.kind == "operational_space" else "hold, quintic, via_points or samples"
             raise SceneError(f"reference.kind: {self.kind} follows {need}, got {reference.kind!r}")
-        law = self._law(model, robot, q0, desired, cartesian)
-        if self.slow is None:
-            return law
-        if cartesian:
-            raise SceneError("control.slow: follows hold, quintic, via_points or samples; remove it")
-        return Multirate(law, self.slow.build(model, desired))
-
-    def _law(self, model: Robot, robot: Robot, q0: np.ndarray, desired: Any, cartesian: bool) -> Controller:
-        """The first controller."""
         kp, kd = self._gains(model, q0)
         if cartesian:
             return OperationalSpace(

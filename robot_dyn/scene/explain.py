@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.control.digital_loop.loop import LINES, Loop
-from robot_dyn.control.digital_loop.multirate import Multirate
 from robot_dyn.effects.explanation import Explanation, Number, Term, as_they_act, edit_terms, explanation
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.coefficients import URDF
@@ -140,7 +139,6 @@ def _of_tick(setup: Setup, kind: str | None) -> Iterator[str]:
     if inside is None or not inside.period_s:
         return
     inside = inside.controller if isinstance(inside, Loop) else inside
-    inside = inside.fast if isinstance(inside, Multirate) else inside
     try:
         counts = [
             len(compiled_equation(StateEquation(setup.plant, each).in_a_mode, None).functions.programs["tick"])

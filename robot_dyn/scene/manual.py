@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.methods import FIXED_STEP
-from robot_dyn.scene.control import BLOCKS, KINDS, Control, Model, Slow
+from robot_dyn.scene.control import BLOCKS, KINDS, Control, Model
 from robot_dyn.scene.effects import ACTING, EDITS
 from robot_dyn.scene.loading import Loading
 from robot_dyn.scene.references import AnyReference
@@ -71,7 +71,6 @@ def manual() -> str:
         "",
     ]
     parts += _section("`[control.model]`", _text(Model), Model)
-    parts += _section("`[control.slow]`", _text(Slow), Slow)
     for line, blocks in BLOCKS.items():
         parts += [f"## `[[control.{line}]]`\n\nBlocks of the {_LINES[line]}; one table for each, with its `kind`.\n"]
         parts += _kinds(*blocks)
@@ -91,7 +90,7 @@ def _kinds(*parts: type[Part]) -> Iterator[str]:
 
 def _section(title: str, text: str, part: type[Part], level: int = 2) -> Iterator[str]:
     yield f"{'#' * level} {title}\n\n{text}\n"
-    fields = {key: field for key, field in part.model_fields.items() if key != "kind" or part in (Control, Slow)}
+    fields = {key: field for key, field in part.model_fields.items() if key != "kind" or part is Control}
     if fields:
         yield "| key | value | unit | default | meaning |\n|---|---|---|---|---|"
         yield from (_row(key, field) for key, field in fields.items())

@@ -28,7 +28,6 @@ LADDERS: dict[str, tuple[float, ...]] = {
     "rk4": (0.02, 0.01, 5e-3, 2e-3, 1e-3, 2e-4, 1e-4),
     "order_8": (0.1, 0.05, 0.02, 0.01, 5e-4, 2e-4, 1e-4),
     "gauss_6": (0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3),
-    "sdirk_3": (0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4),
     "DOP853": (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
     "rosenbrock_5": (0.01, 5e-3, 2e-3, 1e-3),
     "Rosenbrock": (1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
@@ -112,7 +111,7 @@ PROBLEMS = {
         "flyball_governor",
         lambda q: 0.5 + q[:, 3:],
         governor,
-        ("order_8", "DOP853", "sdirk_3", "rosenbrock_5", "Rosenbrock"),
+        ("order_8", "DOP853", "rosenbrock_5", "Rosenbrock"),
     ),
 }
 

@@ -18,6 +18,7 @@ from robot_dyn.simulation.results.error_estimate import Verdict
 from robot_dyn.simulation.setup.schedule import cuts
 from tests.long import long
 from tests.loops import Q0, V0, Exact, exact, matrices, plant
+from tests.two_rates import TwoRates
 
 T, PERIODS = 0.03, 40
 KP, KD, TARGET = np.array([60.0, 45.0]), np.array([5.0, 4.0]), np.array([0.5, 0.2])
@@ -139,8 +140,7 @@ def test_the_rate_limit_of_the_torque() -> None:
 @pytest.mark.parametrize("late", [0.0, 1.25])
 def test_two_rates(engine: str, late: float) -> None:
     """PD at each tick, a spring's torque at each fourth, held between; with delays around both."""
-    slow = rd.control.PD(rd.control.hold([0.1, -0.3]), [9.0, 8.0], [0.5, 0.4], 4 * T)
-    both, kept = rd.control.Multirate(PD, slow), []
+    both, kept = TwoRates(PD.reference, KP, KD, (0.1, -0.3), [9.0, 8.0], [0.5, 0.4], 4, T), []
 
     def by_hand(k: int, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         if k % 4 == 0:
@@ -152,7 +152,7 @@ def test_two_rates(engine: str, late: float) -> None:
 
 
 def test_the_integral_of_a_pid_is_that_of_what_is_measured() -> None:
-    """Controllers with states of their own, in a loop and as a part of two rates."""
+    """A controller with states in a loop."""
     ki, z = np.array([30.0, 20.0]), [np.zeros(2)]
 
     def by_hand(k: int, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -160,17 +160,12 @@ def test_the_integral_of_a_pid_is_that_of_what_is_measured() -> None:
         return law(k, q, v) + z[-2]
 
     pid = rd.control.PID(rd.control.hold(TARGET), KP, ki, KD, period_s=T)
-    nothing = rd.control.PD(rd.control.hold(TARGET), 0.0, 0.0, 2 * T)
-    for controller in (pid, rd.control.Multirate(pid, nothing)):
-        z[:] = [np.zeros(2)]
-        assert (
-            differences(run(rd.control.Loop(controller, measurement_delay=0.75)), exact(by_hand, T, PERIODS, 0.75))
-            < NEAR
-        )
+    late = rd.control.Loop(pid, measurement_delay=0.75)
+    assert differences(run(late), exact(by_hand, T, PERIODS, 0.75)) < NEAR
 
 
 EVERYTHING = rd.control.Loop(
-    rd.control.Multirate(PD, rd.control.PD(rd.control.hold(TARGET), 3.0, 0.1, 2 * T)),
+    TwoRates(PD.reference, KP, KD, (0.5, 0.2), 3.0, 0.1, 2, T),
     position=[rd.control.Noise(1e-4), rd.control.Quantisation(1e-3)],
     velocity=[rd.control.Differences(), rd.control.LowPass(40.0)],
     actuation=[rd.control.Noise(0.1), rd.control.RateLimit(300.0), rd.control.Quantisation(0.02)],
@@ -198,14 +193,13 @@ def test_coefficients_of_blocks_are_swept_by_name() -> None:
     setup = rd.Setup(PLANT, Q0, V0, 10 * T, EVERYTHING, "rk4", T / 4, T, estimate_error=False)
     params = {
         "position.quantisation.resolution": [1e-3, 4e-3], "velocity.low_pass.cutoff": [40.0, 20.0],
-        "actuation.rate_limit.rate": [300.0, 50.0], "position.noise.deviation": [1e-4, 0.0], "fast.kp": [9.0, 50.0],
+        "actuation.rate_limit.rate": [300.0, 50.0], "position.noise.deviation": [1e-4, 0.0], "kp": [9.0, 50.0],
         "actuation.noise.deviation": [0.0, 0.1],
     }  # fmt: skip
     many = rd.rollouts(setup, Q0, V0, params=params)
     for run in range(2):
-        fast = rd.control.PD(rd.control.hold(TARGET), params["fast.kp"][run], KD, T)
         own = replace(
-            EVERYTHING, controller=replace(EVERYTHING.controller, fast=fast), run=run,
+            EVERYTHING, controller=replace(EVERYTHING.controller, kp=params["kp"][run]), run=run,
             position=(
                 rd.control.Noise(params["position.noise.deviation"][run]), rd.control.Quantisation([1e-3, 4e-3][run])
             ),
@@ -222,9 +216,9 @@ def test_coefficients_of_blocks_are_swept_by_name() -> None:
 
 
 def test_two_periods_that_differ_in_their_ratio_share_no_machine_code() -> None:
-    slow = [rd.control.PD(rd.control.hold(TARGET), 9.0, 0.5, r * T) for r in (2, 3)]
-    for each in slow:
-        made = [run(rd.control.Multirate(PD, each), engine, 8) for engine in ("interpreted", "compiled")]
+    for ratio in (2, 3):
+        both = TwoRates(PD.reference, KP, KD, (0.5, 0.2), 9.0, 0.5, ratio, T)
+        made = [run(both, engine, 8) for engine in ("interpreted", "compiled")]
         np.testing.assert_allclose(made[0].q, made[1].q, atol=1e-12)
 
 
@@ -301,10 +295,6 @@ def test_loops_that_have_no_meaning_are_refused() -> None:
     wrong: list[tuple[object, str]] = [
         (lambda: rd.control.Loop(rd.control.PD(hold, 1.0, 1.0)), "acts continuously"),
         (lambda: rd.control.Loop(rd.control.Loop(PD)), "must not be a Loop"),
-        (lambda: rd.control.Multirate(PD, rd.control.Loop(PD)), "must not be a Loop"),
-        (lambda: rd.control.Multirate(PD, rd.control.PD(hold, 1.0, 1.0, 2.5 * T)), "whole number"),
-        (lambda: rd.control.Multirate(rd.control.PD(hold, 1.0, 1.0, 2 * T), PD), "whole number"),
-        (lambda: rd.control.Multirate(PD, rd.control.PD(rd.control.hold([0.0]), 1.0, 1.0, T)), "drives 2 joints"),
         (lambda: rd.control.Loop(PD, position=rd.control.Differences()), "first block of velocity"),
         (lambda: rd.control.Loop(PD, velocity=[block, rd.control.Differences()]), "first block of velocity"),
         (lambda: rd.control.Loop(PD, velocity=[rd.control.LowPass(np.pi / T)]), "cutoff must be less than"),

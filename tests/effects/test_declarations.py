@@ -188,7 +188,7 @@ def test_no_part_of_the_library_is_undeclared() -> None:
     sampled = rd.control.PD(rd.control.hold(Q), 4.0, 1.0, period_s=0.01)
     blocks = [rd.control.Noise(0.1), rd.control.LowPass(3.0), rd.control.Quantisation(0.1)]
     loop = rd.control.Loop(
-        rd.control.Multirate(sampled, sampled),
+        sampled,
         velocity=[rd.control.Differences(), *blocks],
         actuation=rd.control.RateLimit(1.0),
     )

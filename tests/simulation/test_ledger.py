@@ -37,7 +37,7 @@ scenes = pytest.mark.parametrize(("plant", "law"), [*long(CASES[:-1]), CASES[-1]
 
 @scenes
 @pytest.mark.parametrize(
-    ("name", "step"), [("rk4", 5e-3), ("gauss_4", 5e-3), *long([("midpoint", 1e-3), ("sdirk_3", 5e-3)])]
+    ("name", "step"), [("rk4", 5e-3), ("gauss_4", 5e-3), *long([("midpoint", 1e-3), ("gauss_2", 1e-3)])]
 )
 def test_residual_shrinks_with_the_order_of_the_method(name: str, step: float, plant, law) -> None:
     """Work is integrated by the method itself: residual(h)/residual(h/2) is 2ᵖ at least, less 0.3 of p at this h.
@@ -108,7 +108,7 @@ def test_power_is_the_derivative_of_work() -> None:
 
 
 @pytest.mark.parametrize("effect", [FRICTION, DRY], ids=lambda e: e.name)
-@pytest.mark.parametrize("name", ["rk4", *long(["gauss_4", "linearly_implicit_euler"])])
+@pytest.mark.parametrize("name", ["rk4", *long(["gauss_4", "rosenbrock_5"])])
 def test_work_of_a_dissipative_effect_only_falls(name: str, effect) -> None:
     run = rd.simulate(rd.Plant(DOUBLE, [effect]), **START, integrator=rd.integrate.method(name), estimate_error=False)
     work = run.ledger.work[effect.name]
@@ -239,10 +239,10 @@ def test_long_steps_are_the_cause_of_a_ledger_that_does_not_close() -> None:
 
 
 def test_a_stop_passed_within_a_step_is_the_cause_of_a_ledger_that_does_not_close() -> None:
-    """Half an oscillation in the stop takes 36 ms, less than three steps; sdirk_3 damps it."""
-    plant = rd.Plant(DOUBLE, rd.effects.joint_stops(-0.5, 0.6, 1e3, 0.0))
+    """Half an oscillation in the stop takes 25 ms, less than three steps; rosenbrock_5 damps it."""
+    plant = rd.Plant(DOUBLE, rd.effects.joint_stops(-0.5, 0.6, 2e3, 0.0))
     run = rd.simulate(
-        plant, [0.4, 0.2], [3.0, 2.0], duration_s=0.4, integrator="sdirk_3", step_s=0.02, estimate_error=False
+        plant, [0.4, 0.2], [3.0, 2.0], duration_s=0.4, integrator="rosenbrock_5", step_s=0.02, estimate_error=False
     )
     assert "does not close: joint 'joint_2' switches and switches back within 3 steps, at t = 0.1" in run.leak
     assert run.leak.endswith("take step_s = 5e-03")

@@ -12,6 +12,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.setup.options import Options
+from tests.own_method import OwnImplicit
 
 ARM = rd.load("planar_2r")
 PLANT = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3)])
@@ -84,7 +85,10 @@ def test_rollouts_take_the_same() -> None:
             lambda: rd.rollouts(rd.Setup(PLANT, Q, accuracy=1e-6)),
             r"accuracy has no effect, simulate one of the runs.*dataclasses.replace\(setup, accuracy=None\)",
         ),
-        (lambda: rd.rollouts(ARM, Q, integrator="sdirk_3"), "not by sdirk_3: give integrator='rk4' and its step_s"),
+        (
+            lambda: rd.rollouts(ARM, Q, integrator=OwnImplicit()),
+            "not by own_implicit: give integrator='rk4' and its step_s",
+        ),
         (lambda: rd.rollouts(ARM, Q, estimate_error=True), "estimate_error has no effect, simulate one of the runs"),
         (lambda: rd.simulate(ARM, Q, step_s=2e-3), "step_s has no effect on auto, .* integrator='rk4'"),
         (lambda: rd.simulate(ARM, Q, step_s=1e-3), "step_s has no effect on auto"),

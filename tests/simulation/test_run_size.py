@@ -18,7 +18,7 @@ LAW = rd.control.PD(rd.control.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.01)
     [
         rd.integrate.method("rk4"),
         rd.integrate.method("gauss_4"),
-        rd.integrate.method("sdirk_3"),
+        rd.integrate.method("rosenbrock_5"),
         rd.integrate.Adaptive(),
     ],
 )

@@ -20,7 +20,7 @@ from tests.long import long
 DOUBLE = rd.load("planar_2r")
 UR5 = rd.load("ur5")
 START = {"q0": [0.4, -0.7], "v0": [0.3, 0.5]}
-METHODS = [rd.integrate.method(name) for name in ("rk4", "gauss_4", "sdirk_3")] + [rd.integrate.Adaptive()]
+METHODS = [rd.integrate.method(name) for name in ("rk4", "gauss_4", "rosenbrock_5")] + [rd.integrate.Adaptive()]
 
 
 def name(each) -> str:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _LOOK = {  # theme colour and marker, by family: explicit, Gauss, stiff, adaptive
     "DOP853": (0, "o"), "Rosenbrock": (3, "o"), "order_8": (6, "s"), "rk4": (1, "D"), "midpoint": (5, "<"),
     "explicit_euler": (5, "^"), "semi_implicit_euler": (5, "v"), "gauss_2": (2, "<"), "gauss_4": (2, ">"),
-    "gauss_6": (2, "h"), "rosenbrock_5": (3, "s"), "sdirk_3": (3, "^"), "linearly_implicit_euler": (3, "v"),
+    "gauss_6": (2, "h"), "rosenbrock_5": (3, "s"),
 }  # fmt: skip
 _PEERS = {
     "SciPy DOP853 + pin.aba": "x", "SciPy Radau + pin.aba": "+", "SciPy LSODA + pin.aba": "1", "MuJoCo RK4": "D",

@@ -1,7 +1,6 @@
-"""What a real control loop adds to a controller: delays, rounding, filters, noise, limits, two rates.
+"""What a real control loop adds to a controller: delays, rounding, filters, noise, limits.
 
 loop, tick, delay    `Loop`: a controller with delays and blocks, and what happens at each of its ticks
 block                base class of blocks; `Quantisation`, `Noise`, `RateLimit`, `Differences`
 low_pass             `LowPass`
-multirate            `Multirate`: the sum of two controllers with different periods
 """

@@ -27,7 +27,7 @@ from robot_dyn.queries.quantity import M
 from robot_dyn.simulation.setup.setup import Setup
 
 FAMILIES = ("swing", "friction", "dry friction", "stops", "rigid stops", "PD", "sampled PD")
-_METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8", "gauss_4", "sdirk_3")
+_METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8", "gauss_4", "rosenbrock_5")
 _DRAWS = 20  # attempts to draw a method that the scene accepts
 _RECORDS = 20
 

@@ -19,7 +19,6 @@ from robot_dyn.effects.friction import ViscousFriction
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.gauss import Gauss
-from robot_dyn.integrate.implicit import SinglyDiagonallyImplicit
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.model.robot import Robot
 from robot_dyn.report.time_budget import Budget
@@ -109,4 +108,4 @@ def _confirmed(setup: Setup, at: np.ndarray, name: str, limit: float, joint: str
 
 def _iterates(name: str) -> bool:
     """Whether the stages of a method are iterated, so that a run ends, and says so, where they are not found."""
-    return isinstance(method(name), Gauss | SinglyDiagonallyImplicit)
+    return isinstance(method(name), Gauss)

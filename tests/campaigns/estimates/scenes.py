@@ -12,7 +12,7 @@ import robot_dyn as rd
 FAMILIES = ("smooth", "smooth", "friction", "impact", "sampled", "window")  # smooth twice: a third of all scenes
 METHODS = (
     "explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "rk4", "order_8", "gauss_2", "gauss_4", "gauss_6",
-    "sdirk_3", "linearly_implicit_euler",
+    "rosenbrock_5", "rosenbrock_5",
 )  # fmt: skip
 RAIL = """<robot name="rail"><link name="base"/><link name="block"><inertial><mass value="1"/>
 <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>

@@ -35,7 +35,7 @@ APART, LEAST = 0.2, 0.3
 METHODS: dict[str, Any] = {
     "planar_2r": {
         "rk4": ("rk4", 0.01), "gauss_4": ("gauss_4", 0.01), "midpoint": ("midpoint", 1e-3),
-        "semi_implicit_euler": ("semi_implicit_euler", 1e-3), "sdirk_3": ("sdirk_3", 2e-3),
+        "semi_implicit_euler": ("semi_implicit_euler", 1e-3), "rosenbrock_5": ("rosenbrock_5", 2e-3),
         "DOP853 of rtol 1e-7": (rd.integrate.Adaptive("DOP853", 1e-7, 1e-9), 0.0),
         "Rosenbrock of rtol 1e-6": (rd.integrate.Adaptive("Rosenbrock", 1e-6, 1e-8), 0.0),
     },
@@ -46,7 +46,7 @@ FINE = {
     "DOP853 of rtol 1e-11": (rd.integrate.Adaptive("DOP853", 1e-11, 1e-13), 0.0),
     "DOP853 of rtol 3e-14": (rd.integrate.Adaptive("DOP853", 3e-14, 1e-15), 0.0),
 }  # fmt: skip
-SLOW = ("sdirk_3", "Rosenbrock of rtol 1e-6")  # their steps are not compiled: 4 starts
+SLOW = ("rosenbrock_5", "Rosenbrock of rtol 1e-6")  # their steps are not compiled: 4 starts
 SHORT = {"planar_2r": ("rk4", "semi_implicit_euler", "DOP853 of rtol 1e-7"), "panda": ("rk4", "DOP853 of rtol 1e-6")}
 NAMES = {"planar_2r": "double pendulum", "panda": "Panda"}
 DURATION = {"planar_2r": 9.0, "panda": 4.0}  # [s]
