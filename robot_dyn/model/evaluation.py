@@ -8,7 +8,8 @@ Any input other than a single state of moderate float64 values is checked, conve
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
 
@@ -20,8 +21,7 @@ from robot_dyn.description.couplings import Couplings
 from robot_dyn.foundations.errors import PrecisionWarning
 from robot_dyn.foundations.validate import is_moderate, is_plain, shaped
 from robot_dyn.model.conditioning import Regularity, regularity
-from robot_dyn.model.kernels import Kernel
-from robot_dyn.model.mechanism import Mechanism
+from robot_dyn.model.kernels import Kernel, Scratch
 from robot_dyn.queries.batch import answered
 from robot_dyn.queries.dynamics import Array, acceleration
 from robot_dyn.queries.quantity import ALL, DOUBTFUL
@@ -33,18 +33,33 @@ Reduction = Callable[[Couplings, Any], Any]  # maps the result for all joints to
 
 
 @final
+@dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Evaluates kernels for one mechanism."""
+    """Evaluates kernels for one robot.
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        self._mechanism, self._shape = mechanism, (mechanism.n,)
-        self._couplings, self._scratch = mechanism.couplings, mechanism.scratch
+    Attributes:
+        model: The `pinocchio.Model`.
+        couplings: How the joints of `model` follow q.
+        joint_names: Names of the n joints.
+        sizes: The numbers that letters in the shapes of quantities stand for.
+        scratch: Memory that the algorithms of `model` write to.
+    """
+
+    model: Any
+    couplings: Couplings
+    joint_names: tuple[str, ...]
+    sizes: Mapping[str, int]
+    scratch: Scratch
+
+    @cached_property
+    def _shape(self) -> tuple[int]:
+        return (len(self.joint_names),)
 
     @cached_property
     def regularity(self) -> Regularity:
         """Whether M is invertible, judged at a configuration without symmetries."""
-        M = self._equation(pin.crba, Couplings.matrix, self._mechanism.model)(np.linspace(0.3, 0.9, self._mechanism.n))
-        return regularity(M, self._mechanism.joint_names)
+        M = self._equation(pin.crba, Couplings.matrix, self.model)(np.linspace(0.3, 0.9, *self._shape))
+        return regularity(M, self.joint_names)
 
     def answer(
         self, quantity: str, errors: str, kernel: Kernel, reduce: Reduction | None, model: Any, *state: Array
@@ -60,13 +75,13 @@ class Evaluation:
             *state: Arguments of the quantity, (..., n) each.
         """
         if errors.__class__ is str and errors == "raise":
-            shape, couplings = self._shape, self._couplings
+            shape, couplings = self._shape, self.couplings
             for x in state:
                 if not is_plain(x, shape):
                     break
             else:
                 if couplings.trivial:
-                    return kernel(model, self._scratch.data, *state)
+                    return kernel(model, self.scratch.data, *state)
                 return self._coupled(kernel, reduce, model, *state)
         return self._answered(quantity, errors, self._equation(kernel, reduce, model), state)
 
@@ -74,7 +89,7 @@ class Evaluation:
         """M⁻¹ (τ − C v − N), by ABA, or by factorising M if joints are coupled; raises where M is singular."""
         if self.regularity.singular is not None:
             raise self.regularity.singular()
-        model, names, trivial = self._mechanism.model, self._mechanism.joint_names, self._couplings.trivial
+        model, names, trivial = self.model, self.joint_names, self.couplings.trivial
         if not trivial and all(is_plain(x, self._shape) for x in (q, v, tau)):
             inertia = self._coupled(pin.crba, Couplings.matrix, model, q)
             bias = self._coupled(pin.nonLinearEffects, Couplings.torque, model, q, v)
@@ -95,13 +110,13 @@ class Evaluation:
 
     def _coupled(self, kernel: Kernel, reduce: Reduction | None, model: Any, q: ndarray, *rates: ndarray) -> Any:
         """Evaluate a kernel at one state of a mechanism with coupled joints."""
-        couplings = self._couplings
-        answer = kernel(model, self._scratch.data, couplings.position(q), *map(couplings.velocity, rates))
+        couplings = self.couplings
+        answer = kernel(model, self.scratch.data, couplings.position(q), *map(couplings.velocity, rates))
         return answer if reduce is None else reduce(couplings, answer)
 
     def _equation(self, kernel: Kernel, reduce: Reduction | None, model: Any) -> Callable[..., ndarray]:
         """Return the function (q, …) → result of a kernel, which evaluates a batch one state at a time."""
-        couplings, data = self._couplings, self._scratch.data
+        couplings, data = self.couplings, self.scratch.data
 
         def equation(q: ndarray, *rates: ndarray) -> ndarray:
             full = [couplings.position(q), *(couplings.velocity(x) for x in rates)]
@@ -114,9 +129,9 @@ class Evaluation:
         return equation
 
     def _answered(self, quantity: str, errors: str, equation: Callable[..., ndarray], state: tuple[Array, ...]) -> Any:
-        names, requested = self._mechanism.joint_names, ALL[quantity]
+        names, requested = self.joint_names, ALL[quantity]
         arrays = {name: shaped(name, x, names) for name, x in zip(requested.arguments, state, strict=True)}
-        answer = answered(equation, arrays, requested.shape(self._mechanism.sizes), names, errors)
+        answer = answered(equation, arrays, requested.shape(self.sizes), names, errors)
         return answer if answer.ndim else float(answer)
 
 

@@ -1,4 +1,4 @@
-"""Robot: a URDF arm behind the Dynamics protocol, M(q) a + C(q, v) v + N(q) = τ, computed by Pinocchio.
+"""Robot: a URDF arm with the Dynamics protocol, M(q) a + C(q, v) v + N(q) = τ, computed by Pinocchio.
 
 A thin layer over CRBA, RNEA and ABA [Featherstone 2008, ch. 5–7], and C by `coriolis`. One state of float64 goes
 straight to Pinocchio, after checks of a fraction of a microsecond; coupled joints, lists and batches to `evaluation`.
@@ -6,9 +6,10 @@ straight to Pinocchio, after checks of a fraction of a microsecond; coupled join
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from types import MappingProxyType
 from typing import Any, Unpack, final
 
 import numpy as np
@@ -18,9 +19,10 @@ from numpy import ndarray
 from robot_dyn.description.couplings import Couplings
 from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Changes, Edits, takes_changes
-from robot_dyn.description.inertial_parameters import Parametrised, ordered
-from robot_dyn.foundations.errors import announce
-from robot_dyn.foundations.validate import is_moderate, is_plain, is_state
+from robot_dyn.description.inertial_parameters import NAMES, Parametrised, ordered
+from robot_dyn.description.urdf import UNBOUNDED
+from robot_dyn.foundations.errors import DescriptionError, EditError, announce
+from robot_dyn.foundations.validate import instance, is_moderate, is_plain, is_state
 from robot_dyn.model import kernels
 from robot_dyn.model.conditioning import LEAST_DIGITS, checked_digits
 from robot_dyn.model.coriolis import Coriolis
@@ -28,7 +30,7 @@ from robot_dyn.model.evaluation import Evaluation, warn_of_digits, warning_answe
 from robot_dyn.model.findings import findings_of
 from robot_dyn.model.gravity import warn_without_torque
 from robot_dyn.model.info import info_html, robot_line
-from robot_dyn.model.mechanism import Mechanism, forwarded
+from robot_dyn.model.pinocchio_model import build, joint_ids, link_frames
 from robot_dyn.model.to_urdf import to_urdf
 from robot_dyn.queries.dynamics import Array, Axes, Dynamics
 from robot_dyn.queries.quantity import DOUBTFUL
@@ -42,7 +44,7 @@ class Robot(Dynamics, Parametrised):
     Attributes:
         description: The checked file.
         edits: Gravity, locks, payloads, armature.
-        least_digits: Of answers, below which queries warn; None if they do not. See `warn_below`.
+        least_digits: Number of correct digits below which queries warn; None for no warnings. See `warn_below`.
     """
 
     description: Description
@@ -108,43 +110,117 @@ class Robot(Dynamics, Parametrised):
         shape = self._shape
         if is_plain(q, shape) and is_plain(v, shape) and is_plain(a, shape):
             return kernels.regressor(self.model, self._scratch.data, q, v, a)
-        reduce = partial(kernels.regressor_of_coordinates, self._mechanism.body_order)
+        reduce = partial(kernels.regressor_of_coordinates, self._body_order)
         return self._ask("regressor", errors, kernels.regressor, reduce, self.model, q, v, a)
 
     def placement(self, q: Array, frame: str, *, errors: str = "raise") -> ndarray:
-        kernel = self._mechanism.frame_kernels(kernels.placement, frame)
+        kernel = self._frame_kernels(kernels.placement, frame)
         return self._ask("placement", errors, kernel, None, self.model, q)
 
     def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Array:
-        kernel = self._mechanism.frame_kernels(kernels.jacobian, frame, expressed_in)
+        kernel = self._frame_kernels(kernels.jacobian, frame, expressed_in)
         return self._ask("jacobian", errors, kernel, Couplings.columns, self.model, q)
 
     def jacobian_rate(
         self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
     ) -> ndarray:
-        kernel = self._mechanism.frame_kernels(kernels.jacobian_rate, frame, expressed_in)
+        kernel = self._frame_kernels(kernels.jacobian_rate, frame, expressed_in)
         return self._ask("jacobian_rate", errors, kernel, Couplings.columns, self.model, q, v)
 
-    name = forwarded(Mechanism.name)
-    estimated = forwarded(Mechanism.estimated)
-    frame_names = forwarded(Mechanism.frame_names)
-    joint_types = forwarded(Mechanism.joint_types)
-    gravity = forwarded(Mechanism.gravity)
-    lower, upper = forwarded(Mechanism.lower), forwarded(Mechanism.upper)
-    effort_limit = forwarded(Mechanism.effort_limit)
-    velocity_limit = forwarded(Mechanism.velocity_limit)
-    armature = forwarded(Mechanism.armature)
-    damping = forwarded(Mechanism.damping)
-    friction = forwarded(Mechanism.friction)
-    total_mass = forwarded(Mechanism.total_mass)
-    couplings = forwarded(Mechanism.couplings)
-    coriolis = forwarded(Mechanism.coriolis)
-    model = forwarded(Mechanism.model)
-    sizes = forwarded(Mechanism.sizes)
-    n = forwarded(Mechanism.n)  # pyright: ignore
-    joint_names = forwarded(Mechanism.joint_names)  # pyright: ignore
-    _scratch = forwarded(Mechanism.scratch)
-    _weightless = forwarded(Mechanism.weightless)
+    @cached_property
+    def name(self) -> str:
+        """The robot's name in its file."""
+        return self.description.name
+
+    @cached_property
+    def n(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Number of degrees of freedom."""
+        return len(self.joint_names)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Names of the n joints, in the order of q."""
+        return self._built[2]
+
+    @cached_property
+    def joint_types(self) -> tuple[str, ...]:
+        """Types of the n joints: "revolute", "continuous" (revolute without limits) or "prismatic"."""
+        return tuple(self.description.joint_kinds[name] for name in self.joint_names)
+
+    @cached_property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of the links; each has a placement and a Jacobian."""
+        return tuple(link_frames(self.model))
+
+    @cached_property
+    def lower(self) -> ndarray:
+        """Lower position limits, −inf where none is stated, (n,) in [rad] or [m]."""
+        return self._per_joint(self.model.lowerPositionLimit)
+
+    @cached_property
+    def upper(self) -> ndarray:
+        """Upper position limits, inf where none is stated, (n,) in [rad] or [m]."""
+        return self._per_joint(self.model.upperPositionLimit)
+
+    @cached_property
+    def effort_limit(self) -> ndarray:
+        """Effort limits, inf where none is stated, (n,) in [N m] or [N]."""
+        return self._per_joint(self.model.effortLimit)
+
+    @cached_property
+    def velocity_limit(self) -> ndarray:
+        """Velocity limits, inf where none is stated, (n,) in [rad/s] or [m/s]."""
+        return self._per_joint(self.model.velocityLimit)
+
+    @cached_property
+    def gravity(self) -> ndarray:
+        """Acceleration of free fall, (3,) in base axes, in [m/s²]; `with_(gravity=…)` changes it."""
+        return _frozen(np.array(self.edits.gravity))
+
+    @cached_property
+    def armature(self) -> ndarray:
+        """Inertia of the drives felt at the joints, (n,) in [kg m²] or [kg]; part of M."""
+        return self._per_joint(self.model.armature)
+
+    @cached_property
+    def damping(self) -> ndarray:
+        """Viscous friction the file states, with coupled joints Σ s² b, (n,) in [N m s/rad] or [N s/m]; see `Plant`."""
+        return _frozen(self.model.damping @ self.couplings.S**2)
+
+    @cached_property
+    def friction(self) -> ndarray:
+        """Dry friction the file states, with coupled joints Σ |s| f, (n,) in [N m] or [N]; see `Plant`."""
+        return _frozen(self.model.friction @ np.abs(self.couplings.S))
+
+    @cached_property
+    def total_mass(self) -> float:
+        """Mass of all links, those of the base included, in [kg]."""
+        return sum(body.mass for body in self.model.inertias)
+
+    @cached_property
+    def estimated(self) -> Mapping[str, str]:
+        """Links whose inertia was estimated from shapes, not measured, and what from: see `load`."""
+        return MappingProxyType(self.description.estimated)
+
+    @cached_property
+    def model(self) -> Any:
+        """The `pinocchio.Model` of all joints that move, coupled ones included. Read it, do not change it."""
+        return self._built[0]
+
+    @cached_property
+    def couplings(self) -> Couplings:
+        """How the joints of `model` follow q."""
+        return self._built[1]
+
+    @cached_property
+    def coriolis(self) -> Coriolis:
+        """How C of `model` is computed, and the bound of its rounding."""
+        return Coriolis.of(self.model, self.couplings)
+
+    @cached_property
+    def sizes(self) -> Mapping[str, int]:
+        """The numbers that letters in the shapes of quantities stand for."""
+        return MappingProxyType({"n": self.n, "p": len(NAMES) * self.model.nv})
 
     @property
     def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -152,7 +228,7 @@ class Robot(Dynamics, Parametrised):
 
     @property
     def inertial_parameters(self) -> ndarray:  # pyright: ignore[reportIncompatibleMethodOverride]
-        return self._mechanism.inertial_parameters
+        return self._inertial_parameters
 
     @property
     def joint_without_inertia(self) -> str | None:
@@ -161,13 +237,13 @@ class Robot(Dynamics, Parametrised):
 
     @cached_property
     def findings(self) -> tuple[str, ...]:
-        """What is doubtful in the description and its edits, each with its remedy; see docs/reference/findings.md."""
+        """Doubtful values of the description and its edits, each with its remedy; see docs/reference/findings.md."""
         return findings_of(self.description, self.edits, self._evaluation.regularity)
 
     def random_configuration(self, rng: np.random.Generator) -> ndarray:
-        """A position within the joint limits, uniformly distributed.
+        """Return a position within the joint limits, uniformly distributed.
 
-        Of revolute joints without limits, or more than a turn between them, a turn near 0; of prismatic ones ±1 m.
+        A revolute joint without limits, or with more than a turn between them, has a turn near 0; a prismatic one ±1 m.
 
         Args:
             rng: Source of random numbers, such as numpy.random.default_rng(0).
@@ -178,7 +254,12 @@ class Robot(Dynamics, Parametrised):
         Raises:
             QueryError: If rng is not a numpy.random.Generator.
         """
-        return self._mechanism.random_configuration(rng)
+        instance("rng", rng, np.random.Generator, "give one, such as numpy.random.default_rng(0)")
+        slides = np.array([each == "prismatic" for each in self.joint_types])
+        half = (self.upper - self.lower) / 2
+        half = np.where(np.isfinite(half) & slides, half, np.minimum(half, np.where(slides, 1.0, np.pi)))
+        middle = np.clip(0.0, self.lower + half, self.upper - half)
+        return rng.uniform(np.maximum(self.lower, middle - half), np.minimum(self.upper, middle + half))
 
     @staticmethod
     def from_text(urdf: str | bytes, *, source: str = "the text of the URDF") -> Robot:
@@ -270,27 +351,33 @@ class Robot(Dynamics, Parametrised):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "least_digits", checked_digits(self.least_digits))
-        _ = self._mechanism  # so that errors are raised now, not by the first query
+        instance("edits", self.edits, Edits, "give those of another robot, or use with_", error=EditError)
+        if not isinstance(self.description, Description):
+            given = type(self.description).__name__
+            raise DescriptionError(
+                f"a Robot is made of a Description, got {given}; use rd.load, Robot.from_text or Robot.from_pinocchio"
+            )
+        _ = self._built  # so that errors are raised now, not by the first query
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Robot, (self.description, self.edits, self.least_digits)
 
     @cached_property
-    def _mechanism(self) -> Mechanism:
-        return Mechanism(self.description, self.edits)
+    def _built(self) -> tuple[Any, Couplings, tuple[str, ...]]:
+        return build(self.description, self.edits)
 
     @cached_property
     def _evaluation(self) -> Evaluation:
-        return Evaluation(self._mechanism)
+        return Evaluation(self.model, self.couplings, self.joint_names, self.sizes, self._scratch)
 
     @cached_property
     def _shape(self) -> tuple[int] | None:
-        """Shape of a state that goes straight to Pinocchio; None if joints are coupled, or queries may warn."""
+        """Input shape of the fast path; None if mimic joints or warnings need the general one."""
         return (self.n,) if self.couplings.trivial and self.least_digits is None else None
 
     @cached_property
     def _regular_shape(self) -> tuple[int] | None:
-        """The same for forward dynamics; None if M is singular."""
+        """Input shape of the fast path of forward dynamics; None if M is singular."""
         return None if self._evaluation.regularity.singular else self._shape
 
     @cached_property
@@ -298,3 +385,44 @@ class Robot(Dynamics, Parametrised):
         """`Evaluation.answer`, with a warning where the answer has few digits."""
         answer = self._evaluation.answer
         return answer if self.least_digits is None else warning_answer(self, answer)
+
+    @cached_property
+    def _scratch(self) -> kernels.Scratch:
+        """Memory that the algorithms of `model` write to."""
+        return kernels.Scratch(self.model)
+
+    @cached_property
+    def _weightless(self) -> Any:
+        """The model without gravity."""
+        model = self.model.copy()
+        model.gravity = pin.Motion.Zero()
+        return model
+
+    @cached_property
+    def _frame_kernels(self) -> kernels.FrameKernels:
+        """Kernels of frames, by the name of a link or of a joint."""
+        links = link_frames(self.model)
+        joints = {joint: links[child] for joint, child in self.description.joint_frames.items()}
+        return kernels.FrameKernels(links | joints)
+
+    @cached_property
+    def _body_order(self) -> list[int]:
+        """Indices of the bodies in `model`, in the order of their parameters."""
+        names = list(self.model.names[1:])
+        return [names.index(name) for name in self.body_names]
+
+    @cached_property
+    def _inertial_parameters(self) -> ndarray:
+        return _frozen(np.concatenate([self.model.inertias[i + 1].toDynamicParameters() for i in self._body_order]))
+
+    def _per_joint(self, full: ndarray) -> ndarray:
+        """Values of the joints of `model` in the order of q; infinite where the file states no limit."""
+        ids = joint_ids(self.model)
+        values = full[[self.model.idx_vs[ids[name]] for name in self.joint_names]]
+        values[np.abs(values) >= float(UNBOUNDED)] *= np.inf
+        return _frozen(values)
+
+
+def _frozen(x: ndarray) -> ndarray:
+    x.setflags(write=False)
+    return x
