@@ -137,8 +137,8 @@ class Robot(Dynamics, Parametrised):
         """Number of degrees of freedom."""
         return len(self.joint_names)
 
-    @cached_property
-    def joint_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+    @property
+    def joint_names(self) -> tuple[str, ...]:
         """Names of the n joints, in the order of q."""
         return self._built[2]
 

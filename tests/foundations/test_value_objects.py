@@ -34,7 +34,7 @@ NO_VALUES = FOR_AUTHORS | {
 }  # for types, warned of or raised
 HELD = {  # of values that are made by functions, or held by others
     "CartesianReference", "Compiled", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate", "ExplicitRungeKutta",
-    "Gauss", "Ledger", "Outcome", "Statistics", "TaskDynamics", "WorstCase",
+    "Gauss", "Ledger", "Outcome", "Rosenbrock", "Statistics", "TaskDynamics", "WorstCase",
 }  # fmt: skip
 NAMES = sorted(CLASSES - NO_VALUES | HELD)
 
