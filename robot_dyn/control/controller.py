@@ -45,11 +45,9 @@ class Controller(Value, ABC):
         def torque(self, t, q, v, z): ...              # (n,), in [N m] or [N]
         def state_rate(self, t, q, v, z): ...          # ż, (state_size,), in the unit of z per second
 
-    or, for a sampled law that is written from tick to tick, such as an observer,
-
-        def next_state(self, t, q, v, z): ...          # z⁺ after the tick at t, (state_size,); needs a period_s
-
-    and the properties `n` and `state_size`. The methods are pure functions, called with
+    and the properties `n` and `state_size`. A sampled law that is written from tick to tick, such as an observer,
+    defines next_state(self, t, q, v, z) instead of state_rate: z⁺ after the tick at t, (state_size,). All methods
+    are pure functions, called with
 
         t: time, a number, in [s]
         q: position, (n,), in [rad] or [m] by joint

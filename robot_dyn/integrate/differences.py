@@ -34,15 +34,6 @@ def rowwise(function: Callable[[Array], Any]) -> Rate:
     return f
 
 
-def of_fourth_order(f: Callable[[Array], Array], x: Array, h: float) -> Array:
-    """∂f/∂x of a function of numbers (m,), (k, m), by central differences of steps h and 2 h: error O(h⁴) and u/h."""
-    slopes = []
-    for step in h * np.eye(len(x)):
-        near, far = f(x + step) - f(x - step), f(x + 2 * step) - f(x - 2 * step)
-        slopes.append((8 * near - far) / (12 * h))
-    return np.array(slopes).T
-
-
 def by_state(f: Rate, t: Any, y: Array, widths: Array | None = None) -> Array:
     """∂f/∂y_j for each j, (m, ..., m), from 2 m evaluations in one batch.
 

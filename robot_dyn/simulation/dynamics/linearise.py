@@ -1,13 +1,11 @@
 """Linearisation of a plant about a state: d/dt δx = A δx + B δu with x = (q, v, z), z the states of effects.
 
-A = ∂f/∂x and B = ∂f/∂u of f = (v, a(t, x, u), ż(t, x, u)), by central differences of fourth order. Each entry is taken
-at the step that errs least: the change from one step to the next shows the truncation, and the magnitudes of the terms
-of a and ż bound their rounding. [Press et al., Numerical Recipes, 3rd ed., 2007, sec. 5.7]
+A = ∂f/∂x and B = ∂f/∂u of f = (v, a(t, x, u), ż(t, x, u)), by central differences of fourth order.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, final
 
@@ -24,13 +22,8 @@ from robot_dyn.foundations.validate import numbers, one_state
 from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import without_rounding
+from robot_dyn.simulation.dynamics.smooth_differences import ROUNDING, Column
 
-_STEPS = 0.5 ** np.arange(3, 45)
-_ROUNDING = 4 * np.finfo(float).eps  # of the sum of magnitudes of the terms of a rate
-_AGREE = 1e-6  # part of the largest slope of a column: a larger truncation does not show a derivative
-_HIDDEN = 1e-3  # part of the largest slope that any step shows: a larger rounding hides the derivative
-_DOUBT = 1e5  # times the largest rounding of the rates, per unit: a smaller one of a slope does not hide it
-_ONE_SIDED = 0.01  # part of a slope: a larger difference between its two sides is a kink
 _AT_REST = 1e-9  # part of the sum of magnitudes of the terms of a rate
 _SOLVED = 1e-12  # part of the largest entry of x that the solution of a linear system may miss in any other
 _LAYER = 20  # widths from v = 0 within which steps resolve a layer of friction
@@ -79,7 +72,7 @@ class Linearisation(Answer, Value):
 
     def blocks(self) -> Iterator[Block]:
         others = self.state_names[2 * len(self.q) :]
-        x = "(δq, δv)" if not others else "δx"
+        x = "δx" if others else "(δq, δv)"
         yield f"d/dt {x} = A {x} + B δu: A {self.A.shape}, B {self.B.shape}"
         if others:
             yield f"x = (q, v, {', '.join(others)})"
@@ -140,8 +133,7 @@ def linearise(
         )
     A, B = np.zeros((2 * n + size, 2 * n + size)), np.zeros((2 * n + size, n))
     A[:n, n : 2 * n], A[n:], B[n:] = np.eye(n), slopes.values[:, :-n], slopes.values[:, -n:]
-    q, v, z, u = rates.parts(x)
-    return Linearisation(A, B, rates.state_names, rates.input_names, q, v, z, u, float(t))
+    return Linearisation(A, B, rates.state_names, rates.input_names, *rates.parts(x), float(t))
 
 
 @final
@@ -191,7 +183,7 @@ class _Rates:
         effects = numbered(*(equation.effects[k].name for k in equation.states))
         sizes = (place.stop - place.start for place in equation.states.values())
         states = (f"{name} state {k + 1}" for name, size in zip(effects, sizes, strict=True) for k in range(size))
-        return *(f"q {joint}" for joint in joints), *(f"v {joint}" for joint in joints), *states
+        return *(f"{x} {joint}" for x in "qv" for joint in joints), *states
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -201,10 +193,10 @@ class _Rates:
     def longest_steps(self, x: np.ndarray) -> np.ndarray:
         """Return the longest step by each entry of x: a part of the width of a layer of friction about v = 0."""
         n, longest = self.equation.dynamics.n, np.full(len(x), np.inf)
+        v = slice(n, 2 * n)
         for effect in self.equation.effects:
             width = np.broadcast_to(effect.widths[1], n)
-            within = np.abs(x[n : 2 * n]) <= _LAYER * width
-            longest[n : 2 * n] = np.minimum(longest[n : 2 * n], np.where(within, width / 4, np.inf))
+            longest[v] = np.minimum(longest[v], np.where(np.abs(x[v]) <= _LAYER * width, width / 4, np.inf))
         return longest
 
 
@@ -243,9 +235,8 @@ def _balanced(rates: _Rates, x: np.ndarray, unknown: np.ndarray) -> np.ndarray:
         QueryError: If there are none near the start.
     """
     n = rates.equation.dynamics.n
-    wanted = np.full(len(x) - 2 * n, True)
+    wanted = np.full(len(x) - 2 * n, unknown.any())
     wanted[:n] = unknown[-n:]
-    wanted[n:] = unknown[2 * n :].any()
     if not wanted.any():
         return x
     slopes = np.zeros((len(wanted), len(x)))
@@ -280,71 +271,15 @@ def _slopes(rates: _Rates, x: np.ndarray, which: Any = True) -> _Slopes:
     """Return ∂(a, ż)/∂x, (n + size, m), by the entries of x that are chosen; 0 by the others."""
     columns = np.flatnonzero(np.broadcast_to(which, x.shape))
     here, longest = rates(x), rates.longest_steps(x)
-    made = {j: _Column.of(rates, x, j, here, longest[j]) for j in columns.tolist()}
+    made = {j: Column.of(rates, x, j, here, longest[j]) for j in columns.tolist()}
     values = np.zeros((len(here), len(x)))
-    rounding = _ROUNDING * rates.magnitudes(x, values)
+    rounding = ROUNDING * rates.magnitudes(x, values)
     for _ in range(2):  # the second time with the rounding that the slopes show
         for j, column in made.items():
             values[:, j] = column.best(rounding)[0]
-        rounding = _ROUNDING * rates.magnitudes(x, values)
+        rounding = ROUNDING * rates.magnitudes(x, values)
     bad = (j for j, column in made.items() if not column.is_smooth(rounding))
     return _Slopes(values, next(bad, None))
-
-
-@final
-@dataclass(frozen=True)
-class _Column:
-    """Differences of rates by one entry of x, at falling steps.
-
-    Attributes:
-        steps: Their steps, each half of the one before, (k,).
-        slopes: Differences of fourth order, (k, r).
-        bends: Slope on the one side less that on the other, (k, r).
-        rises: Largest change of a rate by each step, (k,), which bounds the rounding that a step adds.
-    """
-
-    steps: np.ndarray
-    slopes: np.ndarray
-    bends: np.ndarray
-    rises: np.ndarray
-
-    @classmethod
-    def of(cls, f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, j: int, here: np.ndarray, most: float) -> _Column:
-        """Return the differences by entry j, with steps up to `most` that change it by more than rounding."""
-        least = 64 * np.spacing(abs(x[j]))
-        steps = np.array([h for h in _STEPS if least <= h <= max(most, _STEPS[-5])])
-        sides, step = [], np.zeros(len(x))
-        for h in steps:
-            step[j] = h
-            sides.append((f(x + step), f(x - step)))
-        up, down = np.array(sides).transpose(1, 0, 2)
-        rise, h = up - down, steps[1:, None]
-        slopes, bends = (8 * rise[1:] - rise[:-1]) / (12 * h), ((up - here) + (down - here))[1:] / h
-        return cls(steps[1:], slopes, bends, np.maximum(np.abs(up - here), np.abs(down - here)).max(axis=1)[1:])
-
-    def best(self, rounding: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the slopes that err least, their truncation, half the jump of the slope, and rounding, each (r,).
-
-        The bend of a smooth rate is h f″ + h³ f⁗/12 + …; two extrapolations leave the jump of the slope.
-
-        Args:
-            rounding: Rounding of the rates at the state, (r,).
-        """
-        truncation = np.abs(np.diff(self.slopes, axis=0))[:-1]
-        bends = 2 * self.bends[1:] - self.bends[:-1]
-        jumps = np.abs(8 * bends[1:] - bends[:-1]) / 14
-        rounded = (rounding + _ROUNDING * self.rises[:-2, None]) / self.steps[:-2, None]
-        k = (truncation + jumps + rounded).argmin(axis=0), np.arange(len(rounding))
-        return self.slopes[k], truncation[k], jumps[k], rounded[k]
-
-    def is_smooth(self, rounding: np.ndarray) -> bool:
-        """Return True if steps agree on a slope, which is the same on both sides."""
-        slopes, truncation, jumps, rounded = self.best(rounding)
-        return not (
-            (truncation > _AGREE * np.abs(slopes).max() + 4 * rounded).any()
-            or (rounded > _HIDDEN * (self.rises / self.steps).max() + _DOUBT * rounding.max()).any()
-            or (jumps > _ONE_SIDED * np.abs(slopes) + 16 * rounded).any()
-        )
 
 
 def _cause(rates: _Rates, x: np.ndarray) -> str:
@@ -354,8 +289,7 @@ def _cause(rates: _Rates, x: np.ndarray) -> str:
     _, reached = equation.applied(u, z, range(len(equation.effects)))
     for k, effect in enumerate(equation.effects):
         for threshold in effect.thresholds(len(q)):
-            values = v if threshold.of_velocity else q
-            i = threshold.joint
+            values, i = v if threshold.of_velocity else q, threshold.joint
             if threshold.state is not None:
                 values, i = z[equation.states[k]], threshold.state
             elif threshold.of_actuation and isinstance(effect, Bound):
