@@ -11,8 +11,9 @@ from pydantic import Field
 from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
 from robot_dyn.control.samples.columns import columns
-from robot_dyn.control.samples.findings import refuse_other_units
+from robot_dyn.control.samples.findings import refuse_other_units, turned
 from robot_dyn.control.samples.measured import from_samples
+from robot_dyn.control.samples.turns import joined_turns
 from robot_dyn.foundations.errors import PlanWarning, SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Truth, Vector3, per_joint
@@ -95,7 +96,10 @@ class ViaPoints(Reference):
             raise SceneError(f"{self.file}: columns of v are for kind = 'samples'; leave them out")
         if table.t[0] < 0:
             raise SceneError(f"{self.file}: the first time is {table.t[0]:g} s; start at 0 s or later")
-        return table.t.tolist(), table.q.tolist()
+        turns = joined_turns(robot, table)
+        if said := [each for i in range(robot.n) for each in turned(robot, turns, i)]:
+            warnings.warn(f"{self.file}: {'; '.join(said)}", PlanWarning, stacklevel=2)
+        return table.t.tolist(), turns.table.q.tolist()
 
 
 class Sampled(Reference):

@@ -240,6 +240,47 @@ def test_what_has_no_single_meaning_is_refused(source: Any, options: dict[str, A
         rd.control.from_samples(ARM, source, **options)
 
 
+def extreme(scale: float = 1.0, head: str = "t", **columns: Any) -> dict[str, Any]:
+    """Five samples, scale apart, with other columns."""
+    return {head: scale * np.arange(5.0)} | dict.fromkeys(NAMES, np.linspace(0.0, 0.1, 5)) | columns
+
+
+@pytest.mark.parametrize("ends", ["rest", "measured"])
+@pytest.mark.parametrize(
+    ("source", "options", "message"),
+    [
+        (extreme(t=[0.0, 1e-300, 1.0, 2.0, 3.0]), {}, "times: sample 2 is 1e-300 s after the one before it"),
+        (extreme(1e299), {}, r"times: sample 2 is 1e\+299 s after"),
+        (extreme(1e300, "t [ms]"), {}, r"times: sample 2 is 1e\+297 s after"),
+        (extreme(t=[-1.7e308, 0.0, 1.0, 2.0, 1.7e308]), {}, "times: sample 2"),
+        (np.zeros((5, 6)), {"time": 1e308}, r"times: sample 2 is 1e\+308 s after"),
+        (np.zeros((5, 6)), {"time": 1e-300}, "times: sample 2 is 1e-300 s after"),
+        (extreme(0.1), {"start_s": 1e17}, r"start_s is 1e\+17 s, where floating-point times are 16 s apart"),
+        (extreme(0.1), {"start_s": -1e17}, r"start_s is -1e\+17 s"),
+        (
+            extreme(elbow_joint=[0.0, 1e308, 0.0, 0.0, 0.0]),
+            {"unit": "rad"},
+            r"'elbow_joint': sample 2 is 1e\+308 rad, beyond 1e\+12 rad",
+        ),
+    ],
+)
+def test_times_and_positions_that_overflow_or_vanish_are_refused(
+    source: Any, options: dict[str, Any], ends: str, message: str
+) -> None:
+    with pytest.raises(PlanError, match=message):
+        rd.control.from_samples(ARM, source, ends=ends, **options)
+
+
+@pytest.mark.parametrize("ends", ["rest", "measured"])
+def test_samples_that_nearly_coincide_are_refused_where_no_spline_passes_through_them(ends: str) -> None:
+    t = np.concatenate([[0.0, 1e-12], np.arange(1.0, 30.0)])
+    q = np.random.default_rng(0).random((31, 6))
+    with pytest.raises(rd.errors.ControlError, match="no spline of degree 5 passes through the samples"):
+        rd.control.from_samples(ARM, q, time=t, ends=ends)
+    with pytest.raises(rd.errors.ControlError, match="no spline of degree 5 passes through the samples"):
+        rd.control.Samples(t, q)
+
+
 ROWS = "\n".join(",".join(f"{x:.9g}" for x in (t, *q)) for t, q in zip(T, REST, strict=True))
 HEADS = ",".join(("t", *NAMES))
 

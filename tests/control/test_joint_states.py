@@ -173,3 +173,25 @@ def test_options_of_logs_are_refused_for_other_sources(options: dict[str, str]) 
     table = {"t": T} | dict(zip(NAMES, Q.T, strict=True))
     with pytest.raises(PlanError, match=r"is of an MCAP log, and the samples are not of one"):
         rd.control.from_samples(ARM, table, **options)
+
+
+@pytest.mark.parametrize(
+    ("definition", "message"),
+    [
+        ("", {}),
+        (STATE.replace("string[] name\n", ""), {}),
+        (STATE.replace("float64[] position", "string[] position"), {"name": ["a"], "position": ["up"]}),
+        ("string[] name\nfloat64[] position\n", {"name": [NAMES[0]], "position": [0.0]}),
+    ],
+)
+def test_a_message_of_another_definition_is_refused_by_name(tmp_path: Path, definition: str, message: dict) -> None:
+    """A log defines its messages; the name alone does not make one a joint state."""
+    path, header = tmp_path / "log.mcap", {"header": {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": ""}}
+    with path.open("wb") as stream, writer.Writer(stream) as log:
+        state = log.register_msgdef("sensor_msgs/msg/JointState", definition)
+        for k in range(3):
+            log.write_message("/joint_states", state, (header if "header" in definition else {}) | message, k, k, k)
+    with pytest.raises(
+        PlanError, match=r"log\.mcap: message 1 of /joint_states has not the header, names and positions"
+    ):
+        rd.control.from_samples(ARM, path)

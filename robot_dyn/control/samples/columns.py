@@ -17,6 +17,8 @@ from robot_dyn.model.robot import Robot
 
 _BESIDE = r"([vau]|tau|power|start|desired|deviation) .*|energy|residual|.* state \d+"
 _OF_A_RUN = re.compile(_BESIDE)  # headings beside t and q in the table of a run
+_LARGEST = 1e12  # [rad] or [m]: far beyond any joint, and no power of it overflows
+_STEPS = 1e-12, 1e15  # [s]: no fifth power of such a step vanishes or overflows
 _NAME_JOINTS = "joints={joint: column}, --joint JOINT=COLUMN on the command line"
 
 
@@ -78,6 +80,12 @@ def columns(
             head = at[name]
             factor, stated[i] = size(head, "length" if kind == "prismatic" else "angle", unit)
             q[:, i] = factor * _finite(head, heads[head])
+            for k in np.flatnonzero(np.abs(q[:, i]) > _LARGEST)[:1]:
+                unit = "m" if kind == "prismatic" else "rad"
+                raise PlanError(
+                    f"column {shown(head)}: sample {k + 1} is {q[k, i]:.3g} {unit}, beyond {_LARGEST:g} {unit};"
+                    " correct it, or leave it out"
+                )
     more = {} if joints is not None else _rates(arm, heads, unit)
     given = np.array([name in at for name in arm.joint_names])
     return Columns(t, q, stated, given, of_time, more, table.note)
@@ -101,15 +109,23 @@ def _times(table: Table, time: Any, least: int) -> tuple[dict[str, np.ndarray], 
         t = factor * _finite(head, t)
         heads = {each: x for each, x in heads.items() if each != head}
     elif isinstance(time, int | float):
-        t = number("time", time, error=PlanError, above=0) * np.arange(m)
+        with np.errstate(over="ignore"):  # refused below
+            t = number("time", time, error=PlanError, above=0) * np.arange(m)
     else:
         t = numbers("time", time, (m,), error=PlanError)
-    for k in np.flatnonzero(np.diff(t) <= 0)[:1]:
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = np.diff(t)
+    for k in np.flatnonzero(steps <= 0)[:1]:
         remedy = "sort them, or leave out what is there twice"
         if table.t is not None:
             remedy = "take the other times, time='log' or time='header', or mend the log"
         raise PlanError(
             f"times must increase: sample {k + 2} is at {t[k + 1]:.9g} s, the one before at {t[k]:.9g} s; {remedy}"
+        )
+    for k in np.flatnonzero(~((steps >= _STEPS[0]) & (steps <= _STEPS[1])))[:1]:
+        raise PlanError(
+            f"times: sample {k + 2} is {steps[k]:.3g} s after the one before it; the time between samples must be"
+            f" {_STEPS[0]:g} to {_STEPS[1]:g} s; check the unit of the times"
         )
     return heads, t, stated
 

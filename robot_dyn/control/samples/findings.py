@@ -10,6 +10,7 @@ import numpy as np
 from robot_dyn.control.extremes import extremes
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.control.samples.columns import Columns
+from robot_dyn.control.samples.turns import Turns, joined_turns, whole_turns
 from robot_dyn.foundations.errors import PlanError
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import of_joint
@@ -20,7 +21,6 @@ _FAR = 1.5  # times the limit: beyond, positions may be in degrees
 _TURNS = 4 * np.pi  # the same for joints without limits, [rad]
 _MANY = 0.1  # of the samples: so many faster than their limit may be in degrees
 _SLOW, _SPEED = 0.01, np.pi  # of the velocity limit, or of so much without one: slower, times may be in [ms]
-_TURN = 0.1  # [rad], and twice the steps beside it: what a joint moves in a step that is a whole turn off
 _WHOLE = 1e-6  # from whole numbers
 _MOVES = 1e-6  # [rad] or [m]
 _LATE_S, _LATE = 1000.0, 10  # a later start, by so many durations, is that of a clock
@@ -37,15 +37,17 @@ def refuse_other_units(arm: Robot, table: Columns) -> None:
     if len(t) < 2:
         return
     _refuse_degrees(arm, table)
-    if not table.of_time and _slow(arm, table) and np.abs(t - np.round(t)).max() <= _WHOLE:
+    slow = not table.of_time and _slow(arm, joined_turns(arm, table).table)
+    if slow and np.abs(t - np.round(t)).max() <= _WHOLE:
         raise PlanError(
             f"times look like ms, µs or ns: whole numbers, {np.median(np.diff(t)):.6g} apart, and no joint reaches 1 %"
             " of its speed; state the unit in the heading, as 't [ms]', or 't [s]' if they are not"
         )
 
 
-def findings(arm: Robot, table: Columns, reference: PiecewisePolynomial, ends: str) -> Iterator[str]:
+def findings(arm: Robot, turns: Turns, reference: PiecewisePolynomial, ends: str) -> Iterator[str]:
     """What is doubtful, in words, each with its remedy."""
+    table = turns.table
     yield from _of_times(arm, table, reference)
     speed = np.diff(table.q, axis=0) / np.diff(table.t)[:, None]
     within, velocity = extremes(reference), extremes(reference, 1)
@@ -54,7 +56,8 @@ def findings(arm: Robot, table: Columns, reference: PiecewisePolynomial, ends: s
         if not table.given[i]:
             yield f"{name} has no samples and rests at {table.q[0, i]:g} {unit}; give a column if it moves"
             continue
-        jumps = list(_jumps(arm, table, i, speed[:, i]))
+        yield from turned(arm, turns, i)
+        jumps = list(_jumps(arm, turns, i, speed[:, i]))
         outside = list(_outside(arm, table, i))
         yield from jumps + outside
         if not jumps and velocity.largest[i] > (1 + _ROUNDING) * _limit(arm)[i]:
@@ -65,7 +68,7 @@ def findings(arm: Robot, table: Columns, reference: PiecewisePolynomial, ends: s
             )
         if not jumps and not outside:
             yield from _between(arm, i, within.least[i], within.at_least[i], within.greatest[i], within.at_greatest[i])
-    yield from _noise(arm, table)
+    yield from _noise(arm, turns)
     if ends == "rest":
         yield from (
             f"{what}, where the motion is at rest; ends='measured' moves as they do" for what in _ends(arm, table)
@@ -77,17 +80,6 @@ def _limit(arm: Robot) -> np.ndarray:
     return np.where(arm.velocity_limit > 0, arm.velocity_limit, np.inf)
 
 
-def _turns(arm: Robot, table: Columns) -> np.ndarray:
-    """Steps of about a whole turn between small ones, as of angles kept between −π and π, (m − 1, n)."""
-    steps = np.abs(np.diff(table.q, axis=0))
-    beside = np.pad(steps, ((1, 1), (0, 0)))
-    beside = np.maximum(beside[:-2], beside[2:])
-    alone = beside < np.pi / 2
-    near = np.minimum(_limit(arm) * np.diff(table.t)[:, None], np.minimum(_TURN + 2 * beside, np.pi / 4))
-    revolute = np.array([kind != "prismatic" for kind in arm.joint_types])
-    return revolute & alone & (np.abs(steps - 2 * np.pi) <= near)
-
-
 def _refuse_degrees(arm: Robot, table: Columns) -> None:
     """PlanError if angles without a stated unit are beyond the limits, and within them as degrees."""
     unknown = ~table.stated & table.given
@@ -95,7 +87,7 @@ def _refuse_degrees(arm: Robot, table: Columns) -> None:
         return
     most = np.maximum(np.abs(arm.lower), np.abs(arm.upper))
     far = np.abs(table.q).max(axis=0)
-    speed, turns = np.abs(np.diff(table.q, axis=0)) / np.diff(table.t)[:, None], _turns(arm, table)
+    speed, turns = np.abs(np.diff(table.q, axis=0)) / np.diff(table.t)[:, None], whole_turns(arm, table)
     fast = ((speed > _limit(arm)) & ~turns).mean(axis=0) > _MANY
     beyond = (far > np.where(np.isfinite(most), _FAR * most, _TURNS)) & ~turns.any(axis=0)
     fits = (far * _DEGREE <= np.where(np.isfinite(most), most, np.inf)) | ~unknown
@@ -137,13 +129,32 @@ def _of_times(arm: Robot, table: Columns, reference: PiecewisePolynomial) -> Ite
         yield f"the first sample is at {start:.10g} s, and runs begin at 0 s; start_s=0 begins there"
 
 
-def _jumps(arm: Robot, table: Columns, i: int, speed: np.ndarray) -> Iterator[str]:
-    """Steps of a joint that are too fast: whole turns, and others."""
-    name, unit, dt = arm.joint_names[i], of_joint("rad", arm.joint_types[i]), np.diff(table.t)
-    turns = _turns(arm, table)[:, i]
+def turned(arm: Robot, turns: Turns, i: int) -> Iterator[str]:
+    """Yield what was done about whole turns of a joint recorded within one turn."""
+    name, t, q = arm.joint_names[i], turns.recorded.t, turns.recorded.q[:, i]
+    if turns.joined[i]:
+        count, k = int(turns.steps[:, i].sum()), int(turns.steps[:, i].argmax())
+        yield (
+            f"{name} jumps by a whole turn in {count} step{'s' * (count > 1)}, the first from {q[k]:.5g} to"
+            f" {q[k + 1]:.5g} rad at sample {k + 2}, {t[k + 1]:.6g} s; all its samples lie within one turn, so the"
+            " angles were unwrapped: the joint turns on; give more samples there if it turned back"
+        )
+    elif turns.unclear[:, i].any():
+        count, k = int(turns.unclear[:, i].sum()), int(turns.unclear[:, i].argmax())
+        yield (
+            f"{name} moves by more than half a turn in {count} step{'s' * (count > 1)}, the first from {q[k]:.5g} to"
+            f" {q[k + 1]:.5g} rad at sample {k + 2}, {t[k + 1]:.6g} s; it may have turned either way, and nothing"
+            " was changed; give more samples there, or unwrap the angles"
+        )
+
+
+def _jumps(arm: Robot, turns: Turns, i: int, speed: np.ndarray) -> Iterator[str]:
+    """Steps of a joint that are too fast: whole turns that were left, and others."""
+    table, name, unit = turns.table, arm.joint_names[i], of_joint("rad", arm.joint_types[i])
+    dt, whole = np.diff(table.t), turns.steps[:, i] & ~turns.joined[i]
     for steps, what, remedy in (
-        (turns, "jumps by a whole turn", "unwrap the angles, as numpy.unwrap does"),
-        ((np.abs(speed) > _limit(arm)[i]) & ~turns, "jumps", "correct the sample, or lengthen the times"),
+        (whole, "jumps by a whole turn", "unwrap the angles if the joint turned on, as numpy.unwrap does"),
+        ((np.abs(speed) > _limit(arm)[i]) & ~whole, "jumps", "correct the sample, or lengthen the times"),
     ):
         if count := int(steps.sum()):
             k = int(np.where(steps, np.abs(speed), 0).argmax())
@@ -197,12 +208,13 @@ def _ends(arm: Robot, table: Columns) -> Iterator[str]:
             yield f"by its samples {arm.joint_names[i]} moves at {abs(speed[k, i]):.3g} {unit} at the {where}"
 
 
-def _noise(arm: Robot, table: Columns) -> Iterator[str]:
-    """The joint whose acceleration noise or rounding determines most.
+def _noise(arm: Robot, turns: Turns) -> Iterator[str]:
+    """The joint whose acceleration noise or rounding determines most; none with whole turns, which are not noise.
 
     Of a smooth motion fourth divided differences vanish with the step as its fourth power, beside those of independent
     errors of deviation σ, which are σ times the norm of their weights; second ones are halves of accelerations.
     """
+    table = turns.table
     if len(table.t) < DENSE:
         return
     fourth, second = _divided(table, 4), _divided(table, 2)
@@ -213,6 +225,7 @@ def _noise(arm: Robot, table: Columns) -> Iterator[str]:
     with np.errstate(invalid="ignore", divide="ignore"):
         part = np.nan_to_num(np.minimum(by_noise / (2 * np.sqrt((second.values**2).mean(axis=0))), 1.0))
     part[noise < _ROUNDED] = 0.0  # of joints that rest
+    part[(turns.steps.any(axis=0) & ~turns.joined) | turns.unclear.any(axis=0)] = 0.0
     i = int(part.argmax())
     if part[i] > _NOISY:
         unit, others = of_joint("rad", arm.joint_types[i]), int((part > _NOISY).sum()) - 1

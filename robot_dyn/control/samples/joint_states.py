@@ -132,11 +132,18 @@ def _of_joints(
     kept: list[_Message] = []
     left_out: dict[str, None] = {}
     for k, (log, message) in enumerate(found):
-        names, position = list(message.name), list(message.position)
+        where = f"{path}: message {k + 1} of {topic}"
+        try:
+            names, position = [str(each) for each in message.name], [float(each) for each in message.position]
+            header = int(message.header.stamp.sec) * 10**9 + int(message.header.stamp.nanosec)
+        except (AttributeError, TypeError, ValueError) as error:
+            raise PlanError(
+                f"{where} has not the header, names and positions of {_TYPE} ({shorten(str(error))}); the log"
+                " defines another message by that name: write it again"
+            ) from None
         if not wanted & set(names):
             left_out |= dict.fromkeys(names)
             continue
-        where = f"{path}: message {k + 1} of {topic}"
         if len(position) != len(names) or len(set(names)) < len(names):
             raise PlanError(f"{where} has {len(position)} positions for {len(set(names))} different names")
         here = {name: x for name, x in zip(names, position, strict=True) if name in wanted}
@@ -144,8 +151,7 @@ def _of_joints(
             odd = sorted(here.keys() ^ kept[0].position.keys())
             raise PlanError(f"{where} has not the joints of the ones before it: {', '.join(odd)}; split the log")
         left_out |= dict.fromkeys(name for name in names if name not in wanted)
-        stamp = message.header.stamp
-        kept.append(_Message(log, int(stamp.sec) * 10**9 + int(stamp.nanosec), here))
+        kept.append(_Message(log, header, here))
     if len(kept) < 2:
         named = ", ".join(left_out) or "none"
         raise PlanError(

@@ -11,10 +11,13 @@ from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.control.samples.columns import columns
 from robot_dyn.control.samples.findings import DENSE, findings, refuse_moving_ends, refuse_other_units
 from robot_dyn.control.samples.spline import Samples, spline
+from robot_dyn.control.samples.turns import joined_turns
 from robot_dyn.foundations.errors import PlanError
 from robot_dyn.foundations.validate import choice, instance, number
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import of_joint
+
+_ROUNDED = 0.01  # of the time between two samples: rounding of the times that is refused
 
 
 def from_samples(
@@ -34,6 +37,10 @@ def from_samples(
     It passes through every sample: noise is not smoothed. How far it may be off between them is said by the spline
     through every second sample, which misses the others by so much. What is doubtful is found and said: gaps in time,
     steps faster than the velocity limits, whole turns, positions beyond the limits, noise, ends that are not at rest.
+
+    Angles of a continuous joint are unwrapped if all of them lie within one turn and every step of more than half a
+    turn is, without a whole turn, like the steps next to it; a finding names the first such step. Other angles are
+    taken as they are: whole turns of a joint with limits, or recorded over several turns, are findings.
 
     Args:
         arm: The robot.
@@ -64,20 +71,32 @@ def from_samples(
     if ends is not None:
         choice("ends", ends, ("rest", "measured"), error=PlanError)
     table = columns(arm, source, time, joints, unit, q0, topic)
-    t, q = table.t, table.q
     refuse_other_units(arm, table)
+    turns = joined_turns(arm, table)
+    table, t, q = turns.table, turns.table.t, turns.table.q
     if ends is None:
         refuse_moving_ends(arm, table)
         ends = "rest"
     if start_s is not None:
-        t = t - t[0] + number("start_s", start_s, error=PlanError)
+        t = _shifted(t, number("start_s", start_s, error=PlanError))
     at_rest = ends == "rest"
     reference = PiecewisePolynomial(*spline(t, q, at_rest=True)) if at_rest else Samples(t, q, **table.more)
     method = "; ".join([_method(arm, t, q, ends), *([table.note] if table.note else [])])
     return Plan(
         *(arm.name, arm.joint_names, arm.joint_types, reference, method),
-        *({"velocity": arm.velocity_limit}, tuple(findings(arm, table, reference, ends))),
+        *({"velocity": arm.velocity_limit}, tuple(findings(arm, turns, reference, ends))),
     )
+
+
+def _shifted(t: np.ndarray, start_s: float) -> np.ndarray:
+    """Times that begin at start_s; PlanError if the steps between them are rounded away there."""
+    shifted = t - t[0] + start_s
+    if (np.abs(np.diff(shifted) - np.diff(t)) > _ROUNDED * np.diff(t)).any():
+        raise PlanError(
+            f"start_s is {start_s:g} s, where floating-point times are {np.spacing(abs(start_s)):.2g} s apart and"
+            f" samples {np.diff(t).min():.3g} s; give a smaller one"
+        )
+    return shifted
 
 
 def _method(arm: Robot, t: np.ndarray, q: np.ndarray, ends: str) -> str:

@@ -17,6 +17,8 @@ import numpy as np
 from robot_dyn.control.reference import PiecewisePolynomial, hermite, increasing, numbers
 from robot_dyn.foundations.errors import ControlError
 
+_MISSED = 1e-6  # of the largest sample: rounding of a spline is far below, and one that fails is far off
+
 
 @final
 class Samples(PiecewisePolynomial):
@@ -30,15 +32,16 @@ class Samples(PiecewisePolynomial):
 
     Args:
         t: Increasing times, shape (m,), m at least 2, in [s].
-        q: Positions, shape (m, n), in [rad] or [m].
+        q: Positions, shape (m, n), in [rad] or [m]; unwrapped, since a jump by a whole turn is a motion here.
         v: Velocities, shape (m, n), in [rad/s] or [m/s].
         a: Accelerations, shape (m, n), in [rad/s²] or [m/s²]; with v.
 
     Raises:
-        ControlError: If times do not increase, shapes do not match or accelerations are given without velocities.
+        ControlError: If times do not increase, shapes do not match or accelerations are given without velocities; if
+            no spline passes through the samples in floating point, because times nearly coincide.
     """
 
-    @np.errstate(all="ignore")  # what overflows is refused as not finite
+    @np.errstate(all="ignore")  # what overflows is refused
     def __init__(self, t: Any, q: Any, v: Any = None, a: Any = None) -> None:
         q = numbers("q", q, ("m", "n"))
         if len(q) < 2:
@@ -54,19 +57,35 @@ class Samples(PiecewisePolynomial):
         super().__init__(t, hermite(np.diff(t), np.concatenate([ends[:-1], ends[1:]], axis=1)))
 
 
+@np.errstate(all="ignore")  # what overflows is refused
 def spline(t: np.ndarray, q: np.ndarray, *, at_rest: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Breaks and coefficients of the spline of degree 5 through samples, or of degree m − 1 if there are fewer.
 
     Not-a-knot at the ends; or at rest there, with no velocity and no acceleration, which takes 2 samples.
+
+    Raises:
+        ControlError: If it does not pass through the samples in floating point.
     """
     from scipy.interpolate import make_interp_spline
 
     unit = (t[-1] - t[0]) / (len(t) - 1)  # of time: derivatives of one size keep the solve well conditioned
     s, degree = (t - t[0]) / unit, 5 if at_rest else min(5, len(t) - 1)
     end = [(order, np.zeros(q.shape[1])) for order in (1, 2)]
-    curve = make_interp_spline(s, q, k=degree, bc_type=(end, end) if at_rest else None)
-    inside = np.isin(s, curve.t)  # not-a-knot leaves out two samples next to each end; a spline of even degree is one
-    inside[[0, -1]] = True
-    starts = s[inside][:-1]
-    terms = [curve.derivative(r)(starts) / factorial(r) if r else curve(starts) for r in range(degree + 1)]
-    return t[inside], np.stack(terms, axis=1) / unit ** np.arange(degree + 1)[:, None]
+    try:
+        curve = make_interp_spline(s, q, k=degree, bc_type=(end, end) if at_rest else None)
+        inside = np.isin(s, curve.t)  # not-a-knot leaves out two samples next to each end; of even degree it is one
+        inside[[0, -1]] = True
+        starts = s[inside][:-1]
+        terms = [curve.derivative(r)(starts) / factorial(r) if r else curve(starts) for r in range(degree + 1)]
+        coefficients = np.stack(terms, axis=1) / unit ** np.arange(degree + 1)[:, None]
+        missed = float(np.abs(curve(s) - q).max())
+    except (ValueError, np.linalg.LinAlgError):  # steps or samples that overflow, or vanish next to others
+        coefficients, missed = np.array(np.nan), np.nan
+    if not (np.isfinite(coefficients).all() and missed <= _MISSED * float(np.abs(q).max())):
+        steps = np.diff(t)
+        raise ControlError(
+            f"no spline of degree {degree} passes through the samples in floating point: times are {steps.min():.3g} to"
+            f" {steps.max():.3g} s apart, and positions up to {np.abs(q).max():.3g}; leave out samples that nearly"
+            " coincide, and check the units"
+        )
+    return t[inside], coefficients
