@@ -35,9 +35,8 @@ def wrapped(q: np.ndarray, least: float = -np.pi) -> np.ndarray:
     return (q - least) % (2 * np.pi) + least
 
 
-def planned(robot: rd.Robot, t: np.ndarray, q: np.ndarray, **options: Any) -> rd.control.Plan:
-    given = {"unit": "rad", "ends": "measured"} | options
-    return rd.control.from_samples(robot, {"t": t, "j": q, "s": 0 * t}, **given)
+def planned(robot: rd.Robot, t: np.ndarray, q: np.ndarray, ends: str = "measured") -> rd.control.Plan:
+    return rd.control.from_samples(robot, {"t": t, "j": q, "s": 0 * t}, unit="rad", ends=ends)
 
 
 def named(findings: tuple[str, ...]) -> list[tuple[str, int, float]]:

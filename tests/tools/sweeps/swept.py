@@ -53,3 +53,11 @@ def swept(folder: Path, runs: int = 200, **changes: Any) -> sw.Sweep:
     path = folder / "scene.toml"
     given = {"runs": runs, "seed": 3, "vary": VARY, "figures": FIGURES, "storage": "npz"} | changes
     return sw.Sweep(str(path if path.exists() else scene(folder)), **given)
+
+
+def of_figure(folder: Path, name: str, kp: Any, runs: int = 512, **changes: Any) -> sw.SweepResult:
+    """A sweep of two steps a run, whose one figure, "f", of own_figures.py depends on kp, and kd in 0 … 1, alone."""
+    scene(folder, SCENE.replace("duration_s = 0.05", "duration_s = 0.002"))
+    vary = {"kp": kp, "kd": sw.uniform(low=0.0, high=1.0)} | changes.pop("vary", {})
+    sweep = swept(folder, runs, vary=vary, figures={"f": f"tests.tools.sweeps.own_figures:{name}"}, **changes)
+    return sw.run(sweep, folder / f"out {sweep.design} {sweep.seed}", threads=1, chunk=runs)

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from math import pi
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from SALib.analyze import pawn, rbd_fast, sobol
-from scipy.stats import f_oneway
+from scipy.stats import f_oneway, randint
 
 from robot_dyn.foundations.errors import SweepError
+from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import designs, sensitivity
 from robot_dyn.tools.sweeps.designs.base import Design
+from tests.tools.sweeps.swept import of_figure
 
 NAMES = ("x1", "x2", "x3")
 PROBLEM = {"num_vars": 3, "names": list(NAMES), "bounds": [[0.0, 1.0]] * 3}
@@ -178,3 +182,40 @@ WRONG: dict[str, Callable[[], Any]] = {
 def test_what_has_no_sensitivity_is_refused(message: str) -> None:
     with pytest.raises(SweepError, match=message):
         WRONG[message]()
+
+
+# --- of sweeps, whose figures are functions of what varies
+
+TEN = {"choice": sw.choice(np.arange(1.0, 11.0)), "of scipy": randint(1, 11)}
+_ROWS = "indices are computed from rows of the design, by fits of degree 12, and not from the values that vary"
+
+
+@pytest.mark.xfail(strict=True, raises=AssertionError, reason=_ROWS)
+@pytest.mark.parametrize("design", ["random", "sobol", "latin"])
+@pytest.mark.parametrize("kind", TEN)
+def test_a_discrete_parameter_that_decides_a_figure_alone_has_the_index_1(
+    tmp_path: Path, kind: str, design: str
+) -> None:
+    """The parity of one of ten values: S = 1, and the distribution given a value is half a step from that of all."""
+    found = of_figure(tmp_path, "parity", TEN[kind], design=design).sensitivity("f")
+    kp, kd = found.first
+    assert kp.estimate > 0.95 and kp.low <= 1 <= kp.high and kd.estimate < 0.05
+    assert found.pawn[0] == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.xfail(strict=True, raises=AssertionError, reason="fits of degree 12 miss eight periods")
+@pytest.mark.parametrize("design", ["random", "sobol", "latin"])
+def test_a_sine_of_eight_periods_has_its_index_in_the_interval(tmp_path: Path, design: str) -> None:
+    """sin(16 π x₁) + x₂ − 1/2: S₁ = (1/2) / (1/2 + 1/12) = 6/7."""
+    kp, _ = of_figure(tmp_path, "waves", sw.uniform(low=0.0, high=1.0), design=design).sensitivity("f").first
+    assert kp.low <= 6 / 7 <= kp.high
+
+
+@pytest.mark.xfail(strict=True, raises=AssertionError, reason="values that vary are put in 16 bins by their order")
+def test_the_report_shows_failures_over_the_parameter_that_decides_them(tmp_path: Path) -> None:
+    """Runs fail by the parity of one of 64 values; three other numbers that vary do not matter."""
+    vary = {"q0": sw.normal(mean=[0.4, 0.9], sd=0.1)}
+    done = of_figure(tmp_path, "fails", sw.choice(np.arange(64.0)), design="sobol", vary=vary)
+    page = done.save_report(tmp_path / "report.html").read_text(encoding="utf-8")
+    shown = re.search(r"failed over (\S+) and (\S+),", page)
+    assert shown is not None and "kp" in shown.groups()

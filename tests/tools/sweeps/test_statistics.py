@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from math import inf, isnan
+from math import inf, isnan, log10
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,11 @@ from scipy.special import ndtri
 from scipy.stats import binom, binomtest, quantile_test, ttest_1samp
 
 from robot_dyn.foundations.errors import SweepError
+from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import designs, statistics
 from robot_dyn.tools.sweeps.estimate import Estimate
 from robot_dyn.tools.sweeps.replicates import groups_of, jackknife
+from tests.tools.sweeps.swept import of_figure
 
 N = 1600
 X = np.random.default_rng(5).gamma(2.0, size=N)
@@ -208,3 +211,44 @@ WRONG: dict[str, Callable[[], Any]] = {
 def test_what_has_no_statistic_is_refused(message: str) -> None:
     with pytest.raises(SweepError, match=message):
         WRONG[message]()
+
+
+# --- of sweeps, whose figures are functions of what varies
+
+UNIT = sw.uniform(low=0.0, high=1.0)
+
+
+@pytest.mark.xfail(
+    strict=True, raises=AssertionError, reason="sixteen equal means of scramblings give an interval of width 0"
+)
+def test_the_mean_of_a_figure_of_0_and_1_has_an_interval(tmp_path: Path) -> None:
+    """The probability 0.48 by 64 runs: an interval that is a point, 0.5, does not hold it."""
+    found = [of_figure(tmp_path, "below", UNIT, 64, design="sobol", seed=seed).mean("f") for seed in range(3)]
+    assert all(each.low < each.estimate < each.high for each in found)
+
+
+@pytest.mark.xfail(strict=True, raises=AssertionError, reason="all that is not finite counts as +∞")
+def test_a_figure_of_minus_infinity_is_below_all_others(tmp_path: Path) -> None:
+    """log10 of an error, half of which vanish: quantile 0.25 is −∞, and quantile 0.75 is log10(1/4)."""
+    low, high = of_figure(tmp_path, "logarithm", UNIT, design="random").quantiles("f", [0.25, 0.75])
+    assert low.estimate == -inf
+    assert high.low <= log10(0.25) <= high.high < log10(0.5)
+
+
+@pytest.mark.xfail(
+    strict=True, raises=AssertionError, reason="what is not finite counts as failed, whatever the outcome of the run"
+)
+def test_finished_runs_without_a_figure_did_not_fail(tmp_path: Path) -> None:
+    done = of_figure(tmp_path, "partly", UNIT, design="random")
+    assert done.outcomes == {"finished": 512, "diverged": 0, "raised": 0}
+    assert done.mean("f", given="known").failed == 0
+    assert done.sensitivity("f", given="known").failed == 0
+
+
+@pytest.mark.xfail(strict=True, raises=AssertionError, reason="both questions are labelled as that about finished runs")
+def test_the_label_of_a_probability_names_the_runs_that_were_asked_about(tmp_path: Path) -> None:
+    done = of_figure(tmp_path, "partly", UNIT, design="random")
+    known = done.probability("f > 0.5", given="known")
+    assert known.n == np.isfinite(done.table("f")["f"]).sum()
+    assert "known" in known.statistic and "finished" not in known.statistic
+    assert "finished" in done.probability("kp > 0.5", given="finished").statistic
