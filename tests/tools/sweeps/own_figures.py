@@ -46,4 +46,4 @@ def fails(run: sw.Run) -> float:
 
 
 for _figure in (parity, waves, below, logarithm, partly, fails):
-    _figure.record = ("q",)
+    _figure.record = ("q",)  # pyright: ignore[reportFunctionMemberAccess]

@@ -22,6 +22,7 @@ from robot_dyn.tools.sweeps.engines.share import share
 from robot_dyn.tools.sweeps.engines.threads import Threads
 from robot_dyn.tools.sweeps.plan.work import Stopped, Work
 from robot_dyn.tools.sweeps.run_sweep import begun
+from tests.tools.sweeps.children import outcome_of
 from tests.tools.sweeps.swept import swept
 
 
@@ -262,3 +263,39 @@ def test_workers_in_processes_make_the_same_bits_and_one_that_is_killed_is_repla
 
         done = sw.run(sweep, tmp_path / "out", chunk=5, cluster=client, on_progress=progress)
     assert killed and done.verify() == Work(sweep).rows(0, 400).digest()
+
+
+DYING = """
+import os, signal
+import distributed
+from tests.tools.sweeps.test_engines import Client
+class Dying(Client, distributed.Client):
+    def submit(self, *_, **__):
+        os.kill(os.getpid(), signal.SIGKILL)
+sw.run(swept(folder, 40), folder / 'out', chunk=10, cluster=Dying())
+"""
+
+
+@pytest.mark.xfail(strict=True, raises=AssertionError, reason="a driver alone removes its token")
+def test_what_a_killed_driver_left_is_removed_by_the_next_one(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    assert outcome_of(DYING, tmp_path, gib=64) == "killed"
+    done = sw.run(swept(tmp_path, 40), tmp_path / "out")
+    assert not len(done.missing)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["rows", "sweep.json"]
+
+
+WITHOUT_SEMAPHORES = """
+import _multiprocessing
+def none(*_, **__):
+    raise FileNotFoundError(2, 'No such file or directory')
+_multiprocessing.SemLock = none
+sw.run(swept(folder, 40), folder / 'out', chunk=10, cluster='local:1x1')
+"""
+
+
+@pytest.mark.xfail(strict=True, raises=AssertionError, reason="what Dask raises where it cannot start is passed on")
+def test_a_machine_without_shared_memory_is_refused_where_dask_needs_it(tmp_path: Path) -> None:
+    """Without /dev/shm no semaphore can be made."""
+    pytest.importorskip("distributed")
+    assert outcome_of(WITHOUT_SEMAPHORES, tmp_path, gib=64) == "refused"

@@ -1,0 +1,228 @@
+"""A damaged folder of a sweep is refused by a RobotDynError: no foreign exception, no hang, no other numbers."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.tools import sweeps as sw
+from tests.tools.sweeps.children import outcome_of
+from tests.tools.sweeps.swept import swept
+
+for _module in ("zarr", "xarray", "pyarrow"):
+    pytest.importorskip(_module)
+Damage = Callable[[Path], object]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> sw.SweepResult:
+    """A sweep of 60 runs in 3 chunks, with samples."""
+    folder = tmp_path_factory.mktemp("whole")
+    return sw.run(swept(folder, 60, samples="q", storage="parquet"), folder / "out", chunk=20)
+
+
+@pytest.fixture
+def copy(whole: sw.SweepResult, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole.path, tmp_path / "out"))
+
+
+def text(name: str, written: str | bytes) -> Damage:
+    return lambda folder: (folder / name).write_bytes(written if isinstance(written, bytes) else written.encode())
+
+
+def key(name: str, value: Any) -> Damage:
+    """Another value of a key of sweep.json; None removes it."""
+
+    def change(folder: Path) -> None:
+        data = json.loads((folder / "sweep.json").read_text()) | {name: value}
+        kept = {key: each for key, each in data.items() if each is not None or key != name}
+        (folder / "sweep.json").write_text(json.dumps(kept))
+
+    return change
+
+
+def removed(folder: Path, name: str) -> Path:
+    path = folder / name
+    shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+    return path
+
+
+def pipe(name: str) -> Damage:
+    return lambda folder: os.mkfifo(removed(folder, name))
+
+
+def zeros(name: str) -> Damage:
+    return lambda folder: removed(folder, name).symlink_to("/dev/zero")
+
+
+def a_folder(name: str) -> Damage:
+    return lambda folder: removed(folder, name).mkdir()
+
+
+def gone(name: str) -> Damage:
+    return lambda folder: removed(folder, name)
+
+
+ROWS, SHARD = "rows/000001.parquet", "samples/q/c/1/0/0"
+FOREIGN = pytest.mark.xfail(strict=True, reason="the exception is one of json, zarr, NumPy or the interpreter")
+HANGS = pytest.mark.xfail(strict=True, raises=AssertionError, reason="zarr opens what is not a regular file")
+NOT_REFUSED = pytest.mark.xfail(strict=True, reason="samples that were damaged are read as nan")
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        pytest.param(text("sweep.json", ""), id="empty"),
+        pytest.param(text("sweep.json", b"\xff\x00" * 100), id="binary"),
+        pytest.param(text("sweep.json", "NaN"), id="NaN"),
+        pytest.param(text("sweep.json", "[]"), id="a list"),
+        pytest.param(text("sweep.json", "[" * 100_000), id="brackets", marks=FOREIGN),
+        pytest.param(a_folder("sweep.json"), id="a folder"),
+        pytest.param(key("runs", "60"), id="runs of text"),
+        pytest.param(key("runs", 10**30), id="too many runs"),
+        pytest.param(key("vary", None), id="without vary"),
+        pytest.param(key("order", 3), id="order of a number"),
+        pytest.param(key("chunk", None), id="without chunk", marks=FOREIGN),
+        pytest.param(key("chunk", 0), id="chunk 0", marks=FOREIGN),
+        pytest.param(key("chunk", -1), id="chunk -1", marks=FOREIGN),
+        pytest.param(key("chunk", 1.5), id="chunk 1.5", marks=FOREIGN),
+        pytest.param(key("chunk", "20"), id="chunk of text", marks=FOREIGN),
+        pytest.param(text(ROWS, ""), id="empty rows"),
+        pytest.param(text(ROWS, b"PAR1" * 100), id="rows of nothing"),
+        pytest.param(a_folder(ROWS), id="rows of a folder"),
+        pytest.param(lambda folder: text("rows", "")(removed(folder, "rows").parent), id="rows a file", marks=FOREIGN),
+    ],
+)
+def test_a_damaged_specification_or_chunk_is_refused(copy: Path, damage: Damage) -> None:
+    damage(copy)
+    with pytest.raises(RobotDynError):
+        sw.read(copy).table()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        pytest.param(text("sweep.json", ""), id="empty", marks=FOREIGN),
+        pytest.param(text("sweep.json", b"\xff\x00" * 100), id="binary", marks=FOREIGN),
+        pytest.param(text("sweep.json", "[]"), id="a list", marks=FOREIGN),
+        pytest.param(a_folder("sweep.json"), id="a folder"),
+        pytest.param(key("runs", "60"), id="runs of text"),
+        pytest.param(key("chunk", 0), id="chunk 0", marks=FOREIGN),
+        pytest.param(text("samples/t/zarr.json", "{"), id="times of samples", marks=FOREIGN),
+        pytest.param(gone("samples"), id="no samples", marks=FOREIGN),
+    ],
+)
+def test_a_damaged_folder_is_not_resumed(copy: Path, whole: sw.SweepResult, damage: Damage) -> None:
+    damage(copy)
+    with pytest.raises(RobotDynError):
+        sw.run(whole.sweep, copy)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        pytest.param(gone("samples"), id="no samples"),
+        pytest.param(gone(SHARD), id="no shard"),
+        pytest.param(gone("samples/q/zarr.json"), id="no array", marks=FOREIGN),
+        pytest.param(text("samples/zarr.json", "{"), id="group", marks=FOREIGN),
+        pytest.param(text("samples/t/zarr.json", "{"), id="times", marks=FOREIGN),
+        pytest.param(text("samples/q/zarr.json", "{}"), id="array", marks=FOREIGN),
+        pytest.param(text(SHARD, ""), id="empty shard", marks=NOT_REFUSED),
+    ],
+)
+def test_damaged_samples_are_refused(copy: Path, damage: Damage) -> None:
+    damage(copy)
+    with pytest.raises(RobotDynError):
+        sw.read(copy).samples().q.values  # noqa: B018
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes and devices have paths on POSIX alone")
+@pytest.mark.parametrize(
+    ("damage", "question"),
+    [
+        pytest.param(pipe("sweep.json"), "table()", id="specification, pipe"),
+        pytest.param(zeros("design.npy"), "table()", id="design, zeros"),
+        pytest.param(zeros(ROWS), "table()", id="rows, zeros"),
+        pytest.param(zeros(SHARD), "samples().q.values", id="shard, zeros"),
+        pytest.param(pipe("samples/q/zarr.json"), "samples().q.values", id="array, pipe", marks=HANGS),
+        pytest.param(zeros("samples/t/zarr.json"), "samples().q.values", id="times, zeros", marks=HANGS),
+    ],
+)
+def test_what_is_not_a_regular_file_is_refused_at_once(
+    copy: Path, whole: sw.SweepResult, damage: Damage, question: str
+) -> None:
+    """The same question is put to the whole folder first, so that the time is that of reading alone."""
+    damage(copy)
+    first = f"sw.read({str(whole.path)!r}).{question}"
+    assert outcome_of(f"sw.read(folder).{question}", copy, wait_s=6.0, first=first) == "refused"
+
+
+# --- bits
+
+
+def flipped(data: bytes, at: int) -> bytes:
+    return data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
+
+
+@pytest.mark.xfail(strict=True, raises=AssertionError, reason="pages of Parquet are read without their checksums")
+def test_one_flipped_bit_of_a_chunk_is_refused_or_changes_nothing(copy: Path) -> None:
+    """Of 60 places in a file of rows; each answer is that of the whole file, or one error."""
+    file, table = copy / ROWS, sw.read(copy).table()
+    data, others = file.read_bytes(), list[int]()
+    for at in np.linspace(4, len(data) - 5, 60).astype(int).tolist():
+        file.write_bytes(flipped(data, at))
+        try:
+            read = sw.read(copy).table()
+        except RobotDynError:
+            continue
+        others += [at for name, x in table.items() if x.tobytes() != read[name].tobytes() and x.dtype.kind in "fi"]
+    assert not others
+
+
+@pytest.mark.xfail(strict=True, reason="digests of samples are compared by verify() alone")
+def test_one_flipped_bit_of_samples_is_refused(copy: Path) -> None:
+    shard = copy / SHARD
+    shard.write_bytes(flipped(shard.read_bytes(), 1000))
+    with pytest.raises(RobotDynError):
+        sw.read(copy).samples().q.values  # noqa: B018
+
+
+# --- memory, versions
+
+
+@pytest.mark.xfail(strict=True, raises=AssertionError, reason="a bounded read asks for its bound, 16 GiB, at once")
+def test_a_sweep_of_a_table_is_read_in_little_memory(tmp_path: Path) -> None:
+    vary = {"kp": sw.uniform(low=10.0, high=20.0)}
+    rows = np.random.default_rng(0).random((32, 1))
+    sw.run(swept(tmp_path, 32, vary=vary, design=rows), tmp_path / "out", chunk=16)
+    assert outcome_of("sw.read(folder / 'out').table()", tmp_path, gib=8) == "done"
+
+
+OTHER_VERSIONS = """
+import importlib.metadata as metadata
+read = metadata.PathDistribution.read_text
+def older(self, name):
+    text = read(self, name)
+    of_ours = text and any(f'Name: {each}\\n' in text for each in ('numpy', 'scipy'))
+    return text.replace('\\nVersion: ', '\\nVersion: 0.', 1) if of_ours and name == 'METADATA' else text
+metadata.PathDistribution.read_text = older
+sw.run(swept(folder, 40), folder / 'old', chunk=20)
+"""
+
+
+@pytest.mark.xfail(strict=True, raises=RobotDynError, reason="versions are part of the specification that must agree")
+def test_results_are_read_after_numpy_and_scipy_were_upgraded(tmp_path: Path) -> None:
+    """A process in which both have other versions makes the folder; here it is read."""
+    assert outcome_of(OTHER_VERSIONS, tmp_path, gib=64) == "done"
+    assert '"numpy": "0.' in (tmp_path / "old" / "sweep.json").read_text()
+    there, here = sw.read(tmp_path / "old"), sw.run(swept(tmp_path, 40), tmp_path / "new", chunk=20)
+    for name, x in here.table("end", "kd", "q0[0]").items():
+        np.testing.assert_array_equal(there.table(name)[name], x)
