@@ -113,8 +113,8 @@ class Advice(Answer):
 
     @reported
     def error(self) -> float | None:
-        """Estimated error of q at the end of the run; None without one."""
-        return None if self.run is None or self.run.error is None else self.run.error.final
+        """Largest estimated error of q over the run; inf if the estimate ends before the run, None without one."""
+        return None if self.run is None or self.run.error is None else self.run.error.largest
 
     @reported
     def error_verdict(self) -> Verdict | None:

@@ -291,8 +291,8 @@ def test_the_estimate_along_dense_samples_is_honest(tmp_path) -> None:
     )
     run, truth = rd.simulate(setup), rd.simulate(setup, integrator="rk4", step_s=3e-4, estimate_error=False)
     error = np.abs(run.q[-1] - truth.q[-1]).max()
-    assert run.error is not None and run.error.resolved_until == 0.3
-    assert 0 < error < 2 * run.error.final < 1e-4
+    assert run.error is not None and run.error.until_s == 0.3
+    assert 0 < error < 2 * run.error.largest < 1e-4
     (tmp_path / "wave.csv").write_text("\n".join(["t,q joint_1,q joint_2", *(f"{x},{x},{2 * x}" for x in t)]))
     scene = 'robot = "planar_2r"\nduration_s = 0.1\n[control]\nkind = "pd"\nfrequency_rad_per_s = 5.0\n'
     (tmp_path / "s.toml").write_text(scene + '[reference]\nkind = "samples"\nfile = "wave.csv"\nends = "measured"\n')

@@ -120,7 +120,7 @@ def test_the_estimate_sees_the_order_over_a_limit() -> None:
     run = saturated("computed_torque", integrator="rk4", step_s=1e-3, estimate_error=True)
     assert run.error is not None
     assert run.error.verdict is Verdict.ORDER
-    assert 0.3 < run.error.final / np.abs(run.q[-1] - exact.q[-1]).max() < 30
+    assert 0.3 < run.error.largest / np.abs(run.q[-1] - exact.q[-1]).max() < 30
 
 
 def test_limits_that_are_not_reached_change_no_step() -> None:

@@ -79,7 +79,7 @@ def check_equal(ours: rd.Trajectory, theirs: rd.Trajectory, tolerance: float) ->
         np.testing.assert_allclose(mine, other, rtol=0, atol=tolerance * (1 + np.abs(other).max()))
     assert (ours.error is None) == (theirs.error is None)
     if ours.error is not None and theirs.error is not None:
-        assert (ours.error.note, ours.error.resolved_until) == (theirs.error.note, theirs.error.resolved_until)
+        assert (ours.error.note, ours.error.until_s) == (theirs.error.note, theirs.error.until_s)
         np.testing.assert_array_equal(ours.error.t, theirs.error.t)
         np.testing.assert_allclose(ours.error.error, theirs.error.error, rtol=1e-3, atol=1e-11)
 
@@ -256,7 +256,7 @@ SHORT = """
 import robot_dyn as rd, sys
 arm = rd.load("planar_2r")
 run = rd.simulate(arm, [0.4, -0.7], [0.3, 0.9], duration_s=0.2, integrator="rk4", engine=sys.argv[1])
-print(run.statistics.engine, *run.q[-1].tolist(), run.error.final, sep=";")
+print(run.statistics.engine, *run.q[-1].tolist(), run.error.largest, sep=";")
 """
 
 

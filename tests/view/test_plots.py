@@ -116,12 +116,12 @@ def test_phase_is_velocity_over_position(cart) -> None:
 
 
 def test_error_growth_is_veiled_where_it_is_not_resolved(run) -> None:
-    error = replace(run.error, resolved_until=0.1, note="not resolved")
+    error = replace(run.error, until_s=0.1, note="not resolved")
     (axes,) = plot(replace(run, error=error), "error_growth").axes
     (veil,) = axes.patches
     assert veil.get_x() == pytest.approx(0.1) and axes.get_yscale() == "log"
     np.testing.assert_array_equal(axes.lines[0].get_xdata(), error.t)
-    assert not plot(replace(run, error=replace(error, resolved_until=0.3)), "error_growth").axes[0].patches
+    assert not plot(replace(run, error=replace(error, until_s=0.3)), "error_growth").axes[0].patches
     with pytest.raises(PlotError, match="no estimate"):
         plot(replace(run, error=None), "error_growth")
 

@@ -161,11 +161,11 @@ def _lines(t: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def _is_estimated(error: ErrorEstimate | None) -> bool:
-    return error is not None and error.resolved_until > 0
+    return error is not None and error.until_s > 0
 
 
 def _error_at(error: ErrorEstimate | None, t: np.ndarray) -> np.ndarray:
     """The estimated error up to the next time of the estimate, (k,); inf after it is resolved."""
     assert error is not None
     later = np.searchsorted(error.t, t * (1 - _SAME)).clip(max=len(error.t) - 1)
-    return np.where(t * (1 - _SAME) <= error.resolved_until, error.error[later], inf)
+    return np.where(t * (1 - _SAME) <= error.until_s, error.error[later], inf)

@@ -91,25 +91,25 @@ def _by_steps(
         paths = {pace: companion(pace, setup).shared for pace in COARSE}
         magnified = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
         result = magnified.from_longer_steps(paths, method.order)
-        if result.resolved_until >= estimated.path.t[-1] and not estimated.doubts(result, paths, method.order):
+        if result.until_s >= estimated.path.t[-1] and not estimated.doubts(result, paths, method.order):
             return result
     half = companion(FINE[0], setup).shared
-    if result.resolved_until > 0 and estimated.lost_at(half) < _GAIN * result.resolved_until:
+    if result.until_s > 0 and estimated.lost_at(half) < _GAIN * result.until_s:
         return result  # chaos: no step of practical length resolves it
     magnified = estimated
     for units in (PUSH, _FAR_PUSH):
         pushed = companion(Fraction(1), _pushed(setup, units)).shared
         magnified = _with_rounding(magnified, pushed, estimated.path, units)
     shorter = magnified.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
-    return shorter if shorter.resolved_until >= result.resolved_until else result
+    return shorter if shorter.until_s >= result.until_s else result
 
 
 def _until_alike(setup: Setup, run: Recording, result: ErrorEstimate) -> ErrorEstimate:
     """The estimate up to where each companion cuts its steps as the run does, so that all take the same one or two."""
     alike = cut_alike(setup, run)
-    if alike is None or alike.t >= result.resolved_until:
+    if alike is None or alike.t >= result.until_s:
         return result
-    return replace(result, resolved_until=alike.t, note=alike.why)
+    return replace(result, until_s=alike.t, note=alike.why)
 
 
 def _by_refinement(
@@ -167,10 +167,10 @@ def _turn(equation: StateEquation, step_log: Path) -> float:
 
 def _looked_between(setup: Setup, run: Recording, result: ErrorEstimate) -> ErrorEstimate:
     """The estimate up to where something acted between two steps only, if that matters beside it."""
-    missed = stepped_over(setup, run.step_log, result.final)
-    if missed is None or missed.t >= result.resolved_until:
+    missed = stepped_over(setup, run.step_log, result.at(result.until_s))
+    if missed is None or missed.t >= result.until_s:
         return result
-    return replace(result, resolved_until=missed.t, note=missed.why)
+    return replace(result, until_s=missed.t, note=missed.why)
 
 
 def _advised(setup: Setup, result: ErrorEstimate, why: str) -> ErrorEstimate:

@@ -165,7 +165,7 @@ def _predicted(trial: Trajectory, requested: float) -> float:
 def _resolved(trial: Trajectory) -> float:
     """The estimated error of a run; inf if the estimate is not valid to the end."""
     error = trial.error
-    return error.final if error is not None and not error.note else inf
+    return inf if error is None else error.largest
 
 
 def _achieved(chosen: _Try, requested: float, spent: int) -> Trajectory:

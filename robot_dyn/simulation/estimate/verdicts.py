@@ -75,7 +75,7 @@ class Estimated:
         matter: shorter steps show no order either.
         """
         by_order = differences(self.path, companions[COARSE[0]], self.n)[-1] / (2.0**order - 1)
-        return self.kink > self.path.t[-1] and not result.final <= _DOUBT * max(by_order, float(self.floor[-1]))
+        return self.kink > self.path.t[-1] and not result.largest <= _DOUBT * max(by_order, float(self.floor[-1]))
 
     def from_shorter_steps(self, companions: Mapping[Fraction, Path], order: int) -> ErrorEstimate:
         """The estimate from companions of `FINE`: |q_h − q_{h/m}| = |e(h)| (1 − m⁻ᵖ), of order 1 where none shows."""

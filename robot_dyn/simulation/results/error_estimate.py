@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated, final
+from math import inf, nan
+from typing import Annotated, Any, final, overload
 
 import numpy as np
 
+from robot_dyn.foundations.validate import times
 from robot_dyn.foundations.values import Layout, Value, read_only
+
+_SAME = 8 * np.finfo(float).eps  # of a time: samples of one time, computed in two ways
 
 
 class Verdict(StrEnum):
@@ -27,15 +32,15 @@ class ErrorEstimate(Value):
     Attributes:
         t: Times of the estimate, (k,), in [s].
         error: Estimate of |q_h − q|, the largest up to each time, (k,).
-        resolved_until: Time up to which it holds, in [s].
+        until_s: Time up to which the estimate holds, in [s]; 0 if no error is estimated.
         note: Why it ends there, or why no error is estimated, and what to do; empty if it holds to the end of the run.
-        verdict: What it rests on at `resolved_until`.
+        verdict: Basis of the estimate at `until_s`.
         reason: Why an error that is bounded shows no order.
     """
 
     t: Annotated[np.ndarray, Layout(("k",))]
     error: Annotated[np.ndarray, Layout(("k",), finite=False)]
-    resolved_until: float
+    until_s: float
     note: str = ""
     verdict: Verdict = Verdict.ORDER
     reason: str = ""
@@ -44,11 +49,12 @@ class ErrorEstimate(Value):
         read_only(self)
 
     def __str__(self) -> str:
-        if not self.resolved_until > 0:
+        if not self.until_s > 0:
             return f"not estimated; {self.note}"
-        figure = f"{self.final:.1e}" if self.verdict is Verdict.ORDER else f"about {self.final:.1e}"
+        last = self.at(self.until_s)
+        figure = f"{last:.1e}" if self.verdict is Verdict.ORDER else f"about {last:.1e}"
         if self.note:
-            figure += f" up to t = {self.resolved_until:g} s"
+            figure += f" up to t = {self.until_s:g} s"
         reason = f": {self.reason}" if self.reason else ""
         return f"{figure} ({self.verdict}{reason})" + (f"; after that none: {self.note}" if self.note else "")
 
@@ -56,10 +62,34 @@ class ErrorEstimate(Value):
         return f"<ErrorEstimate: {self}>"
 
     @property
-    def final(self) -> float:
-        """The largest error up to `resolved_until`; nan if nothing is resolved."""
-        known = self.error[self.t <= self.resolved_until]
-        return float(known.max()) if len(known) else float("nan")
+    def largest(self) -> float:
+        """Largest estimated error over the run; inf if the estimate ends before the run does."""
+        return inf if self.note else self.at(self.until_s)
+
+    @overload
+    def at(self, t: float) -> float: ...
+    @overload
+    def at(self, t: np.ndarray | Sequence[Any]) -> np.ndarray: ...
+    def at(self, t: Any) -> Any:
+        """Return the estimate of the largest error up to time(s) t, in [rad] or [m].
+
+        It is inf after `until_s`, and at all times if no error is estimated; nan for a time before 0, or a t of nan.
+        Between two times of the estimate it is that of the later one.
+
+        Args:
+            t: Times in [s], of any shape; a number gives a number.
+
+        Raises:
+            QueryError: If t is not a time.
+        """
+        known = times("t", t)
+        early = known * (1 - _SAME)
+        estimate = np.full(known.shape, inf)
+        if len(self.t):
+            later = np.searchsorted(self.t, early).clip(max=len(self.t) - 1)
+            estimate = np.where(early <= self.until_s, self.error[later], inf)
+        estimate = np.where(known >= 0, estimate, nan)
+        return estimate if known.ndim else float(estimate)
 
 
 def no_estimate(note: str) -> ErrorEstimate:

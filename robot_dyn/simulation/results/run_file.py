@@ -32,7 +32,7 @@ from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.size import LONGEST_S
 
-FORMAT = 5
+FORMAT = 6
 ROLLOUTS_FORMAT = "rollouts 4"
 RUN = Kind("a run file", ".npz", b"PK\x03\x04")
 MAX_BYTES = 4 * 2**30  # of the arrays of a run that is read, unless more is requested

@@ -263,10 +263,10 @@ def leak(ledger: Ledger, error: ErrorEstimate | None, q: np.ndarray) -> str:
     """As of `Trajectory.leak`, from the ledger, the estimated error and the samples q (m, n) of a run."""
     if not ledger.closes:
         return f"it does not close: {ledger.cause or 'simulate it with its error estimate, which finds the cause'}"
-    if ledger.rounded or error is None or not error.resolved_until > 0:
+    if ledger.rounded or error is None:
         return ""
     span = float(np.ptp(q, axis=0).max())
-    if not span > 0 or ledger.closure <= _CONTRADICTS * max(error.final / span, _ROUNDING):
+    if not span > 0 or ledger.closure <= _CONTRADICTS * max(error.largest / span, _ROUNDING):
         return ""
     why = ledger.cause or "do not trust the estimate, take a smaller step"
     return f"it does not close as well as the estimated error of q implies: {why}"

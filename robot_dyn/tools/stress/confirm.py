@@ -97,7 +97,7 @@ def says(run: Trajectory) -> str:
     """What a run says against itself, or of what it met; empty if its summary is clean."""
     description = [str(kind).replace("_", " ") for kind in dict.fromkeys(each.kind for each in run.remarks)]
     if run.error is not None and run.error.note:
-        until = run.error.resolved_until
+        until = run.error.until_s
         description.append(f"error told up to {until:.3g} s only" if until else "no error told")
     if "does not close" in run.summary:
         description.append("the ledger does not close")
@@ -106,4 +106,4 @@ def says(run: Trajectory) -> str:
 
 def _estimates(run: Trajectory, at: np.ndarray) -> bool:
     """Whether the error estimate admits that the run is off by as much as it is."""
-    return run.error is not None and run.error.final >= LEAST * float(np.abs(run.q - at).max())
+    return run.error is not None and run.error.largest >= LEAST * float(np.abs(run.q - at).max())

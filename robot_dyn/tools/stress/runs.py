@@ -56,11 +56,11 @@ def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
     run = simulate(setup, on_progress=budget.check)
     report = says(run) if run.outcome.ending is Ending.FINISHED else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
     error = run.error
-    if error is None or run.outcome.ending is not Ending.FINISHED or not error.resolved_until:
+    if error is None or run.outcome.ending is not Ending.FINISHED or not error.until_s:
         return JudgedRun(what, setup.duration_s, np.nan, np.nan, np.nan, report, False, setup)
     sure = replace(setup, step_s=None, estimate_error=False, integrator=_BETTER[0])
     better = [simulate(replace(sure, integrator=each), on_progress=budget.check) for each in _BETTER]
-    known = run.t <= error.resolved_until
+    known, estimate = run.t <= error.until_s, error.at(error.until_s)
     if any(each.outcome.ending is not Ending.FINISHED for each in better):
         raise RobotDynError("a better run did not finish")
     if any(each.t.shape != run.t.shape or np.abs(each.t - run.t).max() > _ONE_TIME for each in better):
@@ -68,8 +68,8 @@ def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
     true = float(np.abs(run.q - better[0].q)[known].max())
     unsure = float(np.abs(better[1].q - better[0].q)[known].max())
     floor = _ROUNDING * (1 + float(np.abs(run.q).max())) + unsure
-    misleads = not says_more(run) and max(error.final, floor) < LEAST * max(true, floor)
-    return JudgedRun(what, setup.duration_s, error.final, true, unsure, report or str(error), misleads, setup)
+    misleads = not says_more(run) and max(estimate, floor) < LEAST * max(true, floor)
+    return JudgedRun(what, setup.duration_s, estimate, true, unsure, report or str(error), misleads, setup)
 
 
 def says_more(run: Trajectory) -> bool:

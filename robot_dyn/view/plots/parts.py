@@ -232,7 +232,7 @@ def _residual(view: View) -> Cell:
 def _growth(view: View, error: ErrorEstimate) -> Cell:
     units = {unit("q", each) for each in view.types}
     of_q = units.pop() if len(units) == 1 else unit("q", None)
-    until = error.resolved_until if error.resolved_until < error.t[-1] else np.inf
+    until = error.until_s if error.until_s < error.t[-1] else np.inf
     curve = Curve("estimated error", error.t, error.error)
     return Cell("Estimated error |q − exact|", "t [s]", f"|q − exact| [{of_q}]", (curve,), log=True, until=until)
 

@@ -50,7 +50,7 @@ class Judgement:
     @property
     def ratio(self) -> float:
         """Estimate over true error, both at least the floor."""
-        return max(self.run.error.final, self.floor) / max(self.true, self.floor)
+        return max(self.run.error.at(self.run.error.until_s), self.floor) / max(self.true, self.floor)
 
     @property
     def misleads(self) -> bool:
@@ -75,7 +75,7 @@ def judged(made: Scene, exact: Truth, witness: Truth) -> Judgement:
     run = rd.simulate(made.setup)
     q = exact(made.setup, run.t)
     errors = np.maximum.accumulate(np.abs(run.q - q).max(axis=1))
-    known = run.t <= run.error.resolved_until
+    known = run.t <= run.error.until_s
     true = float(errors[known][-1]) if known.any() else 0.0
     found = Judgement(made, run, true, float(errors[-1]), 0.0)
     if not known.any() or LEAST <= found.ratio <= MOST:  # a floor moves the ratio towards 1

@@ -110,14 +110,16 @@ def passed(run: rd.Trajectory, q: np.ndarray) -> float:
 
 
 def _horizon(case: str, run: rd.Trajectory, q: np.ndarray) -> Row:
-    said, true = run.error.resolved_until, passed(run, q)
+    said, true = run.error.until_s, passed(run, q)
     measure = f"t* = {said:.3g} s, limit truly passed at {true:.3g} s: apart, of that"
     return Row(case, measure, abs(said / true - 1), APART, str(run.error) if said < true else "")
 
 
 def _estimate(case: str, run: rd.Trajectory, q: np.ndarray) -> Row:
-    i = int(np.searchsorted(run.t, run.error.resolved_until, side="right")) - 1
-    return Row(case, "true error at t* over its estimate", errors(run, q)[i] / run.error.final, 1 / LEAST)
+    i = int(np.searchsorted(run.t, run.error.until_s, side="right")) - 1
+    return Row(
+        case, "true error at t* over its estimate", errors(run, q)[i] / run.error.at(run.error.until_s), 1 / LEAST
+    )
 
 
 def _run(robot: rd.Robot, of: tuple[Any, float], seed: int, duration: float, engine: str = "auto") -> rd.Trajectory:

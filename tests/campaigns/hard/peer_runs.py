@@ -48,7 +48,7 @@ def ours(robot: rd.Robot, q0: Any, duration: float, effects: list[Any], **option
     run = rd.simulate(rd.Plant(robot, effects), q0, duration_s=duration, **options)
     end = run.outcome
     said = f"error of q: {run.error}" if end.ending == "finished" else f"{end.ending}: {end.advice}"
-    return End(run.q[-1], run.v[-1], said, run.error.final if end.ending == "finished" else np.nan)
+    return End(run.q[-1], run.v[-1], said, run.error.largest if end.ending == "finished" else np.nan)
 
 
 def mujoco(robot: rd.Robot, q0: Any, duration: float, change: Callable[[Any, Any], None]) -> End:

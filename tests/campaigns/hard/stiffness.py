@@ -32,7 +32,7 @@ ROUNDING = 1e-9  # [rad], below which the truth of an arm cannot tell
 
 def true_error(run: rd.Trajectory, motion: Motion) -> float:
     """The largest up to where the run is said to be resolved."""
-    until = run.error.resolved_until if run.error else run.t[-1]
+    until = run.error.until_s if run.error else run.t[-1]
     known = run.t <= max(until, 0.0)
     return float(np.abs(run.q[known] - motion.exact(run.t)[known]).max())
 
@@ -60,7 +60,7 @@ def _controlled(case: str, motion: Motion, setup: rd.Setup) -> Row:
     run = rd.simulate(setup, integrator=rd.integrate.Adaptive("Rosenbrock", ASKED, ASKED / 100))
     error = true_error(run, motion)
     scale = ASKED * float(np.abs(run.q).max()) + ASKED / 100
-    said = str(run.error) if run.error.final >= LEAST * error else ""
+    said = str(run.error) if run.error.at(run.error.until_s) >= LEAST * error else ""
     return Row(case, f"Rosenbrock of rtol {ASKED:g}: true error over tolerance", error / scale, TIMES, said)
 
 
@@ -69,9 +69,9 @@ def _fixed(case: str, name: str, motion: Motion, setup: rd.Setup) -> Row:
     what = f"{name} of {setup.nominal_step_s:g} s: true error over estimate"
     if run.outcome.ending != "finished":
         return Row(case, what, float("nan"), 1 / LEAST, run.outcome.advice)
-    if not run.error.resolved_until > 0:
+    if not run.error.until_s > 0:
         return Row(case, what, float("nan"), 1 / LEAST, str(run.error))
-    found = max(true_error(run, motion), ROUNDING) / max(run.error.final, ROUNDING)
+    found = max(true_error(run, motion), ROUNDING) / max(run.error.at(run.error.until_s), ROUNDING)
     return Row(case, what, found, 1 / LEAST, f"energy ledger: {run.leak}" if run.leak else "")
 
 
