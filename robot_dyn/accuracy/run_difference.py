@@ -11,11 +11,11 @@ import numpy as np
 
 from robot_dyn.foundations.answer import Block, Table
 from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.result import UNREPORTED
+from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.foundations.validate import instance, number
 from robot_dyn.queries.units import unit, units
 from robot_dyn.report.result import Result
-from robot_dyn.simulation.comparison.difference import TOLERANCE, Difference, difference
+from robot_dyn.simulation.comparison.difference import HALF, TOLERANCE, Difference, difference
 from robot_dyn.simulation.comparison.differing_settings import (
     DifferingSetting,
     differing_settings,
@@ -59,7 +59,9 @@ class RunDifference(Result):
         joints: Rms and largest difference of q, v and u by joint.
         start, end: The time that both runs have, in [s].
         samples: Number of times at which they are compared.
-        interpolated: Whether they are compared between samples, since they were sampled at different times.
+        common: Number of these at which both have a sample; at the others q of one of them is interpolated.
+        fraction: Fraction of the time from start to end that was compared.
+        interpolation: Largest error of interpolation that is allowed for, in the unit of q; 0 if there is none.
         parted: When q first differs by more than their errors, in [s]; None if it never does.
         judged_until: Time until which that is known, in [s].
         bound: What they part beyond, in words.
@@ -77,7 +79,9 @@ class RunDifference(Result):
     start: float
     end: float
     samples: int
-    interpolated: bool
+    common: int
+    fraction: float
+    interpolation: float
     parted: float | None
     judged_until: float
     bound: str
@@ -94,6 +98,8 @@ class RunDifference(Result):
         a, b = self.names
         if self.parted is not None:
             return f"{a} and {b} part at t = {self.parted:.4g} s: q differs by more than {self.bound}"
+        if not self.is_conclusive:
+            return f"{a} and {b} were compared over {self.fraction:.0%} of the time only: record both at the same times"
         end = (
             "" if self.judged_until >= self.end else f" up to t = {self.judged_until:.4g} s, until which both are known"
         )
@@ -101,14 +107,23 @@ class RunDifference(Result):
             return f"{a} and {b} are equal at all {self.samples} times"
         return f"{a} and {b} do not part{end}: q never differs by more than {self.bound}"
 
+    @reported
+    def is_conclusive(self) -> bool:
+        """Whether half of the time or more was compared; if not, nothing is said of runs that part nowhere."""
+        return self.fraction >= HALF
+
     @property
     def rows(self) -> Iterator[Mapping[str, Any]]:
         """A row for each quantity of each joint."""
         return (vars(each) for each in self.joints)
 
     def tables(self) -> Iterator[Block]:
-        where = "interpolated between their samples" if self.interpolated else "common samples"
-        yield f"b − a, {self.start:g} to {self.end:g} s, at {self.samples} times ({where}):"
+        between = self.samples - self.common
+        where = f"{self.common} common samples; q between samples at {between}" if between else "common samples"
+        yield (
+            f"b − a, {self.start:g} to {self.end:g} s, at {self.samples} times ({where}),"
+            f" {self.fraction:.0%} of the time:"
+        )
         rows = tuple(
             (each.joint, f"{each.quantity} [{each.unit}]", each.rms, each.largest, each.at) for each in self.joints
         )
@@ -125,9 +140,11 @@ class RunDifference(Result):
 def compare_runs(a: Trajectory, b: Trajectory, *, tolerance: float = TOLERANCE) -> RunDifference:
     """Compare two runs of one robot on the time that both have: by joint, when they part, what differs in settings.
 
-    They are compared at common samples, or, if few are common, interpolated at the samples of both by cubics of (q, v).
-    They part where q of a joint differs by more than twice the sum of the estimated errors of both; where a run has no
-    estimate, by more than the tolerance. Root mean squares are over time: √(1/T ∫ (x_b − x_a)² dt).
+    They are compared at common samples; in stretches without any, q is compared at the samples of either run as well,
+    where quintics of (q, v, a) are known to be exact enough and no event is near. They part where q of a joint differs
+    by more than twice the sum of the estimated errors of both; where a run has no estimate, by more than the tolerance.
+    If less than half of the time can be compared, record both at the same times. Root mean squares are over time:
+    √(1/T ∫ (x_b − x_a)² dt).
 
     Args:
         a: A run.
@@ -145,17 +162,21 @@ def compare_runs(a: Trajectory, b: Trajectory, *, tolerance: float = TOLERANCE) 
     left = [f"{t:g} to {s:g} s, which only {name} has" for name, t, s in _alone(a, b)]
     if not found.estimated:
         left.append("the errors of the runs, since one has no estimate; simulate with estimate_error=True")
+    beyond = "twice their estimated errors" if found.estimated else f"{tolerance:g} {of_q}"
+    interpolation = f" and {found.interpolation:.1g} {of_q} of interpolation" if found.interpolation > 0 else ""
     return RunDifference(
         robot=a.about.get("robot", ""),
         names=(first, second),
         joints=tuple(_of_joints(found, types)),
-        start=float(found.t[0]),
-        end=float(found.t[-1]),
+        start=found.start,
+        end=found.end,
         samples=len(found.t),
-        interpolated=found.interpolated,
+        common=int(found.is_common.sum()),
+        fraction=found.fraction,
+        interpolation=found.interpolation,
         parted=found.parted,
         judged_until=found.judged_until,
-        bound="twice their estimated errors" if found.estimated else f"{tolerance:g} {of_q}",
+        bound=beyond + interpolation,
         settings=differing_settings(a, b),
         left_out=(*left, *unknown_settings(a, b)),
         environment=_versions(a),
@@ -167,12 +188,15 @@ def compare_runs(a: Trajectory, b: Trajectory, *, tolerance: float = TOLERANCE) 
 def _of_joints(found: Difference, types: tuple[str | None, ...]) -> Iterator[JointDifference]:
     for i, (name, kind) in enumerate(zip(found.joint_names, types, strict=True)):
         for quantity in ("q", "v", "u"):
-            x = getattr(found, quantity)[:, i]
-            yield JointDifference(name, quantity, unit(quantity, kind), _rms(found.t, x), *_largest(found.t, x))
+            at = slice(None) if quantity == "q" else found.is_common
+            t, x = found.t[at], getattr(found, quantity)[at, i]
+            yield JointDifference(name, quantity, unit(quantity, kind), _rms(t, x), *_largest(t, x))
 
 
 def _rms(t: np.ndarray, x: np.ndarray) -> float:
     """Over time, by the trapezoidal rule; nan where x is not known."""
+    if not len(t):
+        return nan
     if len(t) == 1:
         return float(abs(x[0]))
     size = float(np.abs(x).max())

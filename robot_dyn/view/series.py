@@ -94,9 +94,18 @@ def _others(runs: list[Trajectory], names: list[str]) -> list[tuple[Trajectory, 
 def _difference(a: Trajectory, b: Trajectory, of_a: str, of_b: str, of_q: str) -> dict[str, Any]:
     """Positions of a run less those of the first, and when they part."""
     found = difference(a, b)
-    at = ": they do not part" if found.parted is None else f": they part at t = {found.parted:.4g} s"
+    if found.parted is not None:
+        at = f": they part at t = {found.parted:.4g} s"
+    elif found.is_conclusive:
+        at = ": they do not part"
+    else:
+        at = f": compared over {found.fraction:.0%} of the time only; record both at the same times"
+    title = f"difference of q, {of_b} − {of_a}{at}"
+    if not len(found.t):
+        empty = {"t": found.t, "limits": [], "beyond": "", "series": []}
+        return {"title": title, "unit": of_q, **empty, "why": "no common samples"}
     columns = dict(zip(found.joint_names, found.q.T, strict=True))
-    return _drawn(f"difference of q, {of_b} − {of_a}{at}", of_q, [(found.t, columns, "", False, False)])
+    return _drawn(title, of_q, [(found.t, columns, "", False, False)])
 
 
 def _plot(

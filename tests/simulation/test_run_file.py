@@ -180,7 +180,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("about", lambda _: None, "'about' is missing"),
         ("about", lambda text: np.array("[" * 100_000), "'about' is not the JSON"),
         ("about", lambda text: np.array([str(text)]), "'about' holds .*not one text"),
-        ("about", lambda text: said(text, format=3), "it has format 3, this version reads 5; simulate again"),
+        ("about", lambda text: said(text, format=3), "it has format 3, this version reads 6; simulate again"),
         ("about", lambda text: said(text, format="3"), "it has format '3'"),
         ("about", lambda text: said(text, format={"a": 3}), "it has format {'a': 3}"),
         ("wanted", lambda _: np.zeros((21, 2)), "'wanted' is not known to this version"),

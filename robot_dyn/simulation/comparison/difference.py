@@ -1,64 +1,85 @@
 """The difference of two runs of one robot: their motion at common times, and the settings that differ.
 
 Two runs part where |q_b − q_a| of a joint is above twice the sum of their estimated errors, which are no bounds, or
-above a tolerance where one of them has no estimate. Numbers are compared at common samples. Where few are common, q and
-v are interpolated by the cubic Hermite polynomials of (q, v) and of (v, a), u by lines; the bound is then larger by
-what the polynomials change when every other sample is left out: 16 times their error, where the motion is smooth.
+above a tolerance where one of them has no estimate. They are compared at common samples. In stretches without any,
+q of each run is interpolated at the samples of the other by the quintics of (q, v, a), where that is sound: no event is
+near, and the error of interpolation is bounded by half of what they part beyond. The bound at samples h apart is
+
+    δ = max |q_j − p| + h |v_j − p'| + h² |a_j − p''|,    p the quintic between the two neighbours of sample j
+
+over the samples j next to it. Where q is smooth, δ is 400 times the error; of an interval that hides one impact, one
+jump of a force, or one of its rate, the error is below δ wherever in the interval that is.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, nan
 from typing import final
 
 import numpy as np
 
+from robot_dyn.control.reference import hermite, polynomial
 from robot_dyn.foundations.errors import QueryError
-from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.trajectory import Trajectory
 
 TOLERANCE = 1e-6  # [rad] or [m], for runs without an estimate of their error
+HALF = 0.5  # of the time: runs that are compared over less of it are not said to be the same motion
 _MARGIN = 2.0  # of estimated errors
 _ROUNDING = 1e-12  # of the largest |q|: runs that differ by less are not said to part
 _SAME = 8 * np.finfo(float).eps  # of the largest time: samples of one time, computed in two ways
-_FEW = 0.5  # of the samples of the run with fewer: if no more are common, all are compared, interpolated
+_PART = 0.5  # of the difference up to which runs are the same motion: what interpolation may add to it
+_NEIGHBOUR = 0.5  # of the length of an interval: a shorter one next to it does not bound its error
+_CHUNK = 20_000  # times at which a run is interpolated at once
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """b − a at k common times of two runs.
+    """b − a at k times of two runs.
 
     Attributes:
         joint_names: Of the n joints.
-        t: The times, (k,), in [s].
-        q, v, u: b − a, (k, n); nan where it was not recorded.
+        start, end: The time that both runs have, in [s].
+        t: The times at which they are compared, (k,), in [s].
+        q, v, u: b − a, (k, n); nan where it was not recorded; v and u are nan between common samples.
+        is_common: Whether both runs have a sample at each time, (k,); at the others, q of one run is interpolated.
         bound: Difference of q, (k,), up to which the runs are the same motion; inf where that is not known.
-        interpolated: Whether they are compared between samples too.
+        interpolation: Largest error of interpolation that the bounds allow for; 0 if no time is interpolated.
+        fraction: Fraction of the common time that was compared: of intervals between neighbouring times of t that hide
+            further samples of one run at most.
         estimated: Whether the bound is of the estimated errors of both.
     """
 
     joint_names: tuple[str, ...]
+    start: float
+    end: float
     t: np.ndarray
     q: np.ndarray
     v: np.ndarray
     u: np.ndarray
+    is_common: np.ndarray
     bound: np.ndarray
-    interpolated: bool
+    interpolation: float
+    fraction: float
     estimated: bool
 
     @property
     def parted(self) -> float | None:
-        """The first common time at which q differs by more than the bound, in [s]; None if it never does."""
+        """The first time at which q differs by more than the bound, in [s]; None if it never does."""
         beyond = np.flatnonzero(~(np.abs(self.q).max(axis=1) <= self.bound))
         return float(self.t[beyond[0]]) if len(beyond) else None
 
     @property
+    def is_conclusive(self) -> bool:
+        """Whether enough of the time was compared to say that runs do not part."""
+        return self.fraction >= HALF
+
+    @property
     def judged_until(self) -> float:
-        """The last common time before the first one at which the bound is not known, in [s]."""
+        """The last time before the first one at which the bound is not known, in [s]."""
         known = np.cumsum(np.isinf(self.bound)) == 0
-        return float(self.t[known][-1]) if known.any() else float(self.t[0])
+        return float(self.t[known][-1]) if known.any() else self.start
 
 
 def check_comparable(a: Trajectory, b: Trajectory) -> None:
@@ -99,22 +120,54 @@ def difference(a: Trajectory, b: Trajectory, tolerance: float = TOLERANCE) -> Di
         QueryError: If they are of different robots, or have no time in common.
     """
     check_comparable(a, b)
-    begin, end = max(a.t[0], b.t[0]), min(a.t[-1], b.t[-1])
-    inside = [np.flatnonzero((begin <= run.t) & (run.t <= end)) for run in (a, b)]
+    start, end = float(max(a.t[0], b.t[0])), float(min(a.t[-1], b.t[-1]))
+    inside = [np.flatnonzero((start <= run.t) & (run.t <= end)) for run in (a, b)]
     i, j = _common(a.t, b.t, *inside)
-    interpolates = len(i) <= _FEW * min(map(len, inside))
-    if interpolates:
-        t = np.unique(np.concatenate([run.t[at] for run, at in zip((a, b), inside, strict=True)]))
-        (qa, va, ua), (qb, vb, ub) = _interpolated(a, t), _interpolated(b, t)
-        between = np.abs(qa - _coarser(a, t)).max(axis=1) + np.abs(qb - _coarser(b, t)).max(axis=1)
-    else:
-        t, between = a.t[i], np.zeros(len(i))
-        qa, va, ua, qb, vb, ub = a.q[i], a.v[i], a.u[i], b.q[j], b.v[j], b.u[j]
-    estimated = _is_estimated(a.error) and _is_estimated(b.error)
-    error = _MARGIN * (_error_at(a.error, t) + _error_at(b.error, t)) if estimated else tolerance
-    size = np.nan_to_num(np.abs([qa, qb]), nan=0.0, posinf=0.0).max()
-    bound = np.maximum(error + between, _ROUNDING * size)
-    return Difference(a.joint_names, t, qb - qa, vb - va, ub - ua, bound, interpolates, estimated)
+    estimated = a.error is not None and b.error is not None and min(a.error.until_s, b.error.until_s) > 0
+    floor = _ROUNDING * max((float(np.abs(run.q[at][np.isfinite(run.q[at])]).max(initial=0.0))
+                             for run, at in zip((a, b), inside, strict=True)))  # fmt: skip
+
+    def allowed(t: np.ndarray) -> np.ndarray:
+        """Difference of q, (k,), that their errors explain."""
+        if not (estimated and a.error is not None and b.error is not None):
+            return np.full(len(t), max(tolerance, floor))
+        return np.maximum(_MARGIN * (a.error.at(t) + b.error.at(t)), floor)
+
+    alone = [_not_among(run.t, at, common) for run, at, common in ((a, inside[0], i), (b, inside[1], j))]
+    stretches = np.intersect1d(*(np.searchsorted(a.t[i], run.t[at]) for run, at in zip((a, b), alone, strict=True)))
+    parts = [(a.t[i], b.q[j] - a.q[i], np.zeros(len(i)))]
+    for run, at, other, sign in ((a, alone[0], b, 1), (b, alone[1], a, -1)):
+        at = at[np.isin(np.searchsorted(a.t[i], run.t[at]), stretches)]
+        q, between = _interpolated(other, run.t[at])
+        limit = allowed(run.t[at])
+        limit[np.isinf(limit)] = max(limit[np.isfinite(limit)].max(initial=0.0), tolerance)
+        sound = between <= _PART * limit
+        parts.append((run.t[at][sound], sign * (q - run.q[at])[sound], between[sound]))
+    t, q, between = (np.concatenate(each) for each in zip(*parts, strict=True))
+    order = np.argsort(t, kind="stable")
+    unknown = np.full((len(t) - len(i), len(a.joint_names)), nan)
+    v, u = (np.concatenate([x[j] - y[i], unknown])[order] for x, y in ((b.v, a.v), (b.u, a.u)))
+    return Difference(
+        a.joint_names, start, end, t[order], q[order], v, u,
+        is_common=order < len(i),
+        bound=(allowed(t) + between)[order],
+        interpolation=float(between.max(initial=0.0)),
+        fraction=_fraction(start, end, t[order], *(run.t[at] for run, at in zip((a, b), alone, strict=True))),
+        estimated=estimated,
+    )  # fmt: skip
+
+
+def _fraction(start: float, end: float, t: np.ndarray, of_a: np.ndarray, of_b: np.ndarray) -> float:
+    """Fraction of the time that was compared at times t, of runs with further samples."""
+    if not start < end:
+        return float(len(t) > 0)
+    hidden = [np.bincount(np.searchsorted(t, np.setdiff1d(x, t)), minlength=len(t) + 1)[1:-1] for x in (of_a, of_b)]
+    return float(np.diff(t)[np.minimum(*hidden) == 0].sum()) / (end - start)
+
+
+def _not_among(t: np.ndarray, inside: np.ndarray, common: np.ndarray) -> np.ndarray:
+    """Indices of the last samples at their times, without those that are common."""
+    return np.setdiff1d(inside[_last(t[inside])], common, assume_unique=True)
 
 
 def _common(t: np.ndarray, s: np.ndarray, of_t: np.ndarray, of_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -133,39 +186,41 @@ def _last(t: np.ndarray) -> np.ndarray:
     return np.append(np.diff(t) > 0, np.ones(min(len(t), 1), dtype=bool))
 
 
-def _interpolated(run: Trajectory, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q, v and u of a run at times t within it."""
+def _interpolated(run: Trajectory, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (k, n) of a run at times t within it, and the bound of their error, (k,); inf where there is none."""
     at = np.flatnonzero(_last(run.t))
-    known, q, v, a = run.t[at], run.q[at], run.v[at], run.a[at]
-    return _hermite(known, q, v, t), _hermite(known, v, a, t), _lines(known, run.u[at], t)
+    known, points = run.t[at], np.stack([run.q[at], run.v[at], run.a[at]], axis=1)
+    if len(known) < 3:
+        return np.full((len(t), points.shape[2]), nan), np.full(len(t), inf)
+    events = np.array([event.t for event in run.events])
+    slack = _SAME * known[-1]
+    eventful = np.searchsorted(events, known[:-1] - slack) < np.searchsorted(events, known[1:] + slack, "right")
+    chunks = [_of_quintics(known, points, eventful, t[k : k + _CHUNK]) for k in range(0, max(len(t), 1), _CHUNK)]
+    q, bound = (np.concatenate(each) for each in zip(*chunks, strict=True))
+    return q, bound
 
 
-def _coarser(run: Trajectory, t: np.ndarray) -> np.ndarray:
-    """Positions at times t by every other sample; inf if these are too few."""
-    at = np.flatnonzero(_last(run.t))
-    at = np.append(at[:-2:2], at[-1:])
-    return _hermite(run.t[at], run.q[at], run.v[at], t) if len(at) > 1 else np.full((len(t), run.q.shape[1]), inf)
+def _of_quintics(
+    known: np.ndarray, points: np.ndarray, eventful: np.ndarray, t: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """`_interpolated` from samples (m, 3, n) of q, v and a at times (m,), and whether an event is between two."""
+    i = (np.searchsorted(known, t, "right") - 1).clip(0, len(known) - 2)
+    h = known[i + 1] - known[i]
+    bound = np.full(len(t), -inf)
+    for j in (i, i + 1):  # samples next to t
+        before, after = np.maximum(j - 1, 0), np.minimum(j + 1, len(known) - 1)
+        neighbour = np.where(j == i, known[i] - known[before], known[after] - known[i + 1])
+        usable = (neighbour >= _NEIGHBOUR * h) & ~eventful[before] & ~eventful[np.minimum(j, len(eventful) - 1)]
+        off = np.abs(points[j] - np.stack(_quintic(known, points, before, after, known[j]), axis=1))
+        sizes = (off * (h[:, None] ** np.arange(3))[:, :, None]).sum(axis=1).max(axis=1)
+        bound = np.where(usable, np.maximum(bound, sizes), bound)
+    bound = np.where((bound >= 0) & ~eventful[i], bound, inf)
+    return _quintic(known, points, i, i + 1, t)[0], bound
 
 
-def _hermite(t: np.ndarray, y: np.ndarray, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """The piecewise cubic of values and rates, (k, n); lines where a rate is not known."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    if len(t) < 2 or not (np.isfinite(y).all() and np.isfinite(rate).all()):
-        return _lines(t, y, at)
-    return CubicHermiteSpline(t, y, rate)(at)
-
-
-def _lines(t: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
-    return np.stack([np.interp(at, t, column) for column in y.T], axis=1)
-
-
-def _is_estimated(error: ErrorEstimate | None) -> bool:
-    return error is not None and error.until_s > 0
-
-
-def _error_at(error: ErrorEstimate | None, t: np.ndarray) -> np.ndarray:
-    """The estimated error up to the next time of the estimate, (k,); inf after it is resolved."""
-    assert error is not None
-    later = np.searchsorted(error.t, t * (1 - _SAME)).clip(max=len(error.t) - 1)
-    return np.where(t * (1 - _SAME) <= error.until_s, error.error[later], inf)
+def _quintic(
+    known: np.ndarray, points: np.ndarray, i: np.ndarray, j: np.ndarray, t: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """q, v and a at times t of the quintics between samples i and j, each (k, n)."""
+    c = hermite(known[j] - known[i], np.concatenate([points[i], points[j]], axis=1))
+    return polynomial(c, (t - known[i])[:, None])
