@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.cli import report
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estimate
+from tests.campaigns.estimates.switching import scene_of_all
 from tests.long import long
 
 DOUBLE = rd.load("planar_2r")
@@ -132,6 +136,39 @@ def test_a_long_adaptive_run_of_chaos_is_not_resolved() -> None:
     assert run.error.until_s < 20.0
     assert "take rtol = 1e-06" in run.error.note
     assert run.error.at(run.error.until_s) <= 0.1 and run.error.largest == np.inf
+
+
+def test_a_run_whose_estimate_ends_early_has_no_finite_error() -> None:
+    """30 s of a chaotic arm: the estimate ends near 0.1 rad at 20 s, and the end of the run is off by radians."""
+    run = rd.simulate(rd.load("planar_2r"), [-1.2, 2.0], [3.0, -2.0], duration_s=30.0)
+    exact = rd.simulate(
+        rd.load("planar_2r"), [-1.2, 2.0], [3.0, -2.0], duration_s=30.0,
+        integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False,
+    )  # fmt: skip
+    assert run.error is not None and run.error.note
+    assert np.abs(run.q[-1] - exact.q[-1]).max() > 1 > run.error.at(run.error.until_s)
+    assert run.error.until_s < run.t[-1] and run.error.largest == np.inf == run.error.at(run.t[-1])
+    assert report.run(run)["error_largest"] == np.inf
+
+
+def test_the_estimate_at_a_time_is_the_largest_up_to_it() -> None:
+    t, error = np.array([0.0, 0.1, 0.2, 0.3]), np.array([0.0, 1e-9, 1e-9, 4e-9])
+    whole, early = ErrorEstimate(t, error, 0.3), ErrorEstimate(t, error, 0.2, note="companions differ")
+    assert whole.largest == whole.at(0.3) == 4e-9 and early.largest == np.inf
+    np.testing.assert_array_equal(early.at([0.0, 0.05, 0.1, 0.15, 0.2, 0.21]), [0, 1e-9, 1e-9, 1e-9, 1e-9, np.inf])
+    assert whole.at(3 * 0.1) == 4e-9  # one unit after 0.3
+    assert np.isnan(whole.at([-0.1, np.nan])).all() and whole.at(np.zeros((2, 3))).shape == (2, 3)
+    none = no_estimate("it ended in its first step")
+    assert none.largest == none.at(0.0) == np.inf
+    with pytest.raises(QueryError, match="t must be a time in seconds"):
+        whole.at(["soon"])
+
+
+@pytest.mark.parametrize("index", range(8))
+def test_the_largest_error_is_finite_where_the_estimate_holds_to_the_end_of_the_run(index: int) -> None:
+    run = rd.simulate(scene_of_all(5, index).setup)
+    assert run.error is not None
+    assert np.isfinite(run.error.largest) == (run.error.until_s >= run.t[-1] * (1 - 1e-12)), str(run.error)
 
 
 def test_rounding_alone_is_not_an_error_of_the_method() -> None:

@@ -133,10 +133,10 @@ def difference(a: Trajectory, b: Trajectory, tolerance: float = TOLERANCE) -> Di
             return np.full(len(t), max(tolerance, floor))
         return np.maximum(_MARGIN * (a.error.at(t) + b.error.at(t)), floor)
 
-    alone = [_not_among(run.t, at, common) for run, at, common in ((a, inside[0], i), (b, inside[1], j))]
-    stretches = np.intersect1d(*(np.searchsorted(a.t[i], run.t[at]) for run, at in zip((a, b), alone, strict=True)))
+    alone_a, alone_b = _not_among(a.t, inside[0], i), _not_among(b.t, inside[1], j)
+    stretches = np.intersect1d(np.searchsorted(a.t[i], a.t[alone_a]), np.searchsorted(a.t[i], b.t[alone_b]))
     parts = [(a.t[i], b.q[j] - a.q[i], np.zeros(len(i)))]
-    for run, at, other, sign in ((a, alone[0], b, 1), (b, alone[1], a, -1)):
+    for run, at, other, sign in ((a, alone_a, b, 1), (b, alone_b, a, -1)):
         at = at[np.isin(np.searchsorted(a.t[i], run.t[at]), stretches)]
         q, between = _interpolated(other, run.t[at])
         limit = allowed(run.t[at])
@@ -152,7 +152,7 @@ def difference(a: Trajectory, b: Trajectory, tolerance: float = TOLERANCE) -> Di
         is_common=order < len(i),
         bound=(allowed(t) + between)[order],
         interpolation=float(between.max(initial=0.0)),
-        fraction=_fraction(start, end, t[order], *(run.t[at] for run, at in zip((a, b), alone, strict=True))),
+        fraction=_fraction(start, end, t[order], a.t[alone_a], b.t[alone_b]),
         estimated=estimated,
     )  # fmt: skip
 
