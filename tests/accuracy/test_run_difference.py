@@ -11,11 +11,11 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations.errors import QueryError
+from tests.campaigns.run_pairs import one_motion, two_motions
 from tests.cli.test_command_documents import names, promised
 from tests.command import document
 from tests.command import run as ran
 from tests.long import long
-from tests.studies.run_pairs import one_motion, two_motions
 
 DAMPING, SPEED, DURATION = 0.8, 1.3, 0.5
 FREE = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
@@ -177,7 +177,7 @@ def test_an_event_that_no_run_names_does_not_part_one_motion(order: int) -> None
 
 @pytest.mark.parametrize("index", [0, 2, 4, 7, 17, *long([1, 3, 6, 8, 19, 20, 22, 23])])
 def test_pairs_of_one_motion_do_not_part_and_pairs_that_differ_by_ten_times_their_errors_do(index: int) -> None:
-    """Scenes of `run_pairs`; the whole campaign is `python -m tests.studies.run_pairs`."""
+    """Scenes of `run_pairs`; the whole campaign is `python -m tests.campaigns.run_pairs`."""
     one, two = one_motion(7, index), two_motions(7, index)
     assert one is not None and not one.parted, str(one)
     assert two is not None and two.parted, str(two)

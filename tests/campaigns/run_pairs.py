@@ -1,4 +1,4 @@
-"""`python -m tests.studies.run_pairs --pairs 200 --seed 1`: pairs of runs, compared; exit code 1 if a law is broken.
+"""`python -m tests.campaigns.run_pairs --pairs 200 --seed 1`: pairs of runs, compared; exit code 1 if a law is broken.
 
 Pairs of one motion, recorded at different periods: none parts. Pairs whose motions differ by ten times the larger of
 their estimated errors: at least 99 % part where they are recorded at one period, and of those recorded at two where
