@@ -72,8 +72,7 @@ class Linearisation(Answer, Value):
 
     def blocks(self) -> Iterator[Block]:
         others = self.state_names[2 * len(self.q) :]
-        x = "δx" if others else "(δq, δv)"
-        yield f"d/dt {x} = A {x} + B δu: A {self.A.shape}, B {self.B.shape}"
+        yield f"d/dt {(x := 'δx' if others else '(δq, δv)')} = A {x} + B δu: A {self.A.shape}, B {self.B.shape}"
         if others:
             yield f"x = (q, v, {', '.join(others)})"
         found = [x for x in np.linalg.eigvals(self.A).tolist() if complex(x).imag >= 0]
@@ -133,7 +132,8 @@ def linearise(
         )
     A, B = np.zeros((2 * n + size, 2 * n + size)), np.zeros((2 * n + size, n))
     A[:n, n : 2 * n], A[n:], B[n:] = np.eye(n), slopes.values[:, :-n], slopes.values[:, -n:]
-    return Linearisation(A, B, rates.state_names, rates.input_names, *rates.parts(x), float(t))
+    q, v, z, u = rates.parts(x)
+    return Linearisation(A, B, rates.state_names, rates.input_names, q, v, z, u, float(t))
 
 
 @final
