@@ -80,12 +80,17 @@ def spline(t: np.ndarray, q: np.ndarray, *, at_rest: bool = False) -> tuple[np.n
         coefficients = np.stack(terms, axis=1) / unit ** np.arange(degree + 1)[:, None]
         missed = float(np.abs(curve(s) - q).max())
     except (ValueError, np.linalg.LinAlgError):  # steps or samples that overflow, or vanish next to others
-        coefficients, missed = np.array(np.nan), np.nan
+        raise _without_spline(t, q, degree) from None
     if not (np.isfinite(coefficients).all() and missed <= _MISSED * float(np.abs(q).max())):
-        steps = np.diff(t)
-        raise ControlError(
-            f"no spline of degree {degree} passes through the samples in floating point: times are {steps.min():.3g} to"
-            f" {steps.max():.3g} s apart, and positions up to {np.abs(q).max():.3g}; leave out samples that nearly"
-            " coincide, and check the units"
-        )
+        raise _without_spline(t, q, degree)
     return t[inside], coefficients
+
+
+def _without_spline(t: np.ndarray, q: np.ndarray, degree: int) -> ControlError:
+    """The error of samples that no spline passes through in floating point."""
+    steps = np.diff(t)
+    return ControlError(
+        f"no spline of degree {degree} passes through the samples in floating point: times are {steps.min():.3g} to"
+        f" {steps.max():.3g} s apart, and positions up to {np.abs(q).max():.3g}; leave out samples that nearly"
+        " coincide, and check the units"
+    )
