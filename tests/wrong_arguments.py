@@ -249,6 +249,7 @@ def examples(folder: Path) -> dict[str, Example]:
              "about": {"note": "text"}, "engine": "interpreted"},
         ),
         "Spring": (rd.effects.Spring, {"stiffness": 2.0, "rest": [0.1, -0.2]}),
+        "Layer": (rd.effects.Layer, {"joint": 1, "width": 0.01, "level": 0.5, "of_velocity": True}),
         "Threshold": (
             rd.effects.Threshold,
             {"joint": 1, "level": 0.5, "name": "stop", "rising": "touched", "falling": "left", "of_velocity": True},

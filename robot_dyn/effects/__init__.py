@@ -6,7 +6,7 @@
     drives             EffortLimit, ActuatorLag, SeriesElastic, RigidBacklash
     loads              ExternalWrench, CarriedPayload
     to write one       Conservative, Dissipative, Active, Bound, Stateful, Drive, SetValued: base classes of Effect
-                       coefficient, Threshold: what an effect declares; Dynamics: what it is called with
+                       coefficient, Threshold, Layer: what an effect declares; Dynamics: what it is called with
     about them         Plant, EquationOfMotion, Force, Hold, Interval, Mode
 
 docs/developers/extending.md writes an effect step by step; robot_dyn/effects/README.md lists its files.

@@ -33,6 +33,7 @@ from robot_dyn.effects.set_valued import SetValued as SetValued
 from robot_dyn.effects.spring import Spring as Spring
 from robot_dyn.effects.wrench import ExternalWrench as ExternalWrench
 from robot_dyn.foundations.coefficients import coefficient as coefficient
+from robot_dyn.foundations.threshold import Layer as Layer
 from robot_dyn.foundations.threshold import Threshold as Threshold
 from robot_dyn.queries.dynamics import Dynamics as Dynamics
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, final
 
 import numpy as np
@@ -50,6 +51,12 @@ class DryFriction(SetValued):
         if self.stribeck_velocity is not None and self.static is None:
             raise EffectError("stribeck_velocity: has no effect without static, the static friction; give both")
         require("static must not be less than level", np.greater_equal, self.static, self.level)
+
+    @property
+    def widths(self) -> tuple[Any, Any]:
+        if self.static is None or self.stribeck_velocity is None:
+            return inf, inf
+        return inf, np.where(np.greater(self.static, self.level), self.stribeck_velocity, inf)
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         direction = np.sign(v) if self._direction is None else self._direction

@@ -19,7 +19,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import check_coefficients, declared
 from robot_dyn.foundations.errors import EffectError, QueryError
-from robot_dyn.foundations.threshold import Threshold, smooth
+from robot_dyn.foundations.threshold import Layer, Threshold, smooth
 from robot_dyn.foundations.validate import rows
 from robot_dyn.foundations.values import Value
 from robot_dyn.queries.dynamics import Dynamics
@@ -96,10 +96,20 @@ class Effect(Value):
     def widths(self) -> tuple[Any, Any]:
         """Changes in q and in v over which the torque bends, each a scalar or (n,); inf where it is smooth.
 
-        Implicit methods compute the Jacobian from differences within these changes. Where v reverses through such a
-        layer around 0 within a few steps, error estimates do not rely on the order of the method.
+        Implicit methods compute the Jacobian from differences within these changes. The change in v is also the width
+        of a layer around v = 0, see `layers`.
         """
         return inf, inf
+
+    def layers(self, n: int) -> tuple[Layer, ...]:
+        """Return the layers in which a smooth torque or rate bends, on an arm with n joints.
+
+        Error estimates do not rely on the order of the method after a step that crosses much of a layer. By default
+        the layers are those around v = 0 with the widths of `widths`. Override this method for layers of positions or
+        states, or around other velocities.
+        """
+        width = np.broadcast_to(self.widths[1], n)
+        return tuple(Layer(i, float(width[i]), of_velocity=True) for i in range(n) if width[i] < inf)
 
 
 class Force(Effect, ABC):

@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.effects.effect import Active, Stateful, require
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import coefficient
-from robot_dyn.foundations.threshold import Threshold
+from robot_dyn.foundations.threshold import Layer, Threshold
 from robot_dyn.queries.dynamics import Dynamics
 
 _SLOW = 1e-6  # of v_s: no digit depends on reversals of slower motion
@@ -28,12 +28,20 @@ class Bristles(Stateful):
     """Friction with one state for each joint: the deflection z of bristles of stiffness σ, which store ½ σ z²."""
 
     bristle_stiffness: Any
+    coulomb: Any
 
     def state_size(self, n: int) -> int:
         return n
 
     def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
         return (self.bristle_stiffness * z**2 / 2).sum(axis=-1)
+
+    def layers(self, n: int) -> tuple[Layer, ...]:
+        """Return the layers of the velocity, and for each joint the deflection f_c/σ over which bristles give way."""
+        stiffness, sliding = (np.broadcast_to(x, n) for x in (self.bristle_stiffness, self.coulomb))
+        joints = np.flatnonzero(stiffness > 0).tolist()
+        bending = tuple(Layer(i, float(sliding[i] / stiffness[i]), level=None, state=i) for i in joints)
+        return tuple(layer for layer in super().layers(n) if layer.joint in joints) + bending
 
     def reversals(self, slack: Any, n: int) -> tuple[Threshold, ...]:
         """Where the velocity of a joint with bristles reverses, passed by the slack, (n,)."""
@@ -78,7 +86,7 @@ class LuGreFriction(Bristles, Active):
 
     @property
     def widths(self) -> tuple[Any, Any]:
-        return inf, self.stribeck_velocity
+        return inf, np.where(np.greater(self.breakaway, self.coulomb), self.stribeck_velocity, inf)
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         return self.reversals(_SLOW * np.asarray(self.stribeck_velocity), n)

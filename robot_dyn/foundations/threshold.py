@@ -1,4 +1,4 @@
-"""Levels at which an effect, or a controller, switches from one smooth formula to another."""
+"""Levels at which an effect, or a controller, switches between smooth formulas, and layers within which it bends."""
 
 from __future__ import annotations
 
@@ -57,6 +57,40 @@ class Threshold:
     def own(self) -> bool:
         """Whether it is of what belongs to its effect, and of no coordinate, which effects share."""
         return self.of_actuation or self.state is not None
+
+
+@final
+@dataclass(frozen=True)
+class Layer:
+    """A range of a coordinate of a joint, or of a state of an effect, over which a smooth formula bends.
+
+    Attributes:
+        joint: Index of the joint.
+        width: Change of the coordinate over which the formula bends, positive, in its unit.
+        level: The middle of the layer, in the unit of the coordinate; None if the formula bends everywhere.
+        of_velocity: True for a layer of the velocity of the joint.
+        state: Index of the state of the effect that passes the layer; None for a coordinate of the joint.
+
+    Raises:
+        EffectError: If an attribute has another type, the width is not positive, or the layer has two coordinates.
+    """
+
+    joint: int
+    width: float
+    level: float | None = 0.0
+    of_velocity: bool = False
+    state: int | None = None
+
+    def __post_init__(self) -> None:
+        integer("joint", self.joint, most=_MOST, error=EffectError)
+        object.__setattr__(self, "width", number("width", self.width, above=0, error=EffectError))
+        if self.level is not None:
+            object.__setattr__(self, "level", number("level", self.level, error=EffectError))
+        if self.state is not None:
+            integer("state", self.state, most=_MOST, error=EffectError)
+        truth("of_velocity", self.of_velocity, error=EffectError)
+        if self.of_velocity and self.state is not None:
+            raise EffectError("a layer is of the velocity of a joint or of a state, not of both")
 
 
 def smooth(self: object, n: int = 0) -> tuple[Threshold, ...]:

@@ -73,6 +73,7 @@ def values() -> dict[str, Any]:
     )  # fmt: skip
     made = [
         rd.Event(height), rd.effects.Threshold(0, 0.5, "upper stop", "touched", "left"),
+        rd.effects.Layer(0, 0.01, of_velocity=True),
         rd.integrate.Adaptive(), rd.accuracy.Ball(100), rd.compare(ARM, samples=2), rd.Payload("tip", 1.0), ARM,
         rd.Lagrangian(ARM), plant,
         rd.control.PD(PLAN, [1.0, 2.0], 1.0), rd.control.PID(PLAN, 1.0, 1.0, 1.0),

@@ -12,10 +12,12 @@ from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
 from robot_dyn.effects.effect import Active
+from robot_dyn.foundations.arithmetic import tanh
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.results import provenance as origin
 from robot_dyn.simulation.results.error_estimate import Verdict
 from tests.campaigns.estimates.judge import FAR, LEAST, MOST, judge
+from tests.campaigns.estimates.layers import judge_layer, slide, slider_truth
 from tests.campaigns.estimates.scenes import FAMILIES, arms
 from tests.campaigns.estimates.switching import scene_of_all
 from tests.campaigns.estimates.truth import truth
@@ -137,6 +139,75 @@ def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None
     assert judged.run.error.verdict is Verdict.ORDER, str(judged)
     assert "rounding" not in judged.run.error.note
     assert LEAST <= judged.ratio <= FAR, str(judged)
+
+
+@pytest.mark.parametrize(
+    ("method", "step", "friction", "motion"),
+    [
+        ("rk4", 0.001005, (4.44688, 11.37734, 0.01183), (-0.99752, -1.26294, 0.662, 89.49589)),  # 0.023 of the error
+        ("rk4", 0.003, (10.6, 16.0, 0.0116), (-0.6, -1.5, 0.7, 50.0)),  # 0.011
+        ("midpoint", 0.003249, (6.21, 14.05, 0.0075), (-0.344, -1.474, 0.41, 52.4)),  # 0.095
+    ],
+)
+def test_a_layer_that_few_steps_cross_shows_no_order(method, step, friction, motion) -> None:
+    """Stribeck's curve behind a reversal, crossed in a step or two: companions agree by chance on a false error."""
+    run, ratio = slid(method, step, friction, motion)
+    assert run.error.verdict is Verdict.BOUND
+    assert ratio >= LEAST
+
+
+def test_steps_that_resolve_a_layer_show_the_order_by_shorter_ones() -> None:
+    """Five times as long steps cross the layer at once, and agreed by chance on 0.24 of the error."""
+    judged = judge_layer(2, 40)
+    assert judged.run.error.verdict is Verdict.ORDER
+    assert judged.ratio == pytest.approx(1.0, rel=0.1)
+
+
+@dataclass(frozen=True, eq=False)
+class SoftStep(Active):
+    """A force that rises over a short way, in a class of a user's own."""
+
+    level: float
+    width: float
+    declares: bool
+
+    def thresholds(self, n: int) -> tuple[rd.effects.Threshold, ...]:
+        return ()
+
+    def layers(self, n: int) -> tuple[rd.effects.Layer, ...]:
+        return (rd.effects.Layer(0, self.width, self.level),) if self.declares else ()
+
+    def torque(self, dynamics, t, q, v):
+        return -(1 + tanh((q - self.level) / self.width))
+
+
+@pytest.mark.parametrize("level", [0.337, 0.397])
+def test_an_effect_of_a_user_declares_its_layer(level: float) -> None:
+    """1 kg at 1 m/s, and steps of 10 mm over a rise of 2 mm: undeclared, companions agree on less than the error."""
+    width, found = 0.002, []
+    for declares in (False, True):
+        plant = rd.Plant(RAIL, [SoftStep(level, width, declares)])
+        found.append(
+            rd.simulate(plant, [0.0], [1.0], duration_s=0.9, integrator="rk4", step_s=0.01, engine="interpreted")
+        )
+    exact = solve_ivp(
+        lambda t, y: [y[1], -(1 + np.tanh((y[0] - level) / width))],
+        (0, 0.9), [0.0, 1.0], "DOP853", found[0].t, rtol=1e-13, atol=1e-15, max_step=1e-3,
+    )  # fmt: skip
+    error = np.abs(found[0].q[:, 0] - exact.y[0]).max()
+    assert [run.error.verdict for run in found] == [Verdict.ORDER, Verdict.BOUND]
+    assert found[0].error.final < LEAST * error < found[1].error.final
+    assert "layer" in found[1].error.reason
+
+
+def slid(method: str, step: float, friction, motion) -> tuple[rd.Trajectory, float]:
+    """The run of a block with Stribeck's friction, and its estimate over its true error."""
+    level, static, speed = friction
+    q, v, duration, stiffness = motion
+    rubs = rd.effects.DryFriction(level, static=static, stribeck_velocity=speed)
+    setup = slide(step, q, v, duration, stiffness, rubs, method)
+    run = rd.simulate(setup)
+    return run, run.error.final / float(np.abs(run.q - slider_truth(setup, run.t)).max())
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,8 @@
 """Where the right-hand side of a run is smooth, and where it may not be.
 
-A method of order p converges with order p only where f has p derivatives. Thresholds at which no step ends, dry
-friction whose layer |v| < v_s is crossed within a step, and parts that do not declare where they switch may have kinks
-between the ends of steps. [Hairer, Nørsett, Wanner 1993, II.6]
+A method of order p converges with order p only where f has p derivatives. Thresholds at which no step ends, and parts
+that do not declare where they switch, may have kinks between the ends of steps. A thin layer, in which f bends, acts as
+a kink on steps that cross much of it. [Hairer, Nørsett, Wanner 1993, II.6]
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.run.recording import Path
     from robot_dyn.simulation.setup.setup import Setup
 
-_IN_LAYER = 4  # steps within |v| < v_s that show a method's order
+_MOST_CROSSED = 1.0  # widths of a layer, in a step that shows a method's order
+_REACH = 3.0  # widths from the middle of a layer: 1 − tanh 3 = 0.005, exp(−3²) = 1e-4
 _NEAR_LIMIT = 0.95  # of a level of the actuation
 LOOKS = 4000  # between steps, at parts that do not declare where they switch
 _LOOKS = 300  # states at which the actuation is computed
@@ -52,7 +53,7 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> Kink:
     found = [(np.inf, "")]
     if not setup.integrator.controls_error:
         found += _passed(setup, equation, path, q, v)
-        found += _reversed(setup, path, v)
+        found.append(first_crossing(equation, path))
     if not setup.finds_events:
         found.append(_saturation(setup, equation, path, q, v))
     return min(found)
@@ -77,15 +78,33 @@ def _passed(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v:
             yield _first(path.t, happens[:, None], f"{name!r} passes its {each.name} within a step")
 
 
-def _reversed(setup: Setup, path: Path, v: np.ndarray) -> Iterator[Kink]:
-    """When joints reverse within a few steps where a torque bends about v = 0, and no step ends."""
-    n, steps = v.shape[1], np.diff(path.key)[:, None] if (path.key >= 0).all() else 1
-    for effect in setup.plant.effects:
-        cut = [each.joint for each in effect.thresholds(n) if each.of_velocity]
-        layer = np.broadcast_to(effect.widths[1], n).copy()
-        layer[cut] = np.inf
-        happens = (v[:-1] * v[1:] <= 0) & (np.abs(np.diff(v, axis=0)) * _IN_LAYER > layer * steps)
-        yield _first(path.t, happens, f"{effect.name} reverses within a few steps")
+def first_crossing(equation: StateEquation, path: Path, pace: float = 1.0) -> Kink:
+    """Return the time in [s] from which steps cross a layer of an effect too fast, and why; inf and "" if none does.
+
+    Args:
+        equation: The state equation.
+        path: States of a run or of a companion, step by step.
+        pace: Length of its steps, in steps of the run.
+    """
+    n, states = equation.plant.dynamics.n, equation.equation_of_motion.states
+    q, v = path.y[:, :n], equation.velocities(path.y)
+    z = path.y[:, 2 * n + equation.state_size :]
+    steps = np.maximum(1.0, np.diff(path.key) / pace) if (path.key >= 0).all() else 1.0
+    found = [(np.inf, "")]
+    for k, effect in enumerate(equation.plant.effects):
+        for layer in effect.layers(n):
+            if layer.state is not None:
+                x = z[:, states[k].start + layer.state]
+            else:
+                x = (v if layer.of_velocity else q)[:, layer.joint]
+            happens = np.abs(np.diff(x)) > _MOST_CROSSED * layer.width * steps
+            if layer.level is not None:
+                off = x - layer.level
+                near = np.minimum(np.abs(off[:-1]), np.abs(off[1:])) < _REACH * layer.width
+                happens &= near | (off[:-1] * off[1:] <= 0)
+            name = equation.plant.dynamics.joint_names[layer.joint]
+            found.append(_first(path.t, happens[:, None], f"{name!r} crosses a layer of {effect.name} in a few steps"))
+    return min(found)
 
 
 def cubics(t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

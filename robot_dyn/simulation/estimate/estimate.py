@@ -18,7 +18,7 @@ from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.diagnostics.missed_events import cut_alike, stepped_over
 from robot_dyn.simulation.diagnostics.stiffness import damped_oscillation
-from robot_dyn.simulation.dynamics.smoothness import first_kink
+from robot_dyn.simulation.dynamics.smoothness import first_crossing, first_kink
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.estimate.verdicts import (
     COARSE,
@@ -88,10 +88,14 @@ def _by_steps(
         )
     result = no_estimate("fewer than 3 steps between ticks, switches or breaks")
     if turn < _FAR_TURN and min(each.steps for each in setup.segments) >= LEAST_STEPS:
-        paths = {pace: companion(pace, setup).shared for pace in COARSE}
+        longer = {pace: companion(pace, setup) for pace in COARSE}
+        paths = {pace: recording.shared for pace, recording in longer.items()}
         magnified = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
-        result = magnified.from_longer_steps(paths, method.order)
-        if result.until_s >= estimated.path.t[-1] and not estimated.doubts(result, paths, method.order):
+        crossed = min(first_crossing(setup.equation, longer[pace].step_log, float(pace))[0] for pace in COARSE)
+        result = replace(magnified, kink=min(crossed, estimated.kink)).from_longer_steps(paths, method.order)
+        end = estimated.path.t[-1]
+        resolved = result.until_s >= end and (crossed > end or estimated.kink <= end)
+        if resolved and not estimated.doubts(result, paths, method.order):
             return result
     half = companion(FINE[0], setup).shared
     if result.until_s > 0 and estimated.lost_at(half) < _GAIN * result.until_s:

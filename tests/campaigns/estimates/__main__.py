@@ -4,6 +4,7 @@ Or if the order is said to be seen, and the estimate is not 0.3 to 10 of the err
 
 With `--held`: scenes of dry friction and rigid stops with an accuracy that is asked for; exit code 1 if one is missed.
 With `--requests 400`: smooth ones likewise; exit code 1 if one is missed, or refused although a run was good enough.
+With `--layers 400`: a joint on a spring that rubs in a thin layer, or on bristles; judged as the random scenes.
 """
 
 from __future__ import annotations
@@ -12,18 +13,20 @@ import argparse
 import sys
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from statistics import fmean
 
 from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError
 from tests.campaigns.estimates.asked import Answer, answer
 from tests.campaigns.estimates.held import FAMILIES, meet
 from tests.campaigns.estimates.judge import FAR, LEAST, MOST, judge
+from tests.campaigns.estimates.layers import judge_layer
 from tests.campaigns.estimates.switching import scene_of_all
 
 
-def one(task: tuple[int, int]) -> dict:
-    """What came of one scene, as plain values."""
-    judged = judge(*task, scene_of_all)
+def one(task: tuple[int, int], layers: bool = False) -> dict:
+    """Judge the estimate of one scene; return plain values."""
+    judged = judge_layer(*task) if layers else judge(*task, scene_of_all)
     statistics = judged.run.statistics
     return {
         "text": str(judged), "family": judged.scene.family, "misleads": judged.misleads, "ratio": judged.ratio,
@@ -41,15 +44,18 @@ def main() -> int:
     parser.add_argument("--show", action="store_true", help="print every scene")
     parser.add_argument("--held", action="store_true", help="scenes of dry friction and rigid stops")
     parser.add_argument("--requests", type=int, default=0)
+    parser.add_argument("--layers", type=int, default=0, help="scenes of a joint that crosses a thin layer")
     options = parser.parse_args()
     if options.held:
         return _held(options.scenes, options.seed, options.show)
-    numbers = range(options.first, options.first + (options.requests or options.scenes))
+    numbers = range(options.first, options.first + (options.requests or options.layers or options.scenes))
     if options.requests:
         return _requests([(options.seed, i) for i in numbers], options.processes, options.show)
     found = []
     with ProcessPoolExecutor(options.processes) as pool:
-        for each in pool.map(one, [(options.seed, i) for i in numbers], chunksize=4):
+        for each in pool.map(
+            partial(one, layers=options.layers > 0), [(options.seed, i) for i in numbers], chunksize=4
+        ):
             found.append(each)
             each["off"] = each["verdict"] == "order seen" and not LEAST <= each["ratio"] <= FAR
             if options.show or each["misleads"] or each["off"]:
