@@ -37,11 +37,10 @@ class Bristles(Stateful):
         return (self.bristle_stiffness * z**2 / 2).sum(axis=-1)
 
     def layers(self, n: int) -> tuple[Layer, ...]:
-        """Return the layers of the velocity, and for each joint the deflection f_c/σ over which bristles give way."""
+        """Return the deflection f_c/σ over which the bristles of each joint give way."""
         stiffness, sliding = (np.broadcast_to(x, n) for x in (self.bristle_stiffness, self.coulomb))
         joints = np.flatnonzero(stiffness > 0).tolist()
-        bending = tuple(Layer(i, float(sliding[i] / stiffness[i]), level=None, state=i) for i in joints)
-        return tuple(layer for layer in super().layers(n) if layer.joint in joints) + bending
+        return tuple(Layer(i, float(sliding[i] / stiffness[i]), level=None, state=i) for i in joints)
 
     def reversals(self, slack: Any, n: int) -> tuple[Threshold, ...]:
         """Where the velocity of a joint with bristles reverses, passed by the slack, (n,)."""
@@ -87,6 +86,14 @@ class LuGreFriction(Bristles, Active):
     @property
     def widths(self) -> tuple[Any, Any]:
         return inf, np.where(np.greater(self.breakaway, self.coulomb), self.stribeck_velocity, inf)
+
+    def layers(self, n: int) -> tuple[Layer, ...]:
+        """Return the layers of the deflection, and of the velocity: the change of v by which g changes by about f_c."""
+        falls = np.broadcast_to((self.breakaway - self.coulomb) / self.coulomb, n)
+        speed, deflections = np.broadcast_to(self.stribeck_velocity, n), super().layers(n)
+        joints = [layer.joint for layer in deflections if falls[layer.joint] > 0]
+        widths = {i: float(speed[i] / min(falls[i], 1.0)) for i in joints}
+        return deflections + tuple(Layer(i, width, of_velocity=True) for i, width in widths.items())
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
         return self.reversals(_SLOW * np.asarray(self.stribeck_velocity), n)

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from robot_dyn.simulation.run.recording import Path
     from robot_dyn.simulation.setup.setup import Setup
 
-_MOST_CROSSED = 1.0  # widths of a layer, in a step that shows a method's order
+_MOST_CROSSED = 1.0  # widths of a layer, in a step of a companion that shows a method's order
+_THIRDS = 3  # of a step: the steps of the shortest companion
 _REACH = 3.0  # widths from the middle of a layer: 1 − tanh 3 = 0.005, exp(−3²) = 1e-4
 _NEAR_LIMIT = 0.95  # of a level of the actuation
 LOOKS = 4000  # between steps, at parts that do not declare where they switch
@@ -53,7 +54,7 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> Kink:
     found = [(np.inf, "")]
     if not setup.integrator.controls_error:
         found += _passed(setup, equation, path, q, v)
-        found.append(first_crossing(equation, path))
+        found.append(first_crossing(equation, path, parts=_THIRDS))
     if not setup.finds_events:
         found.append(_saturation(setup, equation, path, q, v))
     return min(found)
@@ -78,13 +79,14 @@ def _passed(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v:
             yield _first(path.t, happens[:, None], f"{name!r} passes its {each.name} within a step")
 
 
-def first_crossing(equation: StateEquation, path: Path, pace: float = 1.0) -> Kink:
+def first_crossing(equation: StateEquation, path: Path, pace: float = 1.0, parts: int = 1) -> Kink:
     """Return the time in [s] from which steps cross a layer of an effect too fast, and why; inf and "" if none does.
 
     Args:
         equation: The state equation.
         path: States of a run or of a companion, step by step.
         pace: Length of its steps, in steps of the run.
+        parts: The number of equal parts into which each step is divided.
     """
     n, states = equation.plant.dynamics.n, equation.equation_of_motion.states
     q, v = path.y[:, :n], equation.velocities(path.y)
@@ -97,7 +99,7 @@ def first_crossing(equation: StateEquation, path: Path, pace: float = 1.0) -> Ki
                 x = z[:, states[k].start + layer.state]
             else:
                 x = (v if layer.of_velocity else q)[:, layer.joint]
-            happens = np.abs(np.diff(x)) > _MOST_CROSSED * layer.width * steps
+            happens = np.abs(np.diff(x)) > _MOST_CROSSED * layer.width * steps * parts
             if layer.level is not None:
                 off = x - layer.level
                 near = np.minimum(np.abs(off[:-1]), np.abs(off[1:])) < _REACH * layer.width

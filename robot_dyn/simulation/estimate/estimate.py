@@ -93,8 +93,7 @@ def _by_steps(
         magnified = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
         crossed = min(first_crossing(setup.equation, longer[pace].step_log, float(pace))[0] for pace in COARSE)
         result = replace(magnified, kink=min(crossed, estimated.kink)).from_longer_steps(paths, method.order)
-        end = estimated.path.t[-1]
-        resolved = result.until_s >= end and (crossed > end or estimated.kink <= end)
+        resolved = min(result.until_s, crossed) >= estimated.path.t[-1]
         if resolved and not estimated.doubts(result, paths, method.order):
             return result
     half = companion(FINE[0], setup).shared
