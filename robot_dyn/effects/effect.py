@@ -108,7 +108,7 @@ class Effect(Value):
         the layers are those around v = 0 with the widths of `widths`. Override this method for layers of positions or
         states, or around other velocities.
         """
-        width = np.broadcast_to(self.widths[1], n)
+        width = np.maximum(np.broadcast_to(self.widths[1], n), np.finfo(float).tiny)  # 0 is a kink: any step crosses it
         return tuple(Layer(i, float(width[i]), of_velocity=True) for i in range(n) if width[i] < inf)
 
 

@@ -121,7 +121,11 @@ def _until_reversal(rate: Rate, way: float, t: float, y, end: float, times, resu
         assert first.status != "failed", f"at t = {first.t}"
         if way * first.y[1] < 0:
             dense, before = first.dense_output(), first.t_old
-            root = brentq(lambda s: dense(s)[1], before, first.t, xtol=1e-16) if way * dense(before)[1] > 0 else before
+            root = (
+                brentq(lambda s, dense=dense: dense(s)[1], before, first.t, xtol=1e-16)
+                if way * dense(before)[1] > 0
+                else before
+            )
             last = DOP853(rate, before, dense(before), root, rtol=tolerance, atol=tolerance / 10)
         until = first.t if last is None else last.t_bound
         inside = (times > first.t_old) & (times <= until)
