@@ -228,7 +228,10 @@ def run_values(run: Any) -> tuple[Values, Texts]:
     remarks = sorted((str(x.kind), x.joint, x.quantity, x.value) for x in run.remarks)
     values["values of remarks"] = np.array([x[3] for x in remarks], float)
     if run.error is not None:
-        values |= {"error": np.array([run.error.final]), "resolved until": np.array([run.error.resolved_until])}
+        values |= {
+            "error": np.array([run.error.at(run.error.until_s)]),
+            "resolved until": np.array([run.error.until_s]),
+        }
     texts = {
         "ending": str(run.outcome.ending),
         "method": run.statistics.method,

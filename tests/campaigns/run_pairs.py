@@ -2,8 +2,8 @@
 
 Pairs of one motion, recorded at different periods: none parts. Pairs whose motions differ by ten times the larger of
 their estimated errors: at least 99 % part where they are recorded at one period, and of those recorded at two where
-the comparison is conclusive. Scenes are those of `tests.campaigns.estimates`: smooth motion, dry and regularised friction,
-impacts, stops, bristles, sampled control, windows of force.
+the comparison is conclusive. Scenes are those of `tests.campaigns.estimates`: smooth motion, dry and regularised
+friction, impacts, stops, bristles, sampled control, windows of force.
 """
 
 from __future__ import annotations
