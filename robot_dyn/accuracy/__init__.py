@@ -1,4 +1,4 @@
-"""Accuracy: what it costs in time, how many digits are true, and how far two runs are apart.
+"""Accuracy: its cost in time, the number of true digits, and the difference of two runs.
 
     work_precision     error against time of every method and of other programs (WorkPrecision)
     certify            true digits of M, C, N, inverse and forward dynamics, against balls (Certificate)

@@ -109,7 +109,7 @@ class RunDifference(Result):
 
     @reported
     def is_conclusive(self) -> bool:
-        """Whether half of the time or more was compared; if not, nothing is said of runs that part nowhere."""
+        """Return True if half of the time or more was compared; otherwise no run is reported equal."""
         return self.fraction >= HALF
 
     @property

@@ -1,4 +1,4 @@
-"""What measured results share: their base, their figure, the writer of their files, versions and times.
+"""The base of measured results, their figure, the writer of their files, versions and times.
 
 result            the base of results: a sentence, tables, what was left out
 figure            the sheet of their figures

@@ -64,7 +64,7 @@ def solid(vertices: ndarray, faces: ndarray, *, allow_overlap: bool = False) -> 
     if closed.overlaps and not allow_overlap:
         named = "; ".join(f"{closed.place(i)} and {closed.place(j)}" for i, j in closed.overlaps[:_NAMED])
         more = f", and {len(closed.overlaps) - _NAMED} more pairs" if len(closed.overlaps) > _NAMED else ""
-        raise MeshError(f"{len(closed.corners)} closed parts, of which some overlap ({named}{more}); {REMEDY}")
+        raise MeshError(f"{len(closed.corners)} closed parts, and some overlap ({named}{more}); {REMEDY}")
     body = _enclosed(closed.corners)
     if body is None:
         return None

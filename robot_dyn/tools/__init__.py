@@ -1,6 +1,6 @@
 """Tools: products of their own, which use the library as a user would.
 
-    doctor   what is wrong in a URDF file, and repairs
+    doctor   faults of a URDF file, and repairs
     motors   plans, and whether the motors suffice for them
     sweeps   many runs of a scene under uncertain parameters
     proof    theorems about where an arm will be

@@ -1,4 +1,4 @@
-"""What a real control loop adds to a controller: delays, rounding, filters, noise, limits.
+"""Parts of a real control loop: delays, rounding, filters, noise, limits.
 
 loop, tick, delay    `Loop`: a controller with delays and blocks, and what happens at each of its ticks
 block                base class of blocks; `Quantisation`, `Noise`, `RateLimit`, `Differences`

@@ -24,7 +24,7 @@ _FAST = 1.5  # times the velocity limit: a step without its turn is no faster
 @final
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """Samples whose whole turns were looked for.
+    """Samples that were searched for whole turns.
 
     Attributes:
         recorded: The samples as they were recorded.

@@ -133,7 +133,7 @@ def linearise(
     A, B = np.zeros((2 * n + size, 2 * n + size)), np.zeros((2 * n + size, n))
     A[:n, n : 2 * n], A[n:], B[n:] = np.eye(n), slopes.values[:, :-n], slopes.values[:, -n:]
     q, v, z, u = rates.parts(x)
-    return Linearisation(A, B, rates.state_names, rates.input_names, q, v, z, u, float(t))
+    return Linearisation(A, B, rates.state_names, rates.input_names, q=q, v=v, z=z, u=u, t=float(t))
 
 
 @final

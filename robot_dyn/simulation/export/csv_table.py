@@ -23,10 +23,10 @@ def write(_: object, columns: Iterable[Column], stream: BinaryIO) -> None:
     lines = csv.writer(text)
     lines.writerow(map(table_cell, table))
     for start in range(0, len(values[0]), _ROWS):
-        lines.writerows(zip(*(_cells(each[start : start + _ROWS]) for each in values), strict=True))
+        lines.writerows(zip(*(_cells(column[start : start + _ROWS]) for column in values), strict=True))
     text.detach()
 
 
 def _cells(column: np.ndarray) -> list[Any]:
     cells = column.tolist()
-    return cells if column.dtype.kind in "fiub" else [table_cell(each) for each in cells]
+    return cells if column.dtype.kind in "fiub" else [table_cell(cell) for cell in cells]

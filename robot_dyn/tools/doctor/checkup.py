@@ -170,7 +170,7 @@ def _examined(text: bytes, source: str, package_dirs: tuple[Path, ...], known: M
     found += [finding for find in _OF_TEXT for finding in find(document)]
     explained = any(each.severity is Severity.ERROR for each in found)
     repairs = [each for each in found if each.changes]
-    if repairs or any(each.startswith(_DECLARATION) for each in document.assumed):  # which is written again
+    if repairs or any(line.startswith(_DECLARATION) for line in document.assumed):  # which is written again
         document = _rewritten(document, repairs)
     still = _refusal(document.text, source)
     if refusal is not None and (still is not None or not explained):
@@ -184,7 +184,7 @@ def _examined(text: bytes, source: str, package_dirs: tuple[Path, ...], known: M
         # shapes may stand elsewhere after the next round of repairs, therefore masses wait for the last one
         missing = [*missing_inertials(document, robot.description, of, known if estimated else None, package_dirs)]
         found += missing
-        if made := [each for each in missing if each.changes]:
+        if made := [finding for finding in missing if finding.changes]:
             document = _rewritten(document, made)
             robot = Robot(description.check(document.text, source))
         found += [*masses.masses(document, robot), *shapes.of_one_density(document, robot, of)]
@@ -192,7 +192,7 @@ def _examined(text: bytes, source: str, package_dirs: tuple[Path, ...], known: M
         found += doubtful
         found += masses.beyond_reach(document, robot, found)
         found += gravity_load.weak_joints(document, robot, found)
-        if made := [each for each in doubtful if each.changes and (units or not each.supposed)]:
+        if made := [finding for finding in doubtful if finding.changes and (units or not finding.supposed)]:
             document = _rewritten(document, made)
     loads = refusal is None and not any(each.kind == "refused" for each in found)
     repaired = None if document is written or document.text == text else document.text
@@ -201,7 +201,7 @@ def _examined(text: bytes, source: str, package_dirs: tuple[Path, ...], known: M
 
 def _gone(before: Iterable[Finding], after: Iterable[Finding]) -> tuple[Finding, ...]:
     """The findings of a text that a later one does not have: of each kind and place as many as are fewer."""
-    left, gone = Counter((each.kind, each.where) for each in after), []
+    left, gone = Counter((finding.kind, finding.where) for finding in after), []
     for finding in before:
         if left[finding.kind, finding.where]:
             left[finding.kind, finding.where] -= 1
@@ -226,7 +226,8 @@ def _without_lines(checkup: Checkup, more: Iterable[Finding]) -> Checkup:
     These are about the xacro file: a check of the repaired file does not find them.
     """
     more = tuple(more)
-    found, gone = ([replace(each, line=None) for each in findings] for findings in (checkup.findings, checkup.gone))
+    found = [replace(finding, line=None) for finding in checkup.findings]
+    gone = [replace(finding, line=None) for finding in checkup.gone]
     found = _gravest_first((*found, *more))
     left = found if checkup.repaired is None else checkup.left
     return replace(checkup, findings=found, left=left, gone=tuple(gone))

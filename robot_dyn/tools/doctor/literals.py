@@ -150,5 +150,5 @@ def _beyond_a_turn(values: Iterable[float]) -> bool:
 
 
 def _all_whole(values: Iterable[float], unit: float) -> bool:
-    """Whether angles are multiples of a unit in degrees, to the digits of radians that were rounded."""
+    """Return True if angles are multiples of a unit in degrees, to the rounded digits of radians."""
     return all(abs(x - unit * round(x / unit)) <= _ROUNDED for x in values)

@@ -84,7 +84,7 @@ def sweep(
             )
         if folder is None:
             raise SweepError(f"{what}: of which folder? robot-dyn sweep {what} FOLDER")
-        result = sw.read(folder, scene, dict(assignment("--figure", each) for each in figure or []))
+        result = sw.read(folder, scene, dict(assignment("--figure", text) for text in figure or []))
         if what == "run":
             result = _run(result.sweep, folder, options)
         elif what == "verify":
@@ -110,7 +110,7 @@ def _stated(scene: str, given: dict[str, Any], vary: list[str], figure: list[str
     from robot_dyn.tools.sweeps.plan.texts import assignment, distribution_of, figure_of, samples_of_text
 
     varies = [assignment("--vary", each) for each in vary]
-    figures = [assignment("--figure", each) for each in figure]
+    figures = [assignment("--figure", text) for text in figure]
     changes = {name: value for name, value in given.items() if value is not None}
     if "samples" in changes:
         changes["samples"] = samples_of_text(changes["samples"])

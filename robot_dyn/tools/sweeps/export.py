@@ -29,7 +29,7 @@ def export(sweep: Sweep, folder: Folder, path: str | Path, force: bool) -> Path:
 
 
 def inputs_of(folder: Folder, path: str | Path) -> list[Path]:
-    """What an export or a report of a folder may not replace: anything in it, even under another name."""
+    """Return files that an export or a report may not replace: those of the folder, even under another name."""
     chunks = filter(Path.exists, map(folder.file, range(folder.count))) if file_path(path, SweepError).exists() else ()
     return [folder.path, *chunks]
 

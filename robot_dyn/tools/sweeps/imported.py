@@ -25,7 +25,7 @@ _PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 @final
 @dataclass(frozen=True)
 class Named:
-    """What the reader of a folder names, so that it may be imported.
+    """Functions that the reader of a folder names, so that they may be imported.
 
     Attributes:
         scene: Scene file, or import path of a function; None for the scene that the folder names.

@@ -193,7 +193,7 @@ class SweepResult(Answer):
         return save_report(self, path, truth("force", force, error=SweepError))
 
     def run(self, i: int) -> Trajectory:
-        """Repeat run i by itself, with all that rollouts record: the same bits.
+        """Repeat run i alone, with all that rollouts record: the same bits.
 
         Raises:
             SweepError: If there is no such run, or it raised; says why.

@@ -22,7 +22,7 @@ from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, Cells, X, cells
 
-_PEAKS = 4  # local maxima of a quantity that are looked at more closely
+_PEAKS = 4  # local maxima of a quantity that are refined
 _ROUNDS, _POINTS = 7, 9  # of doing so, and points of each: every round is 4 times closer
 
 

@@ -85,7 +85,7 @@ class MotorBudget(Result):
 
     @property
     def _unknown(self) -> list[str]:
-        """Joints of which no peak torque, continuous torque or speed is known."""
+        """Joints where no peak torque, continuous torque or speed is known."""
         limits = ((x.joint, (x.peak_limit, x.continuous_limit, x.speed_limit)) for x in self.joints)
         return [joint for joint, each in limits if inf in each]
 

@@ -1,4 +1,4 @@
-"""A design of one's own: the rows of a table."""
+"""A user-defined design: the rows of a table."""
 
 from __future__ import annotations
 

@@ -126,8 +126,8 @@ def sweep_of(
             raise SweepError(f"{where}: has format {data['format']}, this version reads {FORMAT}")
         scene = _scene_of(data, named, folder)
         vary = {name: distributions.from_dict(data["vary"][name]) for name in data["order"]}
-        of = {name: _figure_of(name, each, named, folder) for name, each in data["figures"].items()}
-        if unknown := named.figures.keys() - {name for name, each in of.items() if isinstance(each, UserFigure)}:
+        of = {name: _figure_of(name, stated, named, folder) for name, stated in data["figures"].items()}
+        if unknown := named.figures.keys() - {name for name, figure in of.items() if isinstance(figure, UserFigure)}:
             raise SweepError(f"{where}: no function is the figure {shown(min(unknown))}; {nearest(min(unknown), of)}")
         design = data["design"] if table is None else table
         kept = data["samples"]
@@ -138,7 +138,7 @@ def sweep_of(
 
 
 def _scene_of(data: Mapping[str, Any], named: Named, folder: Path | None) -> str | StatedScene:
-    """The scene that the reader names, or the one of the folder: a file; of a function, what is stated about it."""
+    """Return the scene that the reader names or the folder's file; for a function, the stored description."""
     stored = data["scene"]
     if named.scene is None:
         return stored if is_scene(stored) else stated_scene(stored, data["setup"])
@@ -148,7 +148,7 @@ def _scene_of(data: Mapping[str, Any], named: Named, folder: Path | None) -> str
 
 
 def _figure_of(name: str, stored: Mapping[str, Any], named: Named, folder: Path | None) -> Figure:
-    """The figure that a folder stores; of a function, what is stated about it unless the reader names it."""
+    """Return a stored figure; for a function that the reader does not name, the stored description."""
     if name not in named.figures:
         return figures.from_dict(stored)
     path = named.figures[name]
@@ -160,12 +160,12 @@ def _figure_of(name: str, stored: Mapping[str, Any], named: Named, folder: Path 
 
 def names_of(sweep: Sweep) -> Named:
     """The scene and functions that a sweep names, for the processes that run it."""
-    paths = {name: each.path for name, each in sweep.figures.items() if isinstance(each, UserFigure)}
+    paths = {name: figure.path for name, figure in sweep.figures.items() if isinstance(figure, UserFigure)}
     return Named(sweep.source, paths)
 
 
 def _stated_setup(sweep: Sweep) -> dict[str, Any]:
-    """What a setup integrates; of a function also what is needed to read results without calling it."""
+    """Describe the dynamics of a setup; for a function also everything that reading results needs."""
     if isinstance(sweep.scene, StatedScene):
         return dict(sweep.scene.setup)
     stated = _setup(sweep.setup)

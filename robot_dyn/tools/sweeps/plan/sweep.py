@@ -39,7 +39,7 @@ class Sweep(Answer, Value, Caching):
 
     Attributes:
         scene: A scene file, or the import path of a function that returns a `Setup`, such as "my_arm:setup". In a
-            sweep that was read from a folder without naming its function: what the folder states about it.
+            sweep that was read from a folder without naming its function: its stored description.
         runs: N.
         vary: Distributions by name: a parameter of `rollouts(params=…)`, "q0" or "v0". A frozen distribution of
             scipy.stats is one.
@@ -87,7 +87,7 @@ class Sweep(Answer, Value, Caching):
 
     @cached_property
     def setup(self) -> Setup:
-        """What runs, without what varies; SweepError if a folder names a function that its reader has not named."""
+        """Return the setup without varied parameters; SweepError for a function that the reader has not named."""
         if isinstance(self.scene, StatedScene):
             self.scene.refuse()
         made = imported(READER)(self.scene) if is_scene(self.scene) else imported(self.scene)()
