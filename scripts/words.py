@@ -24,17 +24,17 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 592,
-    "as of": 174,
-    "what without noun": 668,
+    "opening": 590,
+    "as of": 172,
+    "what without noun": 666,
     "is told": 22,
-    "says that": 118,
+    "says that": 117,
     "tells that": 7,
-    "goes on": 21,
-    "looks": 93,
-    "believes": 29,
-    "is no": 79,
-    "of its own": 82,
+    "goes on": 20,
+    "looks": 92,
+    "believes": 28,
+    "is no": 78,
+    "of its own": 81,
     "behind": 81,
     "beside": 116,
     "anew": 1,
@@ -43,11 +43,11 @@ CEILINGS = {
     "so many": 50,
     "but for": 19,
     "whatever": 37,
-    "of which": 59,
+    "of which": 58,
     "the same holds": 2,
-    "each": 882,
+    "each": 881,
     "arguments": 97,
-    "Any": 2878,
+    "Any": 2864,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.
