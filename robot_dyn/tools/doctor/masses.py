@@ -66,7 +66,7 @@ def _in_words(robot: Robot, stated: Structure) -> Iterator[Finding]:
 
 
 def _negligible(stated: Structure) -> set[str]:
-    """Links whose mass and moments are lost beside those of others, such as 1e-8 of a frame: M is right."""
+    """Links whose mass and moments are negligible next to those of others, such as 1e-8 of a frame: M is right."""
     heaviest = max((link.mass for link in stated.links.values()), default=0.0)
     largest = max((float(np.trace(link.inertia)) for link in stated.links.values()), default=0.0)
     return {
