@@ -30,9 +30,9 @@ def test_blocks_run_and_print_what_the_page_says(page: Path, tmp_path: Path, mon
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_a_page_is_short_and_begins_with_its_question(page: Path) -> None:
+def test_a_page_begins_with_its_question(page: Path) -> None:
     lines = page.read_text(encoding="utf-8").splitlines()
-    assert len(lines) <= 90 and re.fullmatch(r"\*.+[.?]\*", lines[2])
+    assert re.fullmatch(r"\*.+[.?]\*", lines[2])
 
 
 def test_the_index_names_each_page_by_its_question() -> None:

@@ -21,7 +21,7 @@ def page(_: str) -> str:
 def laws() -> dict[str, str]:
     """The docstring of each family, by its title; none is run."""
     found = {}
-    for path in sorted((ROOT / "tests" / "hard").glob("*.py")):
+    for path in sorted((ROOT / "tests" / "campaigns" / "hard").glob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         titles = [
             node.value.value

@@ -63,9 +63,9 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
 
 
 def _is_path(text: str) -> bool:
-    """Return True for a path of an existing file, and for a text that can be no XML."""
+    """Return True for an existing path, and for a text without > that ends as a file name does."""
     try:
-        return ">" not in text or Path(text).exists()
+        return Path(text).exists() or (">" not in text and bool(Path(text).suffix))
     except (OSError, ValueError):  # too long for a path, or a NUL
         return False
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import PlanError
+from robot_dyn.foundations.errors import ControlError, PlanError
 
 ARM = rd.load("ur5")
 T = np.linspace(0, 2, 81)
@@ -275,9 +275,9 @@ def test_times_and_positions_that_overflow_or_vanish_are_refused(
 def test_samples_that_nearly_coincide_are_refused_where_no_spline_passes_through_them(ends: str) -> None:
     t = np.concatenate([[0.0, 1e-12], np.arange(1.0, 30.0)])
     q = np.random.default_rng(0).random((31, 6))
-    with pytest.raises(rd.errors.ControlError, match="no spline of degree 5 passes through the samples"):
+    with pytest.raises(ControlError, match="no spline of degree 5 passes through the samples"):
         rd.control.from_samples(ARM, q, time=t, ends=ends)
-    with pytest.raises(rd.errors.ControlError, match="no spline of degree 5 passes through the samples"):
+    with pytest.raises(ControlError, match="no spline of degree 5 passes through the samples"):
         rd.control.Samples(t, q)
 
 

@@ -197,7 +197,8 @@ def refused(message: str, path: Path, *inputs: Path) -> None:
 
 
 def test_names_of_other_kinds_and_missing_folders_are_refused(old: Path, tmp_path: Path) -> None:
-    refused("is a folder", tmp_path)
+    (tmp_path / "folder").mkdir()
+    refused("is a folder", tmp_path / "folder")
     refused("there is no folder .*none; create it first", tmp_path / "none" / "x.note")
     refused("there is no folder", old / "y.note")
     refused(r"'\.txt' is not the suffix of a note; end the name with \.note", tmp_path / "x.txt")

@@ -68,7 +68,7 @@ def whole_turns(arm: Robot, table: Columns) -> np.ndarray:
     off = np.fmin(np.abs(short - left), np.abs(short - right))
     off = np.fmin(off, np.where(pace < _MOST, np.abs(short), np.inf))
     as_recorded = np.fmin(*(np.nan_to_num(np.abs(moved - each), nan=np.inf) for each in _beside(moved, dt)))
-    like = (off <= np.minimum(_LIKE + 2 * pace, _MOST)) & (off < as_recorded)
+    like = (off <= np.minimum(_LIKE + 2 * pace, _MOST)) & (off < as_recorded / 2)
     limit = np.where(arm.velocity_limit > 0, arm.velocity_limit, np.inf)
     angles = np.array([kind != "prismatic" for kind in arm.joint_types])
     return angles & (np.abs(moved) > np.pi) & (np.abs(count) == 1) & like & (np.abs(short) <= _FAST * limit * dt)

@@ -18,7 +18,7 @@ from robot_dyn.view.geometry.visuals import drawing
 from tests.broken_files import SOUND
 from tests.campaigns.fuzz.bytes import damage, damage_text
 
-TEXTBOOK = Path(__file__).parents[2] / "urdf"
+TEXTBOOK = Path(__file__).parents[3] / "urdf"
 NUMBERS = ["0", "-1", "1e-320", "1e13", "nan", "inf", "1e-30", "3", "", "0 0", "1 2 3", "٣", "0x10", "1_0", "9" * 400]
 NUMBERS += ["1e12", "-1e12", "1e300", "-1e300", "1e-300", "1e-160", "5e-324", "-0.0", "1e6", "0,5", "1.5708", "90", "a"]
 EDGES = ["0", "1e-320", "5e-324", "1e-160", "1e-300", "1e12", "-1e12", "1e-9", "1", "-1", "1.5707963267948966"]

@@ -20,7 +20,7 @@ from tests.campaigns.hard.case import Row
 from tests.campaigns.hard.families import FAMILIES
 from tests.campaigns.hard.report import Result, summarise, write
 
-BUILD = Path(__file__).parents[2] / "build" / "hard_cases"
+BUILD = Path(__file__).parents[3] / "build" / "hard_cases"
 
 
 def run(task: tuple[str, int, int]) -> Result:

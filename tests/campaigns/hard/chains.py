@@ -122,7 +122,7 @@ LONG: dict[str, str] = {
     for n in (32, 64)
 }
 
-FOLDER = Path(__file__).parents[2] / "urdf" / "hard"
+FOLDER = Path(__file__).parents[3] / "urdf" / "hard"
 
 
 def file_of(name: str) -> Path:

@@ -430,7 +430,7 @@ def test_a_budget_needs_no_extra_and_the_fastest_motion_says_which(monkeypatch) 
 def test_a_budget_loads_no_drawing() -> None:
     code = (
         "import sys, robot_dyn as rd; arm = rd.load('simple_pendulum')\n"
-        "print(budget(rd.control.quintic([0.0], [1.0], 1.0), arm, effort=9.0).fits)\n"
+        "print(rd.tools.motors.budget(rd.control.quintic([0.0], [1.0], 1.0), arm, effort=9.0).fits)\n"
         "print([x for x in ('matplotlib', 'toppra', 'ruckig', 'pandas') if x in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
