@@ -12,7 +12,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations.errors import RobotDynError, RobotDynWarning, shown
 from tests.campaigns.fuzz.campaign import HangError, limited
-from tests.wrong_arguments import LAX, NOT_TEXT, Example, examples, public, wrong
+from tests.wrong_arguments import EXTREME, LAX, NOT_TEXT, Example, examples, public, wrong
 
 LIMIT_S = 20  # of one call; the machine may be busy
 
@@ -37,6 +37,19 @@ def test_wrong_arguments_are_refused(known: dict[str, Example], name: str) -> No
                 each.__class__ in (float, np.ndarray, dict) or shown(each) == "-1" or "nan" in shown(each)
             )
             if result and not (result == "accepted" and allowed):
+                bad.append(f"{argument}={shown(each)}: {result}")
+    assert not bad, "\n".join(bad)
+
+
+@pytest.mark.parametrize("name", sorted(public()))
+def test_extreme_arguments_are_answered_or_refused(known: dict[str, Example], name: str) -> None:
+    """Arrays without axes, scalars of NumPy, None, denormal and huge numbers, NUL in paths."""
+    function, arguments = known[name]
+    bad = []
+    for argument in arguments:
+        for each in EXTREME:
+            result = _outcome(function, arguments | {argument: each})
+            if result not in ("", "accepted"):
                 bad.append(f"{argument}={shown(each)}: {result}")
     assert not bad, "\n".join(bad)
 

@@ -26,6 +26,11 @@ MASKED = np.ma.masked_array([0.1, 0.2], [False, True])
 NOT_REAL: tuple[Any, ...] = (1j, True, "one", b"1", object(), [[0.1], [0.1, 0.2]], MASKED, 10**400, {}, [True, 0.2], rd)
 NOT_NUMBERS = (*NOT_REAL, NAN, INF, -INF, [0.1, NAN], None, np.ones((7, 1)), np.zeros((0, 3)))
 NOT_WHOLE = (*NOT_NUMBERS, -1, 0.5, [1])
+# Of which each is right for some arguments: they are answered or refused, and raise nothing else.
+EXTREME = (
+    np.array(5), np.array(0.5), np.array("q"), np.array(None), np.float64(0.5), np.float32(0.5), np.int8(5), None, "\0",
+    "a\0b.toml", 5e-324, 1e-320, -1e-320, 1.7e308, 2**63, [5e-324, 1e-320], [None, None], {"a": np.array(5)},
+)  # fmt: skip
 NOT_TEXT = (None, 3, NAN, True, b"arm", object(), ["arm"], {}, np.ones(2), 10**5000)
 NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a": 1}, rd.Robot, 10**5000)
 
@@ -38,7 +43,7 @@ RESULTS = {
 # For authors of effects, controllers and methods: called with numbers that were checked before.
 FOR_AUTHORS = {
     "Dynamics", "Effect", "EquationOfMotion", "Hold", "Interval", "Mode", "CartesianReference", "ControlLaw",
-    "TaskDynamics", "orientation_error", "rotation_vector", "ButcherTableau", "RosenbrockTable", "Surd", "System",
+    "TaskDynamics", "ButcherTableau", "RosenbrockTable", "Surd", "System",
     "RightSide", "Stepper", "Solution", "Status", "IntegrationError", "ExplicitRungeKutta", "SemiImplicitEuler",
     "Gauss", "Rosenbrock", "TimeStepping",
 }  # fmt: skip
@@ -385,25 +390,27 @@ def examples(folder: Path) -> dict[str, Example]:
              "figures": {"peak": rd.tools.sweeps.peak("v")}, "design": "random", "seed": 1, "storage": "npz"},
         ),
         "Sweep.values": (swept.sweep.values, {"start": 0, "stop": 3}),
-        "SweepResult.export": (swept.export, {"path": folder / "rows.csv"}),
+        "SweepResult.export": (swept.export, {"path": folder / "rows.csv", "force": True}),
         "SweepResult.mean": (swept.mean, {"figure": "end", "level": 0.9, "given": "finished"}),
         "SweepResult.probability": (swept.probability, {"event": "end > 0.1", "level": 0.9, "given": "finished"}),
         "SweepResult.quantiles": (swept.quantiles, {"figure": "end", "probabilities": [0.5], "level": 0.9}),
         "SweepResult.reasons": (swept.reasons, {}),
         "SweepResult.run": (swept.run, {"i": 3}),
         "SweepResult.setup_of": (swept.setup_of, {"i": 3}),
-        "SweepResult.save_report": (swept.save_report, {"path": folder / "report.html"}),
+        "SweepResult.save_report": (swept.save_report, {"path": folder / "report.html", "force": True}),
         "SweepResult.sensitivity": (swept.sensitivity, {"figure": "end", "level": 0.9, "given": "finished"}),
-        "SweepResult.table": (swept.table, {}),
+        "SweepResult.table": (lambda names: swept.table(names), {"names": "end"}),
         "SweepResult.verify": (swept.verify, {}),
         "SweepResult.worst": (swept.worst, {"figure": "end", "count": 2, "given": "finished"}),
         "choice": (rd.tools.sweeps.choice, {"values": [1.0, 2.0]}),
         "final": (rd.tools.sweeps.final, {"of_what": "q", "joint": "slide"}),
-        "from_scene": (rd.tools.sweeps.from_scene, {"path": of_sweep}),
+        "from_scene": (rd.tools.sweeps.from_scene, {"path": of_sweep, "vary": {}, "figures": {"end": rd.tools.sweeps.final("q", "slide")}}),
+        "orientation_error": (rd.control.orientation_error, {"R_desired": eye, "R": eye}),
+        "rotation_vector": (rd.control.rotation_vector, {"R": eye}),
         "lognormal": (rd.tools.sweeps.lognormal, {"median": 1.0, "sigma_of_log": 0.1}),
         "normal": (rd.tools.sweeps.normal, {"mean": 1.0, "sd": 0.1}),
         "peak": (rd.tools.sweeps.peak, {"of_what": "v", "joint": "slide"}),
-        "read": (rd.tools.sweeps.read, {"folder": folder / "sweep"}),
+        "read": (rd.tools.sweeps.read, {"folder": folder / "sweep", "scene": of_sweep, "figures": {}}),
         "rms_error": (rd.tools.sweeps.rms_error, {"joint": "slide"}),
         "run": (
             rd.tools.sweeps.run,

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array, sqrt, transpose
+from robot_dyn.foundations.errors import QueryError, shown
 
 
 def rotation_vector(R: Array) -> Array:
@@ -22,9 +23,12 @@ def rotation_vector(R: Array) -> Array:
     Returns:
         φ = θ a along the axis a, shape (..., 3), in [rad], ‖φ‖ ≤ π.
 
+    Raises:
+        QueryError: If R has another shape.
+
     Source: Shepperd, Quaternion from rotation matrix, 1978.
     """
-    w, x = _quaternion(np.asanyarray(R))
+    w, x = _quaternion(_matrices("R", R))
     length = sqrt((x * x).sum(axis=-1, keepdims=True))
     # θ/‖x‖ → 2 where there is no turn; np.where keeps this free of branches
     small = length < 1e-150
@@ -34,7 +38,18 @@ def rotation_vector(R: Array) -> Array:
 
 def orientation_error(R_desired: Array, R: Array) -> Array:
     """The turn in base axes that takes R to the desired orientation: φ with R_desired = exp(φ̂) R, shape (..., 3)."""
-    return rotation_vector(R_desired @ transpose(R))
+    return rotation_vector(_matrices("R_desired", R_desired) @ transpose(_matrices("R", R)))
+
+
+def _matrices(name: str, R: Array) -> Array:
+    """Matrices of numbers, or of symbols; QueryError if they are not 3 by 3."""
+    try:
+        array = np.asanyarray(R)
+    except ValueError:  # rows of different lengths
+        array = np.empty(0)
+    if array.shape[-2:] != (3, 3) or array.dtype.kind not in "fiuO":
+        raise QueryError(f"{name} must be rotations of shape (..., 3, 3), got {shown(R)}")
+    return array
 
 
 def _quaternion(R: Array) -> tuple[Array, Array]:

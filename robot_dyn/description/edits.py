@@ -13,7 +13,7 @@ from robot_dyn.description.inertia import implausibility
 from robot_dyn.description.urdf import LARGEST
 from robot_dyn.foundations.errors import EditError, nearest, shown
 from robot_dyn.foundations.signatures import takes, unchanged
-from robot_dyn.foundations.validate import instance, numbers
+from robot_dyn.foundations.validate import instance, numbers, several
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s²], CGPM 1901
 
@@ -108,8 +108,8 @@ class Edits:
             new = replace(new, lock=new.lock + tuple(by_joint("lock", lock, joint_names).items()))
         if "payload" in changes:
             payload = changes["payload"]
-            more = tuple(payload) if isinstance(payload, Iterable) else (payload,)
-            if not all(isinstance(each, Payload) for each in more):
+            more = (payload,) if isinstance(payload, Payload) else several(payload)
+            if more is None or not all(isinstance(each, Payload) for each in more):
                 raise EditError(f"payload must be a Payload or several, got {shown(payload)}")
             new = replace(new, payloads=new.payloads + more)
         if "mass_scale" in changes:

@@ -20,7 +20,7 @@ from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import EffectError, OverflowedError, QueryError, shown
-from robot_dyn.foundations.validate import check_batches, is_moderate, is_plain, joint_values, number
+from robot_dyn.foundations.validate import check_batches, is_moderate, is_plain, joint_values, number, several
 from robot_dyn.queries.dynamics import Dynamics
 
 
@@ -47,11 +47,11 @@ class Plant:
             if effects != "urdf":
                 raise EffectError(f"effects={shown(effects)}; give effects, or 'urdf' for those the file states")
             effects = stated_friction(dynamics)
-        if not isinstance(effects, Iterable):
+        if (given := several(effects)) is None:
             raise EffectError(
                 f"effects must be several, such as [rd.effects.ViscousFriction(0.1)], got {shown(effects)}"
             )
-        parts = [part for effect in effects for part in (effect.parts if isinstance(effect, Effect) else (effect,))]
+        parts = [part for effect in given for part in (effect.parts if isinstance(effect, Effect) else (effect,))]
         for part in parts:
             if not isinstance(part, Force | Bound | CarriedPayload):
                 raise EffectError(

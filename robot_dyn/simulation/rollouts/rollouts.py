@@ -23,7 +23,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.foundations.coefficients import rebuilt
 from robot_dyn.foundations.errors import QueryError, nearest, shown
-from robot_dyn.foundations.validate import choice, instance, integer, joint_values, numbers, truth
+from robot_dyn.foundations.validate import choice, integer, joint_values, numbers, several, truth
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
@@ -209,8 +209,9 @@ def _side_by_side(batch: Batch, passed: Thresholds | None, most: int) -> Tiles:
 
 def _recorded(record: Any) -> tuple[str, ...]:
     """Names of what is to be recorded."""
-    instance("record", record, Iterable, f"give names of {', '.join(RECORDS)}")
-    return tuple(choice("record", name, RECORDS) for name in record)
+    if (names := several(record)) is None:
+        raise QueryError(f"record: give names of {', '.join(RECORDS)}, got {shown(record)}")
+    return tuple(choice("record", name, RECORDS) for name in names)
 
 
 def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) -> Setup:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from robot_dyn.foundations.answer import Answer, Block
-from robot_dyn.foundations.errors import SweepError, nearest
+from robot_dyn.foundations.errors import SweepError, nearest, shown
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.foundations.validate import choice, integer, truth
 from robot_dyn.simulation.results.trajectory import Trajectory
@@ -62,8 +62,8 @@ class SweepResult(Answer):
         known = ("run", *self.sweep.columns, *self.sweep.figures, "outcome", "ended", *TEXTS)
         names = names or known
         for name in names:
-            if name not in known:
-                raise SweepError(f"no column {name!r}; {nearest(name, known)}")
+            if not isinstance(name, str) or name not in known:
+                raise SweepError(f"no column {shown(name)}; {nearest(str(name), known)}")
         found = self.folder.columns(name for name in names if name != "run")
         found["run"] = np.arange(self.sweep.runs)
         if "outcome" in names:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from math import ceil, floor, inf, isnan, log, nan, sqrt
+from math import ceil, floor, inf, isnan, log, log1p, nan, sqrt
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ from robot_dyn.tools.sweeps.replicates import (
 
 FEW = 5
 """Events below which intervals of probabilities are said to be conservative."""
+_COUNTABLE = 1e15  # runs; a larger number is rounded, or infinite
 NOT_RANDOM = "points that are not random"
 GIVEN = None, "finished", "known"
 """Which runs a question is about: all, those that finished, or those of them that have the figures it asks of."""
@@ -220,8 +221,9 @@ def _note_of_quantile(p: float, level: float, n: int, estimate: float, low: floa
         return "the quantile lies among the runs that failed"
     if not (low == -inf or high == inf):
         return ""
-    needed = ceil(log((1 - level) / 2) / log(max(p, 1 - p)))
-    return f"{n} runs, or those that finished, do not bound the quantile; independent ones need {needed} at least"
+    needed = log((1 - level) / 2) / log1p(-min(p, 1 - p))
+    count = f"{ceil(needed)}" if needed < _COUNTABLE else f"{_COUNTABLE:g}"
+    return f"{n} runs, or those that finished, do not bound the quantile; independent ones need {count} at least"
 
 
 def _note_of_mean(x: np.ndarray) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations.errors import SweepError, shown
 from robot_dyn.scene.scene import read_both
 from robot_dyn.tools.sweeps.plan.sweep import Sweep
 from robot_dyn.tools.sweeps.plan.texts import distribution_of, figure_of, samples_of_text
@@ -28,7 +29,9 @@ def from_scene(path: str | Path, **changes: Any) -> Sweep:
     figures = {name: figure_of(name, text, imports=False) for name, text in table.pop("figures", {}).items()}
     stated = {"vary": vary, "figures": figures} | table
     for name in ("vary", "figures"):
-        changes[name] = {**stated.pop(name), **changes.get(name, {})}
+        if not isinstance(more := changes.get(name, {}), Mapping):
+            raise SweepError(f"{name}: give them by name, as {{'kp': …}}, got {shown(more)}")
+        changes[name] = {**stated.pop(name), **more}
     if "samples" in stated:
         stated["samples"] = samples_of_text(stated["samples"])
     stated |= changes
