@@ -404,7 +404,10 @@ def examples(folder: Path) -> dict[str, Example]:
         "SweepResult.worst": (swept.worst, {"figure": "end", "count": 2, "given": "finished"}),
         "choice": (rd.tools.sweeps.choice, {"values": [1.0, 2.0]}),
         "final": (rd.tools.sweeps.final, {"of_what": "q", "joint": "slide"}),
-        "from_scene": (rd.tools.sweeps.from_scene, {"path": of_sweep, "vary": {}, "figures": {"end": rd.tools.sweeps.final("q", "slide")}}),
+        "from_scene": (
+            rd.tools.sweeps.from_scene,
+            {"path": of_sweep, "vary": {}, "figures": {"end": rd.tools.sweeps.final("q", "slide")}},
+        ),
         "orientation_error": (rd.control.orientation_error, {"R_desired": eye, "R": eye}),
         "rotation_vector": (rd.control.rotation_vector, {"R": eye}),
         "lognormal": (rd.tools.sweeps.lognormal, {"median": 1.0, "sigma_of_log": 0.1}),

@@ -116,3 +116,32 @@ def test_an_interrupt_comes_too_where_nothing_can_be_made() -> None:
             raise rd.RobotDynError("cannot be traced")
     finally:
         signal.signal(signal.SIGINT, handler)
+
+
+AT_IMPORT = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.argv = ["robot-dyn", "list"]
+class Interrupt:
+    def find_spec(self, name, *_):
+        if name == {module!r}:
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Interrupt())
+from robot_dyn.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    "module", ["robot_dyn.cli.interrupts", "typer.main", "robot_dyn.cli.app", "robot_dyn.foundations.errors"]
+)
+def test_an_interrupt_at_the_first_imports_ends_in_one_line(module: str) -> None:
+    command = [sys.executable, "-c", AT_IMPORT.format(module=module)]
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (130, "robot-dyn: interrupted\n")
+
+
+def test_importing_the_command_line_leaves_the_handlers_of_a_program() -> None:
+    code = "import signal, robot_dyn.cli; print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", timeout=60, check=False)
+    assert done.stdout == "True\n" or signal.getsignal(signal.SIGINT) is signal.SIG_IGN

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -168,3 +169,12 @@ def test_what_a_urdf_cannot_state_is_refused_by_name(why: str) -> None:
 def test_what_is_no_description_makes_no_robot(wrong: object) -> None:
     with pytest.raises(DescriptionError, match=r"made of a Description, got .*; use rd\.load, Robot\.from_text"):
         rd.Robot(wrong)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_path_that_begins_with_an_angle_bracket_is_a_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("<arm.urdf", "<arm>.urdf"):
+        Path(name).write_text(ARM, encoding="utf-8")
+        assert rd.load(name).joint_names == rd.Robot.from_text(ARM).joint_names
+    with pytest.raises(CatalogError, match="no file"):
+        rd.load("<absent.urdf")

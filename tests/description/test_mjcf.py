@@ -227,3 +227,23 @@ def test_warnings_of_mujoco_are_findings_and_leave_no_file(tmp_path: Path, monke
         mujoco.set_mju_user_warning(None)
     assert robot.total_mass == pytest.approx(4, rel=1e-12)  # up to rounding
     assert [*here.iterdir()] == [] == mine
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        '<geom type="sphere" size="0.1" mass="inf"/>',
+        '<geom type="sphere" size="0.1" density="inf"/>',
+        '<geom type="sphere" size="1e200"/>',
+        '<inertial pos="0 0 0" mass="inf" diaginertia="inf inf inf"/>',
+        '<inertial pos="0 0 0" quat="1 1 0 0" mass="1" diaginertia="inf inf inf"/>',
+    ],
+)
+def test_an_infinite_mass_is_refused_without_a_warning_of_numpy(tmp_path: Path, body: str) -> None:
+    joint = '<joint name="j" type="hinge" axis="0 0 1"/>'
+    path = tmp_path / "arm.xml"
+    path.write_text(f"<mujoco><worldbody><body>{joint}{body}</body></worldbody></mujoco>")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(DescriptionError):
+            rd.load(path)
