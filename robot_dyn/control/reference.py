@@ -16,7 +16,7 @@ import numpy as np
 
 from robot_dyn.foundations import validate
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.errors import ControlError, QueryError
+from robot_dyn.foundations.errors import ControlError, QueryError, shown
 from robot_dyn.foundations.validate import choice, duration, times
 from robot_dyn.foundations.values import Value
 
@@ -259,5 +259,5 @@ def increasing(name: str, values: Any, count: int) -> np.ndarray:
     """Increasing times, shape (count,), frozen; raises ControlError if they do not increase."""
     times = numbers(name, values, (count,))
     if not (np.diff(times) > 0).all():
-        raise ControlError(f"{name} must increase, got {values!r}")
+        raise ControlError(f"{name} must increase, got {shown(values)}")
     return times

@@ -13,7 +13,8 @@ from robot_dyn.description.inertia import implausibility
 from robot_dyn.description.urdf import LARGEST
 from robot_dyn.foundations.errors import EditError, nearest, shown
 from robot_dyn.foundations.signatures import takes, unchanged
-from robot_dyn.foundations.validate import instance, numbers, several
+from robot_dyn.foundations.validate import instance, numbers
+from robot_dyn.foundations.values import several
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s²], CGPM 1901
 

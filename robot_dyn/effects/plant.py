@@ -20,7 +20,8 @@ from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import EffectError, OverflowedError, QueryError, shown
-from robot_dyn.foundations.validate import check_batches, is_moderate, is_plain, joint_values, number, several
+from robot_dyn.foundations.validate import check_batches, is_moderate, is_plain, joint_values, number
+from robot_dyn.foundations.values import several
 from robot_dyn.queries.dynamics import Dynamics
 
 

@@ -301,14 +301,6 @@ def function(what: str, value: Any, arguments: str, *, error: Kind = QueryError)
     return value
 
 
-def several(value: Any) -> tuple[Any, ...] | None:
-    """Return the entries of an iterable; None for anything else, such as an array without axes."""
-    try:
-        return tuple(value)
-    except TypeError:
-        return None
-
-
 def instance(what: str, value: Any, kind: Any, remedy: str, *, error: Kind = QueryError) -> Any:
     """An object of a kind; the remedy says how to get one."""
     if not isinstance(value, kind):

@@ -168,6 +168,14 @@ def read_only(value: Any) -> None:
             object.__setattr__(value, field.name, _frozen(x))
 
 
+def several(value: Any) -> tuple[Any, ...] | None:
+    """Return the entries of an iterable; None for anything else, such as an array without axes."""
+    try:
+        return tuple(value)
+    except TypeError:
+        return None
+
+
 def _frozen(x: Any) -> Any:
     """A read-only view of an array, and of those in a dictionary; any other value itself."""
     if isinstance(x, dict):

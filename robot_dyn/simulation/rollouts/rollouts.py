@@ -23,7 +23,8 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.foundations.coefficients import rebuilt
 from robot_dyn.foundations.errors import QueryError, nearest, shown
-from robot_dyn.foundations.validate import choice, integer, joint_values, numbers, several, truth
+from robot_dyn.foundations.validate import choice, integer, joint_values, numbers, truth
+from robot_dyn.foundations.values import several
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from robot_dyn.foundations.answer import Answer, Block
-from robot_dyn.foundations.errors import SweepError, nearest, shown
+from robot_dyn.foundations.errors import SweepError
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.foundations.validate import choice, integer, truth
 from robot_dyn.simulation.results.trajectory import Trajectory
@@ -62,8 +62,7 @@ class SweepResult(Answer):
         known = ("run", *self.sweep.columns, *self.sweep.figures, "outcome", "ended", *TEXTS)
         names = names or known
         for name in names:
-            if not isinstance(name, str) or name not in known:
-                raise SweepError(f"no column {shown(name)}; {nearest(str(name), known)}")
+            choice("column", name, known, error=SweepError)
         found = self.folder.columns(name for name in names if name != "run")
         found["run"] = np.arange(self.sweep.runs)
         if "outcome" in names:
@@ -163,12 +162,8 @@ class SweepResult(Answer):
     def export(self, path: str | Path, *, force: bool = False) -> Path:
         """Write the table of all runs to a .csv or .parquet file, whole or not at all.
 
-        In a .csv, a text that begins with =, +, -, @, a tab or a line break, and is not a number, gets an apostrophe
-        before it, so that spreadsheets do not compute it.
-
-        Args:
-            path: Where to write; not in the folder of the sweep.
-            force: Whether to replace another table of that name.
+        Another table is replaced only with `force`, and no file in the folder. Texts that a spreadsheet would compute,
+        such as "=1+1", get an apostrophe before them in a .csv.
 
         Raises:
             SweepError: If it cannot be written, or would replace a file.
@@ -181,12 +176,7 @@ class SweepResult(Answer):
     def save_report(self, path: str | Path, *, force: bool = False) -> Path:
         """Write one HTML page: distributions, failures over the two strongest parameters, worst runs.
 
-        Args:
-            path: Where to write; not in the folder of the sweep.
-            force: Whether to replace another report of that name.
-
-        Raises:
-            SweepError: If it cannot be written, or would replace a file.
+        `path` and `force` as in `export`; SweepError if it cannot be written.
         """
         from robot_dyn.tools.sweeps.report import save_report
 

@@ -11,8 +11,10 @@ import numpy as np
 
 from robot_dyn.description import description
 from robot_dyn.foundations import files
-from robot_dyn.foundations.errors import DescriptionError, QueryError
+from robot_dyn.foundations.errors import DescriptionError, QueryError, shorten
+from robot_dyn.foundations.errors import shown as text_of
 from robot_dyn.foundations.validate import choice, instance, number, shaped
+from robot_dyn.foundations.values import several
 from robot_dyn.simulation.observation.remarks import lines
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.result import Rollouts
@@ -117,8 +119,10 @@ def save_plot(run: Trajectory | Rollouts, path: str | Path, *names: str, dpi: fl
     figure = plot(run, *names, **options)
     try:
         figure.savefig(picture, format=path.suffix[1:].lower(), dpi=dpi)
-    except (ValueError, MemoryError) as error:
-        raise PlotError(f"{path}: cannot be drawn at {dpi:g} dpi ({error}); show less, or choose 150") from None
+    except (ValueError, MemoryError, RuntimeError, OverflowError, TypeError) as error:  # of its writers, by dpi
+        raise PlotError(
+            f"{path}: cannot be drawn at {dpi:g} dpi ({shorten(error)}); show less, or choose 150"
+        ) from None
     return files.save(path, lambda stream: stream.write(picture.getvalue()), PlotError)
 
 
@@ -142,8 +146,9 @@ def _names(option: str, given: Any, of: str) -> tuple[str, ...]:
     """One name or several."""
     if isinstance(given, str):
         return (given,)
-    instance(option, given, Collection | None, f"give names of {of}")
-    return () if given is None else tuple(given)
+    if (names := () if given is None else several(given)) is None:
+        raise QueryError(f"{option}: give names of {of}, got {text_of(given)}")
+    return names
 
 
 def _style(theme: str, style: str) -> Style:

@@ -18,6 +18,7 @@ from robot_dyn.tools.motors.limits import Limits
 
 _TIMES = 0.1234, 7.891  # at which torques must be the same
 _ROUNDING = 1e-9
+_LEAST, _MOST = 1e-100, 1e100  # of limits, whose squares and ratios must not overflow
 
 
 def check_effects(plant: Plant) -> None:
@@ -59,7 +60,11 @@ def check_positions(plant: Plant, path: PiecewisePolynomial) -> None:
 
 
 def check_limited(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> None:
-    """Refuse a path along which nothing limits the acceleration."""
+    """Refuse limits whose squares overflow, and a path along which nothing limits the acceleration."""
+    for name, x in (("effort", limits.effort), ("velocity", limits.velocity), ("acceleration", limits.acceleration)):
+        if (wrong := np.isfinite(x) & ((x < _LEAST) | (x > _MOST))).any():
+            joint, value = plant.dynamics.joint_names[int(wrong.argmax())], x[wrong][0]
+            raise PlanError(f"{name} of joint {joint!r} is {value:g}; give one from {_LEAST:g} to {_MOST:g}, or inf")
     slope = path.at(_along(path))[1]
     no_limit = np.isinf(limits.effort) & np.isinf(limits.acceleration)
     alone = (np.abs(slope[:, ~no_limit]).max(axis=-1, initial=0.0) == 0) & np.isinf(limits.effort).all()
