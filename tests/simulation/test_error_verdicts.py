@@ -468,8 +468,3 @@ def test_a_period_of_control_that_is_not_a_time_is_refused(period) -> None:
     object.__setattr__(law, "period_s", period)
     with pytest.raises(QueryError, match="period_s of the controller"):
         rd.Setup(rd.Plant(RAIL), [0.1], controller=law)
-
-
-def test_steps_cut_at_events_do_not_hide_part_of_the_error_of_a_method_of_high_order() -> None:
-    """A pendulum against springs and dampers of stops: where a step is cut changes its error by a factor of 9."""
-    assert not judge(20261128, 283, scene_of_all).misleads

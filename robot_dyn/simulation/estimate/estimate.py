@@ -40,7 +40,6 @@ _EARLY = 10  # steps of a method that chooses them: by then an error that is not
 _GAIN = 1.1  # in the time resolved, that a shorter step must bring
 _FAR_TURN = 1.0  # [rad] in a step: above, longer steps may meet the same angles
 _BLIND_TURN = np.pi  # [rad] in a step: above, shorter ones may, too
-_HIGH_ORDER = 6  # from this order, 2ᵖ − 1 divides by more than the error varies with where a step is cut at an event
 _FAR_PUSH = 1000 * PUSH  # of what a short step adds to q, rounding may lose all until v has grown
 
 Companion = Callable[[Any, Setup], Recording]  # of a factor of the steps, or of a mesh
@@ -74,20 +73,15 @@ def estimate(setup: Setup, run: Recording, companion: Companion) -> ErrorEstimat
                 f"the energy ledger does not close: {motion}, which {method.name} damps in steps longer than"
                 f" {1 / abs(motion.eigenvalue):.0e} s, so that runs with other steps do not show it; take shorter ones"
             )
-        result = _by_steps(setup, method, run, estimated, companion)
+        result = _by_steps(setup, method, estimated, companion, _turn(equation, run.step_log))
         result = _until_alike(setup, run, result)
     return _advised(setup, _looked_between(setup, run, result), why)
 
 
 def _by_steps(
-    setup: Setup, method: Integrator, run: Recording, estimated: Estimated, companion: Companion
+    setup: Setup, method: Integrator, estimated: Estimated, companion: Companion, turn: float
 ) -> ErrorEstimate:
-    """From longer steps; from shorter ones where those are lost, or show less than the order of the method would.
-
-    The error of a step that is cut at an event depends on where it is cut. Longer steps, cut elsewhere, may show the
-    order of the method and miss that part; half as long ones show it, and are run for methods of high order.
-    """
-    turn = _turn(setup.equation, run.step_log)
+    """From longer steps; from shorter ones where those are lost, or show less than the order of the method would."""
     if turn > _BLIND_TURN:
         return no_estimate(
             f"a joint turns by {turn:.3g} rad in a step, so that runs with other steps may meet the same angles"
@@ -98,9 +92,7 @@ def _by_steps(
         paths = {pace: recording.shared for pace, recording in longer.items()}
         magnified = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
         crossed = min(first_crossing(setup.equation, longer[pace].step_log, float(pace))[0] for pace in COARSE)
-        halved = companion(FINE[0], setup).shared if run.events and method.order >= _HIGH_ORDER else None
-        smooth = replace(magnified, kink=min(crossed, estimated.kink))
-        result = smooth.from_longer_steps(paths, method.order, halved)
+        result = replace(magnified, kink=min(crossed, estimated.kink)).from_longer_steps(paths, method.order)
         resolved = min(result.until_s, crossed) >= estimated.path.t[-1]
         if resolved and not estimated.doubts(result, paths, method.order):
             return result

@@ -55,16 +55,8 @@ class Estimated:
     floor: np.ndarray
     meaningless: float
 
-    def from_longer_steps(
-        self, companions: Mapping[Fraction, Path], order: int, halved: Path | None = None
-    ) -> ErrorEstimate:
-        """Return the estimate from companions of longer steps.
-
-        Args:
-            companions: By the length of their steps: those of `COARSE`.
-            order: Order of the method.
-            halved: A companion of half as long steps; the estimate is at least the difference from it.
-        """
+    def from_longer_steps(self, companions: Mapping[Fraction, Path], order: int) -> ErrorEstimate:
+        """The estimate from companions of longer steps, by the length of their steps: those of `COARSE`."""
         A, B, C = (differences(self.path, companions[pace], self.n) for pace in COARSE)
         bound = np.maximum(A, B / 2)  # nan after the end of a companion that ended early
         bound = np.fmax(bound, np.minimum(C / 4, _FAR_OFF * bound))
@@ -74,10 +66,7 @@ class Estimated:
             ratio = np.maximum(far, self.floor) / np.maximum(A, self.floor)
             order_seen &= (ratio > nominal / band) & (ratio < nominal * band)
         order_seen |= self.floor >= A
-        by_order = A / (2.0**order - 1)
-        if halved is not None:
-            by_order = np.fmax(by_order, differences(self.path, halved, self.n))
-        return self._judged(np.where(self._smooth(order_seen), by_order, bound), bound, order_seen)
+        return self._judged(np.where(self._smooth(order_seen), A / (2.0**order - 1), bound), bound, order_seen)
 
     def doubts(self, result: ErrorEstimate, companions: Mapping[Fraction, Path], order: int) -> bool:
         """Whether an estimate from longer steps is far above the one that follows from the order of the method.
