@@ -40,6 +40,7 @@ _EARLY = 10  # steps of a method that chooses them: by then an error that is not
 _GAIN = 1.1  # in the time resolved, that a shorter step must bring
 _FAR_TURN = 1.0  # [rad] in a step: above, longer steps may meet the same angles
 _BLIND_TURN = np.pi  # [rad] in a step: above, shorter ones may, too
+_STEADY = 4  # order of a method above which the error of steps that events cut varies too much with their lengths
 _FAR_PUSH = 1000 * PUSH  # of what a short step adds to q, rounding may lose all until v has grown
 
 Companion = Callable[[Any, Setup], Recording]  # of a factor of the steps, or of a mesh
@@ -73,15 +74,25 @@ def estimate(setup: Setup, run: Recording, companion: Companion) -> ErrorEstimat
                 f"the energy ledger does not close: {motion}, which {method.name} damps in steps longer than"
                 f" {1 / abs(motion.eigenvalue):.0e} s, so that runs with other steps do not show it; take shorter ones"
             )
-        result = _by_steps(setup, method, estimated, companion, _turn(equation, run.step_log))
+        cut = bool(run.events) and method.order > _STEADY
+        result = _by_steps(setup, method, estimated, companion, _turn(equation, run.step_log), cut)
         result = _until_alike(setup, run, result)
     return _advised(setup, _looked_between(setup, run, result), why)
 
 
 def _by_steps(
-    setup: Setup, method: Integrator, estimated: Estimated, companion: Companion, turn: float
+    setup: Setup, method: Integrator, estimated: Estimated, companion: Companion, turn: float, cut: bool
 ) -> ErrorEstimate:
-    """From longer steps; from shorter ones where those are lost, or show less than the order of the method would."""
+    """Return the estimate from longer steps, or from shorter ones where longer ones are lost or may agree by chance.
+
+    Args:
+        setup: What was run.
+        method: Method of fixed step.
+        estimated: The run.
+        companion: See `estimate`.
+        turn: Largest angle by which a joint turns in a step, in [rad].
+        cut: True if events cut steps of a method of high order, so that no error need grow by its order.
+    """
     if turn > _BLIND_TURN:
         return no_estimate(
             f"a joint turns by {turn:.3g} rad in a step, so that runs with other steps may meet the same angles"
@@ -94,7 +105,7 @@ def _by_steps(
         crossed = min(first_crossing(setup.equation, longer[pace].step_log, float(pace))[0] for pace in COARSE)
         result = replace(magnified, kink=min(crossed, estimated.kink)).from_longer_steps(paths, method.order)
         resolved = min(result.until_s, crossed) >= estimated.path.t[-1]
-        if resolved and not estimated.doubts(result, paths, method.order):
+        if resolved and not cut and not estimated.doubts(result, paths, method.order):
             return result
     half = companion(FINE[0], setup).shared
     if result.until_s > 0 and estimated.lost_at(half) < _GAIN * result.until_s:
