@@ -282,7 +282,7 @@ def file_path(value: Any, error: type[RobotDynError]) -> Path:
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # OWASP, CSV injection
 
 
-def table_cell(value: Any) -> Any:
+def table_cell(value: object) -> object:
     """Return a cell of a CSV table; a text that spreadsheets would compute as a formula begins with an apostrophe."""
     if not isinstance(value, str) or not value.startswith(_FORMULA):
         return value

@@ -1,4 +1,4 @@
-"""The doctor of URDF files: what is wrong or doubtful in one, and what can be repaired.
+"""The doctor of URDF files: its faults and doubtful values, and repairs.
 
     check    the findings of a file, and its repairs (Checkup)
 
