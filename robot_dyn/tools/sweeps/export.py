@@ -55,7 +55,7 @@ def _csv(tables: Iterator[Mapping[str, np.ndarray]], stream: BinaryIO) -> None:
 
 
 def _cell(value: object) -> str:
-    text = table_cell(value) if isinstance(value, str) else repr(value)
+    text = str(table_cell(value)) if isinstance(value, str) else repr(value)
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
 
 
