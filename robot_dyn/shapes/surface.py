@@ -118,12 +118,9 @@ def _enclosed(parts: Iterable[ndarray]) -> MassProperties | None:
     Args:
         parts: Corners of the triangles of each closed part, (m, 3, 3), in [m].
     """
-    parts = list(parts)
+    parts = [part for part in parts if len(part)]
     if not parts:
         return None
-    if not any(map(len, parts)):
-        return None
-    parts = [part for part in parts if len(part)]
     low, high = (f([f(part, axis=(0, 1)) for part in parts], axis=0) for f in (np.min, np.max))
     middle = (low + high) / 2
     v = np.concatenate([part - middle for part in parts])
