@@ -9,6 +9,7 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array, sqrt, transpose
 from robot_dyn.foundations.errors import QueryError, shown
+from robot_dyn.foundations.validate import real
 
 
 def rotation_vector(R: Array) -> Array:
@@ -24,7 +25,7 @@ def rotation_vector(R: Array) -> Array:
         φ = θ a along the axis a, shape (..., 3), in [rad], ‖φ‖ ≤ π.
 
     Raises:
-        QueryError: If R has another shape.
+        QueryError: If R has another shape, or an entry that is nan or larger than 2, which no rotation has.
 
     Source: Shepperd, Quaternion from rotation matrix, 1978.
     """
@@ -42,13 +43,16 @@ def orientation_error(R_desired: Array, R: Array) -> Array:
 
 
 def _matrices(name: str, R: Array) -> Array:
-    """Matrices of numbers, or of symbols; QueryError if they are not 3 by 3."""
+    """Matrices of numbers, or of symbols; QueryError if they are not 3 by 3, or no rotation has such an entry."""
+    symbols = isinstance(R, np.ndarray) and R.dtype.kind == "O"
     try:
-        array = np.asanyarray(R)
-    except ValueError:  # rows of different lengths
-        array = np.empty(0)
-    if array.shape[-2:] != (3, 3) or array.dtype.kind not in "fiuO":
+        array = R if symbols else real(R)
+    except ValueError as found:
+        raise QueryError(f"{name} must be rotations of shape (..., 3, 3), got {found}") from None
+    if array.shape[-2:] != (3, 3):
         raise QueryError(f"{name} must be rotations of shape (..., 3, 3), got {shown(R)}")
+    if not symbols and not (np.abs(array) <= 2).all():  # nan, or squares that might overflow
+        raise QueryError(f"{name} must be rotations, whose entries lie in [-1, 1], got {shown(R)}")
     return array
 
 
