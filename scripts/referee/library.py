@@ -229,7 +229,8 @@ def run_values(run: Any) -> tuple[Values, Texts]:
     values["values of remarks"] = np.array([x[3] for x in remarks], float)
     if run.error is not None:
         values |= {
-            "error": np.array([run.error.at(run.error.until_s)]),
+            # nothing is estimated where the estimate ends at the start: stored results have nan there
+            "error": np.array([run.error.at(run.error.until_s) if run.error.until_s > 0 else np.nan]),
             "resolved until": np.array([run.error.until_s]),
         }
     texts = {
