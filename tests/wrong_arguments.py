@@ -31,7 +31,7 @@ EXTREME = (
     np.array(5), np.array(0.5), np.array("q"), np.array(None), np.float64(0.5), np.float32(0.5), np.int8(5), None, "\0",
     "a\0b.toml", 5e-324, 1e-320, -1e-320, 1.7e308, 2**63, [5e-324, 1e-320], [None, None], {"a": np.array(5)},
 )  # fmt: skip
-LONG = {"Adaptive.solve": {"t1"}, "stress": {"budget_s"}, "from_samples": {"time"}}  # that may ask for hours of work
+LONG = {"Adaptive.solve": {"t1"}, "stress": {"budget_s"}}  # that may ask for hours of work
 NOT_TEXT = (None, 3, NAN, True, b"arm", object(), ["arm"], {}, np.ones(2), 10**5000)
 NOT_OBJECTS = (None, 3, NAN, True, "no such", object(), np.ones(2), MASKED, {"a": 1}, rd.Robot, 10**5000)
 
