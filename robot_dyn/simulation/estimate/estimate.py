@@ -152,6 +152,8 @@ def _by_refinement(
 
 def _with_rounding(estimated: Estimated, pushed: Path, of: Path, units: float = PUSH) -> Estimated:
     """With magnified rounding as the floor, observed on a companion and another one that was pushed."""
+    if not len(of.key):  # it diverged before a state that it shares: nothing is observed
+        return estimated
     rounds = carried(of, differences(of, pushed, estimated.n) * (PUSH / units), estimated.n)
     rows = np.searchsorted(of.key[:-1], estimated.path.key)
     return replace(estimated, floor=np.fmax(estimated.floor, np.append(rounds, rounds[-1])[rows]))
