@@ -20,7 +20,8 @@ from robot_dyn.foundations.errors import UndecidedError
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, joint_units, mass_norm, scaled, solved_norm
 from robot_dyn.lagrange.tree import Described
-from robot_dyn.queries.quantity import CORIOLIS_TORQUE, MOST_DIGITS, M, N, Quantity
+from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, M, N
+from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
 
 RESOLUTION = 10.0**-MOST_DIGITS
 _FIRST_BITS, _MOST_BITS = 128, 4096

@@ -16,7 +16,8 @@ from robot_dyn.lagrange.exact import NOTHING, Exact, Scale, Truth, entry_units, 
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.quantity import CORIOLIS_TORQUE, M, N, Quantity
+from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, M, N
+from robot_dyn.queries.quantity import Quantity
 
 FEWER = 250  # random states for each one that balls judge, where no other numbers are fine enough; 8 at least
 _SIDE_BY_SIDE = 8  # states that machine code answers side by side, in the search and in the judgement
