@@ -102,7 +102,7 @@ def _bound(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray], answe
         torques = (state["tau"], robot.coriolis_torque(state["q"], state["v"]), robot.N(state["q"]))
         more = acceleration_norm(inertia, torques, terms) / max(float(solved_norm(inertia, torques)), 1e-300)
         return solved_tolerance(0.0, inertia) * more
-    units = entry_units(answer, inertia)
+    units = entry_units(quantity, inertia)
     return least * float(np.max(terms / units)) / max(float(np.max(np.abs(answer) / units)), 1e-300)
 
 

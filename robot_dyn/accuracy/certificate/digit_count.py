@@ -117,7 +117,7 @@ class DigitCount:
         """Of errors at states, from fine answers; that of `truth`, but for rounding."""
         inertia = evaluate(self._own, M, states)
         if not (quantity.definite or quantity.solves):
-            return Scale(in_joint_units(fine.astype(float), inertia, self._typical(quantity)))
+            return Scale(in_joint_units(quantity, fine.astype(float), inertia, self._typical(quantity)))
         if quantity.definite:
             return Scale(np.array([floored(each) for each in diagonal_scale(inertia)]))
         inertia[~np.all(np.isfinite(fine), axis=-1)] = np.eye(self.robot.n)  # where there is no answer
@@ -130,7 +130,7 @@ class DigitCount:
             return 0.0
         if quantity not in self._sizes:
             answers, inertia = evaluate(self._own, quantity, self.states), evaluate(self._own, M, self.states)
-            ratios = answers / entry_units(answers, inertia)
+            ratios = answers / entry_units(quantity, inertia)
             largest = float(np.nanmax(np.abs(ratios))) or 1.0  # by which they are divided: squares may overflow
             size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())
             self._sizes[quantity] = size if size > NOTHING else 1.0
