@@ -112,8 +112,8 @@ def test_every_query_of_the_table_is_answered_at_the_state():
         assert answers[name] == np.asarray(expected).tolist()
     printed = said(*given)
     assert all(f"{name}, " in printed for name in QUANTITIES)
-    assert refusal(run("query", "ur5", "--quantity", "jacobian"))
-    assert refusal(run("query", "ur5", "--quantity", "momenta"))
+    assert refusal(["query", "ur5", "--quantity", "jacobian"])
+    assert refusal(["query", "ur5", "--quantity", "momenta"])
 
 
 def test_numbers_may_be_named_or_separated_by_blanks():
