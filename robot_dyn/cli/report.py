@@ -16,7 +16,7 @@ from robot_dyn.foundations.validate import choice
 from robot_dyn.model.info import info
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import QUANTITIES
-from robot_dyn.queries.units import numbers_row, of_joint
+from robot_dyn.queries.units import numbers_row
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.trajectory import Trajectory
 
@@ -123,9 +123,8 @@ def query_lines(answers: Document, joints: Sequence[str], types: Sequence[str]) 
     """Return the lines of these answers: a heading with its unit, and a row for each joint or row of a matrix."""
     for name, answer in answers.items():
         quantity = QUANTITIES[name]
-        units = " or ".join(dict.fromkeys(of_joint(quantity.unit, kind) for kind in types))
         yield ""
-        yield f"{name}, {quantity.description.removesuffix('.')} [{units}]:"
+        yield f"{name}, {quantity.description.removesuffix('.')} [{' or '.join(quantity.units(types))}]:"
         rows = np.asarray(answer).reshape(np.shape(answer)[0] if np.ndim(answer) else 1, -1)
         labels = joints if quantity.axes[:1] == ("n",) else ("",) * len(rows)
         yield from (f"  {numbers_row(row)}  {label}".rstrip() for row, label in zip(rows, labels, strict=True))

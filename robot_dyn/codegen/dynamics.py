@@ -127,9 +127,9 @@ class CompiledDynamics(Dynamics[np.ndarray], Parametrised):
     def inertial_parameters(self) -> np.ndarray:  # pyright: ignore[reportIncompatibleMethodOverride]
         return self.robot.inertial_parameters
 
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, *frame: str) -> Any:
+    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
         if frame:
-            return self.robot._answer(name, state, out, errors, *frame)
+            return self.robot._answer(name, state, out, errors, frame)
         if shape := self._shapes[name]:
             y = empty(shape, self._vector[1]) if out is None else out
             if not self._ones[name](*state, y):

@@ -92,7 +92,7 @@ class Lagrangian(Dynamics[Array], Parametrised):
             _MASS_MATRIX_DERIVATIVE, lambda at: mass_matrix_derivative(at, of_bodies(at)), (q,), errors
         )
 
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, *frame: str) -> Array:
+    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Array:
         if frame:
             frame = (self._link(frame[0]), *map(Axes.of, frame[1:]))
         return into(out, self._evaluated(QUANTITIES[name], FORMULAS[name], state, errors, *frame))

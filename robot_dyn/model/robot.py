@@ -60,7 +60,7 @@ class Robot(Dynamics[ndarray], Parametrised):
     __repr__, _repr_html_ = robot_line, info_html
     to_urdf = to_urdf
 
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, *frame: str) -> Any:
+    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
         if out is None and errors is _RAISE:
             shape, scratch, one_state = self._at_once
             for x in state:

@@ -94,7 +94,7 @@ class Dynamics(ABC, Generic[Answer]):
         """Names of the n joints, in the order of q."""
 
     @abstractmethod
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, *frame: str) -> Any:
+    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
         """Return the answer to the query of a name.
 
         Args:
@@ -102,7 +102,7 @@ class Dynamics(ABC, Generic[Answer]):
             state: Its arguments, as the user gave them.
             out: Array for the result, or None.
             errors: "raise" or "nan".
-            *frame: The frame, and the axes of its twist, of a query that has them.
+            frame: The frame, and the axes of its twist, of a query that has them.
         """
 
     @query("n", "n", unit="kg m²", terms=lambda size, x: size.M, definite=True, digits=True)
@@ -178,7 +178,7 @@ class Dynamics(ABC, Generic[Answer]):
     @query(4, 4, unit="1 and m", terms=_placement_terms)
     def placement(self, q: ArrayLike, frame: str, *, out: Answer | None = None, errors: str = "raise") -> Answer:
         """Placement of a frame in the base: the homogeneous matrix [[R, p], [0, 1]]."""
-        return self._answer("placement", (q,), out, errors, frame)
+        return self._answer("placement", (q,), out, errors, (frame,))
 
     @query(6, "n", unit="m/s and rad/s by v", terms=_jacobian_terms)
     def jacobian(
@@ -186,7 +186,7 @@ class Dynamics(ABC, Generic[Answer]):
         errors: str = "raise",
     ) -> Answer:  # fmt: skip
         """Jacobian J(q) of a frame: twist = J v, (linear, angular)."""
-        return self._answer("jacobian", (q,), out, errors, frame, expressed_in)
+        return self._answer("jacobian", (q,), out, errors, (frame, expressed_in))
 
     @query(6, "n", unit="m/s² and rad/s² by v", terms=_jacobian_rate_terms)
     def jacobian_rate(
@@ -194,7 +194,7 @@ class Dynamics(ABC, Generic[Answer]):
         out: Answer | None = None, errors: str = "raise",
     ) -> Answer:  # fmt: skip
         """Rate of change dJ/dt of the Jacobian of a frame, along v."""
-        return self._answer("jacobian_rate", (q, v), out, errors, frame, expressed_in)
+        return self._answer("jacobian_rate", (q, v), out, errors, (frame, expressed_in))
 
     def total_energy(self, q: ArrayLike, v: ArrayLike, *, errors: str = "raise") -> Any:
         """Total energy E = K + V, constant where nothing but gravity acts.

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from inspect import cleandoc, signature
 from math import inf
@@ -79,6 +79,12 @@ class Quantity:
         """Return the shape for one state of a robot with these sizes."""
         return tuple(axis if isinstance(axis, int) else sizes[axis] for axis in self.axes)
 
+    def units(self, joint_types: Iterable[str]) -> tuple[str, ...]:
+        """Return the units of entries, each once, for joints of these types."""
+        if self.axes[:1] != ("n",):
+            return (self.unit,)
+        return tuple(dict.fromkeys(of_joint(self.unit, kind) for kind in joint_types))
+
     def ask(self, engine: Any, state: State, *frame: str, **options: Any) -> Any:
         """Return the answer of an engine at a state, arguments by name."""
         return getattr(engine, self.name)(*(state[name] for name in self.arguments), *frame, **options)
@@ -118,8 +124,7 @@ def _sections(quantity: Quantity, parameters: list[str]) -> str:
     """Return the sections Args, Returns and Raises of a docstring."""
     letters = {"p": "10 N"}
     shape = ", ".join(["...", *(letters.get(str(axis), str(axis)) for axis in quantity.axes)])
-    kinds = ("revolute",) if quantity.framed else ("revolute", "prismatic")
-    units = " or ".join(dict.fromkeys(f"[{of_joint(quantity.unit, kind)}]" for kind in kinds))
+    units = " or ".join(f"[{unit}]" for unit in quantity.units(("revolute", "prismatic")))
     lines = ["Args:", *(f"    {name}: {_PARAMETERS[name]}" for name in parameters), ""]
     lines += ["Returns:", f"    Array of shape ({shape}), in {units}.", ""]
     unknown = ", or the frame or its axes are unknown" if quantity.framed else ""

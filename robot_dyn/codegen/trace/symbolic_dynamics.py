@@ -64,9 +64,9 @@ class SymbolicDynamics(Dynamics[Symbols]):
             self._traced[name] = self._trace.quantity(name)
         return self._traced[name]
 
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, *frame: str) -> Any:
+    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
         if frame:  # no inertia is needed
-            return self._trace.lagrangian._answer(name, state, out, errors, *frame).view(Symbols)
+            return self._trace.lagrangian._answer(name, state, out, errors, frame).view(Symbols)
         value = array_of(self._quantity(name).function(*map(column, state), *self._given))
         shape = self._trace.shape(name)
         return value[0, 0] if shape == (1,) else value.reshape(shape).view(Symbols)
