@@ -24,8 +24,8 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 590,
-    "as of": 172,
+    "opening": 588,
+    "as of": 169,
     "what without noun": 666,
     "is told": 22,
     "says that": 117,
@@ -34,20 +34,20 @@ CEILINGS = {
     "looks": 92,
     "believes": 28,
     "is no": 78,
-    "of its own": 80,
+    "of its own": 78,
     "behind": 81,
-    "beside": 114,
+    "beside": 113,
     "anew": 1,
     "likewise": 29,
-    "in place of": 77,
+    "in place of": 63,
     "so many": 50,
     "but for": 19,
     "whatever": 37,
     "of which": 58,
     "the same holds": 2,
-    "each": 881,
-    "arguments": 97,
-    "Any": 2864,
+    "each": 878,
+    "arguments": 96,
+    "Any": 2703,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.queries.quantity import EQUATION, FRAMES
+from robot_dyn.queries.dynamics import QUANTITIES
 
-ARGUMENTS = {quantity.name: quantity.arguments for quantity in (EQUATION | FRAMES).values()}
-FRAMED = tuple(FRAMES)
+ARGUMENTS = {quantity.name: quantity.arguments for quantity in QUANTITIES.values()}
+FRAMED = tuple(name for name, quantity in QUANTITIES.items() if quantity.framed)
 SEVERAL = [method for method, names in ARGUMENTS.items() if len(names) > 1]
 
 

@@ -28,6 +28,13 @@ def scenes(incomplete: str) -> list[str]:
     return [name for name in starters() if name.startswith(incomplete)]
 
 
+def quantities(incomplete: str) -> list[str]:
+    """Names of the queries of a robot."""
+    from robot_dyn.queries.dynamics import QUANTITIES
+
+    return [name for name in QUANTITIES if name.startswith(incomplete)]
+
+
 def joints(incomplete: str) -> list[str]:
     """Names of the movable joints of the robot named on the command line."""
     return [name for name in _joints() if name.startswith(incomplete)]

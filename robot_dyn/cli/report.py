@@ -9,10 +9,13 @@ import numpy as np
 
 from robot_dyn.cross_check.agreement import Comparison, marked
 from robot_dyn.cross_check.compare import compare
-from robot_dyn.effects.plant_state import plant_state
+from robot_dyn.effects.plant_state import PlantState, plant_state
 from robot_dyn.foundations.answer import Table
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.validate import choice
 from robot_dyn.model.info import info
 from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import QUANTITIES
 from robot_dyn.queries.units import numbers_row
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.trajectory import Trajectory
@@ -93,11 +96,38 @@ def comparison_tables(results: Sequence[tuple[str, Comparison]], refused: dict[s
 def formulations(robot: Robot) -> Document:
     """For each quantity the instructions of each formulation, and the one that is compiled."""
     from robot_dyn.codegen.dynamics import CompiledDynamics
-    from robot_dyn.codegen.trace.trace import QUANTITIES
+    from robot_dyn.codegen.trace import trace
 
     compiled = CompiledDynamics(robot)
-    quantities = {name: {"served_by": compiled.served_by(name)} for name in QUANTITIES}
+    quantities = {name: {"served_by": compiled.served_by(name)} for name in trace.QUANTITIES}
     return {name: row | {"instructions": compiled.instructions.get(name, {})} for name, row in quantities.items()}
+
+
+def queries(state: PlantState, names: Sequence[str], frame: str | None) -> Document:
+    """Return the answers of the rigid bodies at a state to queries of the table, by name.
+
+    Raises:
+        QueryError: If there is no such query or frame, or a query needs a frame.
+    """
+    answers = {}
+    for name in names:
+        quantity = QUANTITIES[choice("quantity", name, QUANTITIES)]
+        frames = [frame] if quantity.framed and frame else []
+        if quantity.framed and not frames:
+            raise QueryError(f"{name} is a quantity of a frame: give --frame LINK")
+        answers[name] = quantity.ask(state.plant.dynamics, vars(state), *frames)
+    return answers
+
+
+def query_lines(answers: Document, joints: Sequence[str], types: Sequence[str]) -> Iterator[str]:
+    """Return the lines of these answers: a heading with its unit, and a row for each joint or row of a matrix."""
+    for name, answer in answers.items():
+        quantity = QUANTITIES[name]
+        yield ""
+        yield f"{name}, {quantity.description.removesuffix('.')} [{' or '.join(quantity.units(types))}]:"
+        rows = np.asarray(answer).reshape(np.shape(answer)[0] if np.ndim(answer) else 1, -1)
+        labels = joints if quantity.axes[:1] == ("n",) else ("",) * len(rows)
+        yield from (f"  {numbers_row(row)}  {label}".rstrip() for row, label in zip(rows, labels, strict=True))
 
 
 def formulation_table(answer: Document) -> Iterator[Any]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy import empty
+from numpy.typing import ArrayLike
 
 from robot_dyn.codegen.derivatives import forward_dynamics_derivatives
 from robot_dyn.codegen.engine import Engine
@@ -19,21 +20,17 @@ from robot_dyn.codegen.threads import thread_count
 from robot_dyn.codegen.trace.right_angles import RightAngle, completed
 from robot_dyn.codegen.trace.trace import QUANTITIES, Trace
 from robot_dyn.description.inertial_parameters import Parametrised
-from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.validate import choice, instance, truth
 from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import Axes, Dynamics
-from robot_dyn.queries.quantity import FORWARD_DYNAMICS_DERIVATIVES
+from robot_dyn.queries.dynamics import FORWARD_DYNAMICS_DERIVATIVES, Dynamics
 
 _DERIVATIVES = FORWARD_DYNAMICS_DERIVATIVES.name
 
 
 @dataclass(frozen=True)
-class CompiledDynamics(Dynamics, Parametrised):
+class CompiledDynamics(Dynamics[np.ndarray], Parametrised):
     """A robot as machine code; each quantity is compiled on first use and checked against Pinocchio.
-
-    With out= the result is written into that array, which is left unchanged if the query raises.
 
     Attributes:
         original: The robot as given.
@@ -117,52 +114,10 @@ class CompiledDynamics(Dynamics, Parametrised):
         """Arguments of `empty` for a result (n,)."""
         return self.n, np.dtype(self.dtype)
 
-    def M(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._fast("M", (q,), out, errors, (self.n, self.n))
-
-    def C(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._fast("C", (q, v), out, errors, (self.n, self.n))
-
-    def N(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._fast("N", (q,), out, errors, self.n)
-
-    def coriolis_torque(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._fast("coriolis_torque", (q, v), out, errors, self.n)
-
-    def coriolis_transpose(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._fast("coriolis_transpose", (q, v), out, errors, self.n)
-
-    def inverse_dynamics(
-        self, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise"
-    ) -> Any:
-        y = empty(*self._vector) if out is None else out
-        if not self._ones["inverse_dynamics"](q, v, a, y):
-            return y
-        return self._ask("inverse_dynamics", (q, v, a), out, errors)
-
-    def forward_dynamics(
-        self, q: Array, v: Array, tau: Array, *, out: np.ndarray | None = None, errors: str = "raise"
-    ) -> Any:
-        y = empty(*self._vector) if out is None else out
-        if not self._ones["forward_dynamics"](q, v, tau, y):
-            return y
-        return self._ask("forward_dynamics", (q, v, tau), out, errors)
-
-    def forward_dynamics_derivatives(
-        self, q: Array, v: Array, tau: Array, *, errors: str = "raise"
-    ) -> tuple[Any, Any, Any]:
-        """∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
-        three = self._fast(_DERIVATIVES, (q, v, tau), None, errors, (3, self.n, self.n))
-        return three[..., 0, :, :], three[..., 1, :, :], three[..., 2, :, :]
-
-    def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Any:
-        return self._ask("kinetic_energy", (q, v), None, errors)
-
-    def potential_energy(self, q: Array, *, errors: str = "raise") -> Any:
-        return self._ask("potential_energy", (q,), None, errors)
-
-    def momentum(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._fast("momentum", (q, v), out, errors, self.n)
+    @cached_property
+    def _shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shapes of results for one state."""
+        return {name: quantity.shape(self.engine.sizes) for name, quantity in QUANTITIES.items()}
 
     @property
     def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -172,28 +127,39 @@ class CompiledDynamics(Dynamics, Parametrised):
     def inertial_parameters(self) -> np.ndarray:  # pyright: ignore[reportIncompatibleMethodOverride]
         return self.robot.inertial_parameters
 
-    def regressor(self, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        return self._fast("regressor", (q, v, a), out, errors, self.engine.shape("regressor"))
+    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
+        if frame:
+            return self.robot._answer(name, state, out, errors, frame)
+        if shape := self._shapes[name]:
+            y = empty(shape, self._vector[1]) if out is None else out
+            if not self._ones[name](*state, y):
+                return y
+        return self.engine.ask(name, state, out, errors, self._otherwise(name))
 
-    def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Any:
-        return self.robot.placement(q, frame, errors=errors)
+    # --- queries of half a microsecond, without the call of `_answer`
 
-    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Any:
-        return self.robot.jacobian(q, frame, expressed_in=expressed_in, errors=errors)
-
-    def jacobian_rate(
-        self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
-    ) -> Any:
-        return self.robot.jacobian_rate(q, v, frame, expressed_in=expressed_in, errors=errors)
-
-    def _fast(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str, shape: Any) -> Any:
-        y = empty(shape, self._vector[1]) if out is None else out
-        if not self._ones[quantity](*arguments, y):
+    def inverse_dynamics(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> np.ndarray:
+        y = empty(*self._vector) if out is None else out
+        if not self._ones["inverse_dynamics"](q, v, a, y):
             return y
-        return self._ask(quantity, arguments, out, errors)
+        return self._answer("inverse_dynamics", (q, v, a), out, errors)
 
-    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
-        return self.engine.ask(quantity, arguments, out, errors, self._otherwise(quantity))
+    def forward_dynamics(
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> np.ndarray:
+        y = empty(*self._vector) if out is None else out
+        if not self._ones["forward_dynamics"](q, v, tau, y):
+            return y
+        return self._answer("forward_dynamics", (q, v, tau), out, errors)
+
+    def forward_dynamics_derivatives(
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, errors: str = "raise"
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
+        three = self._answer(_DERIVATIVES, (q, v, tau), None, errors)
+        return three[..., 0, :, :], three[..., 1, :, :], three[..., 2, :, :]
 
     def _otherwise(self, quantity: str) -> Callable[..., Any]:
         """Pinocchio's method for a quantity."""

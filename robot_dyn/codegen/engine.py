@@ -24,7 +24,7 @@ from robot_dyn.foundations.arithmetic import Float
 from robot_dyn.foundations.errors import QueryError, RobotDynWarning
 from robot_dyn.foundations.validate import converted, shaped, times
 from robot_dyn.foundations.values import OnFirstUse
-from robot_dyn.queries.batch import DoubtError, answered
+from robot_dyn.queries.batch import DoubtError, answered, into
 from robot_dyn.queries.quantity import Quantity
 
 # Measured on chains: forward dynamics of 64 joints, 48 875 instructions, takes 8 s to compile; a batch is then 13 times
@@ -151,7 +151,7 @@ class Engine:
             return np.broadcast_to(np.asarray(otherwise(*state), self.dtype), (*batch, *shape))
 
         answer = answered(equation, arrays, shape, self.joint_names, errors, Float(np.dtype(self.dtype)))
-        return _into(out, answer if requested.axes else answer[..., 0])
+        return into(out, answer if requested.axes else answer[..., 0][()])
 
     def _computed(self, quantity: str, given: tuple[np.ndarray, ...], batch: tuple[int, ...]) -> np.ndarray | None:
         """The kernel's results for a batch of states, or None if it reports a doubt."""
@@ -182,7 +182,7 @@ class Engine:
                 # not `out`: a doubt may come after some rows
                 y = np.empty((states[0], int(np.prod(shape))), self.dtype)
                 if self.many[quantity](arguments, y, self.threads) is Status.FINE:
-                    return _into(out, y.reshape(*states, *shape))
+                    return into(out, y.reshape(*states, *shape))
         except (AttributeError, TypeError):  # not such arrays
             pass
         return None
@@ -264,16 +264,3 @@ class Engine:
 def _never(*_: Any) -> int:
     """In place of a kernel that is not worthwhile: `ask` takes over."""
     return Status.SHAPE
-
-
-def _into(out: np.ndarray | None, result: np.ndarray) -> Any:
-    """The result, in `out` if that is given; QueryError if it does not fit."""
-    if out is None:
-        return result if result.ndim else result[()]
-    if not isinstance(out, np.ndarray) or out.dtype != result.dtype or out.shape != result.shape:
-        got = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else repr(out)
-        raise QueryError(f"out must be an array of {result.dtype} and shape {result.shape}, got {got}")
-    if not out.flags.writeable:
-        raise QueryError("out must be writable, got a read-only array")
-    out[...] = result
-    return out

@@ -28,7 +28,7 @@ from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.quantity import PLANT
+from robot_dyn.queries.dynamics import PLANT
 
 _TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.ask` handles others
 

@@ -20,14 +20,15 @@ from robot_dyn.description.inertial_parameters import parameter_names
 from robot_dyn.foundations.errors import SingularError
 from robot_dyn.foundations.validate import function, instance, integer, number
 from robot_dyn.lagrange.lagrangian import Lagrangian
-from robot_dyn.lagrange.magnitude import Magnitudes, magnitudes
+from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.lagrange.scale import acceleration_norm, diagonal_scale, mass_norm, solved_tolerance
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import Axes
-from robot_dyn.queries.quantity import EQUATION, FORWARD_DYNAMICS, INVERSE_DYNAMICS
+from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, INVERSE_DYNAMICS, QUANTITIES, Axes
+from robot_dyn.queries.quantity import Quantity
 
 TOLERANCE = 1e-12
+_TWIST: dict[int | str, tuple[str, ...]] = {4: ("x", "y", "z", "1"), 6: ("x", "y", "z", "rx", "ry", "rz")}
 
 
 def compare(
@@ -83,43 +84,31 @@ def random_state(robot: Robot, rng: np.random.Generator) -> dict[str, np.ndarray
 def _pairs(
     robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], frames: tuple[str, ...], tolerance: float
 ) -> Iterator[Pair]:
+    """Every query of the table, except forward dynamics, and two identities."""
     q, v, a = (state[name] for name in ("q", "v", "a"))
     size, absolute = magnitudes(own.linkage, q), {name: np.abs(x) for name, x in state.items()}
-    letters = {"n": robot.joint_names, "p": parameter_names(robot.body_names)}
+    names = _TWIST | {"n": robot.joint_names, "p": parameter_names(robot.body_names)}
     known: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    for quantity in EQUATION.values():
-        if not quantity.solves:
-            one, two = known[quantity.name] = quantity.ask(robot, state), quantity.ask(own, state)
-            scale = diagonal_scale(two) if quantity.definite else quantity.terms(size, absolute)
-            yield Pair(quantity.name, one, two, scale, tolerance, tuple(letters[str(axis)] for axis in quantity.axes))
+    for quantity in QUANTITIES.values():
+        if quantity.solves:
+            continue
+        for frame, options in _frames(quantity, frames):
+            one, two = (quantity.ask(engine, state, *frame, **options) for engine in (robot, own))
+            scale = diagonal_scale(two) if quantity.definite else quantity.terms(size, absolute, *frame)
+            known[quantity.name], where = (one, two), "".join((*frame, *(f" ({axes})" for axes in options.values())))
+            yield Pair(quantity.name, one, two, scale, tolerance, tuple(names[x] for x in quantity.axes), where)
     (M, C, N), pin_C, ID = (known[name][1] for name in "MCN"), known["C"][0], known[INVERSE_DYNAMICS.name][0]
     rate, both = own.mass_matrix_derivative(q) @ v, size.C(v) + size.C(v).T
     yield Pair("Ṁ = C + Cᵀ", pin_C + pin_C.T, rate, both, tolerance, (robot.joint_names,) * 2)
     terms = INVERSE_DYNAMICS.terms(size, absolute)
     yield Pair("M a + C v + N = ID", ID, M @ a + C @ v + N, terms, tolerance, (robot.joint_names,))
-    for frame in frames:
-        yield from _frame_pairs(robot, own, q, v, frame, size, tolerance)
 
 
-def _frame_pairs(
-    robot: Robot, own: Lagrangian, q: np.ndarray, v: np.ndarray, frame: str, size: Magnitudes, tolerance: float
-) -> Iterator[Pair]:
-    """Placement and Jacobians of one link. A lever is a difference of positions, so its scale is their size."""
-    g, own_g, reach = robot.placement(q, frame), own.placement(q, frame), size.reach[frame]
-    arm = size.lever[frame] + reach
-    turn, swing = np.abs(v).sum(), arm @ np.abs(v)
-    rows = ("x", "y", "z", "rx", "ry", "rz")
-    unit = np.ones((3, 3))
-    yield Pair("placement", g[:3, :3], own_g[:3, :3], unit, tolerance, (rows[3:], rows[:3]), frame)
-    yield Pair("placement", g[:3, 3], own_g[:3, 3], np.full(3, reach), tolerance, (rows[:3],), frame)
-    for axes in Axes:
-        J = np.vstack([np.tile(arm, (3, 1)), np.ones((3, robot.n))])
-        rate = np.vstack([np.tile(arm * turn + swing, (3, 1)), np.full((3, robot.n), turn)])
-        names, where = (rows, robot.joint_names), f"{frame} ({axes})"
-        one, two = (each.jacobian(q, frame, expressed_in=axes) for each in (robot, own))
-        yield Pair("jacobian", one, two, J, tolerance, names, where)
-        one, two = (each.jacobian_rate(q, v, frame, expressed_in=axes) for each in (robot, own))
-        yield Pair("jacobian_rate", one, two, rate, tolerance, names, where)
+def _frames(quantity: Quantity, frames: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], dict[str, str]]]:
+    """Return the frames and options with which a query is compared."""
+    for frame in ((name,) for name in frames) if quantity.framed else ((),):
+        for axes in Axes if quantity.directed else ("",):
+            yield frame, {"expressed_in": axes} if axes else {}
 
 
 def _forward_pairs(robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], tolerance: float) -> list[Pair]:

@@ -137,4 +137,12 @@ class Couplings(Value):
         """J S, for Jacobians."""
         if self.trivial:
             return J
-        return J.dot(self.S) if J.ndim == 2 else J @ self.S
+        return J.dot(self.S) if J.ndim <= 2 else J @ self.S
+
+    def reduced(self, values: Any, axes: tuple[int | str, ...]) -> Any:
+        """A quantity of all joints as one of the coordinates; "n" marks the axes of joints in its shape."""
+        if self.trivial or "n" not in axes:
+            return values
+        if axes == ("n", "n"):
+            return self.matrix(values)
+        return self.columns(values) if axes[-1] == "n" else self.rows(values)

@@ -18,7 +18,7 @@ from robot_dyn.foundations.validate import instance, number, one_state
 from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.quantity import PLANT, C, M
+from robot_dyn.queries.dynamics import PLANT, C, M
 from robot_dyn.queries.units import numbers_row, units, without_rounding
 
 

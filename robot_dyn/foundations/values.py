@@ -195,14 +195,14 @@ def _writeable(x: Any) -> bool:
     return any(array.flags.writeable for array in _arrays(x))
 
 
-class OnFirstUse(dict[str, Any]):
+class OnFirstUse(dict[Any, Any]):
     """Values by name, each computed when it is first looked up."""
 
-    def __init__(self, compute: Callable[[str], Any]) -> None:
+    def __init__(self, compute: Callable[[Any], Any]) -> None:
         super().__init__()
         self._compute = compute
 
-    def __missing__(self, name: str) -> Any:
+    def __missing__(self, name: Any) -> Any:
         value = self[name] = self._compute(name)
         return value
 

@@ -19,12 +19,13 @@ from robot_dyn.lagrange.exact import RESOLUTION, Exact, entry_units
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import acceleration_norm, solved_norm, solved_tolerance
-from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, MOST_DIGITS, C, M, N, Quantity, by_name
+from robot_dyn.queries.dynamics import QUANTITIES as QUERIES
+from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
 
 if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot
 
-QUANTITIES = by_name(M, C, N, INVERSE_DYNAMICS, FORWARD_DYNAMICS)
+QUANTITIES = {name: quantity for name, quantity in QUERIES.items() if quantity.digits}
 
 _COUNTED = 64  # joints; balls of more take many seconds
 
@@ -101,7 +102,7 @@ def _bound(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray], answe
         torques = (state["tau"], robot.coriolis_torque(state["q"], state["v"]), robot.N(state["q"]))
         more = acceleration_norm(inertia, torques, terms) / max(float(solved_norm(inertia, torques)), 1e-300)
         return solved_tolerance(0.0, inertia) * more
-    units = entry_units(answer, inertia)
+    units = entry_units(quantity, inertia)
     return least * float(np.max(terms / units)) / max(float(np.max(np.abs(answer) / units)), 1e-300)
 
 

@@ -1,4 +1,4 @@
-"""True values of M, C, N, inverse and forward dynamics: ball arithmetic, with bits added until the balls are narrow.
+"""True values of queries such as M, C, N: ball arithmetic, with bits added until the balls are narrow.
 
     radius ≤ 1e-20 · scale
 
@@ -20,7 +20,8 @@ from robot_dyn.foundations.errors import UndecidedError
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, joint_units, mass_norm, scaled, solved_norm
 from robot_dyn.lagrange.tree import Described
-from robot_dyn.queries.quantity import CORIOLIS_TORQUE, MOST_DIGITS, M, N, Quantity
+from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, M, N
+from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
 
 RESOLUTION = 10.0**-MOST_DIGITS
 _FIRST_BITS, _MOST_BITS = 128, 4096
@@ -71,20 +72,25 @@ class Scale:
         return scaled(mass_norm(self.M, error) + (radius * joint_units(self.M)).sum(axis=-1), self.size)
 
 
-def entry_units(values: np.ndarray, M: np.ndarray) -> np.ndarray:
-    """√(M_ii M_jj) for entries of C, (..., n, n), √M_ii for torques, (..., n).
+def entry_units(quantity: Quantity, M: np.ndarray) -> np.ndarray:
+    """√M_ii for each axis of joints in the shape of a quantity, multiplied: √(M_ii M_jj) for C, √M_ii for torques.
 
-    A joint without inertia has no unit of its own; 1e-12 of the largest unit is used.
+    The result has the shape of the quantity, with other axes of length 1. A joint without inertia has no unit of its
+    own; 1e-12 of the largest unit is used.
     """
     units = joint_units(M)
     units = np.maximum(units, NOTHING * units.max(axis=-1, keepdims=True))
-    return units[..., :, None] * units[..., None, :] if values.ndim == M.ndim else units
+    batch = units.shape[:-1]
+    product = np.ones(batch)
+    for k, axis in enumerate(quantity.axes):
+        along = units if axis == "n" else np.ones((*batch, 1))
+        product = product[..., None] * along.reshape(*batch, *(1,) * k, -1)
+    return product
 
 
-def in_joint_units(values: np.ndarray, M: np.ndarray, least: float = 0.0) -> np.ndarray:
-    """Scale of each entry: its unit times the largest entry of C or torques in joint units, or `least` if larger."""
-    units = entry_units(values, M)
-    axes = (-2, -1) if values.ndim == M.ndim else (-1,)
+def in_joint_units(quantity: Quantity, values: np.ndarray, M: np.ndarray, least: float = 0.0) -> np.ndarray:
+    """Scale of each entry: its unit times the largest entry in joint units, or `least` if larger."""
+    units, axes = entry_units(quantity, M), tuple(range(-len(quantity.axes), 0))
     return units * np.maximum(np.max(np.abs(values) / units, axis=axes, keepdims=True), least)
 
 
@@ -130,9 +136,9 @@ class Exact:
         """Return the true values at one state.
 
         Args:
-            quantity: M, C, N, inverse or forward dynamics.
+            quantity: A query without a frame.
             state: Arguments of the quantity by name, (n,) each.
-            typical: Minimum scale of C, N and inverse dynamics, in the units of the joints.
+            typical: Minimum scale of entries, in the units of the joints; not for M and forward dynamics.
 
         Raises:
             SingularError: If M is singular and the quantity is forward dynamics; names the joint.
@@ -158,7 +164,7 @@ class Exact:
             torques = (state["tau"], *(midpoint(each.ask(engine, state)) for each in (CORIOLIS_TORQUE, N)))
             return Scale(solved_norm(inertia, torques), inertia)
         known = np.where(np.abs(midpoint(values)) > radius(values), midpoint(values), 0.0)
-        return Scale(in_joint_units(known, inertia, typical))
+        return Scale(in_joint_units(quantity, known, inertia, typical))
 
     def _engine(self, bits: int) -> Lagrangian:
         if bits not in self._engines:

@@ -128,6 +128,7 @@ class Linkage:
         gravity: (3,) in [m/s²].
         armature: Of the N joints, (N,).
         order: Indices of the bodies, in the order of their inertial parameters.
+        joint_names: Names of the n coordinates.
     """
 
     bodies: tuple[Body, ...]
@@ -136,6 +137,7 @@ class Linkage:
     gravity: Array
     armature: Array
     order: tuple[int, ...]
+    joint_names: tuple[str, ...]
 
     @cached_property
     def inertias(self) -> tuple[Array, ...]:
@@ -239,6 +241,7 @@ def linkage(tree: Tree, joint_names: tuple[str, ...], arithmetic: Arithmetic) ->
         arithmetic.array(tree.gravity),
         arithmetic.array([armature[name] for name in carriers]),
         tuple(map(carriers.index, ordered(joint_names, carriers))),
+        joint_names,
     )
 
 

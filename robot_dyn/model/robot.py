@@ -6,15 +6,17 @@ straight to Pinocchio, after checks of a fraction of a microsecond; coupled join
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
+from math import hypot
 from types import MappingProxyType
 from typing import Any, Unpack, final
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
+from numpy.typing import ArrayLike
 
 from robot_dyn.description.couplings import Couplings
 from robot_dyn.description.description import Description, check
@@ -23,22 +25,27 @@ from robot_dyn.description.inertial_parameters import NAMES, Parametrised, order
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.errors import DescriptionError, EditError, announce
 from robot_dyn.foundations.validate import instance, is_moderate, is_plain, is_state
-from robot_dyn.model import kernels
+from robot_dyn.foundations.values import OnFirstUse
+from robot_dyn.model.calls import Scratch
 from robot_dyn.model.conditioning import LEAST_DIGITS, checked_digits
 from robot_dyn.model.coriolis import Coriolis
-from robot_dyn.model.evaluation import Evaluation, warn_of_digits, warning_answer
+from robot_dyn.model.evaluation import Evaluation, warn_of_digits
 from robot_dyn.model.findings import findings_of
 from robot_dyn.model.gravity import warn_without_torque
 from robot_dyn.model.info import info_html, robot_line
 from robot_dyn.model.pinocchio_model import build, joint_ids, link_frames
 from robot_dyn.model.to_urdf import to_urdf
-from robot_dyn.queries.dynamics import Array, Axes, Dynamics
+from robot_dyn.queries.batch import into
+from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.quantity import DOUBTFUL
+
+_F8 = np.dtype(float)
+_RAISE = "raise"
 
 
 @final
 @dataclass(frozen=True)
-class Robot(Dynamics, Parametrised):
+class Robot(Dynamics[ndarray], Parametrised):
     """A robot: its description and its edits. Immutable; may be shared between threads and pickled.
 
     Attributes:
@@ -53,79 +60,55 @@ class Robot(Dynamics, Parametrised):
     __repr__, _repr_html_ = robot_line, info_html
     to_urdf = to_urdf
 
-    def M(self, q: Array, *, errors: str = "raise") -> ndarray:
-        if is_plain(q, self._shape):
+    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
+        if out is None and errors is _RAISE:
+            shape, scratch, one_state = self._at_once
+            for x in state:
+                if not (x.__class__ is ndarray and x.dtype is _F8 and x.shape == shape and hypot(*x.tolist()) < 1e50):
+                    break
+            else:
+                try:
+                    call = one_state[(name, *frame) if frame else name]
+                except TypeError:  # a frame that is not hashable is refused below
+                    pass
+                else:
+                    return call(scratch.data, *state)
+        answer = into(out, self._evaluation.answer(name, state, errors, *frame))
+        return answer if self.least_digits is None else warn_of_digits(self, name, answer, *state)
+
+    # --- queries of microseconds, answered at once
+
+    def M(self, q: ArrayLike, *, out: ndarray | None = None, errors: str = "raise") -> ndarray:
+        if out is None and is_plain(q, self._uncoupled_shape):
             return pin.crba(self.model, self._scratch.data, q)
-        return self._ask("M", errors, pin.crba, Couplings.matrix, self.model, q)
+        return self._answer("M", (q,), out, errors)
 
-    def C(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        if is_plain(q, self._shape) and is_plain(v, self._shape):
-            return self.coriolis.matrix(self._scratch.data, q, v)
-        return self._ask("C", errors, Coriolis.matrix, Couplings.matrix, self.coriolis, q, v)
-
-    def N(self, q: Array, *, errors: str = "raise") -> ndarray:
-        if is_plain(q, self._shape):
+    def N(self, q: ArrayLike, *, out: ndarray | None = None, errors: str = "raise") -> ndarray:
+        if out is None and is_plain(q, self._uncoupled_shape):
             return pin.computeGeneralizedGravity(self.model, self._scratch.data, q)
-        return self._ask("N", errors, pin.computeGeneralizedGravity, Couplings.torque, self.model, q)
+        return self._answer("N", (q,), out, errors)
 
-    def inverse_dynamics(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> ndarray:
-        shape = self._shape
-        if is_state(q, shape) and is_state(v, shape) and is_state(a, shape):
+    def inverse_dynamics(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: ndarray | None = None, errors: str = "raise"
+    ) -> ndarray:
+        shape = self._uncoupled_shape
+        if out is None and is_state(q, shape) and is_state(v, shape) and is_state(a, shape):
             tau = pin.rnea(self.model, self._scratch.data, q, v, a)
             if is_moderate(tau):  # NaN and inf, in any argument, show in tau
                 return tau
-        return self._ask("inverse_dynamics", errors, pin.rnea, Couplings.torque, self.model, q, v, a)
+        return self._answer("inverse_dynamics", (q, v, a), out, errors)
 
-    def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> ndarray:
+    def forward_dynamics(
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: ndarray | None = None, errors: str = "raise"
+    ) -> ndarray:
         shape = self._regular_shape
-        if is_state(q, shape) and is_state(v, shape) and is_state(tau, shape):
+        if out is None and is_state(q, shape) and is_state(v, shape) and is_state(tau, shape):
             a = pin.aba(self.model, self._scratch.data, q, v, tau)
             if is_moderate(a, DOUBTFUL):
                 return a
-        a = self._evaluation.forward_dynamics(errors, q, v, tau)
-        return a if self.least_digits is None else warn_of_digits(self, "forward_dynamics", a, q, v, tau)
+        return self._answer("forward_dynamics", (q, v, tau), out, errors)
 
-    def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        if is_plain(q, self._shape) and is_plain(v, self._shape):
-            return pin.nonLinearEffects(self._weightless, self._scratch.data, q, v)
-        kernel, model = pin.nonLinearEffects, self._weightless  # less N, that of `model` would keep the digits of N
-        return self._ask("coriolis_torque", errors, kernel, Couplings.torque, model, q, v)
-
-    def coriolis_transpose(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        if is_plain(q, self._shape) and is_plain(v, self._shape):
-            return v.dot(self.coriolis.matrix(self._scratch.data, q, v))
-        kernel = kernels.coriolis_transpose
-        return self._ask("coriolis_transpose", errors, kernel, Couplings.torque, self.coriolis, q, v)
-
-    def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Any:
-        return self._ask("kinetic_energy", errors, kernels.kinetic_energy, None, self.model, q, v)
-
-    def potential_energy(self, q: Array, *, errors: str = "raise") -> Any:
-        return self._ask("potential_energy", errors, pin.computePotentialEnergy, None, self.model, q)
-
-    def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> ndarray:
-        return self._ask("momentum", errors, kernels.momentum, Couplings.torque, self.model, q, v)
-
-    def regressor(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> ndarray:
-        shape = self._shape
-        if is_plain(q, shape) and is_plain(v, shape) and is_plain(a, shape):
-            return kernels.regressor(self.model, self._scratch.data, q, v, a)
-        reduce = partial(kernels.regressor_of_coordinates, self._body_order)
-        return self._ask("regressor", errors, kernels.regressor, reduce, self.model, q, v, a)
-
-    def placement(self, q: Array, frame: str, *, errors: str = "raise") -> ndarray:
-        kernel = self._frame_kernels(kernels.placement, frame)
-        return self._ask("placement", errors, kernel, None, self.model, q)
-
-    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Array:
-        kernel = self._frame_kernels(kernels.jacobian, frame, expressed_in)
-        return self._ask("jacobian", errors, kernel, Couplings.columns, self.model, q)
-
-    def jacobian_rate(
-        self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
-    ) -> ndarray:
-        kernel = self._frame_kernels(kernels.jacobian_rate, frame, expressed_in)
-        return self._ask("jacobian_rate", errors, kernel, Couplings.columns, self.model, q, v)
+    # --- properties
 
     @cached_property
     def name(self) -> str:
@@ -313,7 +296,7 @@ class Robot(Dynamics, Parametrised):
             warn_without_torque(robot)
         return robot if self.least_digits is None else robot.warn_below(self.least_digits)
 
-    def digits(self, quantity: str, *state: Array) -> float:
+    def digits(self, quantity: str, *state: ArrayLike) -> float:
         """Number of correct decimal digits of the answer to a query, counted against true values in balls.
 
             −log10(error),  from 0 to 20
@@ -368,52 +351,37 @@ class Robot(Dynamics, Parametrised):
 
     @cached_property
     def _evaluation(self) -> Evaluation:
-        return Evaluation(self.model, self.couplings, self.joint_names, self.sizes, self._scratch)
+        return Evaluation(self, self._scratch)
 
     @cached_property
     def _shape(self) -> tuple[int] | None:
-        """Input shape of the fast path; None if mimic joints or warnings need the general one."""
-        return (self.n,) if self.couplings.trivial and self.least_digits is None else None
+        """Shape of one state that is answered at once; None if queries may warn."""
+        return (self.n,) if self.least_digits is None else None
+
+    @cached_property
+    def _at_once(self) -> tuple[tuple[int] | None, Scratch, OnFirstUse]:
+        """That shape, and the calls that answer it."""
+        return self._shape, self._scratch, self._evaluation.one_state
+
+    @cached_property
+    def _uncoupled_shape(self) -> tuple[int] | None:
+        """Shape of arguments that Pinocchio takes as they are; None if joints are coupled, or queries may warn."""
+        return self._shape if self.couplings.trivial else None
 
     @cached_property
     def _regular_shape(self) -> tuple[int] | None:
-        """Input shape of the fast path of forward dynamics; None if M is singular."""
-        return None if self._evaluation.regularity.singular else self._shape
+        """The same for forward dynamics; None if M is singular too."""
+        return None if self._evaluation.regularity.singular else self._uncoupled_shape
 
     @cached_property
-    def _ask(self) -> Callable[..., Any]:
-        """`Evaluation.answer`, with a warning where the answer has few digits."""
-        answer = self._evaluation.answer
-        return answer if self.least_digits is None else warning_answer(self, answer)
-
-    @cached_property
-    def _scratch(self) -> kernels.Scratch:
+    def _scratch(self) -> Scratch:
         """Memory that the algorithms of `model` write to."""
-        return kernels.Scratch(self.model)
-
-    @cached_property
-    def _weightless(self) -> Any:
-        """The model without gravity."""
-        model = self.model.copy()
-        model.gravity = pin.Motion.Zero()
-        return model
-
-    @cached_property
-    def _frame_kernels(self) -> kernels.FrameKernels:
-        """Kernels of frames, by the name of a link or of a joint."""
-        links = link_frames(self.model)
-        joints = {joint: links[child] for joint, child in self.description.joint_frames.items()}
-        return kernels.FrameKernels(links | joints)
-
-    @cached_property
-    def _body_order(self) -> list[int]:
-        """Indices of the bodies in `model`, in the order of their parameters."""
-        names = list(self.model.names[1:])
-        return [names.index(name) for name in self.body_names]
+        return Scratch(self.model)
 
     @cached_property
     def _inertial_parameters(self) -> ndarray:
-        return _frozen(np.concatenate([self.model.inertias[i + 1].toDynamicParameters() for i in self._body_order]))
+        ids = joint_ids(self.model)
+        return _frozen(np.concatenate([self.model.inertias[ids[x]].toDynamicParameters() for x in self.body_names]))
 
     def _per_joint(self, full: ndarray) -> ndarray:
         """Values of the joints of `model` in the order of q; infinite where the file states no limit."""

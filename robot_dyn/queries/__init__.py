@@ -1,5 +1,5 @@
 """What every implementation answers.
 
-dynamics: the `Dynamics` protocol and `Axes` · quantity: its quantities as values · batch: states without an answer
+dynamics: `Dynamics`, the queries and their table · quantity: a row of it · batch: states without an answer
 units: SI units of joints, and numbers with their units as texts
 """

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 
@@ -118,3 +119,17 @@ def _halved(
             where = error.row[0] if len(batch) == 1 else error.row
             error.args = (f"{error} in row {where} of the batch",)
             raise
+
+
+def into(out: Any, result: Any) -> Any:
+    """Return the result, in `out` if that is an array; QueryError if it does not fit."""
+    if out is None:
+        return result
+    result = np.asarray(result)
+    if not isinstance(out, np.ndarray) or out.dtype != result.dtype or out.shape != result.shape:
+        got = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else repr(out)
+        raise QueryError(f"out must be an array of {result.dtype} and shape {result.shape}, got {got}")
+    if not out.flags.writeable:
+        raise QueryError("out must be writable, got a read-only array")
+    out[...] = result
+    return out

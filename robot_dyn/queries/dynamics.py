@@ -1,19 +1,28 @@
-"""The protocol of every engine: rigid bodies in gravity, M(q) a + C(q, v) v + N(q) = τ, N = ∂V/∂q."""
+"""The queries of every engine, one table: rigid bodies in gravity, M(q) a + C(q, v) v + N(q) = τ, N = ∂V/∂q.
+
+A new query is a method of `Dynamics` with its row, Pinocchio's call in `model/calls.py` and the own formula in
+`lagrange/formulas.py`, both by its name. Engines, machine code, cross-check, certificates and commands follow.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
 from enum import StrEnum
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, Generic, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.foundations.arithmetic import Array, rounding
 from robot_dyn.foundations.errors import OverflowedError, SingularError, UndecidedError, shown
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.foundations.validate import choice
+from robot_dyn.queries.quantity import DOUBTFUL, Quantity, query, table
 
 T = TypeVar("T")
+Answer = TypeVar("Answer")  # array type of an engine
 
 
 class Axes(StrEnum):
@@ -41,272 +50,181 @@ _OF_PINOCCHIO = {"LOCAL": "body", "LOCAL_WORLD_ALIGNED": "world_aligned", "WORLD
 _OF_PINOCCHIO |= {name.lower(): axes for name, axes in _OF_PINOCCHIO.items()}
 
 
-@runtime_checkable
-class Dynamics(Protocol):
+def _solved_torque(size: Any, x: Mapping[str, Array]) -> Any:
+    """Return the terms of τ − C v − N."""
+    return size.inverse_dynamics(x["v"], np.zeros_like(x["v"])) + x["tau"]
+
+
+def _placement_terms(size: Any, x: Mapping[str, Array], frame: str) -> np.ndarray:
+    """Return 1 for the rotation and the distance from the base for the position."""
+    return np.vstack([np.hstack([np.ones((3, 3)), np.full((3, 1), size.reach[frame])]), [0.0, 0.0, 0.0, 1.0]])
+
+
+def _jacobian_terms(size: Any, x: Mapping[str, Array], frame: str) -> np.ndarray:
+    """Return the scale of both levers: each is a difference of positions, whose scale is their size."""
+    arm = size.lever[frame] + size.reach[frame]
+    return np.vstack([np.tile(arm, (3, 1)), np.ones((3, len(arm)))])
+
+
+def _jacobian_rate_terms(size: Any, x: Mapping[str, Array], frame: str) -> np.ndarray:
+    arm, v = size.lever[frame] + size.reach[frame], x["v"]
+    return np.vstack([np.tile(arm * v.sum() + arm @ v, (3, 1)), np.full((3, len(v)), v.sum())])
+
+
+class Dynamics(ABC, Generic[Answer]):
     """Rigid bodies in gravity: M(q) a + C(q, v) v + N(q) = τ.
 
     `q`, `v`, `a`, `tau` have shape (n,), or (..., n) in a batch, in [rad], [rad/s], [rad/s²], [N m] for a revolute
     joint and [m], [m/s], [m/s²], [N] for a prismatic one. Twists are (linear, angular). Every method raises
     QueryError for a wrong shape, a value that is not finite or an unknown frame, and OverflowedError where the answer
-    would not be finite; in a batch the message and the error's `row` say at which state. With errors="nan" the states
+    would not be finite; in a batch the message and the error's `row` name the state. With errors="nan" the states
     of a batch that have no answer get NaN, and the others theirs.
+
+    An engine defines `n`, `joint_names` and `_answer`; it overrides a query only to answer one state sooner.
     """
 
     @property
+    @abstractmethod
     def n(self) -> int:
         """Number of degrees of freedom."""
-        ...
 
     @property
+    @abstractmethod
     def joint_names(self) -> tuple[str, ...]:
         """Names of the n joints, in the order of q."""
-        ...
 
-    def M(self, q: Array, *, errors: str = "raise") -> Array:
-        """Mass matrix of the kinetic energy K = ½ vᵀ M v.
-
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Symmetric positive definite matrix, shape (..., n, n), in [kg m²], [kg m] or [kg].
-
-        Raises:
-            QueryError: If q has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
-        """
-        ...
-
-    def C(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        """Coriolis matrix of the Christoffel symbols, so that Ṁ = C + Cᵀ.
+    @abstractmethod
+    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
+        """Return the answer to the query of a name.
 
         Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Matrix, shape (..., n, n); C v is in [N m] or [N].
-
-        Raises:
-            QueryError: If an argument has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
+            name: Name of the query.
+            state: Its arguments, as the user gave them.
+            out: Array for the result, or None.
+            errors: "raise" or "nan".
+            frame: The frame, and the axes of its twist, of a query that has them.
         """
-        ...
 
-    def N(self, q: Array, *, errors: str = "raise") -> Array:
-        """Gravity torque ∂V/∂q: the torque that holds the robot at rest.
+    @query("n", "n", unit="kg m²", terms=lambda size, x: size.M, definite=True, digits=True)
+    def M(self, q: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Answer:
+        """Mass matrix of the kinetic energy K = ½ vᵀ M v, symmetric positive definite."""
+        return self._answer("M", (q,), out, errors)
 
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+    @query("n", "n", unit="N m s/rad", terms=lambda size, x: size.C(x["v"]), digits=True)
+    def C(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Answer:
+        """Coriolis matrix of the Christoffel symbols, so that Ṁ = C + Cᵀ."""
+        return self._answer("C", (q, v), out, errors)
 
-        Returns:
-            Torques, shape (..., n), in [N m] or [N].
+    @query("n", unit="N m", terms=lambda size, x: size.N, digits=True)
+    def N(self, q: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Answer:
+        """Gravity torque ∂V/∂q: the torque that holds the robot at rest."""
+        return self._answer("N", (q,), out, errors)
 
-        Raises:
-            QueryError: If q has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
+    @query("n", unit="N m", terms=lambda size, x: size.C(x["v"]) @ x["v"])
+    def coriolis_torque(
+        self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None, errors: str = "raise"
+    ) -> Answer:
+        """Coriolis and centrifugal torque C(q, v) v."""
+        return self._answer("coriolis_torque", (q, v), out, errors)
+
+    @query("n", unit="N m", terms=lambda size, x: size.C(x["v"]).T @ x["v"])
+    def coriolis_transpose(
+        self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None, errors: str = "raise"
+    ) -> Answer:
+        """Cᵀ(q, v) v = ∂K/∂q, as momentum observers use it: d(M v)/dt = τ + Cᵀ v − N."""
+        return self._answer("coriolis_transpose", (q, v), out, errors)
+
+    @query("n", unit="N m", terms=lambda size, x: size.inverse_dynamics(x["v"], x["a"]), digits=True)
+    def inverse_dynamics(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: Answer | None = None, errors: str = "raise"
+    ) -> Answer:
+        """Torque of an acceleration: τ = M a + C v + N."""
+        return self._answer("inverse_dynamics", (q, v, a), out, errors)
+
+    @query("n", unit="rad/s²", terms=_solved_torque, solves=True, doubtful=DOUBTFUL, digits=True)
+    def forward_dynamics(
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: Answer | None = None, errors: str = "raise"
+    ) -> Answer:
+        """Acceleration of a torque: a = M⁻¹ (τ − C v − N)."""
+        return self._answer("forward_dynamics", (q, v, tau), out, errors)
+
+    @query(unit="J", terms=lambda size, x: x["v"] @ size.M @ x["v"] / 2)
+    def kinetic_energy(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Any:
+        """Kinetic energy K = ½ vᵀ M v."""
+        return self._answer("kinetic_energy", (q, v), out, errors)
+
+    @query(unit="J", terms=lambda size, x: size.V)
+    def potential_energy(self, q: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Any:
+        """Potential energy of gravity V = −Σ mᵢ gᵀ pᵢ of the bodies that move, 0 at the origin of the base."""
+        return self._answer("potential_energy", (q,), out, errors)
+
+    @query("n", unit="N m s", terms=lambda size, x: size.M @ x["v"])
+    def momentum(self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Answer:
+        """Generalised momentum p = ∂K/∂v = M v."""
+        return self._answer("momentum", (q, v), out, errors)
+
+    @query("n", "p", unit="N m by parameter", terms=lambda size, x: size.regressor(x["v"], x["a"]))
+    def regressor(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: Answer | None = None, errors: str = "raise"
+    ) -> Answer:
+        """Regressor of the joint torques, Y(q, v, a) with M a + C v + N = Y θ + armature · a, θ `inertial_parameters`.
+
+        Y holds geometry, gravity and couplings and no mass: θ can be identified from measured torques, except for
+        combinations that no motion distinguishes, for which Y is rank-deficient.
+        [Atkeson, An, Hollerbach 1986; Siciliano et al. 2009, §7.2.2]
         """
-        ...
+        return self._answer("regressor", (q, v, a), out, errors)
 
-    def coriolis_torque(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        """Coriolis and centrifugal torque C(q, v) v.
+    @query(4, 4, unit="1 and m", terms=_placement_terms)
+    def placement(self, q: ArrayLike, frame: str, *, out: Answer | None = None, errors: str = "raise") -> Answer:
+        """Placement of a frame in the base: the homogeneous matrix [[R, p], [0, 1]]."""
+        return self._answer("placement", (q,), out, errors, (frame,))
 
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+    @query(6, "n", unit="m/s and rad/s by v", terms=_jacobian_terms)
+    def jacobian(
+        self, q: ArrayLike, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, out: Answer | None = None,
+        errors: str = "raise",
+    ) -> Answer:  # fmt: skip
+        """Jacobian J(q) of a frame: twist = J v, (linear, angular)."""
+        return self._answer("jacobian", (q,), out, errors, (frame, expressed_in))
 
-        Returns:
-            Torques, shape (..., n), in [N m] or [N].
+    @query(6, "n", unit="m/s² and rad/s² by v", terms=_jacobian_rate_terms)
+    def jacobian_rate(
+        self, q: ArrayLike, v: ArrayLike, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED,
+        out: Answer | None = None, errors: str = "raise",
+    ) -> Answer:  # fmt: skip
+        """Rate of change dJ/dt of the Jacobian of a frame, along v."""
+        return self._answer("jacobian_rate", (q, v), out, errors, (frame, expressed_in))
 
-        Raises:
-            QueryError: If an argument has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
-        """
-        ...
-
-    def coriolis_transpose(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        """Cᵀ(q, v) v = ∂K/∂q, as momentum observers use it: d(M v)/dt = τ + Cᵀ v − N.
-
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Torques, shape (..., n), in [N m] or [N].
-
-        Raises:
-            QueryError: If an argument has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
-        """
-        ...
-
-    def inverse_dynamics(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> Array:
-        """Torque of an acceleration: τ = M a + C v + N.
-
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            a: Accelerations, shape (..., n), in [rad/s²] or [m/s²].
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Torques, shape (..., n), in [N m] or [N].
-
-        Raises:
-            QueryError: If an argument has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
-        """
-        ...
-
-    def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> Array:
-        """Acceleration of a torque: a = M⁻¹ (τ − C v − N).
-
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            tau: Torques, shape (..., n), in [N m] or [N].
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Accelerations, shape (..., n), in [rad/s²] or [m/s²].
-
-        Raises:
-            QueryError: If an argument has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
-            SingularError: If M is singular.
-        """
-        ...
-
-    def kinetic_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        """Kinetic energy K = ½ vᵀ M v.
-
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Energy, shape (...), in [J].
-
-        Raises:
-            QueryError: If an argument has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
-        """
-        ...
-
-    def potential_energy(self, q: Array, *, errors: str = "raise") -> Array:
-        """Potential energy of gravity V = −Σ mᵢ gᵀ pᵢ of the bodies that move, 0 at the origin of the base.
-
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Energy, shape (...), in [J].
-
-        Raises:
-            QueryError: If q has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
-        """
-        ...
-
-    def total_energy(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
+    def total_energy(self, q: ArrayLike, v: ArrayLike, *, errors: str = "raise") -> Any:
         """Total energy E = K + V, constant where nothing but gravity acts.
 
         Args:
             q: Positions, shape (..., n), in [rad] or [m] by joint.
             v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
+            errors: "raise", or "nan" for NaN at the states of a batch that have no answer.
 
         Returns:
             Energy, shape (...), in [J].
-
-        Raises:
-            QueryError: If an argument has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
         """
         return self.kinetic_energy(q, v, errors=errors) + self.potential_energy(q, errors=errors)
 
-    def momentum(self, q: Array, v: Array, *, errors: str = "raise") -> Array:
-        """Generalised momentum p = ∂K/∂v = M v.
 
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Momenta, shape (..., n), in [kg m²/s] or [kg m/s].
-
-        Raises:
-            QueryError: If an argument has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
-        """
-        ...
-
-    def placement(self, q: Array, frame: str, *, errors: str = "raise") -> Array:
-        """Placement of a frame in the base: the homogeneous matrix [[R, p], [0, 1]].
-
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            frame: Name of a link, or of a joint: the frame of a joint is that of its child link. A name that a link
-                and a joint share is the link's.
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Matrix, shape (..., 4, 4); p in [m].
-
-        Raises:
-            QueryError: If q has the wrong shape or is not finite, or the frame is unknown.
-            OverflowedError: If the answer would not be finite.
-        """
-        ...
-
-    def jacobian(self, q: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise") -> Array:
-        """Jacobian J(q) of a frame: twist = J v.
-
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            frame: Name of a link or joint, as of `placement`.
-            expressed_in: Axes and point of the twist, "world_aligned" (at the frame's origin, along the base's axes),
-                "body" (along the frame's axes) or "world" (at the base's origin); or as Pinocchio calls them:
-                "local_world_aligned", "local", "world".
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Matrix with rows (linear, angular), shape (..., 6, n); the twist is in [m/s] and [rad/s].
-
-        Raises:
-            QueryError: If q has the wrong shape or is not finite, or the frame or axes are unknown.
-            OverflowedError: If the answer would not be finite.
-        """
-        ...
-
-    def jacobian_rate(
-        self, q: Array, v: Array, frame: str, *, expressed_in: str = Axes.WORLD_ALIGNED, errors: str = "raise"
-    ) -> Array:
-        """Rate of change dJ/dt of the Jacobian of a frame, along v.
-
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            frame: Name of a link or joint, as of `placement`.
-            expressed_in: Axes and point of the twist, as of `jacobian`.
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Matrix with rows (linear, angular), shape (..., 6, n); dJ/dt v is in [m/s²] and [rad/s²].
-
-        Raises:
-            QueryError: If an argument has the wrong shape or is not finite, or the frame or axes are unknown.
-            OverflowedError: If the answer would not be finite.
-        """
-        ...
+QUANTITIES = table(Dynamics)
+EQUATION = {name: quantity for name, quantity in QUANTITIES.items() if not quantity.framed}  # those of machine code
+M, C, N = (QUANTITIES[name] for name in ("M", "C", "N"))
+CORIOLIS_TORQUE, INVERSE_DYNAMICS, FORWARD_DYNAMICS = (
+    QUANTITIES[name] for name in ("coriolis_torque", "inverse_dynamics", "forward_dynamics")
+)
+FORWARD_DYNAMICS_DERIVATIVES = Quantity(  # of machine code alone
+    "forward_dynamics_derivatives", ("q", "v", "tau"), (3, "n", "n"), terms=_solved_torque, solves=True
+)
+PLANT = {  # a plant's; its effects are terms too
+    "N": replace(N, arguments=("t", "q", "v")),
+    "torque": Quantity("torque", ("t", "q", "v"), ("n",)),
+    "inverse_dynamics": replace(INVERSE_DYNAMICS, arguments=("t", "q", "v", "a")),
+    "forward_dynamics": replace(FORWARD_DYNAMICS, arguments=("t", "q", "v", "u")),
+}
 
 
 def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:

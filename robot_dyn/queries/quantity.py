@@ -1,121 +1,133 @@
-"""Quantities of M(q) a + C(q, v) v + N(q) = τ as values: its arguments, its shape, and the terms whose rounding it has.
+"""Rows of the table of queries: arguments, shape, unit and scale of a quantity of M(q) a + C(q, v) v + N(q) = τ.
 
-Engines, machine code, self check, cross-check, command line and tests iterate these values; each engine answers a
-quantity by the method of its name.
+`query` turns a method of `Dynamics` into a row; its signature and its docstring are part of the row.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from inspect import cleandoc, signature
 from math import inf
-from typing import Any, final
-
-import numpy as np
+from typing import Any, TypeVar, final
 
 from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.queries.units import of_joint
 
 DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hides
 MOST_DIGITS = 20  # of an answer that are counted
 
 State = Mapping[str, Array]
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+_PARAMETERS = {
+    "q": "Positions, shape (..., n), in [rad] or [m] by joint.",
+    "v": "Velocities, shape (..., n), in [rad/s] or [m/s].",
+    "a": "Accelerations, shape (..., n), in [rad/s²] or [m/s²].",
+    "tau": "Torques, shape (..., n), in [N m] or [N].",
+    "frame": "Name of a link, or of a joint, whose frame is that of its child link. A shared name is the link's.",
+    "expressed_in": """Axes and point of the twist: "world_aligned" (at the frame's origin, along the base's axes),
+        "body" (along the frame's axes) or "world" (at the base's origin); or Pinocchio's names "local_world_aligned",
+        "local", "world".""",
+    "out": "Array that receives the result and is returned; it is unchanged if the query raises.",
+    "errors": '"raise", or "nan" for NaN at the states of a batch that have no answer.',
+}
 
 
-def _no_terms(size: Any, x: State) -> Any:
-    """The terms of a quantity without contributions of rigid bodies."""
+def _no_terms(size: Any, x: State) -> float:
+    """Return the terms of a quantity without contributions of rigid bodies."""
     return 0.0
 
 
 @final
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity, which an engine answers by the method of that name.
+    """A quantity that an engine answers by the method of its name.
 
     Attributes:
-        name: Of the method.
+        name: Name of the method.
+        description: First line of its docstring.
         arguments: Names of its arguments, each of shape (..., n); "t" is a time.
-        axes: Its shape for one state: numbers, or letters for those of a robot (`sizes`), "n" its degrees of freedom,
-            "p" its inertial parameters.
-        terms: Sum of the absolute values of the terms added into each entry, of `lagrange.magnitude.Magnitudes` at q
-            and the absolute values of the arguments by name. Where M a = τ is solved, of the entries of that τ.
-        framed: Whether it is a quantity of a frame.
-        definite: Whether it is a symmetric positive definite matrix, so that |x_ij| ≤ √(x_ii x_jj).
-        solves: Whether M a = τ is solved for it: no answer where M is singular, an error that grows as M's condition.
+        axes: Shape for one state: numbers, or letters for those of a robot (`sizes`), "n" its degrees of freedom,
+            "p" its inertial parameters. Every query takes batches, by the rules of `queries.batch`.
+        unit: Unit for revolute joints; `units.of_joint` converts it for prismatic ones.
+        terms: Sum of the absolute values of the terms added into each entry, from `lagrange.magnitude.Magnitudes` at q,
+            the absolute values of the arguments by name, and the frame if it has one. Where M a = τ is solved, the
+            terms of that τ.
+        framed: True for a quantity of a frame.
+        directed: True if the axes of its twist are an option.
+        definite: True for a symmetric positive definite matrix, so that |x_ij| ≤ √(x_ii x_jj).
+        solves: True if M a = τ is solved: no answer where M is singular, an error that grows as M's condition.
         doubtful: Size of a result above which M may be singular.
+        digits: True if `Robot.digits` and certificates count its digits.
     """
 
     name: str
     arguments: tuple[str, ...]
-    axes: tuple[int | str, ...] = ()
-    terms: Callable[[Any, State], Any] = _no_terms
+    axes: tuple[int | str, ...]
+    unit: str = ""
+    description: str = ""
+    terms: Callable[..., Any] = _no_terms
     framed: bool = False
+    directed: bool = False
     definite: bool = False
     solves: bool = False
     doubtful: float = inf
+    digits: bool = False
 
     def shape(self, sizes: Mapping[str, int]) -> tuple[int, ...]:
-        """Its shape for one state of a robot of those sizes."""
+        """Return the shape for one state of a robot with these sizes."""
         return tuple(axis if isinstance(axis, int) else sizes[axis] for axis in self.axes)
 
-    def ask(self, engine: Any, state: State, *frame: str) -> Any:
-        """The answer of an engine at a state, arguments by name."""
-        return getattr(engine, self.name)(*(state[name] for name in self.arguments), *frame)
+    def units(self, joint_types: Iterable[str]) -> tuple[str, ...]:
+        """Return the units of entries, each once, for joints of these types."""
+        if self.axes[:1] != ("n",):
+            return (self.unit,)
+        return tuple(dict.fromkeys(of_joint(self.unit, kind) for kind in joint_types))
+
+    def ask(self, engine: Any, state: State, *frame: str, **options: Any) -> Any:
+        """Return the answer of an engine at a state, arguments by name."""
+        return getattr(engine, self.name)(*(state[name] for name in self.arguments), *frame, **options)
 
 
-def _solved_torque(size: Any, x: State) -> Any:
-    """Of τ − C v − N."""
-    return size.inverse_dynamics(x["v"], np.zeros_like(x["v"])) + x["tau"]
+def query(*axes: int | str, unit: str, terms: Callable[..., Any], **properties: Any) -> Callable[[Method], Method]:
+    """Return a decorator that makes a method a row of the table, and completes its docstring.
+
+    Args:
+        *axes: Shape of the answer for one state, as in `Quantity`.
+        unit: Its unit for revolute joints.
+        terms: Scale of its entries, as in `Quantity`.
+        **properties: Other fields of `Quantity`: definite, solves, doubtful, digits.
+    """
+
+    def row(method: Method) -> Method:
+        parameters = list(signature(method).parameters)[1:]
+        text = cleandoc(method.__doc__ or "")
+        arguments = tuple(name for name in parameters if name in ("q", "v", "a", "tau"))
+        quantity = Quantity(
+            method.__name__, arguments, axes, unit, text.partition("\n")[0], terms,
+            framed="frame" in parameters, directed="expressed_in" in parameters, **properties,
+        )  # fmt: skip
+        vars(method)["quantity"] = quantity
+        method.__doc__ = f"{text}\n\n{_sections(quantity, parameters)}"
+        return method
+
+    return row
 
 
-M = Quantity("M", ("q",), ("n", "n"), lambda size, x: size.M, definite=True)
-C = Quantity("C", ("q", "v"), ("n", "n"), lambda size, x: size.C(x["v"]))
-N = Quantity("N", ("q",), ("n",), lambda size, x: size.N)
-CORIOLIS_TORQUE = Quantity("coriolis_torque", ("q", "v"), ("n",), lambda size, x: size.C(x["v"]) @ x["v"])
-CORIOLIS_TRANSPOSE = Quantity("coriolis_transpose", ("q", "v"), ("n",), lambda size, x: size.C(x["v"]).T @ x["v"])
-INVERSE_DYNAMICS = Quantity(
-    "inverse_dynamics", ("q", "v", "a"), ("n",), lambda size, x: size.inverse_dynamics(x["v"], x["a"])
-)
-FORWARD_DYNAMICS = Quantity(
-    "forward_dynamics", ("q", "v", "tau"), ("n",), _solved_torque, solves=True, doubtful=DOUBTFUL
-)
-KINETIC_ENERGY = Quantity("kinetic_energy", ("q", "v"), (), lambda size, x: x["v"] @ size.M @ x["v"] / 2)
-POTENTIAL_ENERGY = Quantity("potential_energy", ("q",), (), lambda size, x: size.V)
-MOMENTUM = Quantity("momentum", ("q", "v"), ("n",), lambda size, x: size.M @ x["v"])
-REGRESSOR = Quantity("regressor", ("q", "v", "a"), ("n", "p"), lambda size, x: size.regressor(x["v"], x["a"]))
-PLACEMENT = Quantity("placement", ("q",), (4, 4), framed=True)
-JACOBIAN = Quantity("jacobian", ("q",), (6, "n"), framed=True)
-JACOBIAN_RATE = Quantity("jacobian_rate", ("q", "v"), (6, "n"), framed=True)
-MASS_MATRIX_DERIVATIVE = Quantity("mass_matrix_derivative", ("q",), ("n", "n", "n"), lambda size, x: size.dM)
-FORWARD_DYNAMICS_DERIVATIVES = Quantity(
-    "forward_dynamics_derivatives", ("q", "v", "tau"), (3, "n", "n"), _solved_torque, solves=True
-)
+def table(engine: type) -> dict[str, Quantity]:
+    """Return the rows that a class defines, by the names of its methods."""
+    return {name: vars(method)["quantity"] for name, method in vars(engine).items() if hasattr(method, "quantity")}
 
 
-def by_name(*quantities: Quantity) -> dict[str, Quantity]:
-    """Quantities by their names."""
-    return {each.name: each for each in quantities}
-
-
-# what every Robot, Lagrangian and CompiledDynamics answers
-EQUATION = by_name(
-    M,
-    C,
-    N,
-    CORIOLIS_TORQUE,
-    CORIOLIS_TRANSPOSE,
-    INVERSE_DYNAMICS,
-    FORWARD_DYNAMICS,
-    KINETIC_ENERGY,
-    POTENTIAL_ENERGY,
-    MOMENTUM,
-    REGRESSOR,
-)
-# what a Plant answers; its effects are terms beside those of the rigid bodies
-PLANT = by_name(
-    replace(N, arguments=("t", "q", "v")),
-    Quantity("torque", ("t", "q", "v"), ("n",)),
-    replace(INVERSE_DYNAMICS, arguments=("t", "q", "v", "a")),
-    replace(FORWARD_DYNAMICS, arguments=("t", "q", "v", "u")),
-)
-FRAMES = by_name(PLACEMENT, JACOBIAN, JACOBIAN_RATE)
-ALL = EQUATION | FRAMES | by_name(MASS_MATRIX_DERIVATIVE, FORWARD_DYNAMICS_DERIVATIVES)
+def _sections(quantity: Quantity, parameters: list[str]) -> str:
+    """Return the sections Args, Returns and Raises of a docstring."""
+    letters = {"p": "10 N"}
+    shape = ", ".join(["...", *(letters.get(str(axis), str(axis)) for axis in quantity.axes)])
+    units = " or ".join(f"[{unit}]" for unit in quantity.units(("revolute", "prismatic")))
+    lines = ["Args:", *(f"    {name}: {_PARAMETERS[name]}" for name in parameters), ""]
+    lines += ["Returns:", f"    Array of shape ({shape}), in {units}.", ""]
+    unknown = ", or the frame or its axes are unknown" if quantity.framed else ""
+    lines += ["Raises:", f"    QueryError: If an argument has the wrong shape or is not finite{unknown}."]
+    lines += ["    OverflowedError: If the answer would not be finite."]
+    return "\n".join(lines + ["    SingularError: If M is singular."] * quantity.solves)

@@ -15,7 +15,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
 from benchmarks.measure import BATCH, Effort, alternate, arms, lowest, row, table
-from robot_dyn.queries.quantity import ALL
+from robot_dyn.queries.dynamics import QUANTITIES
 
 Sides = dict[str, tuple[str, Callable[[], object], Callable[[], object]]]  # what is called bare, and both calls
 
@@ -51,8 +51,8 @@ def both_sides(robot: rd.Robot, state: np.ndarray) -> Sides:
         return pin.computeCoriolisMatrix(model, data, Q, V)
 
     def ours(name: str, **options: str) -> Callable[[], object]:
-        given = [dict(zip("qva", state, strict=True)).get(x, a) for x in ALL[name].arguments]
-        return partial(getattr(robot, name), *given, *[frame] * ALL[name].framed, **options)
+        given = [dict(zip("qva", state, strict=True)).get(x, a) for x in QUANTITIES[name].arguments]
+        return partial(getattr(robot, name), *given, *[frame] * QUANTITIES[name].framed, **options)
 
     bare: dict[str, tuple[str, Callable[[], object]]] = {
         "M": ("crba", M),
@@ -110,7 +110,7 @@ def lagrangian(effort: Effort) -> None:
         state, batch = rng.normal(size=(3, robot.n)), rng.normal(size=(3, BATCH, robot.n))
         own = rd.Lagrangian(robot)
         for name in ("M", "C", "N", "inverse_dynamics", "forward_dynamics"):
-            arguments = len(ALL[name].arguments)
+            arguments = len(QUANTITIES[name].arguments)
             t = alternate({"one": partial(getattr(own, name), *state[:arguments])}, effort)
             fewer = replace(effort, repeats=effort.repeats // 2 + 1)
             t |= alternate({"batch": partial(getattr(own, name), *batch[:arguments])}, fewer)

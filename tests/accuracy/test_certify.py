@@ -18,7 +18,7 @@ from robot_dyn.accuracy.certificate.implementation import Implementation, implem
 from robot_dyn.accuracy.certificate.worst_case_search import random_states
 from robot_dyn.lagrange.digits import QUANTITIES
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
-from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
+from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from tests.long import long
 
 GIVEN = {"q": [0.3, -1.1], "v": [0.5, 0.4], "a": [0.2, 0.9], "tau": [1.0, -2.0]}

@@ -42,8 +42,8 @@ def test_info():
 
 def test_query():
     keys = promised("query")
-    assert document("query", "ur5").keys() == keys.keys() - {"why"}
-    why = document("query", "ur5", "--why", "elbow_joint")
+    assert document("query", "ur5").keys() == keys.keys() - {"why", "quantities"}
+    why = document("query", "ur5", "--why", "elbow_joint", "--quantity", "momentum")
     assert why.keys() == keys.keys()
     own, _, _ = keys["why"].partition(";")
     assert why["why"].keys() == names(own.partition(":")[2])

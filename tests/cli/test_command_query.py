@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.queries.dynamics import QUANTITIES
 from robot_dyn.queries.units import without_rounding
 from tests.command import ROOT, document, refusal, run, said
 
@@ -97,6 +98,22 @@ def test_numbers_are_those_of_the_library():
     back = document("query", "ur5", "--q", Q, "--v", V, f"--tau={','.join(map(repr, answer['tau']))}")
     assert back["a"] == robot.forward_dynamics(q, v, expected["tau"]).tolist()
     assert back["tau"] == answer["tau"]
+
+
+def test_every_query_of_the_table_is_answered_at_the_state():
+    robot = rd.load("ur5")
+    state = {key: np.array(numbers(text)) for key, text in (("q", Q), ("v", V), ("a", A))}
+    state["tau"] = robot.inverse_dynamics(*state.values())
+    asked = [part for name in QUANTITIES for part in ("--quantity", name)]
+    given = ("query", "ur5", "--q", Q, "--v", V, "--a", A, *asked, "--frame", "tool0")
+    answers = document(*given)["quantities"]
+    for name, quantity in QUANTITIES.items():
+        expected = quantity.ask(robot, state, *["tool0"] * quantity.framed)
+        assert answers[name] == np.asarray(expected).tolist()
+    printed = said(*given)
+    assert all(f"{name}, " in printed for name in QUANTITIES)
+    assert refusal(["query", "ur5", "--quantity", "jacobian"])
+    assert refusal(["query", "ur5", "--quantity", "momenta"])
 
 
 def test_numbers_may_be_named_or_separated_by_blanks():

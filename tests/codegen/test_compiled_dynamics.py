@@ -21,7 +21,7 @@ from robot_dyn.codegen.trace.trace import Trace
 from robot_dyn.foundations.errors import OverflowedError, QueryError, SingularError
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import floored
-from robot_dyn.queries.quantity import EQUATION
+from robot_dyn.queries.dynamics import EQUATION
 from tests.codegen.arms import ARMS, compiled, states
 from tests.random_trees import RandomTree, trees
 

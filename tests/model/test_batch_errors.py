@@ -19,7 +19,7 @@ from robot_dyn.foundations.errors import (
     UndecidedError,
 )
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
-from robot_dyn.queries.quantity import EQUATION
+from robot_dyn.queries.dynamics import EQUATION
 from tests.codegen.arms import compiled
 from tests.queries import ARGUMENTS, FRAMED
 

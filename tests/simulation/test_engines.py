@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass, replace
-from inspect import getattr_static
 from typing import final
 
 import numpy as np
@@ -19,10 +18,8 @@ from robot_dyn.control.controller import Stateless
 from robot_dyn.effects.effect import Active
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.integrate.methods import FIXED_STEP
-from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.compiled.self_check import MachineError, check
-from robot_dyn.simulation.compiled.trace import SymbolicDynamics
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from tests.long import long
 from tests.own_method import OwnImplicit
@@ -300,11 +297,3 @@ def test_interpreted_runs_import_no_compiler(tmp_path) -> None:
         "assert not {'casadi', 'llvmlite'} & set(sys.modules), 'imported'"
     )
     subprocess.run([sys.executable, "-c", code], check=True, env=os.environ | {"ROBOT_DYN_CACHE": str(tmp_path)})
-
-
-def test_symbols_are_a_dynamics_by_their_class() -> None:
-    """From Python 3.12 on, a check of a protocol sees attributes of the class alone, none that `__getattr__` makes."""
-    names = [name for name in vars(Dynamics) if not name.startswith("_")] + ["n", "joint_names"]
-    assert {"M", "C", "N", "forward_dynamics"} < set(names)
-    for name in names:
-        getattr_static(SymbolicDynamics, name)

@@ -159,7 +159,7 @@ class Certificate(Result):
         """The digits of forward dynamics, or of the last quantity counted, in a sentence."""
         if not self.digits:
             return "no digits were counted"
-        quantity = self.quantities[-1]
+        quantity = "forward_dynamics" if "forward_dynamics" in self.quantities else self.quantities[-1]
         parts = [
             f"{each.implementation} {each.searched:.1f} in {format_duration(each.time_s)}"
             for each in sorted(self._of(quantity), key=lambda each: each.time_s)

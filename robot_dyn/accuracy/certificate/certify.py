@@ -27,7 +27,8 @@ from robot_dyn.lagrange.digits import QUANTITIES
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.quantity import MOST_DIGITS, M, Quantity
+from robot_dyn.queries.dynamics import M
+from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
 from robot_dyn.report.environment import environment
 from robot_dyn.report.timing import in_turns, repeatable
 

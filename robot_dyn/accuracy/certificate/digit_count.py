@@ -16,7 +16,8 @@ from robot_dyn.lagrange.exact import NOTHING, Exact, Scale, Truth, entry_units, 
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.quantity import CORIOLIS_TORQUE, M, N, Quantity
+from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, M, N
+from robot_dyn.queries.quantity import Quantity
 
 FEWER = 250  # random states for each one that balls judge, where no other numbers are fine enough; 8 at least
 _SIDE_BY_SIDE = 8  # states that machine code answers side by side, in the search and in the judgement
@@ -116,7 +117,7 @@ class DigitCount:
         """Of errors at states, from fine answers; that of `truth`, but for rounding."""
         inertia = evaluate(self._own, M, states)
         if not (quantity.definite or quantity.solves):
-            return Scale(in_joint_units(fine.astype(float), inertia, self._typical(quantity)))
+            return Scale(in_joint_units(quantity, fine.astype(float), inertia, self._typical(quantity)))
         if quantity.definite:
             return Scale(np.array([floored(each) for each in diagonal_scale(inertia)]))
         inertia[~np.all(np.isfinite(fine), axis=-1)] = np.eye(self.robot.n)  # where there is no answer
@@ -129,7 +130,7 @@ class DigitCount:
             return 0.0
         if quantity not in self._sizes:
             answers, inertia = evaluate(self._own, quantity, self.states), evaluate(self._own, M, self.states)
-            ratios = answers / entry_units(answers, inertia)
+            ratios = answers / entry_units(quantity, inertia)
             largest = float(np.nanmax(np.abs(ratios))) or 1.0  # by which they are divided: squares may overflow
             size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())
             self._sizes[quantity] = size if size > NOTHING else 1.0

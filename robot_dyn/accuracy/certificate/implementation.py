@@ -17,7 +17,8 @@ from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.batch import answered
-from robot_dyn.queries.quantity import FORWARD_DYNAMICS, Quantity
+from robot_dyn.queries.dynamics import FORWARD_DYNAMICS
+from robot_dyn.queries.quantity import Quantity
 
 LONGDOUBLE = "Lagrangian, longdouble"
 

@@ -71,6 +71,17 @@ def query(
             metavar="JOINT", help="Split this joint's torque by link and cause.", autocompletion=completion.joints
         ),
     ] = None,
+    quantity: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Add another query of the rigid bodies, such as momentum; may be repeated.",
+            autocompletion=completion.quantities,
+        ),
+    ] = None,
+    frame: Annotated[
+        str | None, typer.Option(metavar="LINK", help="The frame of --quantity jacobian and others.")
+    ] = None,
     effects: Annotated[str | None, typer.Option(help='"urdf" adds the friction that the file states.')] = None,
     payload: Annotated[
         list[str] | None,
@@ -86,6 +97,7 @@ def query(
 
     Of a scene: at its start, under the actuation of its control; what dry friction and rigid stops hold is listed.
     """
+    from robot_dyn.cli import report
     from robot_dyn.effects.plant_state import plant_state
     from robot_dyn.effects.why import why_at
 
@@ -107,7 +119,12 @@ def query(
     acceleration = arguments.vector("--a", a, names) if torque is None else None
     state = plant_state(plant, at, speed, acceleration, torque)
     cause = {} if why is None else {"why": why_at(state, why)}
-    say_json(state, **cause) if as_json else say(state, *(part for each in cause.values() for part in ("", each)))
+    answers = report.queries(state, quantity or (), frame)
+    if as_json:
+        say_json(state, **cause, **({"quantities": answers} if answers else {}))
+        return
+    say(state, *report.query_lines(answers, names, state.types))
+    say(*(part for each in cause.values() for part in ("", each)))
 
 
 def _actuation(setup: rd.Setup, q: np.ndarray, v: np.ndarray) -> np.ndarray:

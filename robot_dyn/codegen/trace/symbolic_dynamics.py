@@ -4,62 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from inspect import getdoc
 from typing import Any, final
 
 import casadi as ca
 import numpy as np
 
 from robot_dyn.codegen.parameters import Parameter, described, split
-from robot_dyn.codegen.trace.symbolic import Symbols, array_of, column, inputs
+from robot_dyn.codegen.trace.symbolic import Symbolic, Symbols, array_of, column, inputs
 from robot_dyn.codegen.trace.trace import Trace, Traced
-from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.tree import Described
 from robot_dyn.queries.dynamics import Dynamics
 
 
-def _least(name: str) -> Any:
-    """Method for a quantity, from the formulation with the fewest instructions."""
-
-    def ask(self: SymbolicDynamics, *arguments: Array) -> Any:
-        return self._ask(name, arguments)
-
-    ask.__doc__ = getattr(Dynamics, name).__doc__
-    return ask
-
-
-def _closed_form(name: str) -> Any:
-    """Property for an attribute of the closed form."""
-    return property(lambda self: getattr(self._trace.lagrangian, name), doc=getdoc(getattr(Lagrangian, name)))
-
-
-def _kinematic(name: str) -> Any:
-    """Method for a quantity of the closed form that needs no inertia."""
-
-    def ask(self: SymbolicDynamics, *arguments: Any, **options: Any) -> Any:
-        return getattr(self._trace.lagrangian, name)(*arguments, **options).view(Symbols)
-
-    ask.__doc__ = getattr(Dynamics, name).__doc__
-    return ask
-
-
 @final
-class SymbolicDynamics:
+class SymbolicDynamics(Dynamics[Symbols]):
     """Symbolic dynamics of a robot.
 
     Args:
         robot: File and edits of the robot.
         known: Numbers of the robot that are inputs (gravity and payloads); all others are constants.
     """
-
-    M, C, N = map(_least, ("M", "C", "N"))
-    coriolis_torque, coriolis_transpose = map(_least, ("coriolis_torque", "coriolis_transpose"))
-    inverse_dynamics, forward_dynamics, momentum = map(_least, ("inverse_dynamics", "forward_dynamics", "momentum"))
-    kinetic_energy, potential_energy = map(_least, ("kinetic_energy", "potential_energy"))
-    total_energy = Dynamics.total_energy
-    n, joint_names, arithmetic = map(_closed_form, ("n", "joint_names", "arithmetic"))
-    placement, jacobian, jacobian_rate = map(_kinematic, ("placement", "jacobian", "jacobian_rate"))
 
     def __init__(self, robot: Described, known: Sequence[Parameter] = ()) -> None:
         vector, symbols = inputs("numbers", sum(each.size for each in known))
@@ -68,6 +32,19 @@ class SymbolicDynamics:
         self._traced: dict[str, Traced] = {}
         self._given: tuple[Any, ...] = self._trace.given
         self._known = known
+
+    @property
+    def n(self) -> int:
+        return self._trace.lagrangian.n
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        return self._trace.lagrangian.joint_names
+
+    @property
+    def arithmetic(self) -> Symbolic:
+        """The numbers it runs in."""
+        return self._trace.arithmetic
 
     def of(self, values: Mapping[str, Any]) -> SymbolicDynamics:
         """Return a copy whose inputs take these values, in the order of `known`."""
@@ -87,7 +64,9 @@ class SymbolicDynamics:
             self._traced[name] = self._trace.quantity(name)
         return self._traced[name]
 
-    def _ask(self, name: str, arguments: tuple[Array, ...]) -> Any:
-        value = array_of(self._quantity(name).function(*map(column, arguments), *self._given))
+    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
+        if frame:  # no inertia is needed
+            return self._trace.lagrangian._answer(name, state, out, errors, frame).view(Symbols)
+        value = array_of(self._quantity(name).function(*map(column, state), *self._given))
         shape = self._trace.shape(name)
         return value[0, 0] if shape == (1,) else value.reshape(shape).view(Symbols)

@@ -24,6 +24,7 @@ from robot_dyn.codegen.trace.symbolic import Symbolic, array_of, column, inputs
 from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.foundations.arithmetic import Array, in_arithmetic
 from robot_dyn.lagrange.christoffel import christoffel
+from robot_dyn.lagrange.formulas import FORMULAS
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.linkage import Linkage
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
@@ -32,13 +33,12 @@ from robot_dyn.lagrange.recursions.kinetic_energy import kinetic_energy
 from robot_dyn.lagrange.recursions.newton_euler import newton_euler
 from robot_dyn.lagrange.recursions.regressor import regressor
 from robot_dyn.lagrange.tree import Described
-from robot_dyn.queries.dynamics import acceleration
-from robot_dyn.queries.quantity import EQUATION, FORWARD_DYNAMICS_DERIVATIVES, by_name
+from robot_dyn.queries.dynamics import EQUATION, FORWARD_DYNAMICS_DERIVATIVES, acceleration
 
-QUANTITIES = EQUATION | by_name(FORWARD_DYNAMICS_DERIVATIVES)  # those with formulations
+QUANTITIES = EQUATION | {"forward_dynamics_derivatives": FORWARD_DYNAMICS_DERIVATIVES}  # those with formulations
 _SOLVED_MOST = 8  # joints one after the other; with more, to solve M a = τ − … outnumbers articulated bodies
 _DERIVED_MOST = 6  # joints; with more, C v derived from K is longer, and takes as long to trace as all the rest
-_CLOSED_FORM_MOST = 4  # joints; with more its O(n³) terms outnumber the recursions' everywhere, except of C
+_CLOSED_FORM_MOST = 4  # joints; with more its O(n³) terms outnumber other formulations everywhere, except of C
 
 
 @final
@@ -118,19 +118,18 @@ class Trace:
         return Traced(functions[least], least, counts)
 
     def _formulations(self, name: str) -> Iterator[tuple[str, Callable[[], Node]]]:
-        """The formulations of a quantity."""
+        """The formulations of a quantity; the closed form always if there is no other."""
         own, coupled = self.lagrangian, self.lagrangian.linkage.couplings.S.shape[0] != self.lagrangian.n
-        if name != "forward_dynamics_derivatives" and (own.n <= _CLOSED_FORM_MOST or name == "C"):
+        articulated = name == "forward_dynamics" and not coupled
+        depth = max(len(body.path) for body in own.linkage.bodies) if articulated else 0
+        others = [*(self._of_recursion(name) if depth <= _SOLVED_MOST else ())]
+        others += self._of_energies(name) if depth <= _DERIVED_MOST else ()
+        if name in FORMULAS and (own.n <= _CLOSED_FORM_MOST or name == "C" or not (others or articulated)):
             arrays = [self.symbols[argument][1] for argument in QUANTITIES[name].arguments]
             yield "closed form", lambda: column(getattr(own, name)(*arrays))
-        if name == "forward_dynamics" and not coupled:
+        if articulated:
             yield "articulated body", lambda: self._forward
-            depth = max(len(body.path) for body in own.linkage.bodies)
-            yield from self._of_recursion(name) if depth <= _SOLVED_MOST else ()
-            yield from self._of_energies(name) if depth <= _DERIVED_MOST else ()
-            return
-        yield from self._of_recursion(name)
-        yield from self._of_energies(name)
+        yield from others
 
     def _of_recursion(self, name: str) -> Iterator[tuple[str, Callable[[], Node]]]:
         (_, q), (_, v), (_, a), (_, tau) = self.symbols.values()

@@ -21,7 +21,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.quantity import CORIOLIS_TORQUE, N
+from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, N
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.observation.remarks import Kind
 from robot_dyn.simulation.setup.setup import Setup

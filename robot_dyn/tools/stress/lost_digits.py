@@ -16,7 +16,8 @@ from robot_dyn.accuracy.certificate.implementation import Implementation, implem
 from robot_dyn.accuracy.certificate.worst_case_search import Batch
 from robot_dyn.lagrange.digits import digits_of
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.quantity import FORWARD_DYNAMICS, INVERSE_DYNAMICS, Quantity
+from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, INVERSE_DYNAMICS
+from robot_dyn.queries.quantity import Quantity
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.tools.stress.finding import WorstCase
 from robot_dyn.tools.stress.work import Work

@@ -23,7 +23,7 @@ from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.methods import method
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.quantity import M
+from robot_dyn.queries.dynamics import M
 from robot_dyn.simulation.setup.setup import Setup
 
 FAMILIES = ("swing", "friction", "dry friction", "stops", "rigid stops", "PD", "sampled PD")

@@ -16,7 +16,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import OverflowedError
 from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.quantity import M, N
+from robot_dyn.queries.dynamics import M, N
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.tools.stress.finding import WorstCase
 from robot_dyn.tools.stress.shrink import shrunk

@@ -20,7 +20,8 @@ from robot_dyn.foundations.arithmetic import midpoint
 from robot_dyn.foundations.errors import NotFiniteError, RobotDynError
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import diagonal_scale, floored, scaled
-from robot_dyn.queries.quantity import INVERSE_DYNAMICS, M, N, Quantity
+from robot_dyn.queries.dynamics import INVERSE_DYNAMICS, M, N
+from robot_dyn.queries.quantity import Quantity
 from tests.campaigns.hard.case import Case, Row
 from tests.campaigns.hard.conditioning import SUMS, U
 

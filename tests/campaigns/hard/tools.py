@@ -31,7 +31,8 @@ from robot_dyn.lagrange.scale import (
     scaled,
     unit_diagonal_condition,
 )
-from robot_dyn.queries.quantity import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
+from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
+from robot_dyn.queries.quantity import Quantity
 from tests.campaigns.hard.case import Case, Row
 from tests.campaigns.hard.conditioning import U
 

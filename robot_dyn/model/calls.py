@@ -1,0 +1,145 @@
+"""Pinocchio's calls by the names of the queries.
+
+A call is built for a robot, and for a frame and its axes if it has them. It computes one state of all joints,
+(data, q, …) → a new array or a number, where `data` is Pinocchio's working memory.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import pinocchio as pin  # pyright: ignore[reportMissingImports]
+from numpy import ndarray
+
+from robot_dyn.foundations.spatial import hat
+from robot_dyn.model.coriolis import jacobian_rate as rate_of
+from robot_dyn.model.pinocchio_model import link_frames
+from robot_dyn.queries.dynamics import Axes, entry
+
+if TYPE_CHECKING:
+    from robot_dyn.model.robot import Robot
+
+Call = Callable[..., Any]
+
+
+class Scratch(threading.local):
+    """Pinocchio's working memory, one instance per thread."""
+
+    def __init__(self, model: Any) -> None:
+        self.data = model.createData()
+
+
+def _coriolis_torque(robot: Robot) -> Call:
+    weightless = robot.model.copy()  # of `robot.model` less N would keep the digits of N
+    weightless.gravity = pin.Motion.Zero()
+    return partial(pin.nonLinearEffects, weightless)
+
+
+def _coriolis_transpose(robot: Robot) -> Call:
+    matrix = robot.coriolis.matrix
+    return lambda data, q, v: v.dot(matrix(data, q, v))
+
+
+def _momentum(robot: Robot) -> Call:
+    model, crba = robot.model, pin.crba
+    return lambda data, q, v: crba(model, data, q).dot(v)
+
+
+def _kinetic_energy(robot: Robot) -> Call:
+    """pin.computeKineticEnergy leaves out the armature of joints whose axis is not x, y or z."""
+    model, crba = robot.model, pin.crba
+    return lambda data, q, v: float(v.dot(crba(model, data, q).dot(v))) / 2
+
+
+def _regressor(robot: Robot) -> Call:
+    """Bodies in the order of their parameters; for one joint Pinocchio returns a flat array."""
+    model, names = robot.model, list(robot.model.names[1:])
+    N, order = model.nv, [names.index(name) for name in robot.body_names]
+
+    def regressor(data: Any, q: ndarray, v: ndarray, a: ndarray) -> ndarray:
+        Y = pin.computeJointTorqueRegressor(model, data, q, v, a)
+        return Y if in_order else Y.reshape(N, N, -1)[:, order].reshape(N, -1)
+
+    in_order = order == list(range(N)) and N > 1
+    return regressor
+
+
+def _frame(robot: Robot, name: str) -> int:
+    """Return the index of the frame of a link or joint; QueryError if it is unknown."""
+    links = link_frames(robot.model)
+    return entry(links | {joint: links[child] for joint, child in robot.description.joint_frames.items()}, name)
+
+
+def _placement(robot: Robot, frame: str) -> Call:
+    model, index = robot.model, _frame(robot, frame)
+
+    def placement(data: Any, q: ndarray) -> ndarray:
+        pin.forwardKinematics(model, data, q)
+        return pin.updateFramePlacement(model, data, index).homogeneous
+
+    return placement
+
+
+def _jacobian(robot: Robot, frame: str, expressed_in: str) -> Call:
+    """Computed in body axes and rotated here: the world-aligned one loses digits with distance from the base."""
+    model, index, axes = robot.model, _frame(robot, frame), Axes.of(expressed_in)
+    reference = pin.WORLD if axes is Axes.WORLD else pin.LOCAL
+
+    def jacobian(data: Any, q: ndarray) -> ndarray:
+        J = pin.computeFrameJacobian(model, data, q, index, reference)
+        return J if J.ndim == 2 else J.reshape(6, 1)  # Pinocchio returns a flat array for one joint
+
+    def aligned(data: Any, q: ndarray) -> ndarray:
+        return _turned(_rotation(model, data, index, q), jacobian(data, q))
+
+    return aligned if axes is Axes.WORLD_ALIGNED else jacobian
+
+
+def _jacobian_rate(robot: Robot, frame: str, expressed_in: str) -> Call:
+    model, index, axes = robot.model, _frame(robot, frame), Axes.of(expressed_in)
+
+    def jacobian_rate(data: Any, q: ndarray, v: ndarray) -> ndarray:
+        if axes is Axes.WORLD:
+            pin.computeJointJacobiansTimeVariation(model, data, q, v)
+            rate = pin.getFrameJacobianTimeVariation(model, data, index, pin.WORLD)
+            return rate if rate.ndim == 2 else rate.reshape(6, 1)
+        J = pin.computeFrameJacobian(model, data, q, index, pin.LOCAL).reshape(6, -1)
+        rate, twist = rate_of(J, v)
+        if axes is Axes.BODY:
+            return rate
+        # d/dt diag(R, R) = diag(R, R) diag(ω̂, ω̂)
+        return _turned(_rotation(model, data, index, q), rate + _turned(hat(twist[3:]), J))
+
+    return jacobian_rate
+
+
+def _rotation(model: Any, data: Any, frame: int, q: ndarray) -> ndarray:
+    """Rotation R from the axes of a frame to those of the base."""
+    pin.forwardKinematics(model, data, q)
+    return pin.updateFramePlacement(model, data, frame).rotation
+
+
+def _turned(R: ndarray, J: ndarray) -> ndarray:
+    """diag(R, R) J."""
+    return (R @ J.reshape(2, 3, -1)).reshape(6, -1)
+
+
+PINOCCHIO: dict[str, Callable[..., Call]] = {
+    "M": lambda robot: partial(pin.crba, robot.model),
+    "C": lambda robot: robot.coriolis.matrix,
+    "N": lambda robot: partial(pin.computeGeneralizedGravity, robot.model),
+    "coriolis_torque": _coriolis_torque,
+    "coriolis_transpose": _coriolis_transpose,
+    "inverse_dynamics": lambda robot: partial(pin.rnea, robot.model),
+    "forward_dynamics": lambda robot: partial(pin.aba, robot.model),
+    "kinetic_energy": _kinetic_energy,
+    "potential_energy": lambda robot: partial(pin.computePotentialEnergy, robot.model),
+    "momentum": _momentum,
+    "regressor": _regressor,
+    "placement": _placement,
+    "jacobian": _jacobian,
+    "jacobian_rate": _jacobian_rate,
+}
