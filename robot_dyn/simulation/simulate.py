@@ -18,10 +18,10 @@ from robot_dyn.foundations.values import cached, derived
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.time_stepping import TimeStepping
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.compiled.engine_choice import choose, most_interpreted
 from robot_dyn.simulation.derived import Results
 from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.declarations import named
+from robot_dyn.simulation.engine.choice import choose, most_interpreted
 from robot_dyn.simulation.estimate.estimate import estimate
 from robot_dyn.simulation.estimate.requested_accuracy import run_to
 from robot_dyn.simulation.observation.observer import Observer
@@ -36,7 +36,7 @@ from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import check_record
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
+    from robot_dyn.simulation.engine.machine_code import CompiledStateEquation
 
 
 @takes_options

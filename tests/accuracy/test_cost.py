@@ -23,8 +23,8 @@ from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.foundations.result import json_text
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.scene.starters import starter
-from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import compiled_equation, compiled_with_constants
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])

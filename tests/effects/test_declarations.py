@@ -16,11 +16,11 @@ from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.effects.effect import Effect
 from robot_dyn.foundations.arithmetic import tanh
 from robot_dyn.foundations.errors import EffectError, TraceError
-from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.compiled.self_check import MachineError
 from robot_dyn.simulation.dynamics.declarations import undeclared
 from robot_dyn.simulation.dynamics.smoothness import LOOKS
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.choice import choose
+from robot_dyn.simulation.engine.self_check import MachineError
 from robot_dyn.simulation.results.error_estimate import Verdict
 from robot_dyn.simulation.results.trajectory import Trajectory
 

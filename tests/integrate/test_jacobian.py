@@ -10,9 +10,9 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.integrate.integrator import System
-from robot_dyn.simulation.compiled import build
-from robot_dyn.simulation.compiled.self_check import MachineError, check, jacobian_error
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import compiled_equation
+from robot_dyn.simulation.engine.self_check import MachineError, check, jacobian_error
 from robot_dyn.simulation.setup.segment_table import segment_table
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52
@@ -40,7 +40,7 @@ def equation_of(made: rd.Setup) -> StateEquation:
 
 def exact_jacobian(made: rd.Setup, t: float, y: np.ndarray) -> np.ndarray:
     """∂f/∂y_j for each j, then ∂f/∂t, of machine code."""
-    machine = build.compiled_equation(equation_of(made), None, jacobian=True)
+    machine = compiled_equation(equation_of(made), None, jacobian=True)
     out, m = np.empty((len(y) + 1, len(y), 1)), len(y)
     p, run_parameters = segment_table(made).parameters[0], machine.run_parameters({})
     machine.in_python.jacobian(t, np.ascontiguousarray(y)[:, None], p, run_parameters, out)
@@ -87,7 +87,7 @@ def test_it_is_held_to_differences_of_the_interpreted_equation() -> None:
 
 
 def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = build.compiled_equation(equation_of(setup()), None, jacobian=True)
+    made = compiled_equation(equation_of(setup()), None, jacobian=True)
     wrong = replace(made, functions=replace(made.functions, checked={}))
     functions = made.in_python
 
@@ -102,9 +102,9 @@ def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_it_is_made_only_for_methods_that_need_it() -> None:
     equation = equation_of(setup())
-    assert "jacobian" not in build.compiled_equation(equation, rd.integrate.method("rk4")).functions.programs
-    assert build.compiled_equation(equation, None).in_python.jacobian == 0
-    assert "jacobian" in build.compiled_equation(equation, None, jacobian=True).functions.programs
+    assert "jacobian" not in compiled_equation(equation, rd.integrate.method("rk4")).functions.programs
+    assert compiled_equation(equation, None).in_python.jacobian == 0
+    assert "jacobian" in compiled_equation(equation, None, jacobian=True).functions.programs
 
 
 def test_runs_in_lock_step_have_each_their_own() -> None:
@@ -113,7 +113,7 @@ def test_runs_in_lock_step_have_each_their_own() -> None:
     made, lanes = setup(controller=law), 16
     rng = np.random.default_rng(3)
     damping = rng.uniform(0.1, 9.0, (lanes, 2))
-    machine = build.compiled_equation(
+    machine = compiled_equation(
         equation_of(made), None, lanes=lanes, extras=(), swept=("viscous_friction.damping",), jacobian=True
     )
     m = machine.equation.size

@@ -20,10 +20,10 @@ from robot_dyn.effects.effect import Active
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.compiled.self_check import MachineError, check
-from robot_dyn.simulation.compiled.trace import SymbolicDynamics
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.choice import choose
+from robot_dyn.simulation.engine.self_check import MachineError, check
+from robot_dyn.simulation.engine.trace import SymbolicDynamics
 from tests.long import long
 from tests.own_method import OwnImplicit
 
@@ -277,10 +277,10 @@ def test_a_second_process_takes_the_machine_code_of_the_store_for_a_short_run(tm
 
 def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
     """The interpreted equation has another gravity than the compiled one: the self check refuses it."""
-    from robot_dyn.simulation.compiled import build
+    from robot_dyn.simulation.engine.cache import compiled_equation
 
     setup = rd.Setup(rd.Plant(ARM), Q)
-    made = build.compiled_equation(StateEquation(setup.plant, None), rd.integrate.method("rk4"))
+    made = compiled_equation(StateEquation(setup.plant, None), rd.integrate.method("rk4"))
     check(made, setup)
     functions = replace(made.functions, checked={})
     other = replace(

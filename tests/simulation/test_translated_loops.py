@@ -20,10 +20,10 @@ from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.integrator import PlainMethod, Stepper
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.integrate.primitives import evaluate
-from robot_dyn.simulation.compiled.build import compiled_equation
-from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now, rules_of, runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import compiled_equation
+from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.observation.guard_levels import guard_levels
 from robot_dyn.simulation.observation.observation import observation_of
 from robot_dyn.simulation.run.fixed_step import samples_at_most

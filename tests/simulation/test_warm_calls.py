@@ -21,8 +21,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.machine_code import CompiledStateEquation
 from robot_dyn.simulation.observation.remarks import Kind
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending

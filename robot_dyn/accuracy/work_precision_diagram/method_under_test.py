@@ -19,8 +19,8 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
 from robot_dyn.report.time_budget import Limit
-from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.results.samples import ledger
 from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending

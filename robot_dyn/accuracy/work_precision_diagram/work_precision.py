@@ -35,8 +35,8 @@ from robot_dyn.queries.units import format_duration, units
 from robot_dyn.report.environment import environment
 from robot_dyn.report.result import Result
 from robot_dyn.report.time_budget import Budget
-from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup

@@ -9,11 +9,11 @@ from typing import NamedTuple, final
 import numpy as np
 
 from robot_dyn.foundations.coefficients import with_values
-from robot_dyn.simulation.compiled.build import with_numbers
-from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
-from robot_dyn.simulation.compiled.engine_choice import checked, compiled_for
 from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import with_numbers
+from robot_dyn.simulation.engine.choice import checked, compiled_for
+from robot_dyn.simulation.engine.machine_code import CompiledStateEquation
 from robot_dyn.simulation.observation.guard_levels import GuardLevels
 from robot_dyn.simulation.observation.observation import Observation, Observed, observation_of, observed
 from robot_dyn.simulation.results.samples import columns

@@ -28,8 +28,8 @@ from robot_dyn.foundations.values import several
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.compiled.build import compiled_equation
-from robot_dyn.simulation.compiled.engine_choice import checked
+from robot_dyn.simulation.engine.cache import compiled_equation
+from robot_dyn.simulation.engine.choice import checked
 from robot_dyn.simulation.results.acting import frame_of, rotors_of
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
 from robot_dyn.simulation.rollouts.batch import Batch

@@ -20,6 +20,7 @@ from robot_dyn.integrate.bernstein import room
 from robot_dyn.integrate.step_control import At, ControlledStepper, control_of
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.interpreted import interpreted, system
 from robot_dyn.simulation.events.crossings import Switches
 from robot_dyn.simulation.events.event_log import event_log
 from robot_dyn.simulation.events.holding import Places
@@ -32,7 +33,6 @@ from robot_dyn.simulation.run.driver import Advance, FunctionsOf
 from robot_dyn.simulation.run.event_loop import Times, event_loop
 from robot_dyn.simulation.run.outcome import Ending, GivesUp, Outcome, Stiff, TooLong
 from robot_dyn.simulation.run.recording import MOST_SHARED, Path, sample
-from robot_dyn.simulation.run.state_functions import interpreted, system
 from robot_dyn.simulation.run.stiffness import FIRST_LOOK, changes_over
 from robot_dyn.simulation.run.switched_run import SwitchedRun
 from robot_dyn.simulation.run.watch import DivergedError, Watch, one_step

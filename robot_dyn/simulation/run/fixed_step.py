@@ -17,12 +17,12 @@ from robot_dyn.foundations.arithmetic import FLOAT64, Array
 from robot_dyn.foundations.errors import RobotDynError, is_mistake
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now
+from robot_dyn.simulation.engine.interpreted import interpreted, sample, system
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.run.driver import Advance, Driver, FunctionsOf
 from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.simulation.run.recording import MOST_SHARED, Path, Recording
-from robot_dyn.simulation.run.state_functions import interpreted, sample, system
 from robot_dyn.simulation.run.time_loop import WATCHED, acts, time_loop
 from robot_dyn.simulation.run.watch import LARGEST, Watch, one_step, overflowed
 from robot_dyn.simulation.setup.schedule import ON_STEP, paced

@@ -14,18 +14,18 @@ import numpy as np
 
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.interpreted import in_modes, interpreted
 from robot_dyn.simulation.events.modes import alone, places
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.run.event_run import EventRun
 from robot_dyn.simulation.run.fixed_step import FixedStep
-from robot_dyn.simulation.run.state_functions import in_modes, interpreted
 from robot_dyn.simulation.run.watch import Watch
 from robot_dyn.simulation.setup.schedule import mesh
 from robot_dyn.simulation.setup.setup import Setup
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
+    from robot_dyn.simulation.engine.machine_code import CompiledStateEquation
 
 
 def make_run(

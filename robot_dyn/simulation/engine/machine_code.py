@@ -13,9 +13,9 @@ import numpy as np
 from robot_dyn.codegen.loops.call import MachineFunction
 from robot_dyn.codegen.parameters import CONTROLLER, ROBOT, Parameter, Part, joined, parameters
 from robot_dyn.foundations.coefficients import value_at
-from robot_dyn.simulation.compiled.functions import CompiledFunctions
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.functions import CompiledFunctions
 
 _FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
 

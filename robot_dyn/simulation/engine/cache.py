@@ -15,10 +15,11 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import TraceError
 from robot_dyn.foundations.values import LRUByIdentity
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
-from robot_dyn.simulation.compiled.functions import CompiledFunctions
-from robot_dyn.simulation.compiled.loop import loop_for
-from robot_dyn.simulation.compiled.programs import (
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.functions import CompiledFunctions
+from robot_dyn.simulation.engine.loop import loop_for
+from robot_dyn.simulation.engine.machine_code import CompiledStateEquation
+from robot_dyn.simulation.engine.programs import (
     Identified,
     Traces,
     identify,
@@ -27,8 +28,7 @@ from robot_dyn.simulation.compiled.programs import (
     stored,
     traced,
 )
-from robot_dyn.simulation.compiled.structure import changeable
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.structure import changeable
 
 _MOST_INSTRUCTIONS = 100_000  # some ten seconds of compiling
 

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 from robot_dyn.codegen.waiting import announced
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.simulation.compiled.programs import Identified, Traces, identify, interpreted, stored
 from robot_dyn.simulation.dynamics.declarations import named, undeclared
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.programs import Identified, Traces, identify, interpreted, stored
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import segments
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
+    from robot_dyn.simulation.engine.machine_code import CompiledStateEquation
 
 # Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s; half of
 # it without the time loop, which is compiled once for a version of this library.
@@ -70,7 +70,7 @@ def most_interpreted(setup: Setup, equation: StateEquation, compiled_equation: C
 
 def _checked(setup: Setup, equation: StateEquation, found: CompiledStateEquation | None) -> CompiledStateEquation:
     """The machine code that exists, or new code, after its self-check."""
-    from robot_dyn.simulation.compiled.self_check import check
+    from robot_dyn.simulation.engine.self_check import check
 
     if found is None:
         return checked(setup, lambda: compiled_for(setup, equation))
@@ -85,7 +85,7 @@ def checked(setup: Setup, build: Callable[[], CompiledStateEquation]) -> Compile
         TraceError: If a part cannot be compiled; names it.
         MachineError: If the machine code does not agree with the interpreted engine.
     """
-    from robot_dyn.simulation.compiled.self_check import check
+    from robot_dyn.simulation.engine.self_check import check
 
     with announced("compiling the equations of this run, once for its structure"):
         compiled = build()
@@ -99,7 +99,7 @@ def compiled_for(setup: Setup, equation: StateEquation, swept: tuple[str, ...] =
     Raises:
         TraceError: If a part cannot be compiled; names it.
     """
-    from robot_dyn.simulation.compiled.build import compiled_equation
+    from robot_dyn.simulation.engine.cache import compiled_equation
 
     code, (_, jacobian, nonsmooth) = _code(setup, equation), _traces(setup)
     return compiled_equation(
@@ -110,11 +110,11 @@ def compiled_for(setup: Setup, equation: StateEquation, swept: tuple[str, ...] =
 def _existing(setup: Setup, identified: Identified, what: Traces) -> CompiledStateEquation | None:
     """The machine code in this process or in the store; None if there is none."""
     programs = None
-    if "robot_dyn.simulation.compiled.build" not in sys.modules:  # to import it takes ten times as long as the look-up
+    if "robot_dyn.simulation.engine.cache" not in sys.modules:  # to import it takes ten times as long as the look-up
         programs = stored(identified, what)
         if programs is None:
             return None
-    from robot_dyn.simulation.compiled.build import existing
+    from robot_dyn.simulation.engine.cache import existing
 
     return existing(identified, what, _plain(setup), setup.finds_events, programs)
 
@@ -131,7 +131,7 @@ def _is_worthwhile(setup: Setup, identified: Identified, what: Traces, seen: flo
 
 def _has_loop(setup: Setup) -> bool:
     """Whether the time loop is in the store."""
-    from robot_dyn.simulation.compiled.loop import loop_of
+    from robot_dyn.simulation.engine.loop import loop_of
 
     method = _plain(setup)
     return (

@@ -18,8 +18,8 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import TraceError
 from robot_dyn.foundations.values import LRUByIdentity
 from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.compiled.structure import of_library, structure
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.structure import of_library, structure
 
 _robots, _symbols, _interpreted = LRUByIdentity(), LRUByIdentity(), LRUByIdentity()
 
@@ -132,7 +132,7 @@ def traced(equation: StateEquation, known: tuple[Parameter, ...], what: Traces, 
     """The programs of a state equation by a trace; arguments as of `Identified`, and whether numbers are constants."""
     from robot_dyn.codegen.trace.from_casadi import program_of
     from robot_dyn.codegen.trace.symbolic_dynamics import SymbolicDynamics
-    from robot_dyn.simulation.compiled.trace import trace
+    from robot_dyn.simulation.engine.trace import trace
 
     def bodies(dynamics: Any, part: Part) -> SymbolicDynamics:
         """Its equations in symbols, traced once for a file and its edits."""

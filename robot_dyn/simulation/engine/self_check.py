@@ -18,16 +18,16 @@ from robot_dyn.codegen.trace.right_angles import models_in_full
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import RobotDynError, because
 from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
-from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
-from robot_dyn.simulation.compiled.functions import STEP, States
-from robot_dyn.simulation.compiled.programs import robot_to_compile
 from robot_dyn.simulation.dynamics.bodies import bodies
 from robot_dyn.simulation.dynamics.moreau_jean import stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.functions import STEP, States
+from robot_dyn.simulation.engine.interpreted import sample
+from robot_dyn.simulation.engine.machine_code import CompiledStateEquation
+from robot_dyn.simulation.engine.programs import robot_to_compile
 from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.recording import Path, Recording
-from robot_dyn.simulation.run.state_functions import sample
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 
