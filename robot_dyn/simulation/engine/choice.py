@@ -6,21 +6,27 @@ Machine code that this process already has, or the store, is used in any case.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from robot_dyn.codegen.waiting import announced
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.simulation.dynamics.declarations import named, undeclared
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.programs import Identified, Traces, identify, interpreted, stored
-from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.setup.size import segments
-
-if TYPE_CHECKING:
-    from robot_dyn.simulation.engine.machine_code import CompiledStateEquation
+from robot_dyn.foundations.values import cached
+from robot_dyn.simulation.dynamics.declarations import named
+from robot_dyn.simulation.engine.cache import (
+    existing,
+    identify,
+    interpreted_before,
+    machine_code,
+    traces_of,
+    with_numbers,
+)
+from robot_dyn.simulation.engine.engine import Engine
+from robot_dyn.simulation.engine.interpreted import Interpreted
+from robot_dyn.simulation.engine.machine_code import MachineCode
+from robot_dyn.simulation.engine.self_check import check
+from robot_dyn.simulation.setup.setup import Setup, segments
 
 # Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s; half of
 # it without the time loop, which is compiled once for a version of this library.
@@ -30,98 +36,94 @@ _GUESSED = 10  # evaluations in a step of an implicit method, beside those of it
 _PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for each second, at least for each segment
 
 
-def choose(setup: Setup, equation: StateEquation, seen: float = 0) -> tuple[CompiledStateEquation | None, str]:
-    """Return the machine code that runs a setup, None for the interpreted engine, and a text for the summary.
+def choose(setup: Setup, seen: float = 0) -> Engine:
+    """Return the engine that runs a setup; machine code is chosen once, but with events it is checked for each run.
 
     Args:
         setup: What to run.
-        equation: Its state equation.
         seen: A lower bound of its evaluations, without its companions.
 
     Raises:
         TraceError: If engine is "compiled" and a part cannot be; names it.
         MachineError: If the machine code does not agree with the interpreted engine.
     """
+    return cached(setup, _chosen, seen, lasts=lambda engine: isinstance(engine, MachineCode) and not setup.events)
+
+
+def _chosen(setup: Setup, seen: float) -> Engine:
     if setup.engine == "interpreted":
-        return None, _interpreted(setup)
+        return _interpreted(setup)
     required = setup.engine == "compiled"
-    if not required and (parts := undeclared(setup.plant, setup.controller)):  # they may do what a trace would lose
-        return None, _interpreted(setup, " ".join((named(parts[0][0]), parts[0][1])))
+    if not required and (parts := setup.undeclared):  # they may do what a trace would lose
+        return _interpreted(setup, " ".join((named(parts[0][0]), parts[0][1])))
     try:
-        identified, what = identify(_code(setup, equation)), _traces(setup)
-        found = _existing(setup, identified, what)
-        if found is None and not required and not _is_worthwhile(setup, identified, what, seen):
-            return None, _interpreted(setup, "short: compiling is not worthwhile")
-        compiled_equation = _checked(setup, equation, found)
-        return compiled_equation, _label(compiled_equation)
+        what = traces_of(setup.integrator)
+        identified = identify(setup.equation, what)
+        code = existing(identified, what, setup.integrator, setup.finds_events)
+        if code is not None:
+            check(code, setup)
+            return code
+        if not required and not _is_worthwhile(setup, interpreted_before(identified, what), seen):
+            most = _COMPILED / _in_all(setup, setup.equation.size) if setup.integrator.controls_error else inf
+            return _interpreted(setup, "short: compiling is not worthwhile", most)
+        return checked(setup, lambda: _of_one_run(setup))
     except (ImportError, RobotDynError) as error:
         if required:
             raise
-        return None, _interpreted(setup, str(error))
+        return _interpreted(setup, str(error))
 
 
-def most_interpreted(setup: Setup, equation: StateEquation, compiled_equation: CompiledStateEquation | None) -> float:
-    """Evaluations after which a run starts again in machine code: a count that was guessed too low."""
-    guessed = setup.engine == "auto" and compiled_equation is None and setup.integrator.controls_error
-    if not guessed or undeclared(setup.plant, setup.controller):  # what is not compiled would never end
-        return inf
-    return _COMPILED / _in_all(setup, equation.size)
+def choose_for_batch(setup: Setup, swept: tuple[str, ...]) -> Engine:
+    """Return the engine of runs that go one after the other on each thread: machine code, unless it is not wanted.
 
-
-def _checked(setup: Setup, equation: StateEquation, found: CompiledStateEquation | None) -> CompiledStateEquation:
-    """The machine code that exists, or new code, after its self-check."""
-    from robot_dyn.simulation.engine.self_check import check
-
-    if found is None:
-        return checked(setup, lambda: compiled_for(setup, equation))
-    check(found, setup)
-    return found
-
-
-def checked(setup: Setup, build: Callable[[], CompiledStateEquation]) -> CompiledStateEquation:
-    """The machine code that `build` returns, after its self-check, which compiles it; says so if that takes long.
+    Args:
+        setup: The setup of all runs.
+        swept: Names of the parameters that differ from run to run.
 
     Raises:
         TraceError: If a part cannot be compiled; names it.
         MachineError: If the machine code does not agree with the interpreted engine.
     """
-    from robot_dyn.simulation.engine.self_check import check
-
-    with announced("compiling the equations of this run, once for its structure"):
-        compiled = build()
-        check(compiled, setup)
-    return compiled
+    if setup.engine == "interpreted":
+        return _interpreted(setup)
+    return checked(setup, lambda: _of_one_run(setup, swept))
 
 
-def compiled_for(setup: Setup, equation: StateEquation, swept: tuple[str, ...] = ()) -> CompiledStateEquation:
-    """The machine code of a run by itself, not checked yet; `swept` as of `compiled_equation`.
+def for_run(engine: Engine, batch: Setup, setup: Setup) -> Engine:
+    """Return the engine of a run of a batch.
+
+    Args:
+        engine: The engine of the batch.
+        batch: The setup of the batch.
+        setup: The setup of the run, which differs in parameters, start and noise.
+    """
+    if not isinstance(engine, MachineCode):
+        return Interpreted(setup.equation)
+    if engine.compiled_form.limited != setup.equation.limited or setup.finds_events != batch.finds_events:
+        return _of_one_run(setup, engine.swept)
+    return with_numbers(engine, setup.equation)
+
+
+def checked(setup: Setup, build: Callable[[], MachineCode]) -> MachineCode:
+    """Return the machine code that `build` returns, after its self-check, which compiles it; announce it if slow.
 
     Raises:
         TraceError: If a part cannot be compiled; names it.
+        MachineError: If the machine code does not agree with the interpreted engine.
     """
-    from robot_dyn.simulation.engine.cache import compiled_equation
-
-    code, (_, jacobian, nonsmooth) = _code(setup, equation), _traces(setup)
-    return compiled_equation(
-        code, _plain(setup), swept=swept, jacobian=jacobian, cuts=setup.finds_events, nonsmooth=nonsmooth
-    )
+    with announced("compiling the equations of this run, once for its structure"):
+        code = build()
+        check(code, setup)
+    return code
 
 
-def _existing(setup: Setup, identified: Identified, what: Traces) -> CompiledStateEquation | None:
-    """The machine code in this process or in the store; None if there is none."""
-    programs = None
-    if "robot_dyn.simulation.engine.cache" not in sys.modules:  # to import it takes ten times as long as the look-up
-        programs = stored(identified, what)
-        if programs is None:
-            return None
-    from robot_dyn.simulation.engine.cache import existing
-
-    return existing(identified, what, _plain(setup), setup.finds_events, programs)
+def _of_one_run(setup: Setup, swept: tuple[str, ...] = ()) -> MachineCode:
+    return machine_code(setup.equation, setup.integrator, swept=swept, cuts=setup.finds_events)
 
 
-def _is_worthwhile(setup: Setup, identified: Identified, what: Traces, seen: float) -> bool:
+def _is_worthwhile(setup: Setup, before: list[float], seen: float) -> bool:
     """Whether compiling takes less time than this run and those of its structure that were interpreted before it."""
-    before, size = interpreted(identified, what), identified.equation.size
+    size = setup.equation.size
     count = before[0] + max(seen * _in_all(setup, size), _evaluations(setup, size))
     if count >= _COMPILED or (count >= _WITHOUT_LOOP and _has_loop(setup)):
         return True
@@ -133,39 +135,14 @@ def _has_loop(setup: Setup) -> bool:
     """Whether the time loop is in the store."""
     from robot_dyn.simulation.engine.loop import loop_of
 
-    method = _plain(setup)
-    return (
-        method is not None
-        and loop_of(method, setup.finds_events, holds=bool(setup.plant.equation_of_motion.set_valued)).is_kept()
-    )
+    method, holds = setup.integrator, bool(setup.plant.equation_of_motion.set_valued)
+    return method.plain and loop_of(method, setup.finds_events, holds=holds).is_kept()
 
 
-def _code(setup: Setup, equation: StateEquation) -> StateEquation:
-    """The equation that is compiled."""
-    return equation if _traces(setup).nonsmooth else equation.in_a_mode
-
-
-def _traces(setup: Setup) -> Traces:
-    method: Any = setup.integrator
-    return Traces(None, method.needs_jacobian, method.nonsmooth)
-
-
-def _plain(setup: Setup) -> Any:
-    """The method, if its steps are compiled."""
-    method: Any = setup.integrator
-    return method if method.plain else None
-
-
-def _interpreted(setup: Setup, why: str = "") -> str:
+def _interpreted(setup: Setup, why: str = "", most: float = inf) -> Interpreted:
     reasons = [why] * bool(why) + ["Jacobian by differences"] * setup.integrator.needs_jacobian
-    return f"interpreted ({'; '.join(reasons)})" if reasons else "interpreted"
-
-
-def _label(compiled_equation: CompiledStateEquation) -> str:
-    if compiled_equation.loop is not None:
-        return "compiled"
-    why = f": {compiled_equation.refused}" if compiled_equation.refused else ""
-    return f"compiled (the equation of motion; steps in Python{why})"
+    label = f"interpreted ({'; '.join(reasons)})" if reasons else "interpreted"
+    return Interpreted(setup.equation, label, most)
 
 
 def _evaluations(setup: Setup, size: int) -> float:
