@@ -23,8 +23,8 @@ from robot_dyn.scene.scene import Scene, read_both
 from robot_dyn.scene.schema import Part, kinds_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
-from robot_dyn.simulation.setup.explanation import explanation_of, model_lines, pace, shortened, span
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.setup.explanation import model_lines, pace, span
+from robot_dyn.simulation.setup.setup import Setup, explanation_of, shortened
 
 OF_FILE = "the robot's file"
 _DELAYS = "measurement_delay_periods", "actuation_delay_periods"
@@ -133,7 +133,7 @@ def _machine_code(plant: Plant, setup: Setup | None) -> Iterator[str]:
 
 def _of_tick(setup: Setup, kind: str | None) -> Iterator[str]:
     """Instructions of a tick, and those of the first controller alone."""
-    from robot_dyn.simulation.compiled.build import compiled_equation
+    from robot_dyn.simulation.engine.cache import machine_code
 
     inside: Any = setup.controller
     if inside is None or not inside.period_s:
@@ -141,7 +141,7 @@ def _of_tick(setup: Setup, kind: str | None) -> Iterator[str]:
     inside = inside.controller if isinstance(inside, Loop) else inside
     try:
         counts = [
-            len(compiled_equation(StateEquation(setup.plant, each).in_a_mode, None).functions.programs["tick"])
+            len(machine_code(StateEquation(setup.plant, each)).code.programs["tick"])
             for each in dict.fromkeys((setup.controller, inside))
         ]
     except RobotDynError:  # the reason is given with the acceleration, or the run is interpreted

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, replace
-from math import inf
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
+from typing import Any, NamedTuple, Unpack
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.validate import function
@@ -18,10 +17,11 @@ from robot_dyn.foundations.values import cached, derived
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.time_stepping import TimeStepping
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.compiled.engine_choice import choose, most_interpreted
 from robot_dyn.simulation.derived import Results
 from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.declarations import named
+from robot_dyn.simulation.engine.choice import choose
+from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.estimate.estimate import estimate
 from robot_dyn.simulation.estimate.requested_accuracy import run_to
 from robot_dyn.simulation.observation.observer import Observer
@@ -34,9 +34,6 @@ from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import check_record
-
-if TYPE_CHECKING:
-    from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 
 
 @takes_options
@@ -75,8 +72,8 @@ def simulate(
     finished, setup = perf_counter(), ran.setup
     record, error, spent, companions = _with_estimate(ran, on_progress)
     estimated = perf_counter()
-    compiled = ran.compiled_equation is not None
-    results = Results(setup, record, ran.observer, error, dict(setup.about), compiled, ran.remarks)
+    exact = ran.engine.exact_right_angles
+    results = Results(setup, record, ran.observer, error, dict(setup.about), exact, ran.remarks)
     known = {"joint_names": setup.plant.dynamics.joint_names, "t": record.t, "events": record.events, "error": error}
     known["accuracy"] = None
     if not (setup.is_value and record.outcome.ending is Ending.FINISHED):  # nothing may be read later
@@ -86,7 +83,7 @@ def simulate(
         EXPLICIT if setup.integrator.name == AUTO else setup.integrator.name,
         0.0 if setup.integrator.controls_error else record.outcome.t / max(record.steps, 1),
         record.steps, record.evaluations, finished - ran.ready, 0.0 if error is None else estimated - finished,
-        ran.engine, ran.ready - began, perf_counter() - estimated, spent, companions,
+        ran.engine.label, ran.ready - began, perf_counter() - estimated, spent, companions,
         ", ".join(named(part) for part, _ in setup.undeclared),
     )  # fmt: skip
     return derived(Trajectory, results, statistics=statistics, **known)
@@ -97,7 +94,7 @@ class _Ran(NamedTuple):
 
     Attributes:
         setup: With the method of the run.
-        compiled_equation, engine: As of `choose`.
+        engine: What evaluated its state equation.
         observer: Its observer.
         record: Its record.
         ready: When it began, on the clock, put later by what it compiled.
@@ -105,8 +102,7 @@ class _Ran(NamedTuple):
     """
 
     setup: Setup
-    compiled_equation: CompiledStateEquation | None
-    engine: str
+    engine: Engine
     observer: Observer
     record: Recording
     ready: float
@@ -117,22 +113,11 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
     """The run of a setup: begun again where another engine, or another method, turns out to be the one for it."""
     seen, said, chooses = 0, (), setup.integrator.name == AUTO
     while True:
-        compiled_equation, engine = _chosen(setup, seen)
-        ready = perf_counter()
-        observer = observer_of(setup)
-        most = (
-            inf if seen else most_interpreted(setup, setup.equation, compiled_equation)
-        )  # else what cannot compile never ends
+        engine = choose(setup, seen)
+        ready, before, observer = perf_counter(), engine.compiling_s, observer_of(setup)
         run = make_run(
-            setup,
-            setup.equation,
-            compiled_equation,
-            on_progress=on_progress,
-            observer=observer,
-            most=most,
-            chooses=chooses,
+            setup, engine, on_progress=on_progress, observer=observer, most=engine.most_evaluations, chooses=chooses
         )
-        before = _spent_on_loops(compiled_equation)
         match run.run():
             case TooLong(evaluations):
                 seen = evaluations
@@ -142,8 +127,7 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
                 setup, chooses, said = cached(setup, _nonsmooth), False, (*said, remark)
             case record:
                 observer.end()
-                ready += _spent_on_loops(compiled_equation) - before
-                return _Ran(setup, compiled_equation, engine, observer, record, ready, said)
+                return _Ran(setup, engine, observer, record, ready + engine.compiling_s - before, said)
 
 
 def _stiff(setup: Setup) -> Setup:
@@ -152,11 +136,6 @@ def _stiff(setup: Setup) -> Setup:
 
 def _nonsmooth(setup: Setup) -> Setup:
     return replace(setup, integrator=TimeStepping())
-
-
-def _chosen(setup: Setup, seen: float) -> tuple[CompiledStateEquation | None, str]:
-    """As of `choose`; machine code is chosen once, but with events it is compared with them before each run."""
-    return cached(setup, choose, setup.equation, seen, lasts=lambda chosen: chosen[0] is not None and not setup.events)
 
 
 def _with_estimate(
@@ -173,7 +152,7 @@ def _with_estimate(
 
     def companion(pace: Any, of: Setup) -> Recording:
         nonlocal spent, companions
-        made = make_run(of, setup.equation, ran.compiled_equation, pace, at_the_end, samples=False).record()
+        made = make_run(of, ran.engine, pace, at_the_end, samples=False).record()
         if made.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
         spent, companions = spent + made.evaluations, companions + 1
@@ -187,12 +166,3 @@ def _with_estimate(
             why = "interrupted after the run, in its error estimate"
             record = replace(record, outcome=Outcome(Ending.STOPPED, record.outcome.t, why))
     return record, error, spent, companions
-
-
-def _spent_on_loops(compiled_equation: CompiledStateEquation | None) -> float:
-    """Time spent on compiling in the first call of a loop, which is not part of the run."""
-    if compiled_equation is None:
-        return 0.0
-    from robot_dyn.codegen.loops.call import spent_on_loops
-
-    return spent_on_loops()

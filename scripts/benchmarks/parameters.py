@@ -15,15 +15,15 @@ import robot_dyn as rd
 from benchmarks.measure import READY, Effort, arms, row, seconds, table
 from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.integrate.methods import method
-from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
-from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import machine_code, machine_code_of_constants
+from robot_dyn.simulation.engine.machine_code import MachineCode
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from robot_dyn.simulation.run.watch import Watch
-from robot_dyn.simulation.setup.size import MOST_BYTES
+from robot_dyn.simulation.setup.setup import MOST_BYTES
 
 
 def parameters(effort: Effort) -> None:
@@ -51,14 +51,14 @@ def parameters(effort: Effort) -> None:
         again = seconds(lambda: rd.simulate(other))
         equation, rk4 = StateEquation(setup.plant, setup.controller), setup.integrator
         made = {
-            "constants": compiled_with_constants(equation, rk4),
-            "inputs": compiled_equation(equation, rk4),
+            "constants": machine_code_of_constants(equation, rk4),
+            "inputs": machine_code(equation, rk4),
         }
         lanes = {
-            "constants": compiled_with_constants(equation, rk4, lanes=LANES),
-            "inputs": compiled_equation(equation, rk4, lanes=LANES, extras=()),
+            "constants": machine_code_of_constants(equation, rk4, lanes=LANES),
+            "inputs": machine_code(equation, rk4, lanes=LANES, extras=()),
         }
-        counts = {kind: len(each.functions.programs["rate"]) for kind, each in made.items()}
+        counts = {kind: len(each.code.programs["rate"]) for kind, each in made.items()}
         alone = _ratio({kind: _one(setup, each) for kind, each in made.items()}, effort)
         many = _ratio({kind: _many(setup, each) for kind, each in lanes.items()}, effort)
         ratio = counts["inputs"] / counts["constants"]
@@ -68,17 +68,15 @@ def parameters(effort: Effort) -> None:
         )  # fmt: skip
 
 
-def _one(setup: rd.Setup, made: CompiledStateEquation) -> Any:
+def _one(setup: rd.Setup, made: MachineCode) -> Any:
     def run() -> float:
-        functions, equation = (made.functions.addresses, made.parameters), made.equation
-        watch, transfers = Watch(setup, equation), PayloadEvents(equation)
-        advance = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.advance())
-        return seconds(advance.record)
+        watch, transfers = Watch(setup, made.compiled_form), PayloadEvents(made.compiled_form)
+        return seconds(FixedStep(watch, transfers, made, Fraction(1)).record)
 
     return run
 
 
-def _many(setup: rd.Setup, made: CompiledStateEquation) -> Any:
+def _many(setup: rd.Setup, made: MachineCode) -> Any:
     starts = np.tile(READY, (8 * LANES, 1))
 
     def run() -> float:

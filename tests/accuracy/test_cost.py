@@ -23,8 +23,8 @@ from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.foundations.result import json_text
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.scene.starters import starter
-from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import machine_code, machine_code_of_constants
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
@@ -38,8 +38,8 @@ def setup(*effects: Any, **options: Any) -> rd.Setup:
 
 def compiled(of: rd.Setup) -> dict[str, int]:
     """Instructions of the programs that `simulate` runs, by name."""
-    made = compiled_equation(StateEquation(of.plant, of.controller), rd.integrate.method("rk4"))
-    return {name: len(program) for name, program in made.functions.programs.items()}
+    made = machine_code(StateEquation(of.plant, of.controller), rd.integrate.method("rk4"))
+    return {name: len(program) for name, program in made.code.programs.items()}
 
 
 CONTROLLERS = {
@@ -130,7 +130,7 @@ def test_machine_code_of_constants_has_no_inputs_and_the_numbers_of_its_robot() 
     for gravity in ((0.0, 0.0, -9.81), (0.0, 0.0, -3.7)):
         plant = rd.Plant(ARM.with_(gravity=gravity), [FRICTION])
         equation = StateEquation(plant, None)
-        made = compiled_with_constants(equation, rd.integrate.method("rk4"))
+        made = machine_code_of_constants(equation, rd.integrate.method("rk4"))
         assert made.parameters.size == 0 < sum(each.size for each in parameters(ARM, plant.effects, None))
         y, out = np.array([*Q, *V, 0.0, 0.0]), np.empty((8, 1))
         made.in_python.rate(0.0, y, np.array([0.0, 1.0]), np.zeros((1, 1)), out)

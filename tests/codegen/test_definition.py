@@ -15,10 +15,10 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.codegen.store.definition import definition
 from robot_dyn.foundations.values import LRUByIdentity
-from robot_dyn.simulation.compiled import build, programs
-from robot_dyn.simulation.compiled.build import compiled_equation
-from robot_dyn.simulation.compiled.structure import structure
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine import cache
+from robot_dyn.simulation.engine.cache import machine_code
+from robot_dyn.simulation.engine.structure import structure
 from tests.codegen.test_kernel import Memory
 
 ARM = rd.load("planar_2r")
@@ -313,17 +313,17 @@ def test_numbers_that_a_controller_follows_and_knows_are_no_structure() -> None:
 
 def in_another_process(module: Any, store: Memory, monkeypatch: pytest.MonkeyPatch) -> str:
     """The rate of an arm with this effect, by the programs of the store if they are there."""
-    monkeypatch.setattr(build, "_functions", LRUByIdentity())
-    monkeypatch.setattr(programs, "_symbols", LRUByIdentity())
-    monkeypatch.setattr(programs, "default_store", lambda: store)
-    made = compiled_equation(StateEquation(rd.Plant(ARM, [module.Drag()]), None), rd.integrate.method("rk4"))
-    return str(made.functions.programs["rate"])
+    monkeypatch.setattr(cache, "_functions", LRUByIdentity())
+    monkeypatch.setattr(cache, "_symbols", LRUByIdentity())
+    monkeypatch.setattr(cache, "default_store", lambda: store)
+    made = machine_code(StateEquation(rd.Plant(ARM, [module.Drag()]), None), rd.integrate.method("rk4"))
+    return str(made.code.programs["rate"])
 
 
 def test_programs_of_user_defined_classes_are_restored_and_after_an_edit_they_are_not(monkeypatch) -> None:
     store, traces = Memory(), []
-    trace = programs.traced
-    monkeypatch.setattr(programs, "traced", lambda *given: traces.append(given) or trace(*given))
+    trace = cache._traced
+    monkeypatch.setattr(cache, "_traced", lambda *given: traces.append(given) or trace(*given))
     first = in_another_process(cell(CELL), store, monkeypatch)
     assert in_another_process(cell(CELL), store, monkeypatch) == first
     assert len(traces) == 1

@@ -15,8 +15,7 @@ from robot_dyn.codegen import waiting
 from robot_dyn.codegen.loops.call import MachineFunction
 from robot_dyn.codegen.primitives import INSTEAD
 from robot_dyn.codegen.waiting import announced
-from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.choice import choose
 
 
 class Screen(io.StringIO):
@@ -85,7 +84,7 @@ def test_machine_code_of_a_run_and_of_a_loop_is_told_and_what_is_there_is_not(
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     setup = rd.Setup(rd.Plant(rd.load("planar_2r").with_(mass_scale=1.013)), [0.4, -0.7], duration_s=3600.0)
     for _ in range(2):
-        assert choose(setup, StateEquation(setup.plant, None))[1] == "compiled"
+        assert choose(setup).label == "compiled"
     loop = MachineFunction(doubled, INSTEAD, lambda: None, "a function")
     for _ in range(2):
         assert loop.calls()(2.0) == 4.0

@@ -11,8 +11,8 @@ from scipy.signal import butter, lfilter, lfilter_zi
 import robot_dyn as rd
 from robot_dyn.accuracy.costs.step_cost import parts
 from robot_dyn.foundations.errors import ControlError, QueryError
-from robot_dyn.simulation.compiled.build import compiled_equation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import machine_code
 from robot_dyn.simulation.observation.remarks import Kind
 from robot_dyn.simulation.results.error_estimate import Verdict
 from robot_dyn.simulation.setup.schedule import cuts
@@ -225,7 +225,7 @@ def test_two_periods_that_differ_in_their_ratio_share_no_machine_code() -> None:
 def test_a_loop_of_nothing_adds_no_instruction() -> None:
     """And a run without a controller, or with a bare one, has the instructions that it had."""
     counts = [
-        {name: len(each) for name, each in compiled_equation(StateEquation(PLANT, x), None).functions.programs.items()}
+        {name: len(each) for name, each in machine_code(StateEquation(PLANT, x)).code.programs.items()}
         for x in (PD, rd.control.Loop(PD), rd.control.Loop(PD, actuation_delay=0.5))
     ]
     assert counts[0] == counts[1]

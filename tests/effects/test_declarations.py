@@ -16,11 +16,10 @@ from robot_dyn.control.digital_loop.block import Block
 from robot_dyn.effects.effect import Effect
 from robot_dyn.foundations.arithmetic import tanh
 from robot_dyn.foundations.errors import EffectError, TraceError
-from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.compiled.self_check import MachineError
 from robot_dyn.simulation.dynamics.declarations import undeclared
 from robot_dyn.simulation.dynamics.smoothness import LOOKS
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.choice import choose
+from robot_dyn.simulation.engine.self_check import MachineError
 from robot_dyn.simulation.results.error_estimate import Verdict
 from robot_dyn.simulation.results.trajectory import Trajectory
 
@@ -42,7 +41,7 @@ def run(part: Any, engine: str, **options: Any) -> Trajectory:
 def engine_of(part: Any) -> str:
     """The engine that a run of six seconds takes, which is worth compiling."""
     setup = setup_of(part, duration_s=6.0)
-    return choose(setup, StateEquation(setup.plant, setup.controller))[1]
+    return choose(setup).label
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ import robot_dyn as rd
 from robot_dyn.codegen.trace.symbolic import TraceError
 from robot_dyn.control.controller import ControlError
 from robot_dyn.foundations.errors import EffectError, QueryError, SceneError
-from robot_dyn.simulation.compiled.self_check import MachineError
+from robot_dyn.simulation.engine.self_check import MachineError
 from robot_dyn.simulation.export.export import export
 from tests.long import long
 

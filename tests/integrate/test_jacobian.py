@@ -10,9 +10,9 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.integrate.integrator import System
-from robot_dyn.simulation.compiled import build
-from robot_dyn.simulation.compiled.self_check import MachineError, check, jacobian_error
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import machine_code
+from robot_dyn.simulation.engine.self_check import MachineError, check, jacobian_error
 from robot_dyn.simulation.setup.segment_table import segment_table
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52
@@ -40,7 +40,7 @@ def equation_of(made: rd.Setup) -> StateEquation:
 
 def exact_jacobian(made: rd.Setup, t: float, y: np.ndarray) -> np.ndarray:
     """∂f/∂y_j for each j, then ∂f/∂t, of machine code."""
-    machine = build.compiled_equation(equation_of(made), None, jacobian=True)
+    machine = machine_code(equation_of(made), jacobian=True)
     out, m = np.empty((len(y) + 1, len(y), 1)), len(y)
     p, run_parameters = segment_table(made).parameters[0], machine.run_parameters({})
     machine.in_python.jacobian(t, np.ascontiguousarray(y)[:, None], p, run_parameters, out)
@@ -87,8 +87,8 @@ def test_it_is_held_to_differences_of_the_interpreted_equation() -> None:
 
 
 def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = build.compiled_equation(equation_of(setup()), None, jacobian=True)
-    wrong = replace(made, functions=replace(made.functions, checked={}))
+    made = machine_code(equation_of(setup()), jacobian=True)
+    wrong = replace(made, code=replace(made.code, checked={}))
     functions = made.in_python
 
     def jacobian(t: float, y: Any, p: Any, run_parameters: Any, out: np.ndarray) -> None:
@@ -102,9 +102,9 @@ def test_wrong_machine_code_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_it_is_made_only_for_methods_that_need_it() -> None:
     equation = equation_of(setup())
-    assert "jacobian" not in build.compiled_equation(equation, rd.integrate.method("rk4")).functions.programs
-    assert build.compiled_equation(equation, None).in_python.jacobian == 0
-    assert "jacobian" in build.compiled_equation(equation, None, jacobian=True).functions.programs
+    assert "jacobian" not in machine_code(equation, rd.integrate.method("rk4")).code.programs
+    assert machine_code(equation).in_python.jacobian == 0
+    assert "jacobian" in machine_code(equation, jacobian=True).code.programs
 
 
 def test_runs_in_lock_step_have_each_their_own() -> None:
@@ -113,8 +113,8 @@ def test_runs_in_lock_step_have_each_their_own() -> None:
     made, lanes = setup(controller=law), 16
     rng = np.random.default_rng(3)
     damping = rng.uniform(0.1, 9.0, (lanes, 2))
-    machine = build.compiled_equation(
-        equation_of(made), None, lanes=lanes, extras=(), swept=("viscous_friction.damping",), jacobian=True
+    machine = machine_code(
+        equation_of(made), lanes=lanes, extras=(), swept=("viscous_friction.damping",), jacobian=True
     )
     m = machine.equation.size
     y, out = rng.normal(size=(m, lanes)), np.empty((m + 1, m, lanes))

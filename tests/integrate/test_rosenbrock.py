@@ -16,8 +16,8 @@ from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.integrate.integrator import IntegrationError, System
 from robot_dyn.integrate.primitives import factor, solve
 from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
-from robot_dyn.simulation.compiled import build
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import machine_code
 from robot_dyn.simulation.setup.segment_table import segment_table
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52
@@ -240,7 +240,7 @@ def test_both_engines_make_the_same_steps() -> None:
     plant, h = rd.Plant(ARM, [rd.effects.ViscousFriction([1e3, 1e4]), rd.effects.Spring(1e4)]), 0.01
     options: dict[str, Any] = {"controller": law, "integrator": "rosenbrock_5", "step_s": h, "duration_s": h}
     setup, equation = rd.Setup(plant, **START, **options), StateEquation(plant, law)
-    machine, m = build.compiled_equation(equation, None, jacobian=True), equation.size
+    machine, m = machine_code(equation, jacobian=True), equation.size
     p, run_parameters = segment_table(setup).parameters[0], machine.run_parameters({})
 
     def exact(t: Any, y: np.ndarray) -> np.ndarray:

@@ -18,9 +18,9 @@ from robot_dyn.control.controller import Stateless
 from robot_dyn.effects.effect import Active
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.integrate.methods import FIXED_STEP
-from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.compiled.self_check import MachineError, check
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.choice import choose
+from robot_dyn.simulation.engine.self_check import MachineError, check
 from tests.long import long
 from tests.own_method import OwnImplicit
 
@@ -234,17 +234,16 @@ def test_auto_compiles_where_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
     """Evaluations times their cost: a second of motion is short, an hour is not."""
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     setup = rd.Setup(rd.Plant(ARM.with_(mass_scale=1.01)), Q, duration_s=1.0, integrator="rk4")
-    assert choose(setup, StateEquation(setup.plant, None))[1] == "interpreted (short: compiling is not worthwhile)"
+    assert choose(setup).label == "interpreted (short: compiling is not worthwhile)"
     long = replace(setup, duration_s=3600.0)
-    machine, words = choose(long, StateEquation(setup.plant, None))
-    assert machine is not None and words == "compiled"
+    assert choose(long).label == "compiled"
 
 
 def test_auto_compiles_what_is_asked_for_again_as_often_as_compiling_takes(monkeypatch) -> None:
     """Each run has 8000 evaluations; three of them as many as compiling takes, loop included."""
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     setup = rd.Setup(rd.Plant(ARM.with_(mass_scale=1.02)), Q, duration_s=1.0, integrator="rk4")
-    said = [choose(setup, StateEquation(setup.plant, None))[1] for _ in range(3)]
+    said = [choose(setup).label for _ in range(3)]
     assert said[0] == "interpreted (short: compiling is not worthwhile)"
     assert said[2] == "compiled"
 
@@ -274,14 +273,14 @@ def test_a_second_process_takes_the_machine_code_of_the_store_for_a_short_run(tm
 
 def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
     """The interpreted equation has another gravity than the compiled one: the self check refuses it."""
-    from robot_dyn.simulation.compiled import build
+    from robot_dyn.simulation.engine.cache import machine_code
 
     setup = rd.Setup(rd.Plant(ARM), Q)
-    made = build.compiled_equation(StateEquation(setup.plant, None), rd.integrate.method("rk4"))
+    made = machine_code(StateEquation(setup.plant, None), rd.integrate.method("rk4"))
     check(made, setup)
-    functions = replace(made.functions, checked={})
+    code = replace(made.code, checked={})
     other = replace(
-        made, equation=StateEquation(rd.Plant(ARM.with_(gravity=(0.0, 0.0, -9.80664))), None), functions=functions
+        made, compiled_form=StateEquation(rd.Plant(ARM.with_(gravity=(0.0, 0.0, -9.80664))), None), code=code
     )
     with pytest.raises(
         MachineError, match=r"differs from the interpreted one by .* allowed: take engine='interpreted'"

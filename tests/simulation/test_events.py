@@ -227,15 +227,15 @@ def test_a_long_run_that_cannot_be_compiled_is_made_in_python(monkeypatch: pytes
     """Begun again once, and then to its end: nothing else is left to try."""
     tried: list[float] = []
 
-    def refuse(*_: object) -> None:
+    def refuse(*_: object, **__: object) -> None:
         tried.append(1.0)
         raise rd.RobotDynError("not here")
 
-    monkeypatch.setattr("robot_dyn.simulation.compiled.engine_choice._existing", lambda *_: None)
-    monkeypatch.setattr("robot_dyn.simulation.compiled.engine_choice.compiled_for", refuse)
-    monkeypatch.setattr("robot_dyn.simulation.compiled.engine_choice._COMPILED", 500)
+    monkeypatch.setattr("robot_dyn.simulation.engine.choice.existing", lambda *_: None)
+    monkeypatch.setattr("robot_dyn.simulation.engine.choice.machine_code", refuse)
+    monkeypatch.setattr("robot_dyn.simulation.engine.choice._COMPILED", 500)
     count = [0.0]  # evaluations of runs before, which other tests may have made
-    monkeypatch.setattr("robot_dyn.simulation.compiled.engine_choice.interpreted", lambda *_: count)
+    monkeypatch.setattr("robot_dyn.simulation.engine.choice.interpreted_before", lambda *_: count)
     tight = rd.integrate.Adaptive(rtol=3e-14, atol=1e-15)
     run = rd.simulate(ARM, [0.3, 0.4], duration_s=0.4, estimate_error=False, integrator=tight)
     assert run.statistics.evaluations > 500

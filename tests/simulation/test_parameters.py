@@ -13,7 +13,7 @@ from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.foundations.arithmetic import tanh
 from robot_dyn.foundations.errors import EffectError, QueryError, TraceError
 from robot_dyn.foundations.linear_algebra import eigh
-from robot_dyn.simulation.compiled import programs
+from robot_dyn.simulation.engine import cache
 from tests.long import long
 
 ARM = rd.load("planar_2r")
@@ -64,7 +64,7 @@ def compiles_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("something is compiled")
 
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
-    monkeypatch.setattr(programs, "traced", refuse)
+    monkeypatch.setattr(cache, "_traced", refuse)
     monkeypatch.setattr(machine_code, "object_file", refuse)
 
 

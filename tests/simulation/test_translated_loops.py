@@ -20,10 +20,10 @@ from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.integrator import PlainMethod, Stepper
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.integrate.primitives import evaluate
-from robot_dyn.simulation.compiled.build import compiled_equation
-from robot_dyn.simulation.compiled.engine_choice import choose
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now, rules_of, runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import machine_code
+from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.observation.guard_levels import guard_levels
 from robot_dyn.simulation.observation.observation import observation_of
 from robot_dyn.simulation.run.fixed_step import samples_at_most
@@ -69,10 +69,8 @@ def assert_same_bits(ours: Any, theirs: Any, without: tuple[str, ...] = ()) -> N
 
 def both(setup: Setup) -> tuple[Any, Any]:
     """A run by machine code, and by Python with the same rates of machine code."""
-    equation = StateEquation(setup.plant, setup.controller, False, setup.events)
-    code, _ = choose(setup, equation)
-    assert code is not None
-    runs = [make_run(setup, equation, each) for each in (code, replace(code, loop=None))]
+    code: Any = choose(setup)
+    runs = [make_run(setup, each) for each in (code, replace(code, machine_loop=None))]
     for each in runs:
         room = each.runs._replace(y=0, run_parameters=0, alive=0, scale=0, energy=0, keys=0), each.stepper.work
         for _, x in numbers(room):  # what is not written yet
@@ -167,11 +165,9 @@ def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
     made.append(replace(made[0], plant=rail, q0=[0.3], v0=[0.0]))
     loops = []
     for each in made:
-        equation = StateEquation(each.plant, None)
-        code, _ = choose(each, equation)
-        assert code is not None
-        make_run(each, equation, code).record()
-        loops.append((code.loop, {id(entry) for entry in code.loop._known.values()}))
+        code: Any = choose(each)
+        make_run(each, code).record()
+        loops.append((code.machine_loop, {id(entry) for entry in code.machine_loop._known.values()}))
     assert loops[0] == loops[1]
 
 
@@ -180,8 +176,7 @@ def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
     made = setup(
         HELD, "DOP853", duration_s=6.0, controller=rd.control.PD(rd.control.hold([1.4, -1.9]), [60.0, 30.0], [0.1, 0.1])
     )
-    equation = StateEquation(made.plant, made.controller)
-    run, calls = make_run(made, equation, choose(made, equation)[0]), []
+    run, calls = make_run(made, choose(made)), []
     inner = run.advance
     run.advance = lambda *given: calls.append(inner(*given)) or calls[-1]
     events = len(run.record().events)
@@ -200,9 +195,7 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.control
     made = setup(SMOOTH, name, duration_s=0.2, step_s=0.002, controller=controller)
     equation = StateEquation(made.plant, made.controller, of.canonical)
     equation = equation if of.nonsmooth else equation.in_a_mode
-    code = compiled_equation(
-        equation, of, lanes=W, extras=("u", "energy"), jacobian=of.needs_jacobian, nonsmooth=of.nonsmooth
-    )
+    code: Any = machine_code(equation, of, lanes=W, extras=("u", "energy"))
     n, m, plan = 2, equation.size, segment_table(made)
     rng = np.random.default_rng(3)
     starts = np.stack([equation.start(q, v) for q, v in rng.normal(size=(W, 2, 2))]).T
@@ -224,8 +217,8 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.control
         records.t[...] = 0
         now, clock = np.zeros(len(Now), np.int64), np.array([0.0, 0.02, 1e-12])
         now[Now.BUDGET] = 10**6
-        advance: Any = time_loop(stepper.step) if interpreted else code.advance()
-        functions = code.in_python if interpreted else code.functions.addresses
+        advance: Any = time_loop(stepper.step) if interpreted else code.machine_loop.calls()
+        functions = code.in_python if interpreted else code.code.addresses
         with np.errstate(all="ignore"):
             ended = advance(
                 functions, plan, runs, records, rules, stepper.coefficients, stepper.work, now, clock,

@@ -21,8 +21,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.machine_code import MachineCode
 from robot_dyn.simulation.observation.remarks import Kind
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
@@ -167,7 +167,7 @@ def test_what_is_kept_does_not_grow_with_the_runs(events: tuple[rd.Event, ...]) 
 
     def held() -> int:
         gc.collect()
-        return sum(isinstance(each, CompiledStateEquation | StateEquation) for each in gc.get_objects())
+        return sum(isinstance(each, MachineCode | StateEquation) for each in gc.get_objects())
 
     for _ in range(2):
         assert rd.simulate(setup).events
@@ -204,7 +204,7 @@ def test_a_second_call_computes_nothing_that_depends_on_the_setup_alone(name: st
     rd.simulate(setup)
     found = calls(lambda: rd.simulate(setup))
     alone = {
-        "choose", "structure", "parameters", "levels", "_plan", "cuts", "undeclared", "is_value", "Switching.at",
+        "_chosen", "structure", "parameters", "levels", "_plan", "cuts", "undeclared", "is_value", "Switching.at",
         "StateEquation.energies", "rules_of", "observations_of",
     }  # fmt: skip
     late = {

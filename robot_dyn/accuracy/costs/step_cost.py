@@ -23,17 +23,16 @@ from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.methods import method
 from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
-from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import machine_code, machine_code_of_constants
+from robot_dyn.simulation.engine.machine_code import MachineCode
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.watch import Watch
-from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.setup.size import MOST_BYTES
+from robot_dyn.simulation.setup.setup import MOST_BYTES, Setup
 
 RUNS = 4096  # side by side
 PER_STEP, PER_RUN = "step of RK4", "step of RK4 and run"
@@ -101,14 +100,14 @@ def pairs_of_parts(setup: Setup) -> Iterator[Pair]:
 def numbers(setup: Setup) -> Pair:
     """Numbers as inputs of machine code, and as constants."""
     short = _short(setup, _STEPS)
-    constants = _alone(short, compiled_with_constants(_equation(short), short.integrator))
+    constants = _alone(short, machine_code_of_constants(_equation(short), short.integrator))
     return Pair("machine code", NUMBERS, PER_STEP, one_run(setup).named("inputs"), constants.named("constants"))
 
 
 def side_by_side(setup: Setup) -> Pair:
     """One run, and many of them side by side on one thread."""
     short = _short(setup, _STEPS_OF_MANY)
-    made = compiled_equation(_equation(short), short.integrator, lanes=LANES, extras=())
+    made = machine_code(_equation(short), short.integrator, lanes=LANES, extras=())
     starts = np.tile(short.q0, (RUNS, 1)), np.tile(short.v0, (RUNS, 1))
 
     def run() -> float:
@@ -124,20 +123,19 @@ def side_by_side(setup: Setup) -> Pair:
 def one_run(setup: Setup) -> Way:
     """A step of one run."""
     short = _short(setup, _STEPS)
-    return _alone(short, compiled_equation(_equation(short), short.integrator))
+    return _alone(short, machine_code(_equation(short), short.integrator))
 
 
-def instructions(made: CompiledStateEquation) -> int:
+def instructions(made: MachineCode) -> int:
     """Of a step, what the method itself adds apart."""
-    programs = made.functions.programs
+    programs = made.code.programs
     return _EVALUATIONS * len(programs["rate"]) + (len(programs["tick"]) if "tick" in programs else 0)
 
 
-def _alone(short: Setup, made: CompiledStateEquation) -> Way:
+def _alone(short: Setup, made: MachineCode) -> Way:
     def run() -> float:
-        functions, equation = (made.functions.addresses, made.parameters), made.equation
-        watch, transfers = Watch(short, equation), PayloadEvents(equation)
-        steps = FixedStep(watch, transfers, lambda _: functions, Fraction(1), made.advance())
+        watch, transfers = Watch(short, made.compiled_form), PayloadEvents(made.compiled_form)
+        steps = FixedStep(watch, transfers, made, Fraction(1))
         began = process_time()
         record = steps.record()
         spent = process_time() - began
@@ -151,7 +149,7 @@ def _alone(short: Setup, made: CompiledStateEquation) -> Way:
 
 
 def _equation(setup: Setup) -> StateEquation:
-    return StateEquation(setup.plant, setup.controller).in_a_mode
+    return StateEquation(setup.plant, setup.controller)
 
 
 def _short(setup: Setup, steps: int) -> Setup:

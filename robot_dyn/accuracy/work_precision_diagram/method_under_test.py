@@ -19,13 +19,12 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.robot import Robot
 from robot_dyn.report.time_budget import Limit
-from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.results.samples import ledger
 from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.simulation.setup.schedule import MOST_CUT
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.setup.size import MOST_CUT
 
 RECORDS = 25  # approximate number of times at which errors are evaluated
 _MOST_RECORDS = 400  # limit where records must fall on switching times
@@ -201,9 +200,7 @@ def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:
     Raises:
         TraceError: As in `choose`.
     """
-    equation = StateEquation(setup.plant, setup.controller, setup.integrator.canonical)
-    machine, _ = choose(setup, equation)
-    run = make_run(setup, equation, machine, on_progress=limit, thresholds=events)
+    run = make_run(setup, choose(setup), on_progress=limit, thresholds=events)
     began = perf_counter()
     record = run.record()
     spent = perf_counter() - began
@@ -215,5 +212,5 @@ def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:
         met = common(record.t, np.append(0.0, record.ends)) >= 0
     return Run(
         record.t[met], record.y[met, : setup.plant.dynamics.n] if finished else None,
-        ledger(equation, record).closure if finished else float("nan"), record.steps, record.evaluations, spent,
+        ledger(setup.equation, record).closure if finished else float("nan"), record.steps, record.evaluations, spent,
     )  # fmt: skip

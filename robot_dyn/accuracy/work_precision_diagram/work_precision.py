@@ -35,8 +35,7 @@ from robot_dyn.queries.units import format_duration, units
 from robot_dyn.report.environment import environment
 from robot_dyn.report.result import Result
 from robot_dyn.report.time_budget import Budget
-from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
@@ -240,7 +239,7 @@ def _engines(setup: Setup) -> tuple[Setup, tuple[str, ...], list[str]]:
         return setup, (setup.engine,), []
     compiled = replace(recorded(setup, setup.duration_s), engine=COMPILED)
     try:
-        choose(compiled, StateEquation(setup.plant, setup.controller))
+        choose(compiled)
     except (ImportError, RobotDynError) as error:
         return replace(setup, engine=INTERPRETED), (INTERPRETED,), [f"machine code: {error}"]
     return replace(setup, engine=COMPILED), (COMPILED, INTERPRETED), []

@@ -276,6 +276,12 @@ class StateEquation(Caching):
         """The values of the events, in floats or symbols."""
         return [call(each.function, t, q, v) for each in self.events]
 
+    def event_values(self, t: float, y: Array, held: Array | None) -> Array:
+        """Return what reaches each limited part, (n,) each, and the values of the events, (G,), in a state (m,)."""
+        q, v, z, _ = self.state(y)
+        demands = self.demands(t, q, v, z, held, self.limited)
+        return np.array([*np.ravel(demands), *self.switching(t, q, v)], dtype=float)
+
     def energies(self, t: Array, q: Array, v: Array) -> tuple[Array, Array]:
         """Kinetic energy, and the potential of gravity and of all conservative effects, of samples (m, n)."""
         return self.equation_of_motion.energies(t, q, v)

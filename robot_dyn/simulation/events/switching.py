@@ -94,7 +94,7 @@ class Switching:
         for i in np.flatnonzero((distances == 0) & (moving == 0)):  # a stop is touched, and not passed
             sides[i] = 1.0 if self.thresholds[i].falling == "touched" else -1.0
         first = n * len(self.equation.limited)
-        values = self.values(t, y, held)
+        values = self.equation.event_values(t, y, held)
         distances = values[actuation] - levels[E:]
         # at distance 0 a limit is reached
         sides = np.concatenate([sides, np.where(distances == 0, -np.sign(levels[E:]), np.sign(distances))])
@@ -134,19 +134,6 @@ class Switching:
         if self.equation.sampled and (held is None or np.isnan(held).any()):  # before the first tick
             y, held = self.equation.tick(t, y)
         return self.equation.rate(t, y, held)[0][rows]
-
-    def values(self, t: float, y: np.ndarray, held: Array | None) -> np.ndarray:
-        """What reaches each limited part, (n,) each, and the user's switching functions, (G,)."""
-        q, v, z, _ = self.equation.state(y)
-        demands = self.equation.demands(t, q, v, z, held, self.equation.limited)
-        return np.array([*np.ravel(demands), *self.equation.switching(t, q, v)], dtype=float)
-
-    def function(self, t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
-        """The same, as of `evaluate`."""
-        x = y[:, 0].copy()
-        x.setflags(write=False)
-        held = run_parameters[: self._n, 0].copy() if self.equation.sampled else None
-        out[:, 0] = self.values(min(max(t, p[0]), p[1]), x, held)
 
     def on(self, sides: np.ndarray) -> StateEquation:
         """The state equation with each threshold on its side, in the mode that is known; smooth there."""

@@ -30,7 +30,7 @@ from robot_dyn.simulation.results.serialise import (
 )
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.simulation.setup.size import LONGEST_S
+from robot_dyn.simulation.setup.setup import LONGEST_S
 
 FORMAT = 6
 ROLLOUTS_FORMAT = "rollouts 4"

@@ -19,9 +19,9 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.integrate.integrator import PlainMethod
-from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why, rules_of, runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.machine_code import MachineCode
 from robot_dyn.simulation.events.detection import Detecting
 from robot_dyn.simulation.observation.observation import observations_of, observed
 from robot_dyn.simulation.results.trajectory import Statistics
@@ -54,19 +54,19 @@ class Tiles:
 
     Args:
         batch: The runs.
-        compiled: Their state equation.
-        extras: What machine code records beside the state, as of `compiled_equation`.
+        code: Their state equation.
+        extras: What machine code records beside the state, as in `machine_code`.
         most: Number of bytes to record at most.
         thresholds: At which `simulate` cuts steps; None if it cuts none, or cuts are not requested.
     """
 
     def __init__(
-        self, batch: Batch, compiled: CompiledStateEquation, extras: tuple[str, ...], most: int,
+        self, batch: Batch, code: MachineCode, extras: tuple[str, ...], most: int,
         thresholds: Thresholds | None = None,
     ) -> None:  # fmt: skip
         setup, recorded = batch.setup, batch.recorded
-        equation, n = compiled.equation, compiled.equation.plant.dynamics.n
-        self.batch, self.setup, self.compiled, self.extras = batch, setup, compiled, extras
+        equation, n = code.compiled_form, code.compiled_form.plant.dynamics.n
+        self.batch, self.setup, self.code, self.extras = batch, setup, code, extras
         self.y, self.thresholds = _starts(equation, batch.q0, batch.v0), thresholds
         self.levels = batch.levels(equation.plant, equation.controller)
         places = {
@@ -81,7 +81,7 @@ class Tiles:
         batch.check_size(most)
         self.table, self.apart = segment_table(setup), 0
         steps = int(self.table.counts[:-1].sum())
-        if "actuation" in compiled.functions.programs:
+        if "actuation" in code.code.programs:
             self.apart = 1 if equation.sampled else max(1, steps // _INSTANTS)
         self.instants = steps // self.apart if self.apart > 1 else 0
         rows = samples_at_most(setup, self.table.counts)
@@ -147,8 +147,8 @@ class Tiles:
 
     def _runs(self, tile: int) -> Runs:
         """The runs of a tile at their start; a tile that is not full repeats a run."""
-        equation, index = self.compiled.equation, self._numbers(tile)
-        run_parameters = self.compiled.run_parameters({name: x[index] for name, x in self.batch.sweep.items()})
+        equation, index = self.code.compiled_form, self._numbers(tile)
+        run_parameters = self.code.run_parameters({name: x[index] for name, x in self.batch.sweep.items()})
         return runs_of(equation, self.y[index].T, run_parameters, self.out_extras.shape[1], self.batch.number_of(index))
 
     def _numbers(self, tile: int) -> np.ndarray:
@@ -156,14 +156,14 @@ class Tiles:
         return np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.batch) - 1)
 
     def _tile(self, tile: int) -> None:
-        equation, n = self.compiled.equation, self.setup.plant.dynamics.n
+        equation, n = self.code.compiled_form, self.setup.plant.dynamics.n
         lanes, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
         method = cast(PlainMethod, self.setup.integrator)
-        advance = self.compiled.advance()
-        assert advance is not None
+        assert self.code.machine_loop is not None
+        advance = self.code.machine_loop.calls()
         rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
-        functions, now = self.compiled.functions.addresses, np.zeros(len(Now), dtype=np.int64)
+        functions, now = self.code.code.addresses, np.zeros(len(Now), dtype=np.int64)
         now[Now.BUDGET] = np.iinfo(np.int64).max
         none = np.empty((0, equation.size))
         records = records_of(
@@ -228,7 +228,7 @@ class Tiles:
 
     def _advice(self, why: np.ndarray) -> list[str]:
         """Why runs diverged and what to do; nothing for the others."""
-        advice, equation = [""] * len(why), self.compiled.equation
+        advice, equation = [""] * len(why), self.code.compiled_form
         for run in np.flatnonzero(why).tolist():
             fastest = equation.fastest_joint(self.last[:, run])
             advice[run] = diverged_advice(_REASONS[Why(why[run])], fastest, self.setup)

@@ -9,11 +9,10 @@ from typing import NamedTuple, final
 import numpy as np
 
 from robot_dyn.foundations.coefficients import with_values
-from robot_dyn.simulation.compiled.build import with_numbers
-from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
-from robot_dyn.simulation.compiled.engine_choice import checked, compiled_for
 from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.choice import choose_for_batch, for_run
+from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.observation.guard_levels import GuardLevels
 from robot_dyn.simulation.observation.observation import Observation, Observed, observation_of, observed
 from robot_dyn.simulation.results.samples import columns
@@ -57,26 +56,16 @@ class OneByOne:
 
     def __init__(self, batch: Batch, levels: GuardLevels) -> None:
         self.batch, self.setup, self.levels = batch, batch.setup, levels
-        self.compiled = self.setup.engine != "interpreted"
-        self.compiled_equation: CompiledStateEquation | None = None
-        if self.compiled:
-            self.compiled_equation = checked(
-                self.setup, lambda: compiled_for(self.setup, self.setup.equation, tuple(batch.sweep))
-            )
+        self.engine = choose_for_batch(self.setup, tuple(batch.sweep))
         self.records: list[Single | None] = [None] * len(batch)
         self.stop = np.zeros(1, np.int64)
 
-    def _run_of(self, run: int) -> tuple[Setup, StateEquation, CompiledStateEquation | None]:
-        """The setup of a run, its state equation, and its machine code, which is that of all."""
+    def _run_of(self, run: int) -> tuple[Setup, Engine]:
+        """The setup of a run, and its engine."""
         plant, controller = self.batch.parts(run)
         changes = {"plant": plant, "controller": controller, "q0": self.batch.q0[run], "v0": self.batch.v0[run]}
         setup = with_values(self.setup, changes)
-        equation, compiled = setup.equation, self.compiled_equation
-        if compiled is None:
-            return setup, equation, None
-        if compiled.equation.limited != equation.limited or setup.finds_events != self.setup.finds_events:
-            return setup, equation, compiled_for(setup, equation, tuple(self.batch.sweep))
-        return setup, equation, with_numbers(compiled, equation.in_a_mode)  # only numbers differ
+        return setup, for_run(self.engine, self.setup, setup)
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> None:
         """Run all; Ctrl-C ends them, and an error of `on_progress`, which is called with the mean time reached."""
@@ -86,18 +75,18 @@ class OneByOne:
             if on_progress is not None:
                 on_progress(end * sum(each is not None for each in self.records) / len(self.records))
 
-        in_threads(self._run, len(self.records), threads if self.compiled else 1, self.stop, look)
+        in_threads(self._run, len(self.records), int(min(threads, self.engine.most_threads)), self.stop, look)
         if on_progress is not None and not self.stop[0]:
             on_progress(end)
 
     def _run(self, i: int) -> None:
         if self.stop[0]:
             return
-        setup, equation, compiled = self._run_of(i)
+        setup, engine = self._run_of(i)
         observer = observer_of(setup, self.levels.of_runs([i]))
-        run = make_run(setup, equation, compiled, observer=observer)
+        run = make_run(setup, engine, observer=observer)
         run.stop = self.stop
-        self.records[i] = self._single(equation, run.record(), observer.observation)
+        self.records[i] = self._single(setup.equation, run.record(), observer.observation)
 
     def _single(self, equation: StateEquation, record: Recording, observation: Observation) -> Single:
         """The record of a run without the sample at an event that ended it, which no other run has."""
@@ -137,9 +126,7 @@ def one_by_one(batch: Batch, most: int, threads: int, on_progress: Callable[[flo
         np.array([each.t for each in outcomes]), ending == Ending.DIVERGED, ending == Ending.STOPPED,
         tuple(map(advice_of, outcomes)), steps, evaluations,
     )  # fmt: skip
-    engine = (
-        f"{'compiled' if runs.compiled else 'interpreted'}, {B} run{'s' * (B > 1)} one after the other on each thread"
-    )
+    engine = f"{runs.engine.label}, {B} run{'s' * (B > 1)} one after the other on each thread"
     step = 0.0 if setup.integrator.controls_error else setup.duration_s / setup.steps
     most_steps, most_evaluations, spent = int(steps.max()), int(evaluations.max()), perf_counter() - began
     statistics = Statistics(setup.integrator.name, step, most_steps, most_evaluations, spent, engine=engine)

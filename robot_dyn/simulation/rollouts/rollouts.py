@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any, Unpack, cast
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -26,10 +26,9 @@ from robot_dyn.foundations.errors import QueryError, nearest, shown
 from robot_dyn.foundations.validate import choice, integer, joint_values, numbers, truth
 from robot_dyn.foundations.values import several
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
-from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.compiled.build import compiled_equation
-from robot_dyn.simulation.compiled.engine_choice import checked
+from robot_dyn.simulation.engine.cache import machine_code
+from robot_dyn.simulation.engine.choice import checked
 from robot_dyn.simulation.results.acting import frame_of, rotors_of
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
 from robot_dyn.simulation.rollouts.batch import Batch
@@ -40,8 +39,7 @@ from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds, thresholds
 from robot_dyn.simulation.setup.checks import check_stops
 from robot_dyn.simulation.setup.options import Options, setup_of, takes_options
-from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.setup.size import MOST_BYTES
+from robot_dyn.simulation.setup.setup import MOST_BYTES, Setup
 
 LARGEST_NUMBER = 2**53  # of a run
 RECORDS = ("q", "v", "u", "energy", "work")
@@ -200,10 +198,9 @@ def _side_by_side(batch: Batch, passed: Thresholds | None, most: int) -> Tiles:
     equation = setup.equation
     from_code = ("u", "v", "energy") if equation.canonical else ("u", "energy")
     extras = tuple(name for name in from_code if name in recorded)
-    method = cast(Integrator, setup.integrator)
     build = partial(
-        compiled_equation, equation, method, lanes=LANES, extras=extras, swept=tuple(batch.sweep),
-        jacobian=method.needs_jacobian, detects=passed is not None, nonsmooth=setup.integrator.nonsmooth,
+        machine_code, equation, setup.integrator, lanes=LANES, extras=extras, swept=tuple(batch.sweep),
+        detects=passed is not None,
     )  # fmt: skip
     return Tiles(batch, checked(setup, build), extras, most, passed)
 

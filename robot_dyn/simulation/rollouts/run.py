@@ -12,6 +12,7 @@ import numpy as np
 
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.interpreted import sample
 from robot_dyn.simulation.results.acting import acting, at_stop, wrenches
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.results.provenance import settings_text
@@ -19,7 +20,6 @@ from robot_dyn.simulation.results.samples import Tracking, columns, tracking_of
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.batch import parts_of_run
 from robot_dyn.simulation.rollouts.overview import remarks_of
-from robot_dyn.simulation.run.state_functions import sample
 from robot_dyn.simulation.setup.setup import Setup
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from robot_dyn.foundations.threshold import smooth
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import LockStep, lock_step
 from robot_dyn.simulation.events.switching import Switching
+from robot_dyn.simulation.setup.schedule import MOST_CUT
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.setup.size import MOST_CUT
 
 
 @final

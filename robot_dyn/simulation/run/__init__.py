@@ -5,7 +5,6 @@
 - `time_loop`, `fixed_step`: steps of fixed length, one run or many in lock step, and the driver of one
 - `event_loop`, `event_run`, `switched_run`: steps that are chosen or cut at events, and the driver
 - `recording`: what both loops record, and its result
-- `state_functions`: the interpreted state equation as functions for a loop
 - `watch`: when a run has diverged; `stiffness`: when another method is faster
 - `philox`: noise by number
 """

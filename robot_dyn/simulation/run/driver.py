@@ -15,8 +15,8 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.values import cached
-from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, rules_of, runs_of
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Rules, rules_of, runs_of
+from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.observation.observation import NOTHING
@@ -29,9 +29,6 @@ from robot_dyn.simulation.setup.setup import Setup
 
 _PAUSE_S = 0.1  # between looks at the keyboard
 
-Advance = Callable[..., int]
-FunctionsOf = Callable[[StateEquation], tuple[Functions, np.ndarray]]
-
 
 class Driver(ABC):
     """A run in progress.
@@ -39,16 +36,15 @@ class Driver(ABC):
     Args:
         watch: Of the setup, and its state equation.
         payloads: What it carries.
-        functions_of: Gives the functions of a state equation, for the loop, and their parameters (P,).
+        engine: What evaluates its state equation.
         table: The segments of the run.
-        machine_code: The loop of the method as machine code; then the functions are, too.
         on_progress: Called with the time reached, at each step or some ten times a second.
         observer: Sees each step.
 
     Attributes:
         setup, equation: What is run, with what it carries now.
         functions, table, runs, records, rules: What the loop takes.
-        compiled: Whether its loop is machine code.
+        in_python: The same functions as Python calls them.
         now: Where it is; see `loop_state.Now`.
         stop: Its first entry ends the run at its next step where it is not 0, as Ctrl-C does.
         events: What happened.
@@ -59,16 +55,16 @@ class Driver(ABC):
     records: Records
 
     def __init__(
-        self, watch: Watch, payloads: PayloadEvents, functions_of: FunctionsOf, table: SegmentTable,
-        machine_code: Advance | None, on_progress: Callable[[float], object] | None, observer: Observer | None,
+        self, watch: Watch, payloads: PayloadEvents, engine: Engine, table: SegmentTable,
+        on_progress: Callable[[float], object] | None, observer: Observer | None,
     ) -> None:  # fmt: skip
-        self.watch, self.payloads, self.functions_of, self.table = watch, payloads, functions_of, table
-        self.setup, self.equation, self.compiled = watch.setup, watch.equation, machine_code is not None
+        self.watch, self.payloads, self.engine, self.table = watch, payloads, engine, table
+        self.setup, self.equation = watch.setup, watch.equation
         self.on_progress, self.observer = on_progress, observer
         self.rules = cached(self.setup, _rules)
         n, m = self.rules.n, self.equation.size
         self.start = self.equation.start(self.setup.q0, self.setup.v0)
-        self.functions, parameters = functions_of(self.equation)
+        self.functions, self.in_python, parameters, _ = engine.evaluated(self.equation, watch)
         run_parameters = np.concatenate([np.full(self.rules.held, np.nan), parameters])[:, None]
         self.runs = runs_of(self.equation, self.start[:, None], run_parameters, m + n + 2)
         self.runs.energy[0], self.runs.scale[0] = watch.energy, watch.scale
@@ -136,7 +132,8 @@ class Driver(ABC):
 
     def _loop(self) -> Outcome | GivesUp:
         """Advance to the end of the run, or until it gives up."""
-        budget, reported = self.first if self.compiled else 1, -1.0
+        most = self.engine.most_steps
+        budget, reported = int(min(self.first, most)), -1.0
         while True:
             if self.on_progress is not None and self.time > reported:
                 reported = self.time
@@ -151,7 +148,7 @@ class Driver(ABC):
                 raise KeyboardInterrupt
             if (outcome := self._judge(ended)) is not None:
                 return outcome
-            if ended is Ended.PAUSED and self.compiled:
+            if ended is Ended.PAUSED and budget < most:
                 spent = perf_counter() - began
                 budget = int(np.clip(budget * _PAUSE_S / max(spent, 1e-9), self.first // 10, 100 * budget))
         if self.on_progress is not None and self.time > reported:
@@ -187,7 +184,9 @@ class Driver(ABC):
         s = int(self.now[Now.SEGMENT])
         self.runs.y[:, 0], happened = self.payloads.over(float(self.table.starts[s]), self.y)
         self.equation = self.watch.equation = self.payloads.equation
-        self.functions, self.runs.run_parameters[self.rules.held :, 0] = self.functions_of(self.equation)
+        self.functions, self.in_python, self.runs.run_parameters[self.rules.held :, 0], _ = self.engine.evaluated(
+            self.equation, self.watch
+        )
         self.table.payload_events[s] = 0
         return happened
 

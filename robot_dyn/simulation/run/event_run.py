@@ -18,21 +18,20 @@ from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.bernstein import room
 from robot_dyn.integrate.step_control import At, ControlledStepper, control_of
-from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now
+from robot_dyn.simulation.dynamics.loop_state import Ended, Now
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.engine import Engine
+from robot_dyn.simulation.engine.interpreted import interpreted, system
 from robot_dyn.simulation.events.crossings import Switches
 from robot_dyn.simulation.events.event_log import event_log
-from robot_dyn.simulation.events.holding import Places
 from robot_dyn.simulation.events.mode_change import end_mode, without_modes
 from robot_dyn.simulation.events.modes import NOTHING_HELD, modes_of
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.observation.observer import Observer
-from robot_dyn.simulation.run.driver import Advance, FunctionsOf
 from robot_dyn.simulation.run.event_loop import Times, event_loop
 from robot_dyn.simulation.run.outcome import Ending, GivesUp, Outcome, Stiff, TooLong
 from robot_dyn.simulation.run.recording import MOST_SHARED, Path, sample
-from robot_dyn.simulation.run.state_functions import interpreted, system
 from robot_dyn.simulation.run.stiffness import FIRST_LOOK, changes_over
 from robot_dyn.simulation.run.switched_run import SwitchedRun
 from robot_dyn.simulation.run.watch import DivergedError, Watch, one_step
@@ -63,13 +62,10 @@ class EventRun(SwitchedRun):
     Args:
         watch: As of `Driver`.
         payloads: As of `Driver`.
-        functions_of: As of `Driver`.
+        engine: As of `Driver`.
         mesh: Where steps end, (k,), before error control ends them; None for error control alone.
-        places: Where the run parameters have the mode.
-        machine_code: As of `Driver`.
         on_progress: As of `Driver`.
         observer: As of `Driver`.
-        in_python: The functions as Python calls them, where they are machine code.
         samples: Whether samples are recorded.
         most: Evaluations after which it gives up as `TooLong`.
         thresholds: Whether those of the effects are found; otherwise the effects switch by themselves within steps.
@@ -79,33 +75,30 @@ class EventRun(SwitchedRun):
     first = 200
 
     def __init__(
-        self, watch: Watch, payloads: PayloadEvents, functions_of: FunctionsOf, mesh: np.ndarray | None,
-        places: Places, machine_code: Advance | None = None,
+        self, watch: Watch, payloads: PayloadEvents, engine: Engine, mesh: np.ndarray | None,
         on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
-        in_python: Functions | None = None, samples: bool = True, most: float = inf,
-        thresholds: bool = True, chooses: bool = False,
+        samples: bool = True, most: float = inf, thresholds: bool = True, chooses: bool = False,
     ) -> None:  # fmt: skip
         setup, equation = watch.setup, watch.equation
-        super().__init__(watch, payloads, functions_of, segment_table(setup), machine_code, on_progress, observer)
-        self.most, self.samples, self.chooses, self.in_python = most, samples, chooses, in_python
+        super().__init__(watch, payloads, engine, segment_table(setup), on_progress, observer)
+        self.most, self.samples, self.chooses = most, samples, chooses
         self._look = FIRST_LOOK if chooses else 0
         self.stepper, self.control = _method(setup, equation)
         self.bodies, of = self.functions.bodies, self.stepper
         modes, brief = None, _BRIEF * setup.duration_s
         if equation.impulses:
-            modes = modes_of(equation, self.runs.run_parameters.copy(), places, _ACCUMULATED, brief)
+            modes = modes_of(equation, self.runs.run_parameters.copy(), engine.places(), _ACCUMULATED, brief)
             modes.start(self.start)
         alone = thresholds and modes is None and not payloads.any
         self.switching = cached(setup, _switching) if alone else Switching(equation, modes=modes)
         if not thresholds:
             self.switching = Switching(equation, self.switching.quantities, modes)
-        self.advance = machine_code or event_loop(
-            of.begin, of.step, of.error, of.accept, of.dense, without_modes if modes is None else end_mode
-        )
+        ends_mode = without_modes if modes is None else end_mode
+        self.advance = engine.loop(lambda: event_loop(of.begin, of.step, of.error, of.accept, of.dense, ends_mode))
         self.times = _times(setup, mesh, samples)
         states = 0 if self.times.compared == inf else _COMPARED + len(self.table.counts) + 2
         self.records = self._records(int(most_samples(setup)) + 2 if samples else 0, states, _CHUNK)
-        events, degree = self.functions.events if self.compiled else self.switching.function, len(of.work.F)
+        events, degree = self.functions.events, len(of.work.F)
         if alone and not setup.events:
             known = copied(cached(setup, _switches))
             self.switches = known._replace(functions=events, b=np.zeros(degree + 1), stack=room(degree))
@@ -208,8 +201,7 @@ class EventRun(SwitchedRun):
         """Record a sample where an event ends the run."""
         row, s, records = int(self.now[Now.ROW]), int(self.now[Now.SEGMENT]), self.records
         if not (row and records.t[row - 1] == t):
-            functions = self.in_python or self.functions
-            sample(functions, self.runs, records, 0, self.now, t, self.runs.y, self.table.parameters[s])
+            sample(self.in_python, self.runs, records, 0, self.now, t, self.runs.y, self.table.parameters[s])
 
     def _paths(self) -> tuple[Path, Path, np.ndarray]:
         records, shared, steps = self.records, int(self.now[Now.SHARED]), int(self.now[Now.WALKED])

@@ -17,19 +17,18 @@ from robot_dyn.foundations.arithmetic import FLOAT64, Array
 from robot_dyn.foundations.errors import RobotDynError, is_mistake
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now
+from robot_dyn.simulation.engine.engine import Engine
+from robot_dyn.simulation.engine.interpreted import interpreted, sample, system
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.observation.observer import Observer
-from robot_dyn.simulation.run.driver import Advance, Driver, FunctionsOf
+from robot_dyn.simulation.run.driver import Driver
 from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.simulation.run.recording import MOST_SHARED, Path, Recording
-from robot_dyn.simulation.run.state_functions import interpreted, sample, system
 from robot_dyn.simulation.run.time_loop import WATCHED, acts, time_loop
 from robot_dyn.simulation.run.watch import LARGEST, Watch, one_step, overflowed
 from robot_dyn.simulation.setup.schedule import ON_STEP, paced
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
-
-_NEEDS_REVIEW = 1e6  # of Σ |y| in machine code, which does not see that M becomes singular
 
 
 @final
@@ -39,9 +38,8 @@ class FixedStep(Driver):
     Args:
         watch: As of `Driver`.
         payloads: As of `Driver`.
-        functions_of: As of `Driver`.
+        engine: As of `Driver`.
         pace: Length of a step, in steps of the setup; 1 records samples.
-        machine_code: As of `Driver`.
         on_progress: As of `Driver`.
         observer: As of `Driver`.
     """
@@ -49,18 +47,17 @@ class FixedStep(Driver):
     first = 1000
 
     def __init__(
-        self, watch: Watch, payloads: PayloadEvents, functions_of: FunctionsOf, pace: Fraction,
-        machine_code: Advance | None = None, on_progress: Callable[[float], object] | None = None,
-        observer: Observer | None = None,
+        self, watch: Watch, payloads: PayloadEvents, engine: Engine, pace: Fraction,
+        on_progress: Callable[[float], object] | None = None, observer: Observer | None = None,
     ) -> None:  # fmt: skip
         setup, equation = watch.setup, watch.equation
         table = segment_table(setup, pace)
-        super().__init__(watch, payloads, functions_of, table, machine_code, on_progress, observer)
+        super().__init__(watch, payloads, engine, table, on_progress, observer)
         self.segments, n, m = paced(setup.segments, pace), self.rules.n, equation.size
         self.stepper = cast(Integrator, setup.integrator).stepper(FLOAT64, m, n, m + n, 1, equation.widths)
-        self.advance = machine_code or time_loop(self.stepper.step)
+        self.advance = engine.loop(lambda: time_loop(self.stepper.step))
         every, thin = self._shared(pace)
-        largest = _NEEDS_REVIEW if self.compiled else LARGEST
+        largest = min(engine.doubtful, LARGEST)
         self.rules = self.rules._replace(largest=largest, every=every, thin=thin)
         rows = samples_at_most(setup, table.counts) if pace == 1 else 1
         self.records = self._records(rows, int((-(-table.counts // every)).sum()) // thin + 2, 0)
@@ -143,11 +140,12 @@ class FixedStep(Driver):
 
     def _recording(self, outcome: Outcome) -> Recording:
         recording = super()._recording(outcome)
-        if self.compiled and self.setup.integrator.nonsmooth:
+        if self.setup.integrator.nonsmooth:
             # machine code has no rates at samples: which joints rest is for the equation to find
-            held = slice(self.equation.size, self.equation.size + self.rules.n)
+            m, n = self.equation.size, self.rules.n
             for t, y, made in zip(recording.t, recording.y, recording.made, strict=True):
-                sample(self.equation, float(t), y, made[held].copy() if self.rules.held else None, made)
+                if np.isnan(made[:m]).all():
+                    sample(self.equation, float(t), y, made[m : m + n].copy() if self.rules.held else None, made)
         return recording
 
 

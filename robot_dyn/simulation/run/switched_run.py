@@ -35,7 +35,6 @@ class SwitchedRun(Driver):
     Attributes:
         control, switches, sides: What the loop takes, too.
         switching: Its switching functions, and its modes.
-        in_python: The functions as Python calls them, where they are machine code.
         bodies: The function of that name, of the equation whose parts switch by themselves.
         log: What the loop has noted since it was called.
         samples: Whether samples are recorded.
@@ -48,7 +47,6 @@ class SwitchedRun(Driver):
     switches: Switches
     sides: Sides
     switching: Switching
-    in_python: Functions | None
     bodies: Any
     log: EventLog
     samples: bool
@@ -81,14 +79,15 @@ class SwitchedRun(Driver):
         """Let the functions be those of the sides that the switching functions are on."""
         switching = self.switching
         if switching.thresholds or switching.dropped or self.payloads.any:
-            functions, parameters = self.functions_of(switching.on(self.switches.sides))
+            on_sides = switching.on(self.switches.sides)
+            functions, self.in_python, parameters, by_numbers = self.engine.evaluated(on_sides, self.watch)
             self.functions = functions._replace(bodies=self.bodies)
             self.runs.run_parameters[self.rules.held :, 0] = parameters
-            if self.in_python is not None:  # else functions change with the sides
+            if by_numbers:  # else functions change with the sides
                 keep_numbers(self.sides, switching.of_thresholds(self.switches.sides), parameters)
         if switching.modes is not None:
             write_mode(switching.modes.holding, self.runs.run_parameters)
-        if not self.compiled:
+        if callable(self.functions.rate):
             self.functions = self._lenient(self.functions)
 
     def _forget_sides(self) -> None:
@@ -143,12 +142,12 @@ class SwitchedRun(Driver):
         s = int(self.now[Now.SEGMENT])
         t = float(self.table.starts[s])
         self._keep(*self._change_payload())
-        functions, self.bodies = self.functions, self.functions.bodies
+        self.bodies = self.functions.bodies
         if (modes := self.switching.modes) is not None:
             run_parameters = self.runs.run_parameters.copy()
             run_parameters[: self.rules.held] = np.nan
             modes = Modes(self.equation, modes.holding._replace(run_parameters=run_parameters))
-            self._settle(modes, self.in_python or functions, t, self.table.parameters[s])
+            self._settle(modes, self.in_python, t, self.table.parameters[s])
         self.switching = Switching(self.equation, self.switching.dropped, modes)
         self._forget_sides()
         self._take_log()

@@ -1,59 +1,70 @@
-"""What a setup is checked for: that its parts fit each other and the method, and have an answer at the start."""
+"""Checks of a setup: that its parts fit each other and the method, and have an answer at the start."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import ControlError, EffectError, OverflowedError, QueryError, call, shown
 from robot_dyn.foundations.validate import Kind, float64, number
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.setup.size import MOST_CUT
-
-if TYPE_CHECKING:
-    from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.setup.event import Event
+from robot_dyn.simulation.setup.schedule import MOST_CUT
 
 _UNITS = ("rad", "m")
 
 
-def check_parts(setup: Setup) -> None:
-    """That the method can integrate the setup, and that effects, controller and events have an answer at the start.
+def check_method(plant: Plant, method: Any, events: tuple[Event, ...], finds_events: bool) -> None:
+    """Check that a method can integrate what moves, and find events.
 
     Raises:
-        QueryError: If the method cannot, or an event returns no number.
-        EffectError, ControlError: If an effect or the controller does not return one number for each joint.
+        QueryError: If the method cannot.
     """
-    if setup.events and not setup.finds_events:
-        method = setup.integrator
+    if events and not finds_events:
         raise QueryError(
             f"events: steps of {method.name} are not cut; take integrator='DOP853'"
             if method.nonsmooth
             else f"events: runs of more than {MOST_CUT} steps of {method.name} are not cut; take longer"
             " steps, or integrator='DOP853'"
         )
-    _check_set_valued(setup)
-    _check_payloads(setup)
-    _check_drives(setup)
-    _check_torques(setup)
-    _check_control(setup)
-    _check_events(setup)
-    nothing = np.zeros(setup.plant.dynamics.n)
-    setup.plant.actuation(nothing)
+    _check_set_valued(plant, method, finds_events)
+    _check_payloads(plant, method)
+    if method.nonsmooth and (drives := [*plant.equation_of_motion.drives.values()]):
+        raise QueryError(f"{drives[0].name}: {method.name} takes no motors of a drive; take integrator='DOP853'")
+
+
+def check_start(
+    plant: Plant, controller: Controller | None, events: tuple[Event, ...], q0: Array, v0: Array
+) -> None:  # fmt: skip
+    """Check that effects, controller and events have an answer at the start, between rigid stops.
+
+    Raises:
+        QueryError: If the start is beyond a stop, or an event returns no number.
+        EffectError, ControlError: If an effect or the controller does not return one number for each joint.
+    """
+    check_stops(plant, q0)
+    _check_torques(plant, q0, v0)
+    if controller is not None:
+        _check_control(controller, q0, v0)
+    for event in events:
+        value = call(event.function, 0.0, q0, v0)
+        if np.ndim(value) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
+            raise QueryError(f"event {event.name!r}: its function must return a finite number, got {shown(value)}")
+    nothing = np.zeros(plant.dynamics.n)
+    plant.actuation(nothing)
     with suppress(OverflowedError):  # a start so far out is the outcome of a run
-        setup.plant.forward_dynamics(0.0, setup.q0, setup.v0, nothing)  # a singular M is reported here
+        plant.forward_dynamics(0.0, q0, v0, nothing)  # a singular M is reported here
 
 
-def check_model(setup: Setup) -> None:
-    """That the controller means the joints and links of the plant; a file with other names all over may fit too."""
-    plant, controller = setup.plant.dynamics, setup.controller
-    if controller is None:
-        return
+def check_model(plant: Dynamics, controller: Controller, q0: Array) -> None:
+    """Check that a controller means the joints and links of the plant; a file with only other names may fit too."""
     for model in controller.models.values():
         pairs = tuple(zip(model.joint_names, plant.joint_names, strict=False))
         if not any(of_model in plant.joint_names for of_model, _ in pairs):
@@ -65,11 +76,11 @@ def check_model(setup: Setup) -> None:
                     " joints of both"
                 )
     if controller.task_frame is not None:
-        plant.placement(setup.q0, controller.task_frame)  # so that an unknown link is reported here
+        plant.placement(q0, controller.task_frame)  # so that an unknown link is reported here
 
 
 def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:
-    """That a start is not beyond a rigid stop.
+    """Check that a start is not beyond a rigid stop.
 
     Raises:
         QueryError: If it is; names the joint, and by `of` the start.
@@ -81,14 +92,13 @@ def check_stops(plant: Plant, q0: Array, of: str = "q0") -> None:
             raise QueryError(f"{of}: {name!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
 
 
-def _check_set_valued(setup: Setup) -> None:
-    """That steps can end where joints are held and let go, and that the start is not beyond a rigid stop."""
-    effects = setup.plant.equation_of_motion.set_valued
-    method: Any = setup.integrator
+def _check_set_valued(plant: Plant, method: Any, finds_events: bool) -> None:
+    """Check that steps can end where joints are held and let go."""
+    effects = plant.equation_of_motion.set_valued
     for fails, why in (
         (method.canonical, "integrates momenta"),
         (not method.controls_error and method.order < 2, "is of order 1, too low to find where"),
-        (not setup.finds_events, f"takes more than {MOST_CUT} steps"),
+        (not finds_events, f"takes more than {MOST_CUT} steps"),
     ):
         if effects and fails and not method.nonsmooth:
             raise QueryError(
@@ -97,68 +107,45 @@ def _check_set_valued(setup: Setup) -> None:
             )
     if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
         raise QueryError(f"{other[0].name}: has no law for {method.name}; take integrator='DOP853'")
-    check_stops(setup.plant, setup.q0)
 
 
-def _check_payloads(setup: Setup) -> None:
-    """That the state is one of velocities where payloads come and go."""
-    method: Any = setup.integrator
+def _check_payloads(plant: Plant, method: Any) -> None:
+    """Check that the state is one of velocities where payloads come and go."""
     for fails, why in (
         (method.canonical, f"what is picked up or dropped changes momenta, which {method.name} integrates"),
         (method.nonsmooth, f"steps of {method.name} do not end where it comes and goes"),
     ):
-        if setup.plant.equation_of_motion.payloads and fails:
+        if plant.equation_of_motion.payloads and fails:
             raise QueryError(f"carried_payload: {why}; take integrator='DOP853'")
 
 
-def _check_drives(setup: Setup) -> None:
-    """That the method integrates motors with the joints that they drive."""
-    for drive in setup.plant.equation_of_motion.drives.values():
-        if setup.integrator.nonsmooth:
-            raise QueryError(
-                f"{drive.name}: {setup.integrator.name} takes no motors of a drive; take integrator='DOP853'"
-            )
-
-
-def _check_torques(setup: Setup) -> None:
-    """That what each effect returns at the start is one number for each joint."""
-    dynamics = setup.plant.dynamics
+def _check_torques(plant: Plant, q0: Array, v0: Array) -> None:
+    """Check that what each effect returns at the start is one number for each joint."""
+    dynamics, equation = plant.dynamics, plant.equation_of_motion
     with np.errstate(all="ignore"):
-        torques = setup.plant.equation_of_motion.torques(0.0, setup.q0, setup.v0)
-        for force, torque in zip(setup.plant.forces, torques, strict=True):
+        torques = equation.torques(0.0, q0, v0)
+        for force, torque in zip(plant.forces, torques, strict=True):
             _check_returned(f"{type(force).__name__}.torque", torque, dynamics.n, error=EffectError)
             if any(each.of_actuation for each in force.thresholds(dynamics.n)):
                 raise EffectError(f"{force.name}: thresholds of the actuation are for bounds")
-        equation = setup.plant.equation_of_motion
         u, z = np.zeros(dynamics.n), np.zeros(equation.state_size)
         u, reached = equation.applied(u, z)
-        names = (type(setup.plant.effects[k]).__name__ for k in equation.states)
-        rates = equation.state_rates(0.0, setup.q0, setup.v0, u, reached, z)
+        names = (type(plant.effects[k]).__name__ for k in equation.states)
+        rates = equation.state_rates(0.0, q0, v0, u, reached, z)
         for name, (place, rate) in zip(names, rates, strict=True):
             _check_returned(f"{name}.state_rate", rate, place.stop - place.start, "state", error=EffectError)
 
 
-def _check_control(setup: Setup) -> None:
-    """That what the controller returns at the start is one number for each joint, and for each of its states."""
-    controller, n = setup.controller, setup.plant.dynamics.n
-    if controller is None:
-        return
+def _check_control(controller: Controller, q0: Array, v0: Array) -> None:
+    """Check that what the controller returns at the start is one number for each joint, and for each of its states."""
     with np.errstate(all="ignore"), suppress(OverflowedError):  # of its model: the outcome of a run
-        start = 0.0, setup.q0, setup.v0, np.zeros(controller.state_size)
+        start = 0.0, q0, v0, np.zeros(controller.state_size)
         torque = call(controller.torque, *start)
-        _check_returned(f"{controller.name}.torque", torque, n, error=ControlError)
+        _check_returned(f"{controller.name}.torque", torque, controller.n, error=ControlError)
         if controller.state_size:
             after = controller.next_state if controller.period_s else controller.state_rate
             what = f"{controller.name}.{after.__name__}"
             _check_returned(what, call(after, *start), controller.state_size, "state", error=ControlError)
-
-
-def _check_events(setup: Setup) -> None:
-    """That what each event returns at the start is a number."""
-    for event in setup.events:
-        value = call(event.function, 0.0, setup.q0, setup.v0)
-        if np.ndim(value) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
-            raise QueryError(f"event {event.name!r}: its function must return a finite number, got {shown(value)}")
 
 
 def least_accuracy(given: Any, dynamics: Dynamics) -> float:

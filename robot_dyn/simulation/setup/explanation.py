@@ -1,30 +1,14 @@
-"""What a setup integrates, in words: the equation of motion with its control law, what acts, method and start."""
+"""The control of a setup in words: its law, what it consists of, its models and references."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.loop import SIGNALS, Loop
 from robot_dyn.control.reference import Reference
-from robot_dyn.effects.explanation import Explanation, as_they_act, edit_terms, explanation
-from robot_dyn.queries.units import units
-
-if TYPE_CHECKING:
-    from robot_dyn.simulation.setup.setup import Setup
-
-
-def explanation_of(setup: Setup) -> Explanation:
-    """The equation of motion of a setup, with its control, method and start."""
-    plant, controller = explanation(setup.plant), setup.controller
-    return replace(
-        plant,
-        equation=(*plant.equation, f"u = {'0' if controller is None else law(controller)}"),
-        control=() if controller is None else tuple(_control(controller, setup.plant.dynamics)),
-        method=tuple(_method(setup)),
-    )
+from robot_dyn.effects.explanation import as_they_act, edit_terms
 
 
 def law(controller: Controller) -> str:
@@ -37,7 +21,8 @@ def pace(period_s: float) -> str:
     return f"every {period_s:g} s, constant between" if period_s else "continuously"
 
 
-def _control(controller: Controller, dynamics: Any) -> Iterator[str]:
+def control_lines(controller: Controller, dynamics: Any) -> Iterator[str]:
+    """A controller and its parts, line by line."""
     inside = controller.controller if isinstance(controller, Loop) else controller
     yield f"control: {inside.name}, {pace(controller.period_s)}"
     yield from (f"  {text}" for text in as_they_act([inside], dynamics))
@@ -85,31 +70,3 @@ def span(reference: Reference) -> str:
     pieces = reference.polynomials.values()
     start, end = min(each.start for each in pieces), max(each.end for each in pieces)
     return f"{start:g} to {end:g} s, {end - start:g} s long" if end > start else "constant"
-
-
-def shortened(setup: Setup) -> str:
-    """The longest step that a method of fixed step takes, if that is not its own; else empty."""
-    taken = setup.taken_step_s
-    if taken >= setup.nominal_step_s * (1 - 1e-9):
-        return ""
-    return f", in fact {taken:.6g} at most: steps end at samples, ticks and switches"
-
-
-def _method(setup: Setup) -> Iterator[str]:
-    method: Any = setup.integrator
-    name: str = method.name
-    used: dict[str, Any] = {}
-    if setup.accuracy is not None:
-        name = f"chosen for an error of q of at most {setup.accuracy:g}"
-    elif method.controls_error:
-        used = {"rtol": method.rtol, "atol": method.atol}
-    else:
-        used = {"step_s": f"{setup.nominal_step_s}{shortened(setup)}"}
-    yield f"method: {name}, {setup.duration_s:g} s"
-    used |= {key: getattr(setup, key) for key in ("record_period_s", "estimate_error", "engine")}
-    yield from (f"  {key} = {value}" for key, value in used.items())
-    yield "start:"
-    types = getattr(setup.plant.dynamics, "joint_types", (None,) * len(setup.q0))
-    for key, values in (("q", setup.q0), ("v", setup.v0)):
-        numbers = ", ".join(f"{x:.6g}" for x in values) if values.any() else "0"
-        yield f"  {key} = {numbers} {units(key, types)}"

@@ -17,6 +17,7 @@ import numpy as np
 
 from robot_dyn.foundations.errors import QueryError
 
+MOST_CUT = 200_000  # steps of a run of fixed step that is cut at events
 LEAST_STEPS = 3  # on a segment: fewer leave no room for a longer step
 ULPS = 4  # times that differ by no more units in the last place are one
 ON_STEP = 1e-9  # of step_s: a sample that lies so near to the end of a step is taken there

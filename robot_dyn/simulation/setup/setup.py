@@ -2,31 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from math import inf
+from math import inf, ulp
+from sys import float_info
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.control.control_law import ControlLaw
 from robot_dyn.control.controller import Controller
+from robot_dyn.effects.explanation import Explanation, explanation
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.arithmetic import Array, Ball
 from robot_dyn.foundations.errors import QueryError, shown
-from robot_dyn.foundations.validate import choice, duration, instance, integer, one_state, truth
+from robot_dyn.foundations.validate import LEAST_EXACT, choice, duration, instance, integer, one_state, truth
 from robot_dyn.foundations.values import Caching, Value
 from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
+from robot_dyn.queries.units import units
 from robot_dyn.simulation.dynamics.declarations import is_value, undeclared
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.setup.checks import check_model, check_parts, least_accuracy
+from robot_dyn.simulation.setup.checks import check_method, check_model, check_start, least_accuracy
 from robot_dyn.simulation.setup.event import Event
-from robot_dyn.simulation.setup.explanation import explanation_of
-from robot_dyn.simulation.setup.schedule import LEAST_STEPS, ON_STEP, Segment, cuts, near, nodes, steps_on
-from robot_dyn.simulation.setup.size import MOST_CUT, check_segments
+from robot_dyn.simulation.setup.explanation import control_lines, law
+from robot_dyn.simulation.setup.schedule import LEAST_STEPS, MOST_CUT, ON_STEP, Segment, cuts, near, nodes, steps_on
 
 ENGINES = ("auto", "interpreted", "compiled")
+MOST_BYTES = 8 * 2**30  # of all that is recorded, by default
+LONGEST_S = LEAST_EXACT / float_info.epsilon  # up to there floats resolve the times of a run
+MOST_STEPS = 1e11  # about a day of the fastest machine code
+_SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # by estimate; the second is a quintic at its start and along it
 STEP_S = 1e-3  # of a method of fixed step, unless given
 _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where a part does not declare where it switches
 
@@ -101,9 +108,11 @@ class Setup(Value, Caching):
         choice("engine", self.engine, ENGINES)
         object.__setattr__(self, "events", _events(self.events))
         object.__setattr__(self, "controller", _controller(self.controller, len(names)))
-        check_model(self)
-        check_segments(self)
-        check_parts(self)
+        if self.controller is not None:
+            check_model(self.plant.dynamics, self.controller, self.q0)
+        _check_segments(self)
+        check_method(self.plant, self.integrator, self.events, self.finds_events)
+        check_start(self.plant, self.controller, self.events, self.q0, self.v0)
 
     def _check_accuracy(self) -> None:
         """That an accuracy is one, and that nothing else chooses method or tolerance."""
@@ -246,3 +255,88 @@ def _controller(given: Any, n: int) -> Controller | None:
             raise QueryError(f"the controller drives {controller.n} joints, the plant has {n}")
         integer("state_size of the controller", controller.state_size)
     return controller
+
+
+def _check_segments(setup: Setup) -> None:
+    """Refuse a run of more steps, ticks or switches than are possible, or of times that floats do not resolve.
+
+    Raises:
+        QueryError: If it is one; with the number and the remedy.
+    """
+    cut = segments(setup)
+    size = cut * (_SEGMENT_BYTES + _SEGMENT_BYTES_PER_JOINT * setup.plant.dynamics.n)
+    if size > MOST_BYTES:
+        raise QueryError(
+            f"a run of {setup.duration_s:g} s with {cut:.3g} ticks and switches takes {gibibytes(size)}, more than "
+            f"{gibibytes(MOST_BYTES)}: take a longer period_s of the controller, or a shorter duration_s"
+        )
+    if steps(setup) > MOST_STEPS:
+        raise QueryError(
+            f"a run of {setup.duration_s:g} s takes {steps(setup):.3g} steps of step_s = {setup.nominal_step_s:g} s,"
+            f" more than {MOST_STEPS:g}: take a longer step_s, or a shorter duration_s"
+        )
+    if setup.duration_s > LONGEST_S:
+        raise QueryError(
+            f"a run of {setup.duration_s:g} s ends at a time that floats resolve to {ulp(setup.duration_s):.1g} s only:"
+            f" take a shorter duration_s, {LONGEST_S:.2g} s at most"
+        )
+
+
+def segments(setup: Setup) -> float:
+    """At most so many segments between ticks, breaks and switches."""
+    controller = setup.controller
+    period = controller.period_s / len(controller.instants) if controller else 0.0
+    cuts = sum(len(effect.switches) for effect in setup.plant.effects) + len(controller.knots if controller else ())
+    return 2.0 + cuts + (setup.duration_s / period if period > 0 else 0.0)
+
+
+def steps(setup: Setup) -> float:
+    """About so many steps of a fixed-step method; 0 for an adaptive one, which chooses them."""
+    if setup.integrator.controls_error:
+        return 0.0
+    step = min(setup.nominal_step_s, setup.record_period_s or inf)  # samples lie on steps
+    return setup.duration_s / step + 4 * segments(setup)
+
+
+def gibibytes(size: float) -> str:
+    """Return a number of bytes as text, in GiB."""
+    return f"{size / 2**30:.3g} GiB"
+
+
+def explanation_of(setup: Setup) -> Explanation:
+    """Return what a setup integrates, in words: the equation of motion, what acts, control, method and start."""
+    plant, controller = explanation(setup.plant), setup.controller
+    return replace(
+        plant,
+        equation=(*plant.equation, f"u = {'0' if controller is None else law(controller)}"),
+        control=() if controller is None else tuple(control_lines(controller, setup.plant.dynamics)),
+        method=tuple(_method(setup)),
+    )
+
+
+def shortened(setup: Setup) -> str:
+    """The longest step that a method of fixed step takes, if that is not its own; else empty."""
+    taken = setup.taken_step_s
+    if taken >= setup.nominal_step_s * (1 - 1e-9):
+        return ""
+    return f", in fact {taken:.6g} at most: steps end at samples, ticks and switches"
+
+
+def _method(setup: Setup) -> Iterator[str]:
+    method: Any = setup.integrator
+    name: str = method.name
+    used: dict[str, Any] = {}
+    if setup.accuracy is not None:
+        name = f"chosen for an error of q of at most {setup.accuracy:g}"
+    elif method.controls_error:
+        used = {"rtol": method.rtol, "atol": method.atol}
+    else:
+        used = {"step_s": f"{setup.nominal_step_s}{shortened(setup)}"}
+    yield f"method: {name}, {setup.duration_s:g} s"
+    used |= {key: getattr(setup, key) for key in ("record_period_s", "estimate_error", "engine")}
+    yield from (f"  {key} = {value}" for key, value in used.items())
+    yield "start:"
+    types = getattr(setup.plant.dynamics, "joint_types", (None,) * len(setup.q0))
+    for key, values in (("q", setup.q0), ("v", setup.v0)):
+        numbers = ", ".join(f"{x:.6g}" for x in values) if values.any() else "0"
+        yield f"  {key} = {numbers} {units(key, types)}"

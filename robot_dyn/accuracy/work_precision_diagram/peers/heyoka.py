@@ -14,8 +14,7 @@ from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion
 from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import COMPILED
 from robot_dyn.codegen.program import Kind, Program
 from robot_dyn.report.time_budget import Limit
-from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import machine_code
 
 _TOLERANCES = (1e-6, 1e-10, 1e-14)  # each is compiled by itself, which takes many seconds
 
@@ -24,11 +23,11 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
     """Its Taylor method."""
     hy: Any = import_module("heyoka")
     setup, n = motion.setup, motion.robot.n
-    machine, _ = choose(setup, StateEquation(setup.plant, None))
-    if machine is None or setup.engine != COMPILED:
+    if setup.engine != COMPILED:
         raise PeerError("its equations are taken from our machine code, which this run has not")
+    machine = machine_code(setup.equation)
     names = [hy.make_vars(f"y{i}") for i in range(2 * n)]
-    rates = _in_heyoka(hy, machine.functions.programs["rate"], names, machine.parameters)
+    rates = _in_heyoka(hy, machine.code.programs["rate"], names, machine.parameters)
     start = np.concatenate([setup.q0, setup.v0])
     integrators: dict[float, Any] = {}
 

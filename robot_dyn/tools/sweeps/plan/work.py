@@ -19,8 +19,7 @@ from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.simulation.rollouts.overview import remarks_on_each, texts_by_run
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.rollouts import batch_of, manners, run_batch
-from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.setup.size import MOST_BYTES
+from robot_dyn.simulation.setup.setup import MOST_BYTES, Setup
 from robot_dyn.tools.sweeps.folder.rows import DIVERGED, FINISHED, RAISED, Rows
 from robot_dyn.tools.sweeps.folder.samples import check_times
 from robot_dyn.tools.sweeps.plan.runs import Runs, taken

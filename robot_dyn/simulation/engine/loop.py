@@ -47,7 +47,7 @@ def loop_of(method: Any, cuts: bool, detects: bool = False, holds: bool = False)
     Args:
         method: An `Integrator` or `Adaptive`.
         cuts: Whether steps are chosen, or cut at events.
-        detects: As of `compiled_equation`.
+        detects: As in `machine_code`.
         holds: Whether something may hold joints.
     """
     if not cuts:

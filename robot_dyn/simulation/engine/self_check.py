@@ -18,16 +18,15 @@ from robot_dyn.codegen.trace.right_angles import models_in_full
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import RobotDynError, because
 from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
-from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
-from robot_dyn.simulation.compiled.functions import STEP, States
-from robot_dyn.simulation.compiled.programs import robot_to_compile
 from robot_dyn.simulation.dynamics.bodies import bodies
 from robot_dyn.simulation.dynamics.moreau_jean import stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.cache import robot_to_compile
+from robot_dyn.simulation.engine.interpreted import Interpreted, sample
+from robot_dyn.simulation.engine.machine_code import STEP, MachineCode, States
 from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.recording import Path, Recording
-from robot_dyn.simulation.run.state_functions import sample
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -74,7 +73,7 @@ class _Evaluated(NamedTuple):
         return self.run_parameters[: equation.plant.dynamics.n, lane] if equation.sampled else None
 
 
-def check(compiled: CompiledStateEquation, setup: Setup) -> None:
+def check(code: MachineCode, setup: Setup) -> None:
     """Compare machine code with the interpreted equations.
 
     Once is enough, at random states, where the version of this library identifies the code of all parts. Any other part
@@ -83,36 +82,36 @@ def check(compiled: CompiledStateEquation, setup: Setup) -> None:
     Raises:
         MachineError: If they differ by more than rounding.
     """
-    checked, changeable = compiled.functions.checked, compiled.functions.changeable
-    controller = models_in_full(compiled.equation.controller, robot_to_compile)  # as they are traced
-    if controller is not compiled.equation.controller:
-        compiled = replace(compiled, equation=replace(compiled.equation, controller=controller))
+    checked, changeable = code.code.checked, code.code.changeable
+    controller = models_in_full(code.compiled_form.controller, robot_to_compile)  # as they are traced
+    if controller is not code.compiled_form.controller:
+        code = replace(code, compiled_form=replace(code.compiled_form, controller=controller))
     states = next(iter(checked.values()), None)
     if states is None:
-        states = _states_of_run(setup) if changeable else _random_states(setup, compiled.equation.size)
-        _compare(compiled, setup, states)
+        states = _states_of_run(setup) if changeable else _random_states(setup, code.compiled_form.size)
+        _compare(code, setup, states)
     elif changeable:
-        _compare(compiled, setup, _some(states))
-    checked[compiled.loop] = states
+        _compare(code, setup, _some(states))
+    checked[code.machine_loop] = states
 
 
-def _compare(compiled: CompiledStateEquation, setup: Setup, states: States) -> None:
-    rng, equation, functions = np.random.default_rng(20), compiled.equation, compiled.functions
+def _compare(code: MachineCode, setup: Setup, states: States) -> None:
+    rng, equation, functions = np.random.default_rng(20), code.compiled_form, code.code
     W, table, held = functions.runs, segment_table(setup), equation.plant.dynamics.n * equation.sampled
     results = {name: np.empty((functions.programs.results(name), W)) for name in functions.programs}
-    swept = {each.name: np.tile(each.value.ravel(), (W, 1)) for each in compiled.known if each.name in compiled.swept}
-    run_parameters = compiled.run_parameters(swept)
+    swept = {each.name: np.tile(each.value.ravel(), (W, 1)) for each in code.known if each.name in code.swept}
+    run_parameters = code.run_parameters(swept)
     for i, time in enumerate(states.t.tolist()):
         p = table.parameters[int(np.searchsorted(table.starts[:-1], time, side="right")) - 1]
         t, y = min(max(time, p[0]), p[1]), np.ascontiguousarray(states.y[(i + np.arange(W)) % len(states.y)].T)
         run_parameters[:held] = rng.normal(size=(held, W))
         for name, out in results.items():
             if name not in STEP:
-                getattr(compiled.in_python, name)(t, y, p, run_parameters, out)
+                getattr(code.in_python, name)(t, y, p, run_parameters, out)
         at = _Evaluated(t, y, p, run_parameters, results)
         try:
             for lane in range(min(W, _LANES)):
-                _compare_lane(compiled, at, lane)
+                _compare_lane(code, at, lane)
         except RobotDynError:
             raise
         except Exception as error:  # of changeable code
@@ -122,25 +121,25 @@ def _compare(compiled: CompiledStateEquation, setup: Setup, states: States) -> N
             J = results["jacobian"][:, 0].reshape(equation.size + 1, equation.size)
             worst = jacobian_error(equation, t, y[:, 0], at.held(equation, 0), p, J)
             if not worst <= 1:
-                raise _differs(compiled, "Jacobian", worst * _DIFFERENCES, _DIFFERENCES, t)
+                raise _differs(code, "Jacobian", worst * _DIFFERENCES, _DIFFERENCES, t)
 
 
-def _compare_lane(compiled: CompiledStateEquation, at: _Evaluated, lane: int) -> None:
+def _compare_lane(code: MachineCode, at: _Evaluated, lane: int) -> None:
     """Compare all results of one lane."""
-    pairs = [*_results_of_lane(compiled, at, lane)]
+    pairs = [*_results_of_lane(code, at, lane)]
     if "problem" in at.results and not lane:
-        pairs += _results_of_step(compiled, at)
-    y, plant = at.y[:, lane], compiled.equation.plant
+        pairs += _results_of_step(code, at)
+    y, plant = at.y[:, lane], code.compiled_form.plant
     allowed = _AGREES * max(1.0, float(np.linalg.cond(plant.M(y[: plant.dynamics.n]))))
     worst = max(_difference(*pair, y) for pair in pairs)
     if not worst <= allowed:
-        raise _differs(compiled, "state equation", worst, allowed, at.t)
+        raise _differs(code, "state equation", worst, allowed, at.t)
 
 
-def _results_of_lane(compiled: CompiledStateEquation, at: _Evaluated, lane: int) -> Pairs:
+def _results_of_lane(code: MachineCode, at: _Evaluated, lane: int) -> Pairs:
     """What the functions return for a lane, quantity by quantity, and what the equation gives."""
-    equation, t, y, held = compiled.equation, at.t, at.y[:, lane], at.held(compiled.equation, lane)
-    ours, single = {name: out[:, lane] for name, out in at.results.items()}, compiled.functions.runs == 1
+    equation, t, y, held = code.compiled_form, at.t, at.y[:, lane], at.held(code.compiled_form, lane)
+    ours, single = {name: out[:, lane] for name, out in at.results.items()}, code.code.runs == 1
     n, m = equation.plant.dynamics.n, equation.size
     theirs = np.empty(m + n + 2)
     sample(equation, t, y, held, theirs)
@@ -154,9 +153,7 @@ def _results_of_lane(compiled: CompiledStateEquation, at: _Evaluated, lane: int)
     if "actuation" in ours:
         yield ours["actuation"], u
     if "events" in ours:
-        q, v, z, _ = equation.state(y)
-        demands = equation.demands(t, q, v, z, held, equation.limited)
-        yield ours["events"], np.array([*np.ravel(demands), *equation.switching(t, q, v)], dtype=float)
+        yield ours["events"], equation.event_values(t, y, held)
     if "bodies" in ours:
         both = ours["bodies"], bodies(equation, t, y, held)
         yield from zip(*(np.split(each, [n * n]) for each in both), strict=True)
@@ -166,13 +163,13 @@ def _results_of_lane(compiled: CompiledStateEquation, at: _Evaluated, lane: int)
         yield ours["tick"][n:], after[2 * n : 2 * n + equation.state_size]
 
 
-def _results_of_step(compiled: CompiledStateEquation, at: _Evaluated) -> Pairs:
+def _results_of_step(code: MachineCode, at: _Evaluated) -> Pairs:
     """y⁺, v⁺ and its places by a step of time stepping, lane by lane, and what the equation gives."""
-    equation, (m, W) = compiled.equation, at.y.shape
+    equation, (m, W) = code.compiled_form, at.y.shape
     n = equation.plant.dynamics.n
     x = np.vstack([at.y, np.full((1, W), _LENGTH), np.zeros((n, W))])
-    out = np.empty((m + 2 * n + 1 + compiled.functions.programs.results("problem"), W))
-    compiled.in_python.step(at.t, x, at.p, at.run_parameters, out)
+    out = np.empty((m + 2 * n + 1 + code.code.programs.results("problem"), W))
+    code.in_python.step(at.t, x, at.p, at.run_parameters, out)
     for lane in range(min(W, _LANES)):
         theirs = stepped(equation, at.t, x[:, lane], at.held(equation, lane))
         yield out[:m, lane], theirs[:m]
@@ -185,9 +182,9 @@ def _difference(x: Array, y: Array, start: Array) -> float:
     return float(np.abs(x - y).max(initial=0.0) / size) if np.isfinite(x).all() and np.isfinite(y).all() else np.inf
 
 
-def _differs(compiled: CompiledStateEquation, what: str, worst: float, allowed: float, t: float) -> MachineError:
-    of, remedy = f"of {compiled.functions.name}", "take engine='interpreted', and report it"
-    if parts := compiled.functions.changeable:
+def _differs(code: MachineCode, what: str, worst: float, allowed: float, t: float) -> MachineError:
+    of, remedy = f"of {code.code.name}", "take engine='interpreted', and report it"
+    if parts := code.code.changeable:
         of = f"with {' or '.join(parts)}"
         remedy = (
             "methods must be functions of their arguments and of what their part declares; take"
@@ -235,7 +232,7 @@ def _first_second(setup: Setup) -> Path:
         short = replace(
             setup, duration_s=span, record_period_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
         )
-        record = make_run(short, short.equation, None, samples=False, most=_MOST).run()
+        record = make_run(short, Interpreted(short.equation), samples=False, most=_MOST).run()
         if not isinstance(record, Recording):
             span /= 10
             continue

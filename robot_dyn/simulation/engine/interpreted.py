@@ -1,14 +1,11 @@
-"""The state equation as functions for a time loop, (t, y, p, run_parameters, out), of one interpreted run.
-
-rate: y' and u    tick: u, in zero-order hold from then on, and the next states of the controller    energy: K and V
-sample: y', u, K and V    jacobian: as of `RightSide`, by differences    bodies: as of `bodies`
-"""
+"""The interpreted engine: the functions of a state equation in Python, its Jacobian by differences."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from math import inf
+from typing import Any, ClassVar, final
 
 import numpy as np
 
@@ -22,10 +19,44 @@ from robot_dyn.simulation.dynamics.bodies import bodies
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.moreau_jean import behind, stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.run.watch import Watch
+from robot_dyn.simulation.engine.engine import Advance, Evaluated, Watched
+from robot_dyn.simulation.events.holding import Places
+from robot_dyn.simulation.events.modes import alone
 
 
-def interpreted(equation: StateEquation, watch: Watch) -> Functions:
+@final
+@dataclass(frozen=True)
+class Interpreted:
+    """The engine that evaluates a state equation in Python; attributes as in `Engine`."""
+
+    equation: StateEquation
+    label: str = "interpreted"
+    most_evaluations: float = inf
+    exact_right_angles: ClassVar[bool] = False
+    doubtful: ClassVar[float] = inf
+    most_threads: ClassVar[float] = 1
+    most_steps: float = field(default=1, init=False)
+    compiling_s: float = field(default=0.0, init=False)
+
+    def evaluated(self, equation: StateEquation, watch: Watched) -> Evaluated:
+        """Return the functions of an equation; see `Engine`."""
+        if equation.impulses and watch.setup.finds_events:
+            functions, numbers = in_modes(equation, watch), np.zeros(3 * equation.plant.dynamics.n)
+        else:
+            functions, numbers = interpreted(equation, watch), np.zeros(0)
+        return Evaluated(functions, functions, numbers, False)
+
+    def places(self) -> Places:
+        """Return where the mode stands: the run parameters are the mode and nothing else."""
+        n = self.equation.plant.dynamics.n
+        return alone(n, n * self.equation.sampled)
+
+    def loop(self, plain: Callable[[], Advance]) -> Advance:
+        """Return the plain time loop."""
+        return plain()
+
+
+def interpreted(equation: StateEquation, watch: Watched) -> Functions:
     """The functions of a state equation, in Python.
 
     `rate` and `jacobian` raise what the equation raises, `tick` and `energy` the DivergedError of the watch; `sample`
@@ -69,11 +100,15 @@ def interpreted(equation: StateEquation, watch: Watch) -> Functions:
         held = run_parameters[:n, 0].copy() if equation.sampled else None
         out[:, 0] = bodies(equation, min(max(t, p[0]), p[1]), _state(y), held)
 
-    functions = Functions(rate, tick, energy, sampled, jacobian, 0, step, of_behind, bodies=of_bodies)
+    def events(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
+        held = run_parameters[:n, 0].copy() if equation.sampled else None
+        out[:, 0] = equation.event_values(min(max(t, p[0]), p[1]), _state(y), held)
+
+    functions = Functions(rate, tick, energy, sampled, jacobian, events, step, of_behind, bodies=of_bodies)
     return functions
 
 
-def in_modes(equation: StateEquation, watch: Watch) -> Functions:
+def in_modes(equation: StateEquation, watch: Watched) -> Functions:
     """The same in the mode that the last 3n run parameters are: held, direction and contact."""
     known: dict[bytes, Functions] = {}
 
@@ -92,7 +127,7 @@ def in_modes(equation: StateEquation, watch: Watch) -> Functions:
         return function
 
     names = "rate", "tick", "energy", "sample", "jacobian", "bodies"
-    return Functions(**{name: forwarded(name) for name in names})
+    return interpreted(equation, watch)._replace(**{name: forwarded(name) for name in names})
 
 
 def sample(equation: StateEquation, t: float, y: Array, held: Array | None, out: Array) -> None:

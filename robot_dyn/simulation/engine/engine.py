@@ -1,0 +1,109 @@
+"""The protocol of the engines of a run: interpreted (`interpreted.py`) and machine code (`machine_code.py`).
+
+engine = choose(setup);   run = make_run(setup, engine);   recording = run.record()
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+import numpy as np
+
+from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.simulation.dynamics.loop_state import Functions
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.events.holding import Places
+from robot_dyn.simulation.setup.setup import Setup
+
+Advance = Callable[..., int]
+
+
+class Watched(Protocol):
+    """What an interpreted function reports errors to; see `run.watch.Watch`."""
+
+    setup: Setup
+
+    def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
+        """Run one controller tick."""
+        ...
+
+    def answer(self, t: float, y: Array, ask: Callable[[], Any]) -> Any:
+        """Return the result of `ask`; raise the error that ends the run if the equations cannot be evaluated."""
+        ...
+
+
+class Evaluated(NamedTuple):
+    """A state equation as functions, see `Engine`.
+
+    Attributes:
+        functions: As the time loop calls them; addresses if it is machine code.
+        in_python: The same functions as Python calls them.
+        numbers: Their parameters, (P,), which follow the actuation in zero-order hold in `run_parameters`.
+        by_numbers: True if other coefficients, such as those of a mode, change the numbers alone.
+    """
+
+    functions: Functions
+    in_python: Functions
+    numbers: np.ndarray
+    by_numbers: bool
+
+
+class Engine(Protocol):
+    """What evaluates the state equation y' = f(t, y) of a run, in [rad], [m], [s], [kg], and takes its steps.
+
+    Each of its functions is called as (t, y, p, run_parameters, out) and writes into `out`: y is (m, 1), p are the
+    numbers of a segment of the run, and run_parameters (O, 1) the torques in zero-order hold, then the parameters.
+    With n joints:
+
+        rate       y' and the actuation u                                     (m + n, 1)
+        jacobian   ∂f/∂y_j for each j, then ∂f/∂t                             (m + 1, m, 1)
+        energy     K and V, in [J]                                            (2, 1)
+        sample     y', u, K and V                                             (m + n + 2, 1)
+        tick       u in zero-order hold, then the states of the controller    (n + z, 1)
+        bodies     M by rows, loads, loads of motors; see `bodies`            (n² + n + motors, 1)
+        events     what reaches limited parts, then user-defined events       (F, 1)
+        step       a step in which velocities may jump; see `RightSide`, also for `behind`
+
+    Attributes:
+        equation: The state equation of the setup.
+        label: Its name in the summary of a run, with the reason for it.
+        exact_right_angles: True if right angles of the robot's file are written out in full.
+        doubtful: Σ |y| beyond which a step of fixed length is repeated by the interpreted equation.
+        most_steps: Steps after which the loop returns: 1 to report progress at each of them.
+        most_threads: Threads that may run it side by side.
+        most_evaluations: Evaluations after which another engine is to be chosen.
+        compiling_s: Time that this thread has spent on compiling loops, in [s].
+    """
+
+    exact_right_angles: ClassVar[bool]
+    doubtful: ClassVar[float]
+    most_threads: ClassVar[float]
+
+    @property
+    def equation(self) -> StateEquation: ...
+    @property
+    def label(self) -> str: ...
+    @property
+    def most_steps(self) -> float: ...
+    @property
+    def most_evaluations(self) -> float: ...
+    @property
+    def compiling_s(self) -> float: ...
+
+    def evaluated(self, equation: StateEquation, watch: Watched) -> Evaluated:
+        """Return the functions of an equation that differs from its own in coefficients or what is carried.
+
+        Args:
+            equation: The state equation.
+            watch: What interpreted functions report errors to.
+        """
+        ...
+
+    def places(self) -> Places:
+        """Return where the mode of what holds joints stands among the run parameters."""
+        ...
+
+    def loop(self, plain: Callable[[], Advance]) -> Advance:
+        """Return the time loop for one run: machine code, or the plain function that `plain` returns."""
+        ...

@@ -1,0 +1,220 @@
+"""The engine of machine code: the functions of a state equation, their parameters, and the time loop.
+
+LLVM is imported where something is compiled or loaded.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import inf
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, final
+
+import numpy as np
+
+from robot_dyn.codegen.parameters import CONTROLLER, ROBOT, Parameter, Part, joined, parameters
+from robot_dyn.codegen.program import Programs
+from robot_dyn.codegen.store.cache import default_store
+from robot_dyn.codegen.store.keys import digest, sources_of_the_writer
+from robot_dyn.foundations.coefficients import value_at
+from robot_dyn.foundations.convex import PASSES
+from robot_dyn.simulation.dynamics.loop_state import Functions
+from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation.engine.engine import Advance, Evaluated, Watched
+from robot_dyn.simulation.events.holding import Places
+from robot_dyn.simulation.events.modes import places
+
+if TYPE_CHECKING:
+    from robot_dyn.codegen.loops.call import MachineFunction
+
+_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
+STEP = "problem", "newton", "behind"  # programs of one function; the last is one by itself, too
+
+
+class States(NamedTuple):
+    """Times (k,), in [s], and states (k, m)."""
+
+    t: np.ndarray
+    y: np.ndarray
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CompiledFunctions:
+    """The functions of a state equation, as programs and machine code.
+
+    Attributes:
+        programs: rate, energy and sample, tick where there is one, and jacobian where a method needs it.
+        runs: W.
+        name: Of what moves, for messages.
+        shared: As of `write_function`.
+        changeable: Names of the parts whose code may be another at the next run, or do what a trace does not see.
+        checked: States at which they were compared with the interpreted equation, by the loops that they ran in.
+    """
+
+    programs: Programs
+    runs: int
+    name: str
+    shared: Mapping[int, int] = field(default_factory=dict)
+    changeable: tuple[str, ...] = ()
+    checked: dict[Any, States] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def _key(self) -> str:
+        return digest([sources_of_the_writer(), str(self.runs), str(sorted(self.shared.items())), str(self.programs)])
+
+    def is_kept(self) -> bool:
+        """Whether its machine code is in the store."""
+        store = default_store()
+        return store is not None and store.load(self._key) is not None
+
+    @cached_property
+    def addresses(self) -> Functions:
+        """The addresses of the functions, which are compiled unless they are in the store."""
+        from robot_dyn.codegen.llvm import machine_code
+        from robot_dyn.codegen.llvm.lock_step import write_function, write_step
+
+        def write(module: Any, prefix: str) -> None:
+            for name, program in self.programs.items():
+                if name == "problem":
+                    three: Any = tuple(self.programs[each] for each in STEP)
+                    write_step(module, f"{prefix}step", three, self.runs, self.shared, PASSES)
+                elif name != "newton":
+                    shared = {} if name == "behind" else self.shared
+                    write_function(module, f"{prefix}{name}", program, self.runs, shared)
+
+        written = {*self.programs, *(["step"] if "problem" in self.programs else [])}
+        known = [name for name in Functions._fields if name in written]
+        about = f"the state equation of {self.name}"
+        addresses = machine_code.addresses(known, self._key, write, default_store(), about)
+        return Functions(**dict.fromkeys(Functions._fields, 0) | dict(zip(known, addresses, strict=True)))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class MachineCode:
+    """The engine that evaluates a state equation by machine code; further attributes as in `Engine`.
+
+    Attributes:
+        equation: The state equation of the setup.
+        compiled_form: The equation that was compiled: in a mode, with right angles written out in full.
+        code: Its functions as machine code.
+        known: Its parameters, with the values of the setup.
+        machine_loop: The time loop as machine code; None if steps are taken in Python.
+        swept: Names of the parameters that differ from run to run.
+        refused: Why steps are taken in Python although those of the method might be machine code.
+    """
+
+    equation: StateEquation
+    compiled_form: StateEquation
+    code: CompiledFunctions
+    known: tuple[Parameter, ...]
+    machine_loop: MachineFunction | None
+    swept: tuple[str, ...] = ()
+    refused: str = ""
+    exact_right_angles: ClassVar[bool] = True
+    doubtful: ClassVar[float] = 1e6  # machine code does not see that M becomes singular
+    most_threads: ClassVar[float] = inf
+    most_evaluations: float = field(default=inf, init=False)
+
+    @property
+    def label(self) -> str:
+        """Its name in the summary of a run; see `Engine`."""
+        if self.machine_loop is not None:
+            return "compiled"
+        why = f": {self.refused}" if self.refused else ""
+        return f"compiled (the equation of motion; steps in Python{why})"
+
+    @property
+    def most_steps(self) -> float:
+        """Steps after which the loop returns; see `Engine`."""
+        return 1 if self.machine_loop is None else inf
+
+    @property
+    def compiling_s(self) -> float:
+        """Time that this thread has spent on compiling loops, in [s]."""
+        from robot_dyn.codegen.loops.call import spent_on_loops
+
+        return spent_on_loops()
+
+    def evaluated(self, equation: StateEquation, watch: Watched) -> Evaluated:
+        """Return the functions of an equation, with its numbers; see `Engine`."""
+        in_python = self.in_python
+        functions = in_python if self.machine_loop is None else self.code.addresses
+        numbers = self.parameters if equation is self.equation else self._numbers(equation)
+        return Evaluated(functions, in_python, numbers, True)
+
+    def _numbers(self, equation: StateEquation) -> np.ndarray:
+        """Parameters of an equation with other values, cached for the latest machine code."""
+        latest = equation.cache.get(MachineCode)
+        if latest is None or latest[0] is not self:
+            latest = equation.cache[MachineCode] = self, self.parameters_of(equation)
+        return latest[1]
+
+    def places(self) -> Places:
+        """Return where the mode stands among the parameters of effects; see `Engine`."""
+        plant = self.equation.plant
+        return places(self.known, plant.effects, plant.dynamics.n * self.equation.sampled)
+
+    def loop(self, plain: Callable[[], Advance]) -> Advance:
+        """Return the time loop, which stores the addresses of its arrays; the plain one if it is not compiled."""
+        return plain() if self.machine_loop is None else self.machine_loop.calls()
+
+    @cached_property
+    def parameters(self) -> np.ndarray:
+        """The values of the parameters, one row after the other."""
+        return joined(self.known)
+
+    def parameters_of(self, equation: StateEquation) -> np.ndarray:
+        """The values of the parameters of a state equation with other coefficients of its parts, or other payloads."""
+        plant = equation.plant
+        of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(plant.effects)}
+        of[CONTROLLER] = equation.controller
+        known = [
+            replace(each, value=np.broadcast_to(value_at(of[each.part], each.key), each.value.shape))
+            if each.part in of and value_at(of[each.part], each.key) is not None  # no mode is chosen yet
+            else each
+            for each in self.known
+        ]
+        if plant.equation_of_motion.payloads:
+            bodies = {each.key: each.value for each in parameters(plant.dynamics, (), None, self.swept)}
+            known = [replace(each, value=bodies[each.key]) if each.part == ROBOT else each for each in known]
+        return joined(known)
+
+    def run_parameters(self, swept: Mapping[str, np.ndarray]) -> np.ndarray:
+        """The numbers of W runs, (O, W): what is held, then row by row what is swept, (W, size) each, then the others.
+
+        A single run has all of them row by row.
+        """
+        held, W = self.equation.plant.dynamics.n * self.equation.sampled, self.code.runs
+        if W == 1:
+            return np.concatenate([np.zeros(held), self.parameters])[:, None]
+        shared = [each for each in self.known if each.name not in swept]
+        names = [each.name for each in self.known if each.name in swept]
+        rows = np.vstack([np.zeros((held, W)), *(swept[name].T for name in names)])
+        block = np.zeros((-(-sum(each.size for each in shared) // W), W))
+        block.ravel()[: sum(each.size for each in shared)] = joined(shared)
+        return np.vstack([rows, block])
+
+    @cached_property
+    def in_python(self) -> Functions:
+        """The functions as Python calls them."""
+        return Functions(*(_callable(address) if address else 0 for address in self.code.addresses))
+
+    def is_kept(self) -> bool:
+        """Whether its machine code is in this process or in the store, with its loop."""
+        checked, loop = self.code.checked, self.machine_loop
+        if loop in checked:
+            return True
+        return (bool(checked) or self.code.is_kept()) and (loop is None or loop.is_kept())
+
+
+def _callable(address: int) -> Callable[..., None]:
+    function = _FUNCTION(address)
+
+    def call(t: float, y: np.ndarray, p: np.ndarray, run_parameters: np.ndarray, out: np.ndarray) -> None:
+        function(t, y.ctypes.data, p.ctypes.data, run_parameters.ctypes.data, out.ctypes.data)
+
+    return call
