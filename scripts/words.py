@@ -24,9 +24,9 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 590,
-    "as of": 172,
-    "what without noun": 666,
+    "opening": 584,
+    "as of": 169,
+    "what without noun": 660,
     "is told": 22,
     "says that": 117,
     "tells that": 7,
@@ -47,7 +47,7 @@ CEILINGS = {
     "the same holds": 2,
     "each": 881,
     "arguments": 97,
-    "Any": 2864,
+    "Any": 2863,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.

@@ -1,4 +1,4 @@
-"""What a run records: one table of quantities, the fields that one run and many share, and those of one run.
+"""The record of a run: one table of quantities, the fields that one run and many share, and those of one run.
 
 A quantity that is added stands in QUANTITIES and in the fields of `TrajectoryData`: files, tables, DataFrames, Datasets
 and exports have it from there. `derived.py` computes it.
@@ -31,7 +31,7 @@ class Quantity(Layout):
 
     Attributes:
         unit: In SI units, or "q", "v", "a" or "u" for the unit of the joint.
-        title: What it is, in words.
+        title: Its name in words.
         heading: Of its columns in tables; empty if it has none.
         over: Name of its second axis, where that is not of joints.
     """
@@ -43,7 +43,7 @@ class Quantity(Layout):
 
     @property
     def of_joints(self) -> bool:
-        """Whether it is a number of each joint."""
+        """True if it has a number for every joint."""
         return self.shape == _MN
 
     @property
@@ -82,13 +82,13 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RunData(Derived):
-    """What was recorded of a run at m samples, or of B runs: arrays but t have then a leading axis B.
+    """The record of a run at m samples, or of B runs, where all arrays except t have a leading axis B.
 
     Attributes:
         joint_names: Of the n joints.
         t: Sample times, (m,), in [s].
         q, v, u: Positions, velocities and actuation, (m, n) or (B, m, n); None if not recorded.
-        statistics: What it took.
+        statistics: Steps, evaluations and times.
         about: Texts that make it whole: URDF, edits, settings, versions.
     """
 
@@ -105,7 +105,7 @@ class RunData(Derived):
 
     @property
     def summary(self) -> str:
-        """A few lines: how it ended, how accurate it is, and what it took."""
+        """A few lines: how it ended, its accuracy and its cost."""
         raise NotImplementedError
 
     def columns(self) -> Iterable[Column]:
@@ -113,13 +113,13 @@ class RunData(Derived):
         raise NotImplementedError
 
     def _variables(self) -> Mapping[str, Variable]:
-        """What a Dataset holds beside the columns of the table."""
+        """Further variables of a Dataset."""
         return {}
 
     def table(self) -> dict[str, np.ndarray]:
         """The table as columns by quantity, joint and unit, such as `run.table()["q elbow_joint [rad]"]`.
 
-        A run has a row for each sample. Rollouts have a row for each run: what was swept, the start, the end, the
+        A run has a row for each sample. Rollouts have a row for each run: swept parameters, start, end,
         tracking error, the remarks; the rms of v and u over the samples up to the end, as far as they were recorded
         (`record=("q", "v", "u")` for u), and extremes of q, v and u over the steps, which need no record.
         """
@@ -141,9 +141,9 @@ class RunData(Derived):
 
 
 def attributes(run: RunData) -> dict[str, str]:
-    """What a table states of its run as a whole: robot, settings, versions, and the summary without its times.
+    """Attributes of a table: robot, settings, versions, and the summary without its times.
 
-    No path of this machine is in it.
+    They contain no path of this machine.
     """
     about = {name: run.about[name] for name in ("robot", "edits", "settings", "run", "versions") if name in run.about}
     lines = [line for line in run.summary.splitlines() if not line.startswith("time: ")]

@@ -1,4 +1,4 @@
-"""What a run took, and what a requested accuracy cost."""
+"""Steps, evaluations and times of a run; a requested accuracy and its cost."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import final
 @final
 @dataclass(frozen=True)
 class Statistics:
-    """What a run took.
+    """Steps, evaluations and times of a run.
 
     Attributes:
         method: Name of the integrator.
@@ -21,7 +21,7 @@ class Statistics:
         companions_s: Time of the error estimate.
         engine: Which loop ran, and why if another was possible.
         compile_s: Time before the run, for the choice of the loop and for compiling it.
-        samples_s: Time after it, for what follows from the states of its samples and is not computed later.
+        samples_s: Time after it, for quantities at its samples that are not computed later.
         companion_evaluations: Evaluations of the error estimate.
         companion_runs: Companion runs of the error estimate.
         user_code: Parts of the setup that are user-defined code, by name; each run calls them.

@@ -1,4 +1,4 @@
-"""The fields of rollouts: those of `RunData` with a leading axis of runs, how each ended, and what it started from."""
+"""The fields of rollouts: those of `RunData` with a leading axis of runs, and the start, parameters and end of each."""
 
 from __future__ import annotations
 
@@ -26,9 +26,7 @@ class Overview(Value):
     """The overview of a batch.
 
     Attributes:
-        worst: As of `Rollouts`.
-        remarks: As of `Rollouts`.
-        tracking_error: As of `Rollouts`.
+        worst, remarks, tracking_error: As of `Rollouts`.
     """
 
     worst: int
