@@ -8,7 +8,7 @@ from __future__ import annotations
 from benchmarks.measure import PICTURES, command_line, starter_setup
 
 import robot_dyn as rd
-from robot_dyn.accuracy.costs.text import cost_rows
+from robot_dyn.accuracy.costs.cost import cost_rows
 
 SCENE, QUICK = "panda_computed_torque", "pendulum"
 

@@ -23,7 +23,7 @@ from robot_dyn.simulation.comparison.differing_settings import (
     unknown_settings,
 )
 from robot_dyn.simulation.results.provenance import joint_types
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 
 
 @final
@@ -89,7 +89,7 @@ class RunDifference(Result):
     left_out: tuple[str, ...]
     environment: dict[str, str]
     interrupted: bool = False
-    runs: tuple[Trajectory, Trajectory] | None = field(default=None, metadata=UNREPORTED)
+    runs: tuple[TrajectoryData, TrajectoryData] | None = field(default=None, metadata=UNREPORTED)
     difference: Difference | None = field(default=None, metadata=UNREPORTED)
 
     @property
@@ -137,7 +137,7 @@ class RunDifference(Result):
         yield ""
 
 
-def compare_runs(a: Trajectory, b: Trajectory, *, tolerance: float = TOLERANCE) -> RunDifference:
+def compare_runs(a: TrajectoryData, b: TrajectoryData, *, tolerance: float = TOLERANCE) -> RunDifference:
     """Compare two runs of one robot on the time that both have: by joint, when they part, what differs in settings.
 
     They are compared at common samples; in stretches without any, q is compared at the samples of either run as well,
@@ -155,7 +155,7 @@ def compare_runs(a: Trajectory, b: Trajectory, *, tolerance: float = TOLERANCE) 
         QueryError: If they are of different robots, or have no time in common.
     """
     for name, run in (("a", a), ("b", b)):
-        instance(name, run, Trajectory, "give the trajectory of rd.simulate or rd.load_run, or a run of rollouts")
+        instance(name, run, TrajectoryData, "give the trajectory of rd.simulate or rd.load_run, or a run of rollouts")
     tolerance = number("tolerance", tolerance, above=0, error=QueryError)
     found, types = difference(a, b, tolerance), joint_types(a)
     of_q, (first, second) = units("q", types), run_names(a, b)
@@ -212,7 +212,7 @@ def _largest(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     return float(abs(x[k])), float(t[k])
 
 
-def _alone(a: Trajectory, b: Trajectory) -> Iterator[tuple[str, float, float]]:
+def _alone(a: TrajectoryData, b: TrajectoryData) -> Iterator[tuple[str, float, float]]:
     """Times that one run has and the other has not, by name."""
     names = run_names(a, b)
     for name, run, other in ((names[0], a, b), (names[1], b, a)):
@@ -222,6 +222,6 @@ def _alone(a: Trajectory, b: Trajectory) -> Iterator[tuple[str, float, float]]:
             yield name, float(other.t[-1]), float(run.t[-1])
 
 
-def _versions(run: Trajectory) -> dict[str, str]:
+def _versions(run: TrajectoryData) -> dict[str, str]:
     pairs = (each.partition(" ") for each in run.about.get("versions", "").split(", ") if each)
     return {name: version for name, _, version in pairs}

@@ -31,9 +31,9 @@ def draw(result: RunDifference, theme: str = "light") -> Figure:
         )
     across = 3 if len(names) in (5, 6, 9) else min(_ACROSS, len(names))
     rows = -(-len(names) // across)
-    head = _HEAD + heading_room(_WIDE, result, theme)
+    head = _HEAD + heading_room(_WIDE, result.sentence, theme)
     height = head + _PAIR * rows + _FOOT
-    figure, colours = sheet(_WIDE, height, result, _caption(result), theme)
+    figure, colours = sheet(_WIDE, height, result.sentence, _caption(result), theme)
     grid = figure.add_gridspec(
         rows, across, left=0.06, right=0.985, top=1 - head / height, bottom=_FOOT / height, wspace=0.32, hspace=0.35
     )

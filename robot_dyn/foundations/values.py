@@ -23,7 +23,6 @@ NOT_STORED: Mapping[str, bool] = {"stored": False}
 """Metadata of a field that files leave out."""
 
 
-@final
 @dataclass(frozen=True)
 class Layout:
     """How a file stores an array, stated in the type of its field: `Annotated[np.ndarray, Layout(("m", "n"))]`.

@@ -5,12 +5,10 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping, Sequence
-from importlib import import_module
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.report.result import Result
 from robot_dyn.view.plots.figure import THEMES, drawable, framed
 
 if TYPE_CHECKING:
@@ -33,8 +31,8 @@ class ResultError(RobotDynError):
     """A result that cannot be written."""
 
 
-def sheet(width: float, height: float, result: Result, caption: str, theme: str) -> tuple[Figure, Colours]:
-    """Return a figure of a size in [inch], headed by the sentence of a result and a caption, and its colours.
+def sheet(width: float, height: float, sentence: str, caption: str, theme: str) -> tuple[Figure, Colours]:
+    """Return a figure of a size in [inch], headed by a sentence and a caption, and its colours.
 
     For the page of a notebook, which has the sentence beside it, there is no heading.
     """
@@ -44,29 +42,20 @@ def sheet(width: float, height: float, result: Result, caption: str, theme: str)
         return Figure(figsize=(_PART * width, height), facecolor=PAGE["paper"]), PAGE
     colours = THEMES[theme]
     figure = Figure(figsize=(width, height), facecolor=colours["paper"])
-    heading, left = _heading(result, width), _LEFT / width
+    heading, left = _heading(sentence, width), _LEFT / width
     below = _CAPTION + _LINE * heading.count("\n")
     figure.text(left, 1 - _TOP / height, lines(heading), fontsize=12, weight="bold", va="top", **ink(colours))
     figure.text(left, 1 - below / height, lines(caption), fontsize=8.5, va="top", linespacing=1.4, **ink(colours))
     return figure, colours
 
 
-def drawn(result: Result, theme: str = "light") -> Figure:
-    """Draw a result by the module that its class names.
-
-    Raises:
-        ResultError: If there is nothing to draw.
-    """
-    return import_module(result.diagram).draw(result, theme)
-
-
-def heading_room(width: float, result: Result, theme: str) -> float:
+def heading_room(width: float, sentence: str, theme: str) -> float:
     """Return the height in [inch] of the lines of a heading after its first one; 0 on a page, which has none."""
-    return 0.0 if theme == "page" else _LINE * _heading(result, width).count("\n")
+    return 0.0 if theme == "page" else _LINE * _heading(sentence, width).count("\n")
 
 
-def _heading(result: Result, width: float) -> str:
-    return fill(result.sentence, int(_LETTERS * width))
+def _heading(sentence: str, width: float) -> str:
+    return fill(sentence, int(_LETTERS * width))
 
 
 def inline(figure: Figure) -> str:

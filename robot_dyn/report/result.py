@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from importlib import import_module
 from typing import Any, ClassVar
 
 from robot_dyn.foundations.answer import Answer, Block
@@ -49,9 +50,18 @@ class Result(Answer):
 
     @property
     def drawing(self) -> str:
-        from robot_dyn.report.figure import drawn, inline
+        from robot_dyn.report.figure import inline
 
         try:
             return inline(drawn(self, "page")) if self.diagram else ""
         except RobotDynError:  # there is nothing to draw
             return ""
+
+
+def drawn(result: Result, theme: str = "light") -> Any:
+    """Draw a result by the module that its class names.
+
+    Raises:
+        ResultError: If there is nothing to draw.
+    """
+    return import_module(result.diagram).draw(result, theme)

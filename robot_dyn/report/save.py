@@ -9,8 +9,8 @@ from pathlib import Path
 from robot_dyn.foundations import files
 from robot_dyn.foundations.result import json_text
 from robot_dyn.foundations.validate import choice, instance
-from robot_dyn.report.figure import ResultError, drawn
-from robot_dyn.report.result import Result
+from robot_dyn.report.figure import ResultError
+from robot_dyn.report.result import Result, drawn
 from robot_dyn.view.plots.figure import THEMES
 from robot_dyn.view.plots.plots import PICTURES
 

@@ -10,30 +10,14 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.foundations.errors import QueryError, shorten
 from robot_dyn.foundations.extras import needs
 
-if TYPE_CHECKING:
-    from robot_dyn.simulation.results.trajectory import Trajectory
-    from robot_dyn.simulation.rollouts.result import Rollouts
-
 EXTRA = "data"
-LONG_NAMES: Mapping[str, str] = {
-    "t": "time",
-    "q": "position",
-    "v": "velocity",
-    "a": "acceleration",
-    "u": "actuation within its bounds",
-    "desired": "desired position",
-    "deviation": "deviation from the desired motion",
-    "energy": "kinetic and potential energy",
-    "residual": "energy that nothing accounts for",
-}
-_DIMENSIONS = {"power": "source", "work": "source", "deviation": "axis"}  # where a quantity is not of the joints
 
 Variable = tuple[tuple[str, ...], np.ndarray, dict[str, str]]  # dimensions, numbers and attributes
 
@@ -48,12 +32,16 @@ class Column:
         values: Of each row.
         unit: Empty if there is none.
         of: Joint, effect or number of what it is a quantity; empty if there is but one.
+        title: The quantity in words.
+        over: Name of the axis that `of` is on, where that is not of joints.
     """
 
     quantity: str
     values: np.ndarray
     unit: str = ""
     of: str = ""
+    title: str = ""
+    over: str = ""
 
     @property
     def heading(self) -> str:
@@ -105,22 +93,12 @@ def data_set(
         if name in variables:
             raise QueryError(f"two variables would be named {shorten(name)!r}; give effects other names")
         units = " or ".join(dict.fromkeys(column.unit for column in group if column.unit))
-        about = {key: text for key, text in (("units", units), ("long_name", LONG_NAMES.get(quantity, ""))) if text}
+        about = {key: text for key, text in (("units", units), ("long_name", group[0].title)) if text}
         if of == ("",):
             variables[name] = (row,), group[0].values, about
             continue
-        over = "joint" if of == joint_names else _DIMENSIONS.get(quantity, f"{name}_number")
+        over = "joint" if of == joint_names else group[0].over or f"{name}_number"
         coordinates.setdefault(over, list(of))
         variables[name] = (row, over), np.stack([column.values for column in group], axis=1), about
     coordinates |= {name: variables.pop(name) for name in (row, "t") if name in variables}
     return needs("xarray", extra=EXTRA).Dataset(variables, coordinates, dict(attributes))
-
-
-def attributes(run: Trajectory | Rollouts) -> dict[str, str]:
-    """What a table says of its run as a whole: robot, settings, versions, and the summary without its times.
-
-    No path of this machine is in it.
-    """
-    about = {name: run.about[name] for name in ("robot", "edits", "settings", "run", "versions") if name in run.about}
-    lines = [line for line in run.summary.splitlines() if not line.startswith("time: ")]
-    return {"title": "run of robot_dyn", "method": run.statistics.method} | about | {"summary": "\n".join(lines)}

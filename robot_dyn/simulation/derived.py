@@ -20,10 +20,9 @@ from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.acting import acting, at_stop, frame_of, rotors_of, wrenches
 from robot_dyn.simulation.results.causes import broken_away, effect_torques, plant_of
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
-from robot_dyn.simulation.results.ledger import Ledger
+from robot_dyn.simulation.results.ledger import Ledger, leak
 from robot_dyn.simulation.results.provenance import edits_of_machine_code, origin, settings_text
 from robot_dyn.simulation.results.samples import Columns, Tracking, columns, ledger, tracking_of
-from robot_dyn.simulation.results.trajectory import leak
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup

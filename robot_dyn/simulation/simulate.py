@@ -27,7 +27,8 @@ from robot_dyn.simulation.estimate.requested_accuracy import run_to
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estimate
-from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
+from robot_dyn.simulation.results.statistics import Statistics
+from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Accumulation, Ending, Outcome, Stiff, TooLong
 from robot_dyn.simulation.run.recording import Recording

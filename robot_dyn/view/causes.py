@@ -10,16 +10,17 @@ import numpy as np
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import unit
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.causes import causes_of
+from robot_dyn.simulation.results.run_data import TrajectoryData
 
 _MOST = 2000  # samples; no slider is wider in pixels of a screen
 _STEPS = 32767  # of 16 bits, for the largest torque of a joint
 
 
-def causes(run: Trajectory, robot: Robot) -> dict[str, Any] | None:
+def causes(run: TrajectoryData, robot: Robot) -> dict[str, Any] | None:
     """The entry `causes` of the document of a run; None if it cannot be split."""
     try:
-        split = run.causes()
+        split = causes_of(run)
     except RobotDynError:
         return None
     parts = np.stack([*split.torques.values(), split.tau])

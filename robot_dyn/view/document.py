@@ -21,7 +21,7 @@ from robot_dyn.queries.dynamics import Array
 from robot_dyn.simulation.comparison.differing_settings import run_names
 from robot_dyn.simulation.observation.remarks import lines
 from robot_dyn.simulation.results.provenance import robot_of
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.view import commands
 from robot_dyn.view.causes import causes, resolution
 from robot_dyn.view.geometry.coarse import look_of
@@ -59,7 +59,7 @@ class Shown:
 
     name: str
     prefix: str
-    run: Trajectory
+    run: TrajectoryData
     stage: Stage
     motion: Motion
     keys: Keyframes
@@ -112,7 +112,7 @@ class _Picture:
 
 @np.errstate(all="ignore")  # what is far out is drawn as far as it can be
 def document(
-    runs: tuple[Trajectory, ...], package_dirs: Iterable[str | Path], frame: str | None, inertia: bool,
+    runs: tuple[TrajectoryData, ...], package_dirs: Iterable[str | Path], frame: str | None, inertia: bool,
     meshes: str = "full",
 ) -> dict[str, Any]:  # fmt: skip
     """Return the document of runs; arguments as of `replay`.
@@ -122,7 +122,7 @@ def document(
         QueryError: If it carries no robot, or no robot has the frame.
     """
     for run in runs:
-        instance("run", run, Trajectory, "give the trajectory of rd.simulate, or a run of rollouts, as runs[0]")
+        instance("run", run, TrajectoryData, "give the trajectory of rd.simulate, or a run of rollouts, as runs[0]")
     package_dirs, inertia = searched(package_dirs), truth("inertia", inertia)
     instance("frame", frame, str | None, "give the name of a link, or None")
     names = run_names(*runs)
@@ -236,7 +236,7 @@ def _title(shown: list[Shown]) -> str:
 
 
 def _shown(
-    number: int, run: Trajectory, names: tuple[str, ...], look: Callable[..., Drawing], dirs: tuple[Path, ...],
+    number: int, run: TrajectoryData, names: tuple[str, ...], look: Callable[..., Drawing], dirs: tuple[Path, ...],
     inertia: bool,
 ) -> Shown:  # fmt: skip
     robot = robot_of(run)
@@ -258,7 +258,7 @@ def _shown(
     return Shown(name, "" if len(names) == 1 else f"{name}: ", run, stage, motion, keys, drawn, tuple(problems), notes)
 
 
-def _drawable(run: Trajectory) -> Trajectory:
+def _drawable(run: TrajectoryData) -> TrajectoryData:
     """The run up to its first sample that cannot be drawn."""
     u = np.isfinite(run.u) | np.isnan(run.u).all()  # rollouts may not have recorded it
     good = np.all(np.abs(run.q) < _FAR, axis=1) & np.all(np.isfinite(run.v) & u, axis=1)

@@ -14,7 +14,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from robot_dyn.control.reference import hermite, polynomial
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 
 TOLERANCE = 5e-4  # [rad] or [m]; half a millimetre at a reach of one metre, below a pixel of the screen
 CHORD = TOLERANCE / 10  # what lines between the times of a `Motion` may be off
@@ -57,7 +57,7 @@ class Keyframes:
     error: np.ndarray
 
 
-def motion_of(run: Trajectory) -> Motion:
+def motion_of(run: TrajectoryData) -> Motion:
     """The samples of a run, and as many times between them as straight lines need."""
     data = [run.q, run.v] + ([run.a] if np.isfinite(run.a).all() else [])
     columns = np.stack(data, axis=1)
@@ -98,7 +98,7 @@ def keyframes(t: np.ndarray, q: np.ndarray, tolerance: float = TOLERANCE) -> Key
     return Keyframes(drawn, positions, len(t), error)
 
 
-def stated_error(run: Trajectory, motion: Motion, keys: Keyframes, units: Mapping[str, str]) -> str:
+def stated_error(run: TrajectoryData, motion: Motion, keys: Keyframes, units: Mapping[str, str]) -> str:
     """How far keyframes are off the motion, and that from what is recorded; units of the joints by name."""
     worst = int(keys.error.argmax())
     name, unit = list(units.items())[worst]

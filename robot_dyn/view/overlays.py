@@ -14,7 +14,7 @@ import numpy as np
 from robot_dyn.foundations.spatial import first_moment
 from robot_dyn.lagrange.linkage import BASE, Pose
 from robot_dyn.shapes.triangles import Mesh
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
 from robot_dyn.view.geometry.shapes import arrow, cylinder, sphere
@@ -67,7 +67,7 @@ class Overlays:
 
 
 def overlays(
-    stage: Stage, run: Trajectory, motion: Motion, reach: float, frame: str | None = None, ghost: bool = False
+    stage: Stage, run: TrajectoryData, motion: Motion, reach: float, frame: str | None = None, ghost: bool = False
 ) -> Overlays:
     """What a run recorded: centre of mass, paths of frames, joints at their stops.
 
@@ -142,7 +142,7 @@ def centre_of_mass(stage: Stage, at: Placements) -> np.ndarray:
     return total / mass if mass > 0 else total
 
 
-def _stops(found: Overlays, stage: Stage, run: Trajectory, reach: float) -> None:
+def _stops(found: Overlays, stage: Stage, run: TrajectoryData, reach: float) -> None:
     """A red drum on each joint that comes to a stop, visible while it is there."""
     assert run.at_stop is not None
     for index, name in enumerate(run.joint_names):
@@ -158,7 +158,7 @@ def _stops(found: Overlays, stage: Stage, run: Trajectory, reach: float) -> None
         found.notes.append(f"{name} is red while it is at a stop")
 
 
-def arrows(shown: list[tuple[Stage, Trajectory, Overlays]], reach: float) -> list[str]:
+def arrows(shown: list[tuple[Stage, TrajectoryData, Overlays]], reach: float) -> list[str]:
     """Add the arrows of all runs, on one scale; return notes on the scale.
 
     Args:
@@ -178,7 +178,7 @@ def arrows(shown: list[tuple[Stage, Trajectory, Overlays]], reach: float) -> lis
 
 
 def _arrow(
-    found: Overlays, stage: Stage, run: Trajectory, reach: float, name: str, link: str,
+    found: Overlays, stage: Stage, run: TrajectoryData, reach: float, name: str, link: str,
     t: np.ndarray, F: np.ndarray, rgba: Rgba,
 ) -> None:  # fmt: skip
     """One arrow on a link: F (k, 3) at times t (k,), in parts of the largest."""

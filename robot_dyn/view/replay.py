@@ -11,14 +11,14 @@ from robot_dyn.foundations.errors import ModelWarning
 from robot_dyn.foundations.files import target
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Array
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.view.document import document, still
 from robot_dyn.view.page import PAGE, Page, ReplayError
 
 
 def replay(
-    run: Trajectory,
-    *ghosts: Trajectory,
+    run: TrajectoryData,
+    *ghosts: TrajectoryData,
     package_dirs: Iterable[str | Path] = (),
     frame: str | None = None,
     inertia: bool = False,
@@ -44,9 +44,9 @@ def replay(
 
 
 def save_replay(
-    run: Trajectory,
+    run: TrajectoryData,
     path: str | Path,
-    *ghosts: Trajectory,
+    *ghosts: TrajectoryData,
     package_dirs: Iterable[str | Path] = (),
     frame: str | None = None,
     inertia: bool = False,

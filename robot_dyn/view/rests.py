@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 
 _HOLD = {"dry_friction", "rigid_stops"}  # among the names of what acts
 _MOST = 200  # of a joint
@@ -29,7 +29,7 @@ class Rest(NamedTuple):
     at_stop: bool
 
 
-def rests(run: Trajectory) -> tuple[tuple[Rest, ...], ...]:
+def rests(run: TrajectoryData) -> tuple[tuple[Rest, ...], ...]:
     """Return the first rests of each joint, in the order of time; none in a run without effects that hold joints."""
     names = run.joint_names
     if not _HOLD & set(run.acting or ()):
@@ -44,7 +44,7 @@ def rests(run: Trajectory) -> tuple[tuple[Rest, ...], ...]:
     return tuple(_of_joint(run, i, t[order], q[:, i], v[:, i]) for i in range(len(names)))
 
 
-def lanes(run: Trajectory, prefix: str, most_events: int) -> Iterator[dict[str, Any]]:
+def lanes(run: TrajectoryData, prefix: str, most_events: int) -> Iterator[dict[str, Any]]:
     """The entries `rests` of a page's document: of each joint that is held for a time, its rests and its events."""
     for name, spans in zip(run.joint_names, rests(run), strict=True):
         if spans:
@@ -52,7 +52,7 @@ def lanes(run: Trajectory, prefix: str, most_events: int) -> Iterator[dict[str, 
             yield {"joint": prefix + name, "spans": [list(each) for each in spans], "events": events[:most_events]}
 
 
-def _of_joint(run: Trajectory, i: int, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[Rest, ...]:
+def _of_joint(run: TrajectoryData, i: int, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[Rest, ...]:
     held = (v[1:] == 0) & (v[:-1] == 0) & (q[1:] == q[:-1])
     edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int)))
     stops = set() if run.at_stop is None else set(run.q[run.at_stop[:, i], i].tolist())

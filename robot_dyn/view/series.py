@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.comparison.difference import comparable, difference
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 
 if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot
@@ -28,7 +28,7 @@ _MOST = 1e38  # of single precision
 _UNSTATED = 1e300  # what a file states from here on limits nothing
 
 
-def plots(runs: list[Trajectory], stages: list[Stage], names: list[str]) -> list[dict[str, Any]]:
+def plots(runs: list[TrajectoryData], stages: list[Stage], names: list[str]) -> list[dict[str, Any]]:
     """Return title, unit, times, series and limits of each plot, and why it has none.
 
     A series has one colour in the run and its ghosts; desired positions and velocities have that of the joint.
@@ -54,11 +54,11 @@ def plots(runs: list[Trajectory], stages: list[Stage], names: list[str]) -> list
     return [*found, _plot("energy ledger", "J", runs, marks, [_energy(run) for run in runs])]
 
 
-def _by_joint(run: Trajectory, x: np.ndarray) -> Columns:
+def _by_joint(run: TrajectoryData, x: np.ndarray) -> Columns:
     return dict(zip(run.joint_names, x.T, strict=True))
 
 
-def _desired(runs: list[Trajectory], field: str) -> list[Columns]:
+def _desired(runs: list[TrajectoryData], field: str) -> list[Columns]:
     """Desired values of each run; none where they are those of the first."""
     found, first = [], getattr(runs[0], field)
     for run in runs:
@@ -68,14 +68,14 @@ def _desired(runs: list[Trajectory], field: str) -> list[Columns]:
     return found
 
 
-def _deviation(run: Trajectory) -> Columns:
+def _deviation(run: TrajectoryData) -> Columns:
     if run.deviation is None:
         return {}
     names = run.joint_names if run.desired is not None else [f"frame, {axis}" for axis in "xyz"]
     return dict(zip(names, run.deviation.T, strict=True))
 
 
-def _energy(run: Trajectory) -> Columns:
+def _energy(run: TrajectoryData) -> Columns:
     ledger, m = run.ledger, len(run.t)
     energy = {
         "K": ledger.kinetic,
@@ -86,12 +86,12 @@ def _energy(run: Trajectory) -> Columns:
     return {name: column[:m] for name, column in energy.items()}
 
 
-def _others(runs: list[Trajectory], names: list[str]) -> list[tuple[Trajectory, str]]:
+def _others(runs: list[TrajectoryData], names: list[str]) -> list[tuple[TrajectoryData, str]]:
     """The runs that can be compared with the first, with their names."""
     return [(run, name) for run, name in zip(runs[1:], names[1:], strict=True) if comparable(runs[0], run)]
 
 
-def _difference(a: Trajectory, b: Trajectory, of_a: str, of_b: str, of_q: str) -> dict[str, Any]:
+def _difference(a: TrajectoryData, b: TrajectoryData, of_a: str, of_b: str, of_q: str) -> dict[str, Any]:
     """Positions of a run less those of the first, and when they part."""
     found = difference(a, b)
     if found.parted is not None:
@@ -111,7 +111,7 @@ def _difference(a: Trajectory, b: Trajectory, of_a: str, of_b: str, of_q: str) -
 def _plot(
     title: str,
     unit: str,
-    runs: list[Trajectory],
+    runs: list[TrajectoryData],
     marks: list[str],
     columns: list[Columns],
     desired: list[Columns] | None = None,

@@ -9,13 +9,13 @@ from robot_dyn.queries.units import format_duration, units
 from robot_dyn.simulation.comparison.difference import comparable
 from robot_dyn.simulation.comparison.differing_settings import differing_settings
 from robot_dyn.simulation.results.provenance import joint_types
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 
 _NONE = "–"
 _MOST_SETTINGS = 60
 
 
-def settings_table(named: Sequence[tuple[str, Trajectory]]) -> dict[str, Any]:
+def settings_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any]:
     """The settings in which runs of one robot differ from the first, as of `cost_table`; no rows for others."""
     (_, first), *others = named
     if any(not comparable(first, other) for _, other in others):
@@ -28,7 +28,7 @@ def settings_table(named: Sequence[tuple[str, Trajectory]]) -> dict[str, Any]:
     return {"runs": [name for name, _ in named], "rows": rows}
 
 
-def cost_table(named: Sequence[tuple[str, Trajectory]]) -> dict[str, Any]:
+def cost_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any]:
     """Return the run names and the rows, each a heading and one text per run; empty rows are left out."""
     columns = [dict(_rows(run)) for _, run in named]
     headings = dict.fromkeys(heading for column in columns for heading in column)
@@ -36,7 +36,7 @@ def cost_table(named: Sequence[tuple[str, Trajectory]]) -> dict[str, Any]:
     return {"runs": [name for name, _ in named], "rows": rows}
 
 
-def _rows(run: Trajectory) -> Iterator[tuple[str, str]]:
+def _rows(run: TrajectoryData) -> Iterator[tuple[str, str]]:
     s, unit = run.statistics, units("q", joint_types(run))
     yield "method", f"{s.method}, step {s.step_s:.4g} s" if s.step_s else s.method
     yield "engine", s.engine
@@ -50,7 +50,7 @@ def _rows(run: Trajectory) -> Iterator[tuple[str, str]]:
         yield from _accuracy(run)
 
 
-def _accuracy(run: Trajectory) -> Iterator[tuple[str, str]]:
+def _accuracy(run: TrajectoryData) -> Iterator[tuple[str, str]]:
     """Requested accuracy, and the cost of one digit more or fewer; time is assumed proportional to evaluations."""
     of = run.accuracy
     assert of is not None

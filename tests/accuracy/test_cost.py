@@ -15,8 +15,8 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.accuracy.costs import step_cost
 from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Pair, Version, Way, in_turns
+from robot_dyn.accuracy.costs.cost import _cells
 from robot_dyn.accuracy.costs.query_cost import QueryCost
-from robot_dyn.accuracy.costs.text import _cells
 from robot_dyn.codegen.parameters import parameters
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.foundations.errors import QueryError, RobotDynError

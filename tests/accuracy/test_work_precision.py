@@ -24,8 +24,8 @@ from robot_dyn.accuracy.work_precision_diagram.past_horizon import past_horizon
 from robot_dyn.accuracy.work_precision_diagram.peers import found
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError, desired_motion
 from robot_dyn.accuracy.work_precision_diagram.reference_run import HorizonError, Reference, reference
-from robot_dyn.accuracy.work_precision_diagram.text import programs
 from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
+from robot_dyn.accuracy.work_precision_diagram.work_precision import programs
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.result import json_text
 from robot_dyn.integrate.explicit import ExplicitRungeKutta

@@ -5,6 +5,5 @@ certificate        its result
 implementation     the implementations that are compared
 digit_count        errors against finer numbers and balls
 worst_case_search  the search for the state of largest error
-text               what it says
 diagram            the figure
 """

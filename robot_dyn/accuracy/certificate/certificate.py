@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from math import log10, nan
+from math import isfinite, log10, nan
 from typing import Any, ClassVar, final
 
-from robot_dyn.accuracy.certificate.text import DECIMALS, certificate_tables
-from robot_dyn.foundations.answer import Block
+from robot_dyn.foundations.answer import Block, Table
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.validate import choice
 from robot_dyn.queries.units import format_duration
 from robot_dyn.report.result import Result
+
+DECIMALS = "decimals of the file as float64"  # name of the implementation that computes exactly with these decimals
 
 
 @final
@@ -110,7 +111,40 @@ class Certificate(Result):
     interrupted: bool = False
 
     def tables(self) -> Iterator[Block]:
-        return certificate_tables(self)
+        """A line for each quantity and implementation, and what it rests on."""
+        yield (
+            f"{self.robot}: decimal digits that hold, against balls of {self.bits} bits: error of M_ij relative to"
+            " √(M_ii M_jj); of C, N and inverse"
+        )
+        own = "or its rms at random states if that is more"
+        yield f"dynamics to the largest entry in the units √M_ii of the joints, {own};"
+        yield "of forward dynamics to M⁻¹τ, M⁻¹C v and M⁻¹N, in the norm of M"
+        given = any(each.given is not None for each in self.digits)
+        headings = (
+            "quantity",
+            "implementation",
+            *["given"] * given,
+            "typical",
+            "worst of",
+            "random",
+            "searched",
+            "time",
+        )
+        yield Table(headings, tuple(map(tuple, _digit_rows(self, given))), right=headings[2:])
+        of = self.condition
+        lose = f": up to {of.digits:.1f} digits for forward dynamics to lose" if isfinite(of.digits) else ""
+        yield (
+            f"κ of M scaled to a unit diagonal: typical {of.typical:.3g}, largest at random {of.random:.3g}, searched"
+            f" {of.searched:.3g}{lose}"
+        )
+        if lost := [f"{implementation} {digits:+.1f}" for implementation, digits in self.lost.items()]:
+            yield f"digits of inverse less those of forward dynamics, at the worst states: {', '.join(lost)}"
+        if self.right_angles:
+            yield (
+                "machine code writes right angles out in full, and is judged by these; of the file as it stands that"
+                f" leaves {min(self.right_angles.values()):.1f} digits"
+            )
+        yield "times of one query from Python, the least of calls that take turns; no more than 20 digits are counted"
 
     def of(self, quantity: str, implementation: str) -> Held:
         """The digits of one quantity by one implementation.
@@ -168,3 +202,17 @@ class Certificate(Result):
 
     def _of(self, quantity: str) -> Iterator[Held]:
         return (each for each in self.digits if each.quantity == quantity)
+
+
+def _digit_rows(result: Certificate, given: bool) -> Iterator[list[str]]:
+    """A row for each implementation, and one for the decimals of the file, by quantity."""
+    for quantity in result.quantities:
+        for k, each in enumerate(each for each in result.digits if each.quantity == quantity):
+            yield [quantity if not k else "", *_held(each, given)]
+        yield ["", DECIMALS, *[""] * (3 + given), f"{result.decimals[quantity]:.1f}", ""]
+
+
+def _held(each: Held, given: bool) -> list[str]:
+    own = ["—" if each.given is None else f"{each.given:.1f}"] if given else []
+    worst = [f"{each.random:.1f}", f"{each.searched:.1f}"]
+    return [each.implementation, *own, f"{each.typical:.1f}", str(each.samples), *worst, format_duration(each.time_s)]

@@ -22,7 +22,7 @@ def draw(result: Certificate, theme: str = "light") -> Figure:
     """
     if not result.digits:
         raise ResultError("no digits were counted, so there is nothing to draw; look at left_out")
-    figure, colours = sheet(_WIDTH, _HEIGHT, result, _caption(result), theme)
+    figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), theme)
     hues = {name: colours["lines"][k % len(colours["lines"])] for k, name in enumerate(result.implementations)}
     grid = figure.add_gridspec(1, len(result.quantities), left=0.04, right=0.99, top=0.76, bottom=0.2, wspace=0.16)
     for k, quantity in enumerate(result.quantities):

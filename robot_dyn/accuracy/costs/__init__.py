@@ -4,6 +4,5 @@ cost           the study and its result
 step_cost      a step with each part on and off
 query_cost     algorithms for one query
 ab_comparison  two versions, timed in turns
-text           what it says
 diagram        the figure
 """

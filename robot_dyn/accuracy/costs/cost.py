@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, final
+from math import isfinite
+from typing import Any, ClassVar, final
 
 from robot_dyn.accuracy.costs import step_cost
 from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Pair, Version, in_turns
 from robot_dyn.accuracy.costs.query_cost import QueryCost
-from robot_dyn.accuracy.costs.text import cost_tables
 from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.answer import Block
+from robot_dyn.foundations.answer import Block, Table
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.validate import choice, function, integer, number
@@ -24,9 +24,6 @@ from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
-
-if TYPE_CHECKING:
-    pass
 
 _MOST_REPEATS = 1000
 
@@ -62,7 +59,12 @@ class Cost(Result):
     interrupted: bool = False
 
     def tables(self) -> Iterator[Block]:
-        return cost_tables(self)
+        """A line for each alternative, by what they are of."""
+        yield f"{self.robot}: {', '.join(self.acting) or 'no effects'}"
+        headings = ("per", "what", "first / second", "instructions", "ratio", "time", "ratio")
+        yield Table(headings, tuple(map(tuple, cost_rows(self))), right=headings[3:])
+        yield "instructions are exact; times of the processor, in machine code on one thread, are the least over turns;"
+        yield "± half of the interquartile range of the ratios in a turn; ~ a time that did not repeat to 5 %"
 
     def of(self, what: str) -> ABComparison:
         """The two versions of what differs, such as "gravity" or "forward dynamics".
@@ -173,3 +175,25 @@ def _questions(setup: Setup) -> Iterator[tuple[str, Callable[[], list[Pair]]]]:
     robot = getattr(setup.plant.dynamics, "robot", setup.plant.dynamics)
     if isinstance(robot, Robot):
         yield from ((name, lambda make=make: [make()]) for name, make in QueryCost(robot).pairs())
+
+
+def cost_rows(result: Cost) -> Iterator[list[str]]:
+    """A row for each alternative: per, what, versions, instructions and their ratio, times and theirs."""
+    for k, each in enumerate(result.alternatives):
+        again = k > 0 and result.alternatives[k - 1].per == each.per
+        yield ["" if again else each.per, *_cells(each)]
+
+
+def _cells(each: ABComparison) -> Iterator[str]:
+    first, second = each.first, each.second
+    yield each.what
+    yield f"{first.name} / {second.name}"
+    yield f"{first.instructions} / {second.instructions}"
+    yield f"{each.instructions_ratio:.3g}" if isfinite(each.instructions_ratio) else "—"
+    yield " / ".join(map(_time, (first, second)))
+    noise = ", within noise" * each.within_noise
+    yield "—" if each.time_ratio is None else f"{each.time_ratio:.2f} ± {each.time_ratio_spread:.2f}{noise}"
+
+
+def _time(of: Version) -> str:
+    return "—" if of.time_s is None else f"{'~' * (not of.repeatable)}{format_duration(of.time_s)}"

@@ -29,7 +29,7 @@ def draw(result: Cost, theme: str = "light") -> Figure:
     parts = _parts(result)
     others = [each for each in result.alternatives if each.group != "parts"]
     height = _HEIGHT + _ROW * max(len(parts), len(others))
-    figure, colours = sheet(_WIDTH, height, result, _caption(result), theme)
+    figure, colours = sheet(_WIDTH, height, result.sentence, _caption(result), theme)
     grid = figure.add_gridspec(
         1, 2, left=0.125, right=0.975, top=1 - 1.3 / height, bottom=0.55 / height, wspace=0.72, width_ratios=(1, 1.1)
     )

@@ -7,6 +7,5 @@ tolerance_ladder   the measured runs of a method: order, price of an error
 reference_run      what errors are measured against, and the horizon
 past_horizon       energy and return where no error can be measured
 peers/             SciPy, MuJoCo, Drake, heyoka
-text               what it says
 diagram            the figure
 """

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.accuracy.work_precision_diagram.text import program_of
 from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import INTERPRETED, Point, ToleranceLadder
-from robot_dyn.accuracy.work_precision_diagram.work_precision import WorkPrecision
+from robot_dyn.accuracy.work_precision_diagram.work_precision import WorkPrecision, program_of
 from robot_dyn.report.figure import Colours, ResultError, key, legend, programs, sheet, styled
 
 if TYPE_CHECKING:
@@ -38,7 +37,7 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     """
     if not any(np.isfinite(p.error) for each in result.ladders for p in each.points):
         raise ResultError("no run ended, so there is nothing to draw; look at left_out")
-    figure, colours = sheet(_WIDTH, _HEIGHT, result, _caption(result), theme)
+    figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), theme)
     grid = figure.add_gridspec(
         3, 2, width_ratios=(2.1, 1), left=0.065, right=0.985, top=0.845, bottom=0.195, hspace=0.62, wspace=0.17
     )

@@ -8,14 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor, isfinite, log10
-from typing import TYPE_CHECKING, Any, ClassVar, final
+from typing import Any, ClassVar, final
 
 from robot_dyn.accuracy.work_precision_diagram.measurement import measure
 from robot_dyn.accuracy.work_precision_diagram.method_under_test import own, recorded, switches, whole
 from robot_dyn.accuracy.work_precision_diagram.past_horizon import PastHorizon, past_horizon
 from robot_dyn.accuracy.work_precision_diagram.peers import found
 from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference, reference
-from robot_dyn.accuracy.work_precision_diagram.text import work_precision_tables
 from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import (
     COMPILED,
     INTERPRETED,
@@ -24,7 +23,7 @@ from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import (
     ToleranceLadder,
 )
 from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.answer import Block
+from robot_dyn.foundations.answer import Block, Table
 from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.validate import function, instance, integer, number, truth
@@ -40,12 +39,11 @@ from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
 
-if TYPE_CHECKING:
-    pass
-
 # In this order, should the budget end: first what is most used and what costs least.
 _FIRST = ("DOP853", "rk4", "order_8", "explicit_euler", "Rosenbrock", "gauss_6", "gauss_4", "midpoint")
 _MOST_REPEATS, _MOST_DIGITS = 1000, 20
+_DIGITS = (3, 6, 9)  # of the columns
+_OWN = "robot_dyn"  # this program
 _USUAL_DIGITS = 6  # digits, of the sentence
 _ENOUGH = 5  # methods of a sentence: with so many, none that is extrapolated is named
 _ALWAYS_NAMED = ("rk4", "rk4 (without events)", "explicit_euler")
@@ -90,7 +88,25 @@ class WorkPrecision(Result):
     past_horizon: tuple[PastHorizon, ...] = ()
 
     def tables(self) -> Iterator[Block]:
-        return work_precision_tables(self)
+        """What it rests on, and a line for each method."""
+        of = self.reference
+        yield f"{self.robot}: {', '.join(self.acting) or 'no effects'}"
+        yield (
+            f"error: largest |q − q_ref| over joints and {of.records} records in {of.horizon_s:g} s, in {self.unit};"
+            f" reference: {of.methods[0]}, {of.error:.1e} from {of.methods[1]}: no error below that is believed"
+        )
+        if of.parted_s is not None:
+            lost = "" if of.lost_s is None else f", and differ by 0.1 at {of.lost_s:.3g} s"
+            yield (
+                f"horizon: {of.horizon_s:g} s of {self.duration_s:g} s: beyond it runs at tight tolerances part from"
+                f" each other{lost}"
+            )
+        columns = [digits for digits in _DIGITS if 10.0**-digits >= of.error]
+        headings = ("method", "order", "measured", *(f"{digits} digits" for digits in columns), "least error", "in")
+        yield Table(headings, tuple(map(tuple, _ladder_rows(self, columns))), right=headings[1:])
+        yield "times of prepared runs, the least of runs that take turns; * the least; ( ) extrapolated by the order"
+        if self.past_horizon:
+            yield from _beyond_horizon(self)
 
     @property
     def front(self) -> tuple[tuple[ToleranceLadder, Point], ...]:
@@ -265,3 +281,62 @@ def _several(methods: Any) -> tuple[Any, ...]:
 def _ordered(names: Iterable[str]) -> tuple[str, ...]:
     names = tuple(name for name in names if name != AUTO)
     return (*(name for name in _FIRST if name in names), *(name for name in names if name not in _FIRST))
+
+
+def _ladder_rows(result: WorkPrecision, columns: list[int]) -> Iterator[list[str]]:
+    """A row for each method: orders, what so many digits cost, and the finest run."""
+    floor = result.reference.error
+    best = {digits: min((p.value for _, p in result.digits(10.0**-digits)), default=0.0) for digits in columns}
+    for each in result.ladders:
+        prices = [(each.price(10.0**-digits), digits) for digits in columns]
+        cells = ["—" if p is None else _price(p.value, p.extrapolated, p.value == best[d]) for p, d in prices]
+        finest = min(each.points, key=lambda point: point.error)
+        error = f"{finest.error:.1e}" if finest.error > floor else f"< {floor:.0e}"
+        order = "—" if each.order is None else str(each.order)
+        seen = "—" if each.measured_order is None else f"{each.measured_order:.1f}"
+        yield [each.name, order, seen, *cells, error if isfinite(finest.error) else "—", format_duration(finest.time_s)]
+
+
+def _beyond_horizon(result: WorkPrecision) -> Iterator[Block]:
+    """Energy and the way back where no error can be measured, a line for each method."""
+    returns = any(each.returned is not None for each in result.past_horizon)
+    yield ""
+    yield f"over all of {result.duration_s:g} s, where no error can be measured, the finest runs:"
+    rows = []
+    for each in result.past_horizon:
+        back = "—" if each.returned is None else f"{each.returned:.1e}"
+        rows.append((each.name, f"{each.setting:.3g}", f"{each.energy:.1e}", *[back] * returns))
+    headings = ("method", "setting", "energy", *["there and back"] * returns)
+    yield Table(headings, tuple(rows), right=headings[1:])
+    yield "energy: largest residual, as a part of the energy exchanged" + (
+        f"; there and back: |q − q₀| in {result.unit} of a run that turns round at the end" if returns else ""
+    )
+
+
+def programs(result: WorkPrecision, error: float) -> Iterator[str]:
+    """What an error takes by the cheapest method of each program, this library first; and what was left out."""
+    best: dict[str, Any] = {}
+    for ladder, price in result.digits(error):
+        best.setdefault(program_of(ladder), (ladder, price))
+    own = best.get(_OWN)
+    for program in dict.fromkeys([_OWN, *best, *map(program_of, result.ladders)]):
+        if program in best:
+            ladder, price = best[program]
+            name = f"{_OWN} {ladder.name}" if program == _OWN else ladder.name
+            times = f", {float(f'{price.value / own[1].value:.2g}'):g} times as long" if own and program != _OWN else ""
+            yield f"  {name}: {format_duration(price.value)}{times}{' (extrapolated)' if price.extrapolated else ''}"
+        else:
+            ended = dict.fromkeys(each.ended for each in result.ladders if program_of(each) == program)
+            yield f"  {program}: reached by no run ({'; '.join(ended)})"
+    yield "  times of prepared runs, the least of runs that take turns"
+    yield from (f"  left out: {each}" for each in result.left_out)
+
+
+def program_of(ladder: ToleranceLadder) -> str:
+    """The program that a ladder is of."""
+    return ladder.method.split(" ")[0] if ladder.peer else _OWN
+
+
+def _price(seconds: float, extrapolated: bool, least: bool) -> str:
+    words = f"({format_duration(seconds)})" if extrapolated else format_duration(seconds)
+    return f"{words}{' *' if least else ''}"

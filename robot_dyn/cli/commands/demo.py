@@ -72,7 +72,7 @@ def demo(
 
 def _price(swing: rd.Setup) -> Iterator[str]:
     """What digits of a free swing cost, here and now."""
-    from robot_dyn.accuracy.work_precision_diagram.text import programs
+    from robot_dyn.accuracy.work_precision_diagram.work_precision import programs
 
     yield ""
     yield f"What 1e-8 rad takes here: {swing.duration_s:g} s of the same arm, swinging freely"

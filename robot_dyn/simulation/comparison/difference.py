@@ -21,7 +21,7 @@ import numpy as np
 
 from robot_dyn.control.reference import hermite, polynomial
 from robot_dyn.foundations.errors import QueryError
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 
 TOLERANCE = 1e-6  # [rad] or [m], for runs without an estimate of their error
 HALF = 0.5  # of the time: runs that are compared over less of it are not said to be the same motion
@@ -82,7 +82,7 @@ class Difference:
         return float(self.t[known][-1]) if known.any() else self.start
 
 
-def check_comparable(a: Trajectory, b: Trajectory) -> None:
+def check_comparable(a: TrajectoryData, b: TrajectoryData) -> None:
     """QueryError unless two runs are of one robot, and have times in common."""
     names = tuple(run.about.get("robot", "") for run in (a, b))
     if a.joint_names != b.joint_names:
@@ -98,7 +98,7 @@ def check_comparable(a: Trajectory, b: Trajectory) -> None:
         )
 
 
-def comparable(a: Trajectory, b: Trajectory) -> bool:
+def comparable(a: TrajectoryData, b: TrajectoryData) -> bool:
     """Whether two runs are of one robot, and have times in common."""
     try:
         check_comparable(a, b)
@@ -108,7 +108,7 @@ def comparable(a: Trajectory, b: Trajectory) -> bool:
 
 
 @np.errstate(all="ignore")  # the last samples of a run that diverged may overflow
-def difference(a: Trajectory, b: Trajectory, tolerance: float = TOLERANCE) -> Difference:
+def difference(a: TrajectoryData, b: TrajectoryData, tolerance: float = TOLERANCE) -> Difference:
     """Return b − a on the time that both runs have.
 
     Args:
@@ -186,7 +186,7 @@ def _last(t: np.ndarray) -> np.ndarray:
     return np.append(np.diff(t) > 0, np.ones(min(len(t), 1), dtype=bool))
 
 
-def _interpolated(run: Trajectory, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _interpolated(run: TrajectoryData, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (k, n) of a run at times t within it, and the bound of their error, (k,); inf where there is none."""
     at = np.flatnonzero(_last(run.t))
     known, points = run.t[at], np.stack([run.q[at], run.v[at], run.a[at]], axis=1)

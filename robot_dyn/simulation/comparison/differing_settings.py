@@ -12,7 +12,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 
 ABSENT = "—"
 _NAMED = 36  # letters of a setting, or of its value, by which a run is named
@@ -31,7 +31,7 @@ class DifferingSetting:
     b: str
 
 
-def differing_settings(a: Trajectory, b: Trajectory) -> tuple[DifferingSetting, ...]:
+def differing_settings(a: TrajectoryData, b: TrajectoryData) -> tuple[DifferingSetting, ...]:
     """What differs in the settings of two runs, in their start, in the file of the robot and in versions.
 
     Numbers are shortened to six digits where these differ. Of runs that carry no settings, what acted and the method
@@ -45,7 +45,7 @@ def differing_settings(a: Trajectory, b: Trajectory) -> tuple[DifferingSetting, 
     return tuple(_pair(name, first, second) for name in names if first.get(name) != second.get(name))
 
 
-def run_names(*runs: Trajectory) -> tuple[str, ...]:
+def run_names(*runs: TrajectoryData) -> tuple[str, ...]:
     """Names of runs: their robots, if these differ; else their files, or what differs in settings; else numbers.
 
     One or two settings name them; of more, one does, and "…" says that there are others. All differ from each other.
@@ -95,7 +95,7 @@ def _unless_absent(value: str) -> str:
     return "" if value in (ABSENT, "acts") else f" {value}"
 
 
-def unknown_settings(a: Trajectory, b: Trajectory) -> tuple[str, ...]:
+def unknown_settings(a: TrajectoryData, b: TrajectoryData) -> tuple[str, ...]:
     """What is not known of the settings of two runs, in sentences."""
     notes = []
     if None in (_settings(a), _settings(b)):
@@ -105,7 +105,7 @@ def unknown_settings(a: Trajectory, b: Trajectory) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _settings(run: Trajectory) -> dict[str, str] | None:
+def _settings(run: TrajectoryData) -> dict[str, str] | None:
     """Those that a run carries; None if it carries none that can be read."""
     try:
         settings = json.loads(run.about["settings"])
@@ -115,14 +115,14 @@ def _settings(run: Trajectory) -> dict[str, str] | None:
     return settings if is_text else None
 
 
-def _of_old_run(run: Trajectory) -> dict[str, str]:
+def _of_old_run(run: TrajectoryData) -> dict[str, str]:
     """What acted, edits and method."""
     acted = dict.fromkeys(run.acting or (), "acts")
     step = {"step": f"{run.statistics.step_s!r} s"} if run.statistics.step_s else {}
     return acted | {"edits": run.about.get("edits", ""), "method": run.statistics.method} | step
 
 
-def _texts(run: Trajectory) -> dict[str, str]:
+def _texts(run: TrajectoryData) -> dict[str, str]:
     """Start, accuracy, file of the robot, versions."""
     start = {f"start {key}": ", ".join(map(repr, getattr(run, key)[0].tolist())) for key in ("q", "v")}
     urdf = run.about.get("urdf")

@@ -20,7 +20,8 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, LEAST_RTOL, STIFF, Adap
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.simulation.dynamics.fastest_motion import fastest
 from robot_dyn.simulation.observation.remarks import Kind
-from robot_dyn.simulation.results.trajectory import Accuracy, Trajectory
+from robot_dyn.simulation.results.statistics import Accuracy
+from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
 

@@ -12,11 +12,9 @@ from robot_dyn.foundations.extras import needs
 from robot_dyn.foundations.files import Kind, file_path, save, target
 from robot_dyn.simulation.columns import EXTRA, Column
 from robot_dyn.simulation.export import csv_table, mcap_log, netcdf, parquet
+from robot_dyn.simulation.results.run_data import RunData
 from robot_dyn.simulation.results.run_file import RunFileError
-from robot_dyn.simulation.results.table import columns as of_run
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.rollouts.result import Rollouts
-from robot_dyn.simulation.rollouts.table import columns as of_runs
+from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 
 
 @final
@@ -39,12 +37,12 @@ _OF_RUN = (Format(TABLE, csv_table.write), *_OF_BOTH, _LOG)
 _OF_RUNS = (Format(Kind("a table of runs", ".csv", b"run,"), csv_table.write), *_OF_BOTH)
 
 
-def kinds(run: Trajectory | Rollouts) -> tuple[Kind, ...]:
+def kinds(run: RunData) -> tuple[Kind, ...]:
     """The kinds of file that a run, or a batch, can be exported to."""
     return tuple(each.kind for each in _formats(run).values())
 
 
-def export(run: Trajectory | Rollouts, path: str | Path) -> Path:
+def export(run: RunData, path: str | Path) -> Path:
     """Write a run, or a batch, to a file for other programs, whole or not at all; its suffix says in which format.
 
         .csv      run.table(): a row for each sample, or for each run of a batch; float() returns the numbers
@@ -60,19 +58,19 @@ def export(run: Trajectory | Rollouts, path: str | Path) -> Path:
         RunFileError: If it cannot be written.
         MissingExtraError: If the format needs a package that is not installed.
     """
-    if not isinstance(run, Trajectory | Rollouts):
+    if not isinstance(run, RunData):
         raise RunFileError(f"export takes a Trajectory of rd.simulate, or Rollouts, got {shown(run)}")
     path = file_path(path, RunFileError)
-    if isinstance(run, Rollouts) and path.suffix.lower() == _LOG.kind.suffix:
+    if isinstance(run, RolloutsData) and path.suffix.lower() == _LOG.kind.suffix:
         raise RunFileError(f"{path}: a log is of one run, and these are {len(run)}; give one of them, such as runs[0]")
     path = target(path, kinds(run), RunFileError)
     form = _formats(run)[path.suffix.lower()]
     for package in form.packages:
         needs(package, extra=EXTRA)
-    columns = list(of_runs(run) if isinstance(run, Rollouts) else of_run(run))
+    columns = list(run.columns())
     return save(path, lambda stream: form.write(run, columns, stream), RunFileError)
 
 
-def _formats(run: Trajectory | Rollouts) -> Mapping[str, Format]:
+def _formats(run: RunData) -> Mapping[str, Format]:
     """By suffix."""
-    return {each.kind.suffix: each for each in (_OF_RUNS if isinstance(run, Rollouts) else _OF_RUN)}
+    return {each.kind.suffix: each for each in (_OF_RUNS if isinstance(run, RolloutsData) else _OF_RUN)}

@@ -23,9 +23,10 @@ import numpy as np
 
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.extras import needs
-from robot_dyn.simulation.columns import EXTRA, Column, attributes
+from robot_dyn.simulation.columns import EXTRA, Column
+from robot_dyn.simulation.results.causes import causes_of
+from robot_dyn.simulation.results.run_data import TrajectoryData, attributes
 from robot_dyn.simulation.results.run_file import RunFileError
-from robot_dyn.simulation.results.trajectory import Trajectory
 
 _JOINT_STATE = """std_msgs/Header header
 string[] name
@@ -50,7 +51,7 @@ _DEFINITIONS = {_STATE: _JOINT_STATE, _NUMBER: "float64 data\n"}
 Topic = tuple[str, str, Iterator[Any]]  # its name, its type, and its messages
 
 
-def write(run: Trajectory, columns: Iterable[Column], stream: BinaryIO) -> None:
+def write(run: TrajectoryData, columns: Iterable[Column], stream: BinaryIO) -> None:
     """Write a message of each topic at each sample."""
     if not (run.t < _LONGEST_S).all():
         raise RunFileError(f"the run ends at t = {run.t[-1]:.3g} s; stamps of ROS 2 end at {_LONGEST_S:.3g} s")
@@ -69,15 +70,15 @@ def write(run: Trajectory, columns: Iterable[Column], stream: BinaryIO) -> None:
                 log.write_message(name, types[kind], next(messages), ns, ns, k)
 
 
-def _causes(run: Trajectory) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+def _causes(run: TrajectoryData) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """The torque of the joints by cause, (m, n) each; and, without them, why."""
     try:
-        return run.causes().torques, {}
+        return causes_of(run).torques, {}
     except QueryError as error:
         return {}, {"causes": f"none: {error}"}
 
 
-def _of_joints(run: Trajectory, stamps: Sequence[int], causes: dict[str, np.ndarray]) -> Iterator[Topic]:
+def _of_joints(run: TrajectoryData, stamps: Sequence[int], causes: dict[str, np.ndarray]) -> Iterator[Topic]:
     none = np.empty((len(run.t), 0))  # fields that say nothing are empty, as sensor_msgs/JointState.msg has it
     yield "/joint_states", _STATE, _states(run, stamps, run.q, run.v, run.u)
     if run.desired is not None:
@@ -86,7 +87,7 @@ def _of_joints(run: Trajectory, stamps: Sequence[int], causes: dict[str, np.ndar
         yield name, _STATE, _states(run, stamps, none, none, torque)
 
 
-def _states(run: Trajectory, stamps: Sequence[int], *values: np.ndarray) -> Iterator[Any]:
+def _states(run: TrajectoryData, stamps: Sequence[int], *values: np.ndarray) -> Iterator[Any]:
     """Messages of position, velocity and effort, each (m, n) or (m, 0)."""
     names = list(run.joint_names)
     for ns, position, velocity, effort in zip(stamps, *values, strict=True):

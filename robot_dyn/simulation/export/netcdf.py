@@ -6,14 +6,13 @@ from typing import BinaryIO
 
 import numpy as np
 
+from robot_dyn.simulation.results.run_data import RunData
 from robot_dyn.simulation.results.run_file import RunFileError
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.rollouts.result import Rollouts
 
 _LARGEST = 2**31 - 1  # netCDF-3 has no longer integers, and SciPy writes no larger variables in bytes
 
 
-def write(run: Trajectory | Rollouts, _: object, stream: BinaryIO) -> None:
+def write(run: RunData, _: object, stream: BinaryIO) -> None:
     """Write the Dataset of a run, or of a batch."""
     data = run.to_xarray()
     for name, x in data.data_vars.items():

@@ -6,12 +6,11 @@ from collections.abc import Iterable
 from typing import BinaryIO
 
 from robot_dyn.foundations.extras import needs
-from robot_dyn.simulation.columns import EXTRA, Column, attributes, by_heading
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.columns import EXTRA, Column, by_heading
+from robot_dyn.simulation.results.run_data import RunData, attributes
 
 
-def write(run: Trajectory | Rollouts, columns: Iterable[Column], stream: BinaryIO) -> None:
+def write(run: RunData, columns: Iterable[Column], stream: BinaryIO) -> None:
     """Write the columns of `run.table()`, under the same names."""
     arrow = needs("pyarrow", extra=EXTRA)
     columns = list(columns)

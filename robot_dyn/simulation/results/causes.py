@@ -6,7 +6,6 @@ What effects exert follows from the states of the run, and is stored with it; th
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,10 +14,8 @@ from robot_dyn.effects.causes import Causes, by_cause, exerted_torques
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.simulation.results.provenance import robot_of
+from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.simulation.results.samples import Columns
-
-if TYPE_CHECKING:
-    from robot_dyn.simulation.results.trajectory import Trajectory
 
 _OPEN = 1e-9  # of the torques: far above rounding
 
@@ -66,7 +63,7 @@ def _stacked(states: dict[str, np.ndarray]) -> np.ndarray | None:
     return np.hstack(list(states.values())) if states else None
 
 
-def causes_of(run: Trajectory) -> Causes:
+def causes_of(run: TrajectoryData) -> Causes:
     """The causes of a run, as of `Trajectory.causes`.
 
     Raises:

@@ -7,12 +7,12 @@ import numpy as np
 from robot_dyn.foundations.display import legend, page, plot, side_by_side, text
 from robot_dyn.queries.units import units
 from robot_dyn.simulation.results.provenance import joint_types
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 
 _MOST_JOINTS = 8  # of which curves are drawn
 
 
-def trajectory_html(run: Trajectory) -> str:
+def trajectory_html(run: TrajectoryData) -> str:
     """The summary and plots over time."""
     joints = run.joint_names[:_MOST_JOINTS]
     types = joint_types(run)

@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from robot_dyn.codegen.store.keys import version_of
 from robot_dyn.codegen.trace.right_angles import written_out
@@ -24,12 +24,9 @@ from robot_dyn.description.edits import Payload
 from robot_dyn.foundations.errors import DescriptionError, QueryError, shorten
 from robot_dyn.model.findings import reservations
 from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.results.run_data import RunData
 from robot_dyn.simulation.setup.settings import settings_of
-
-if TYPE_CHECKING:
-    from robot_dyn.simulation.results.trajectory import Trajectory
-    from robot_dyn.simulation.rollouts.result import Rollouts
-    from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.setup.setup import Setup
 
 _LISTED = 4  # findings in a summary
 
@@ -95,7 +92,7 @@ def portable(source: str, folder: Path) -> str:
     return path.name
 
 
-def about_the_robot(run: Trajectory | Rollouts) -> Iterator[str]:
+def about_the_robot(run: RunData) -> Iterator[str]:
     """What was estimated of a run's robot, and what was assumed or left out of its file: the first, and how many."""
     with suppress(DescriptionError):
         found = reservations(_description(run))
@@ -104,14 +101,14 @@ def about_the_robot(run: Trajectory | Rollouts) -> Iterator[str]:
             yield f"robot: {len(more)} more findings on its file; rd.info lists them"
 
 
-def _description(run: Trajectory | Rollouts) -> Description:
+def _description(run: RunData) -> Description:
     """The robot's file, as the run carries it; DescriptionError if there is none."""
     description = check(run.about.get("urdf", "").encode(), run.about.get("source", "the run's URDF"))
     of_reading = filter(None, run.about.get("findings", "").split("\n"))  # which the URDF alone does not give again
     return replace(description, findings=tuple(dict.fromkeys((*of_reading, *description.findings))))
 
 
-def joint_types(run: Trajectory | Rollouts) -> tuple[str | None, ...]:
+def joint_types(run: RunData) -> tuple[str | None, ...]:
     """Types of the joints of a run, as of `Robot.joint_types`; None for each of a run without a URDF."""
     try:
         kinds = _description(run).joint_kinds
@@ -126,7 +123,7 @@ def versions() -> str:
     return ", ".join(f"{name} {version_of(name)}" for name in ("robot-dyn", "pin", "numpy", "scipy"))
 
 
-def robot_of(run: Trajectory) -> Robot:
+def robot_of(run: RunData) -> Robot:
     """The robot of a run, from the texts it carries.
 
     Raises:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from robot_dyn.foundations.errors import escaped
@@ -12,17 +10,14 @@ from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.observation.remarks import lines as lines_of
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.provenance import about_the_robot, joint_types
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import RunData, TrajectoryData
 from robot_dyn.simulation.run.outcome import Ending
-
-if TYPE_CHECKING:
-    from robot_dyn.simulation.rollouts.result import Rollouts
 
 _LISTED = 3  # events in a summary
 _NOTICED = 0.01  # [s]: shorter times are left out
 
 
-def summary(run: Trajectory) -> str:
+def summary(run: TrajectoryData) -> str:
     """A few lines: outcome, what acted, ledger, error, tracking, cost."""
     s, ledger, unit = run.statistics, run.ledger, units("q", joint_types(run))
     opening = f"{run.outcome.ending} at t = {run.outcome.t:g} s, {len(run.t)} samples"
@@ -61,13 +56,13 @@ def summary(run: Trajectory) -> str:
     return "\n".join(map(escaped, lines))
 
 
-def of_tracking(run: Trajectory | Rollouts, of_frame: bool) -> str:
+def of_tracking(run: RunData, of_frame: bool) -> str:
     """What a tracking error is of, with its unit."""
     what = "the frame [m]" if of_frame else f"q [{units('q', joint_types(run))}]"
     return f"tracking error of {what}"
 
 
-def _not_estimated(run: Trajectory) -> str:
+def _not_estimated(run: TrajectoryData) -> str:
     """That its error was not estimated, and why."""
     if run.outcome.ending is Ending.STOPPED:
         return "not estimated (the run was stopped)"

@@ -4,32 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.columns import Column
 from robot_dyn.simulation.results.provenance import joint_types
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import QUANTITIES, TrajectoryData
 
 
-def columns(run: Trajectory) -> Iterator[Column]:
-    """q, v, a, u and desired positions by joint, or the deviation of a frame; power by source; energy; states."""
+def columns(run: TrajectoryData) -> Iterator[Column]:
+    """The quantities with a heading: of joints by name, of sources by name, states by number.
+
+    A deviation from a joint reference is left out: it is q − desired.
+    """
     types = dict(zip(run.joint_names, joint_types(run), strict=True))
-
-    def of_joints(quantity: str, values: np.ndarray, like: str) -> Iterator[Column]:
-        for (name, kind), x in zip(types.items(), values.T, strict=True):
-            yield Column(quantity, x, unit(like, kind), name)
-
-    yield Column("t", run.t, "s")
-    for key in ("q", "v", "a", "u"):
-        yield from of_joints(key, getattr(run, key), key)
-    if run.desired is not None:
-        yield from of_joints("desired", run.desired, "q")
-    elif run.deviation is not None:  # of a frame; that of the joints is q − desired
-        yield from (Column("deviation", x, "m", axis) for axis, x in zip("xyz", run.deviation.T, strict=True))
-    yield from (Column("power", power, "W", name) for name, power in run.power.items())
-    yield Column("energy", run.ledger.energy, "J")
-    yield Column("residual", run.ledger.residual, "J")
-    states = () if run.controller_states is None else (("controller", run.controller_states),)
-    for name, z in (*states, *run.effect_states.items()):
-        yield from (Column(f"{name} state", x, of=str(k + 1)) for k, x in enumerate(z.T))
+    for key, row in QUANTITIES.items():
+        values = getattr(run.ledger if key in ("energy", "residual") else run, key) if row.heading else None
+        if values is None or (key == "deviation" and run.desired is not None):
+            continue
+        for name, x in values.items() if isinstance(values, dict) else (("", values),):
+            if x.ndim == 1:
+                yield Column(row.heading, x, row.unit, name, row.title, row.over)
+            elif row.of_joints:
+                for (joint, kind), y in zip(types.items(), x.T, strict=True):
+                    yield Column(row.heading, y, unit(row.unit, kind), joint, row.title)
+            else:
+                numbers = "xyz" if row.over else map(str, range(1, 1 + x.shape[1]))
+                for of, y in zip(numbers, x.T, strict=True):
+                    yield Column(f"{name} {row.heading}".lstrip(), y, row.unit, of, row.title, row.over)

@@ -3,6 +3,7 @@
 - rollouts: the function `rollouts`, its arguments, and the choice between the two ways of running a batch.
 - batch: starts and values that differ from run to run; lock_step: 64 runs per tile in machine code; thresholds: where
   such runs would need cut steps; one_by_one: runs one after the other on each thread; pool: the threads.
-- result: `Rollouts`; run: one of its runs as a `Trajectory`; overview: remarks, tracking errors, causes of divergence.
+- rollouts_data: the fields of `Rollouts`; result: `Rollouts`; run: one of its runs as a `Trajectory`; overview:
+  remarks, tracking errors, causes of divergence; table, html: its table and its page.
 - sweepable: the parameters that may differ from run to run; file: files of rollouts.
 """

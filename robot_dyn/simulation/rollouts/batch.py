@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.codegen.parameters import over_runs, with_parameters
+from robot_dyn.codegen.parameters import over_runs
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, guard_levels
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.results.provenance import origin
-from robot_dyn.simulation.results.trajectory import Statistics
+from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.rollouts.sweepable import parts_of_run
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.size import check_batch
@@ -108,14 +109,6 @@ class Batch:
             about=origin(self.setup.plant.dynamics) | self.setup.about, params=dict(self.sweep), setup=setup,
             q0=self.q0, v0=self.v0, observed=observed, numbers=self.numbers,
         )  # fmt: skip
-
-
-def parts_of_run(setup: Setup, values: Mapping[str, Any], number: int) -> tuple[Plant, Controller | None]:
-    """Plant and controller of the run of this number, with its values by name and its noise."""
-    plant, controller = setup.plant, setup.controller
-    if values:
-        plant, controller = with_parameters(plant, controller, values)
-    return plant, None if controller is None else controller.of_run(number)
 
 
 def advice_of(outcome: Outcome) -> str:

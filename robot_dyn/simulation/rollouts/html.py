@@ -7,13 +7,13 @@ import numpy as np
 from robot_dyn.foundations.display import legend, page, plot, side_by_side, text
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.provenance import joint_types
-from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 
 _MOST_JOINTS, _MOST_RUNS = 8, 2000
 _QUANTILES = {"least": 0.0, "median": 0.5, "largest": 1.0}
 
 
-def rollouts_html(runs: Rollouts) -> str:
+def rollouts_html(runs: RolloutsData) -> str:
     """The summary; of the first joints the least, the median and the largest q over the runs."""
     if runs.q is None or not len(runs):
         return page("Rollouts", text(runs.summary))

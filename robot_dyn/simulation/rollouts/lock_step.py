@@ -24,7 +24,7 @@ from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.machine_code import MachineCode
 from robot_dyn.simulation.events.detection import Detecting
 from robot_dyn.simulation.observation.observation import observations_of, observed
-from robot_dyn.simulation.results.trajectory import Statistics
+from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.rollouts.batch import Batch, Ends, advice_of
 from robot_dyn.simulation.rollouts.one_by_one import OneByOne, Single
 from robot_dyn.simulation.rollouts.pool import in_threads

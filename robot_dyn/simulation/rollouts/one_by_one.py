@@ -16,7 +16,7 @@ from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.observation.guard_levels import GuardLevels
 from robot_dyn.simulation.observation.observation import Observation, Observed, observation_of, observed
 from robot_dyn.simulation.results.samples import columns
-from robot_dyn.simulation.results.trajectory import Statistics
+from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.rollouts.batch import Batch, Ends, advice_of
 from robot_dyn.simulation.rollouts.pool import in_threads
 from robot_dyn.simulation.rollouts.result import Rollouts

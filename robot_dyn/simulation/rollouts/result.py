@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, replace
 from functools import cached_property
 from operator import index
-from typing import Annotated, Any, final, overload
+from typing import Any, final, overload
 
 import numpy as np
 
 from robot_dyn.foundations.errors import QueryError, escaped
-from robot_dyn.foundations.validate import integer
-from robot_dyn.foundations.values import NOT_STORED, Layout, Value, read_only
-from robot_dyn.simulation.columns import attributes, by_heading, data_frame, data_set
-from robot_dyn.simulation.observation.observation import Observed
+from robot_dyn.simulation.columns import Column, Variable
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.observation.remarks import lines as lines_of
 from robot_dyn.simulation.results.provenance import about_the_robot
 from robot_dyn.simulation.results.summary import of_tracking
-from robot_dyn.simulation.results.trajectory import Statistics, Trajectory
-from robot_dyn.simulation.rollouts.overview import Overview, of_some, overview
-from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.rollouts.html import rollouts_html
+from robot_dyn.simulation.rollouts.overview import of_some, overview
+from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
+from robot_dyn.simulation.rollouts.run import trajectory
+from robot_dyn.simulation.rollouts.table import columns, samples
 
 _SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved", "numbers")  # by all runs
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Rollouts(Value):
+class Rollouts(RolloutsData):
     """B runs with m samples each. Samples after the end of a run are nan; quantities not recorded are None.
 
     `runs[i]` is the `Trajectory` of one run and `runs[i:j]` a subset, numbered from 0; neither copies samples. All
@@ -62,38 +60,6 @@ class Rollouts(Value):
             the original batch; None for a batch numbered from 0 on, and for runs read from a file.
     """
 
-    joint_names: tuple[str, ...]
-    t: Annotated[np.ndarray, Layout(("m",))]
-    q: Annotated[np.ndarray, Layout(("B", "m", "n"))] | None
-    v: Annotated[np.ndarray, Layout(("B", "m", "n"))] | None
-    u: Annotated[np.ndarray, Layout(("B", "m", "n"))] | None
-    kinetic: Annotated[np.ndarray, Layout(("B", "m"))] | None
-    potential: Annotated[np.ndarray, Layout(("B", "m"))] | None
-    work: dict[str, Annotated[np.ndarray, Layout(("B", "m"))]] | None
-    ended: Annotated[np.ndarray, Layout(("B",))]
-    diverged: Annotated[np.ndarray, Layout(("B",), "bool")]
-    stopped: Annotated[np.ndarray, Layout(("B",), "bool")]
-    advice: tuple[str, ...]
-    steps: Annotated[np.ndarray, Layout(("B",), "int64")]
-    evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
-    statistics: Statistics
-    sources: tuple[str, ...]
-    about: dict[str, str]
-    params: dict[str, Annotated[np.ndarray, Layout(("B", None))]]
-    setup: Setup | None = field(default=None, metadata=NOT_STORED)
-    uncut: tuple[str, ...] = ()
-    q0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
-    v0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
-    observed: Observed | None = None
-    saved: Overview | None = None
-    numbers: np.ndarray | None = field(default=None, metadata=NOT_STORED)
-
-    def __post_init__(self) -> None:
-        read_only(self)
-
-    def __len__(self) -> int:
-        return len(self.ended)
-
     def __iter__(self) -> Iterator[Trajectory]:
         return (self[run] for run in range(len(self)))
 
@@ -115,8 +81,6 @@ class Rollouts(Value):
             QueryError: If q or v was not recorded, a slice is empty, or `run` is neither an integer nor a slice.
             IndexError: If no run has that number.
         """
-        from robot_dyn.simulation.rollouts.run import trajectory
-
         if isinstance(run, slice):
             taken = range(len(self))[run]
             if not taken:
@@ -133,28 +97,6 @@ class Rollouts(Value):
         except IndexError:
             raise IndexError(f"there is no run {run}: runs are numbered from 0 to {len(self) - 1}") from None
         return trajectory(self, number)
-
-    def outcome(self, run: int) -> Outcome:
-        """Return how a run ended; raises QueryError if no run has that number."""
-        run = integer("run", run, least=-len(self), most=len(self) - 1)
-        ended = float(self.ended[run])
-        if self.stopped[run]:
-            return Outcome(Ending.STOPPED, ended, "interrupted; all samples up to here are kept")
-        if not self.diverged[run]:
-            return Outcome(Ending.FINISHED, ended, self.advice[run])
-        return Outcome(Ending.DIVERGED, ended, self.advice[run])
-
-    def setup_of(self, run: int) -> Setup:
-        """Return the setup of a single run: `rd.simulate(runs.setup_of(17))` repeats the run with an error estimate.
-
-        Raises:
-            QueryError: If no run has that number, or the runs were read from a file.
-        """
-        from robot_dyn.simulation.rollouts.run import setup_of
-
-        if self.setup is None:
-            raise QueryError("runs that were read from a file have no setup; run rd.rollouts again, and use its result")
-        return setup_of(self, self.setup, integer("run", run, least=-len(self), most=len(self) - 1) % len(self))
 
     @cached_property
     def overview(self) -> Overview:
@@ -186,35 +128,14 @@ class Rollouts(Value):
         """
         return self.overview.worst
 
-    def table(self) -> dict[str, np.ndarray]:
-        """A row for each run, as columns (B,) by quantity, joint and unit: `runs.table()["rms v elbow_joint [rad/s]"]`.
+    def columns(self) -> Iterator[Column]:
+        """Return the columns of the table."""
+        return columns(self, self.overview)
 
-        What was swept, the start, the end, the tracking error, the remarks; the rms of v and u over the samples up to
-        the end, as far as they were recorded (`record=("q", "v", "u")` for u), and extremes of q, v and u
-        over the steps, which need no record (see `observed`).
-        """
-        from robot_dyn.simulation.rollouts.table import columns
-
-        return by_heading(columns(self))
-
-    def to_pandas(self) -> Any:
-        """Return `table` as a `pandas.DataFrame`; MissingExtraError without pandas."""
-        from robot_dyn.simulation.rollouts.table import columns
-
-        return data_frame(columns(self), attributes(self))
-
-    def to_xarray(self) -> Any:
-        """Return `table` and all samples as an `xarray.Dataset` over run, t and joint; MissingExtraError without it."""
-        from robot_dyn.simulation.rollouts.table import columns, samples
-
-        return data_set(columns(self), self.joint_names, attributes(self), samples(self))
-
-    def __repr__(self) -> str:
-        return f"<Rollouts: {self.summary}>"
+    def _variables(self) -> Mapping[str, Variable]:
+        return samples(self)
 
     def _repr_html_(self) -> str:
-        from robot_dyn.simulation.rollouts.html import rollouts_html
-
         return rollouts_html(self)
 
     @property

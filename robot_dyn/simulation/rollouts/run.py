@@ -6,7 +6,6 @@ a = M⁻¹ (τ − C v − N),   P_k = τ_kᵀ v;   nan where neither the record
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,15 +17,12 @@ from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.results.provenance import settings_text
 from robot_dyn.simulation.results.samples import Tracking, columns, tracking_of
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.rollouts.batch import parts_of_run
 from robot_dyn.simulation.rollouts.overview import remarks_of
+from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.setup.setup import Setup
 
-if TYPE_CHECKING:
-    from robot_dyn.simulation.rollouts.result import Rollouts
 
-
-def trajectory(runs: Rollouts, run: int) -> Trajectory:
+def trajectory(runs: RolloutsData, run: int) -> Trajectory:
     """Return the trajectory of a run; see `Rollouts`.
 
     Raises:
@@ -39,7 +35,7 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
     unknown = np.full_like(q, np.nan)
     u = unknown if runs.u is None else runs.u[run, known]
     a, power, energy = unknown, np.full((len(t), len(runs.sources)), np.nan), np.full((len(t), 2), np.nan)
-    setup = None if runs.setup is None else setup_of(runs, runs.setup, run)
+    setup = None if runs.setup is None else runs.setup_of(run)
     if setup is not None:
         a, u, power, energy = _follows(setup, t, q, v, None if runs.u is None else u)
     if runs.kinetic is not None and runs.potential is not None:
@@ -61,15 +57,6 @@ def trajectory(runs: Rollouts, run: int) -> Trajectory:
         extremes=None if runs.observed is None else runs.observed.extremes[run],
         desired_velocity=tracking.desired_velocity,
     )  # fmt: skip
-
-
-def setup_of(runs: Rollouts, setup: Setup, run: int) -> Setup:
-    """Return the setup of a single run: that of the batch, with the start, parameters and noise of the run."""
-    number = run if runs.numbers is None else int(runs.numbers[run])
-    plant, controller = parts_of_run(setup, {name: x[run] for name, x in runs.params.items()}, number)
-    q0 = setup.q0 if runs.q0 is None else runs.q0[run]
-    v0 = setup.v0 if runs.v0 is None else runs.v0[run]
-    return replace(setup, plant=plant, controller=controller, q0=q0, v0=v0, estimate_error=True)
 
 
 def _follows(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.codegen.parameters import sweepable_parameters
+from robot_dyn.codegen.parameters import sweepable_parameters, with_parameters
+from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import SIGNAL
 from robot_dyn.control.digital_loop.loop import SIGNALS
 from robot_dyn.effects.plant import Plant
@@ -95,3 +96,11 @@ def _shown(value: np.ndarray) -> str:
     if value.ndim == 1 and value.size > 1 and (value == value[0]).all():
         return f"{value[0]:g} each"
     return ", ".join(f"{x:g}" for x in value.flat)
+
+
+def parts_of_run(setup: Setup, values: Mapping[str, Any], number: int) -> tuple[Plant, Controller | None]:
+    """Plant and controller of the run of this number, with its values by name and its noise."""
+    plant, controller = setup.plant, setup.controller
+    if values:
+        plant, controller = with_parameters(plant, controller, values)
+    return plant, None if controller is None else controller.of_run(number)

@@ -8,17 +8,19 @@ import numpy as np
 
 from robot_dyn.codegen.parameters import parameters
 from robot_dyn.queries.units import of_joint, unit, units
-from robot_dyn.simulation.columns import LONG_NAMES, Column, Variable
+from robot_dyn.simulation.columns import Column, Variable
+from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.provenance import joint_types
+from robot_dyn.simulation.results.run_data import QUANTITIES
 from robot_dyn.simulation.results.samples import root_mean_squares
 from robot_dyn.simulation.rollouts.overview import texts_by_run
-from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 from robot_dyn.simulation.rollouts.sweepable import swept_parameter
 
 Types = Mapping[str, str | None]  # of joints, by name
 
 
-def columns(runs: Rollouts) -> Iterator[Column]:
+def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
     """A number for each run; the rms is over the samples up to its end, extremes are over its steps."""
     types = dict(zip(runs.joint_names, joint_types(runs), strict=True))
     yield Column("run", np.arange(len(runs)))
@@ -29,9 +31,9 @@ def columns(runs: Rollouts) -> Iterator[Column]:
     yield Column("ended", runs.ended, "s")
     yield Column("outcome", np.array([runs.outcome(i).ending.value for i in range(len(runs))]))
     yield Column("steps", runs.steps)
-    if runs.tracking_error is not None:
-        yield Column("tracking error", runs.tracking_error, _tracking_unit(runs, types))
-    yield from _of_remarks(runs)
+    if of.tracking_error is not None:
+        yield Column("tracking error", of.tracking_error, _tracking_unit(runs, types))
+    yield from _of_remarks(of.remarks, len(runs))
     for key in ("v", "u"):
         if (x := getattr(runs, key)) is not None:
             yield from _of_joints(f"rms {key}", root_mean_squares(x), key, types)
@@ -41,18 +43,17 @@ def columns(runs: Rollouts) -> Iterator[Column]:
                 yield from _of_joints(f"{which} {key}", runs.observed.extremes[:, row, side], key, types)
 
 
-def samples(runs: Rollouts) -> dict[str, Variable]:
+def samples(runs: RolloutsData) -> dict[str, Variable]:
     """What was recorded of the runs, over runs and sample times."""
-    kinds = joint_types(runs)
-    found: dict[str, Variable] = {"t": (("t",), runs.t, {"units": "s", "long_name": LONG_NAMES["t"]})}
-    for key in ("q", "v", "u"):
-        if (x := getattr(runs, key)) is not None:
-            found[key] = ("run", "t", "joint"), x, {"units": units(key, kinds), "long_name": LONG_NAMES[key]}
-    for key in ("kinetic", "potential"):
-        if (x := getattr(runs, key)) is not None:
-            found[key] = ("run", "t"), x, {"units": "J", "long_name": f"{key} energy"}
-    for name, x in (runs.work or {}).items():
-        found[f"work_{name}"] = ("run", "t"), x, {"units": "J", "long_name": f"work of {name}"}
+    kinds, found = joint_types(runs), dict[str, Variable]()
+    for key, row in QUANTITIES.items():
+        values = getattr(runs, key, None)
+        for name, x in values.items() if isinstance(values, dict) else (("", values),):
+            if x is not None:
+                over = ("t",) if key == "t" else ("run", "t", "joint")[: x.ndim]
+                about = {"units": units(row.unit, kinds) if row.of_joints else row.unit, "long_name": row.title}
+                about |= {"long_name": f"{row.title} of {name}"} if name else {}
+                found[f"{key}_{name}" if name else key] = over, x, about
     return found
 
 
@@ -61,18 +62,18 @@ def _of_joints(quantity: str, values: np.ndarray, like: str, types: Types) -> It
         yield Column(quantity, x, unit(like, kind), name)
 
 
-def _tracking_unit(runs: Rollouts, types: Types) -> str:
+def _tracking_unit(runs: RolloutsData, types: Types) -> str:
     return "m" if "frame" in runs.about else units("q", types.values())
 
 
-def _of_remarks(runs: Rollouts) -> Iterator[Column]:
+def _of_remarks(remarks: tuple[Remark, ...], count: int) -> Iterator[Column]:
     """How many remarks are about a run, and what they are about."""
-    texts = texts_by_run(runs.remarks, len(runs))
+    texts = texts_by_run(remarks, count)
     yield Column("number of remarks", np.array([text.count(";") + 1 if text else 0 for text in texts]))
     yield Column("remarks", np.array(texts))
 
 
-def _of_parameters(runs: Rollouts, types: Types) -> Iterator[Column]:
+def _of_parameters(runs: RolloutsData, types: Types) -> Iterator[Column]:
     """What was swept: by joint, where its setup is known and says that it is of joints; else numbered if of several."""
     setup = runs.setup
     known = (

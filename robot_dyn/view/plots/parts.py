@@ -15,7 +15,7 @@ import numpy as np
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
-from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.view.plots.figure import DESIRED, NEAR, Cell, Curve
 from robot_dyn.view.plots.sheet import Panel
 from robot_dyn.view.rests import Rest, rests
@@ -41,7 +41,7 @@ class View:
         width: Of the figure, in [mm].
     """
 
-    run: Trajectory
+    run: TrajectoryData
     joints: tuple[int, ...]
     types: tuple[str | None, ...]
     efforts: np.ndarray
@@ -237,7 +237,7 @@ def _growth(view: View, error: ErrorEstimate) -> Cell:
     return Cell("Estimated error |q − exact|", "t [s]", f"|q − exact| [{of_q}]", (curve,), log=True, until=until)
 
 
-def _marks(run: Trajectory, i: int) -> tuple[float, ...]:
+def _marks(run: TrajectoryData, i: int) -> tuple[float, ...]:
     return tuple(each.t for each in run.events if each.joint in ("", run.joint_names[i]))
 
 

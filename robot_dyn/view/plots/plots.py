@@ -16,8 +16,8 @@ from robot_dyn.foundations.errors import shown as text_of
 from robot_dyn.foundations.validate import choice, instance, number, shaped
 from robot_dyn.foundations.values import several
 from robot_dyn.simulation.observation.remarks import lines
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.results.run_data import TrajectoryData
+from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.view.plots.batch import BATCH_PLOTS, BatchView
 from robot_dyn.view.plots.figure import PAPER, THEMES, Style
@@ -37,7 +37,7 @@ STYLES = ("screen", "paper")
 
 
 def plot(
-    run: Trajectory | Rollouts,
+    run: TrajectoryData | RolloutsData,
     *names: str,
     only: Collection[str] | str | None = None,
     joints: Collection[str] | str | None = None,
@@ -72,8 +72,8 @@ def plot(
         QueryError: If a part, a joint, a style or a theme is unknown, or the limits or the width cannot be.
         PlotError: If the run has no samples, too many joints, or lacks what a requested part shows.
     """
-    instance("run", run, Trajectory | Rollouts, "give the trajectory of rd.simulate, or rollouts")
-    of_batch = isinstance(run, Rollouts)
+    instance("run", run, TrajectoryData | RolloutsData, "give the trajectory of rd.simulate, or rollouts")
+    of_batch = isinstance(run, RolloutsData)
     parts = [*names, *_names("only", only, "parts")]
     known = BATCH_PLOTS if of_batch else PLOTS
     for name in parts:
@@ -84,7 +84,7 @@ def plot(
     for name in shown:
         choice("joint", name, run.joint_names)
     look, width = _style(theme, style), _width(width_mm)
-    if isinstance(run, Rollouts):
+    if isinstance(run, RolloutsData):
         if limits is not None:
             raise QueryError("limits are of a run; plot(runs[0], limits=…)")
         return _of_batch(BatchView(run, _columns(run, shown), x, y, width), parts, look)
@@ -98,7 +98,9 @@ def plot(
         return draw(panels, _opening(run, look), look, width, run.outcome.ending is Ending.DIVERGED)
 
 
-def save_plot(run: Trajectory | Rollouts, path: str | Path, *names: str, dpi: float = 200, **options: Any) -> Path:
+def save_plot(
+    run: TrajectoryData | RolloutsData, path: str | Path, *names: str, dpi: float = 200, **options: Any
+) -> Path:
     """Write a figure of a run as PNG, SVG or PDF by the suffix of `path` (.png is added if it has none).
 
     Another picture of that format under that name is replaced; a file of another kind is not.
@@ -167,7 +169,7 @@ def _width(width_mm: float) -> float:
     return width
 
 
-def _opening(run: Trajectory, style: Style) -> list[tuple[str, str]]:
+def _opening(run: TrajectoryData, style: Style) -> list[tuple[str, str]]:
     """Lines above the panels: what it is and how it ended, and the remarks in colour."""
     end = run.outcome
     title = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
@@ -175,7 +177,7 @@ def _opening(run: Trajectory, style: Style) -> list[tuple[str, str]]:
     return [(text, ink) for text in (title, end.advice) if text] + [(text, orange) for text in lines(run.remarks)]
 
 
-def _columns(run: Trajectory | Rollouts, shown: Collection[str]) -> tuple[int, ...]:
+def _columns(run: TrajectoryData | RolloutsData, shown: Collection[str]) -> tuple[int, ...]:
     """Of the joints shown."""
     columns = tuple(i for i, name in enumerate(run.joint_names) if name in shown)
     if not 0 < len(columns) <= MOST_JOINTS:
@@ -184,7 +186,7 @@ def _columns(run: Trajectory | Rollouts, shown: Collection[str]) -> tuple[int, .
     return columns
 
 
-def _view(run: Trajectory, shown: Collection[str], limits: np.ndarray | None, width: float) -> View:
+def _view(run: TrajectoryData, shown: Collection[str], limits: np.ndarray | None, width: float) -> View:
     """Types of joints and limits by the URDF of the run; without one both units are named."""
     columns = _columns(run, shown)
     try:

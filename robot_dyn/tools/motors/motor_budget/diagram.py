@@ -31,10 +31,10 @@ def draw(result: MotorBudget, theme: str = "light") -> Figure:
     """
     if not 0 < len(result.joints) <= _MOST:
         raise ResultError(f"a budget of {len(result.joints)} joints cannot be drawn, up to {_MOST} can")
-    head = _HEAD + heading_room(_WIDE, result, theme)
+    head = _HEAD + heading_room(_WIDE, result.sentence, theme)
     rows, above = -(-len(result.joints) // _ACROSS), _ROW * len(result.joints) + 0.5
     height = head + above + _GAP + _CELL * rows + _FOOT
-    figure, colours = sheet(_WIDE, height, result, f"Limits: {result.limits}; {result.resolution}.", theme)
+    figure, colours = sheet(_WIDE, height, result.sentence, f"Limits: {result.limits}; {result.resolution}.", theme)
     top = 1 - head / height
     bars = figure.add_gridspec(1, 2, left=0.14, right=0.985, top=top, bottom=top - above / height, wspace=0.05)
     _used(figure.add_subplot(bars[0]), result, colours)

@@ -1,0 +1,189 @@
+"""The record of a run: one table of quantities, the fields that one run and many share, and those of one run.
+
+A quantity that is added stands in QUANTITIES and in the fields of `TrajectoryData`: files, tables, DataFrames, Datasets
+and exports have it from there. `derived.py` computes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType, NoneType
+from typing import Annotated, Any, final
+
+import numpy as np
+
+from robot_dyn.foundations.values import Derived, Layout, read_only
+from robot_dyn.simulation.columns import Column, Variable, by_heading, data_frame, data_set
+from robot_dyn.simulation.events.occurrence import Occurrence
+from robot_dyn.simulation.observation.remarks import Remark
+from robot_dyn.simulation.results.error_estimate import ErrorEstimate
+from robot_dyn.simulation.results.ledger import Ledger, leak
+from robot_dyn.simulation.results.samples import root_mean_square
+from robot_dyn.simulation.results.statistics import Accuracy, Statistics
+from robot_dyn.simulation.run.outcome import Outcome
+
+
+@final
+@dataclass(frozen=True)
+class Quantity(Layout):
+    """A quantity at the samples of a run; its layout is that of one run.
+
+    Attributes:
+        unit: In SI units, or "q", "v", "a" or "u" for the unit of the joint.
+        title: Its name in words.
+        heading: Of its columns in tables; empty if it has none.
+        over: Name of its second axis, where that is not of joints.
+    """
+
+    unit: str = ""
+    title: str = ""
+    heading: str = ""
+    over: str = ""
+
+    @property
+    def of_joints(self) -> bool:
+        """True if it has a number for every joint."""
+        return self.shape == _MN
+
+    @property
+    def of_runs(self) -> Layout:
+        """The layout of many runs."""
+        return Layout(("B", *self.shape), self.dtype)
+
+
+_M, _MN = ("m",), ("m", "n")
+QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
+    {
+        "t": Quantity(_M, unit="s", title="time", heading="t"),
+        "q": Quantity(_MN, unit="q", title="position", heading="q"),
+        "v": Quantity(_MN, unit="v", title="velocity", heading="v"),
+        "a": Quantity(_MN, absent=True, unit="a", title="acceleration", heading="a"),
+        "u": Quantity(_MN, absent=True, unit="u", title="actuation within its bounds", heading="u"),
+        "desired": Quantity(_MN, unit="q", title="desired position", heading="desired"),
+        "desired_velocity": Quantity(_MN, unit="v", title="desired velocity"),
+        "deviation": Quantity(
+            ("m", ("n", 3)), unit="m", title="deviation from the desired motion", heading="deviation", over="axis"
+        ),
+        "at_stop": Quantity(_MN, "bool", title="whether it is at or beyond a stop"),
+        "effect_torques": Quantity(_MN, absent=True, unit="u", title="torque of an effect"),
+        "power": Quantity(_M, absent=True, unit="W", heading="power", over="source"),
+        "kinetic": Quantity(_M, absent=True, unit="J", title="kinetic energy"),
+        "potential": Quantity(_M, absent=True, unit="J", title="potential energy"),
+        "work": Quantity(_M, absent=True, unit="J", title="work"),
+        "energy": Quantity(_M, unit="J", title="kinetic and potential energy", heading="energy"),
+        "residual": Quantity(_M, unit="J", title="energy that nothing accounts for", heading="residual"),
+        "controller_states": Quantity(("m", "z"), heading="controller state"),
+        "effect_states": Quantity(("m", None), heading="state"),
+    }
+)
+"""By name, in the order of tables; those without a unit have that of their effect."""
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class RunData(Derived):
+    """The record of a run at m samples, or of B runs, where all arrays except t have a leading axis B.
+
+    Attributes:
+        joint_names: Of the n joints.
+        t: Sample times, (m,), in [s].
+        q, v, u: Positions, velocities and actuation, (m, n) or (B, m, n); None if not recorded.
+        statistics: Steps, evaluations and times.
+        about: Texts that make it whole: URDF, edits, settings, versions.
+    """
+
+    joint_names: tuple[str, ...]
+    t: Annotated[np.ndarray, QUANTITIES["t"]]
+    q: np.ndarray | None
+    v: np.ndarray | None
+    u: np.ndarray | None
+    statistics: Statistics
+    about: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+    @property
+    def summary(self) -> str:
+        """A few lines: how it ended, its accuracy and its cost."""
+        raise NotImplementedError
+
+    def columns(self) -> Iterable[Column]:
+        """Return the columns of the table, with quantity, joint and unit."""
+        raise NotImplementedError
+
+    def _variables(self) -> Mapping[str, Variable]:
+        """Further variables of a Dataset."""
+        return {}
+
+    def table(self) -> dict[str, np.ndarray]:
+        """The table as columns by quantity, joint and unit, such as `run.table()["q elbow_joint [rad]"]`.
+
+        A run has a row for each sample. Rollouts have a row for each run: swept parameters, start, end,
+        tracking error, the remarks; the rms of v and u over the samples up to the end, as far as they were recorded
+        (`record=("q", "v", "u")` for u), and extremes of q, v and u over the steps, which need no record.
+        """
+        return by_heading(self.columns())
+
+    def to_pandas(self) -> Any:
+        """Return `table` as a `pandas.DataFrame`; MissingExtraError without pandas."""
+        return data_frame(self.columns(), attributes(self))
+
+    def to_xarray(self) -> Any:
+        """Return `table` as an `xarray.Dataset` over t or run, and joint, with units; MissingExtraError without xarray.
+
+        That of rollouts has all samples too, over run, t and joint.
+        """
+        return data_set(self.columns(), self.joint_names, attributes(self), self._variables())
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.summary}>"
+
+
+def attributes(run: RunData) -> dict[str, str]:
+    """Attributes of a table: robot, settings, versions, and the summary without its times.
+
+    They contain no path of this machine.
+    """
+    about = {name: run.about[name] for name in ("robot", "edits", "settings", "run", "versions") if name in run.about}
+    lines = [line for line in run.summary.splitlines() if not line.startswith("time: ")]
+    return {"title": "run of robot_dyn", "method": run.statistics.method} | about | {"summary": "\n".join(lines)}
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class TrajectoryData(RunData):
+    """The fields of one run, as `Trajectory` describes them."""
+
+    q: Annotated[np.ndarray, QUANTITIES["q"]]
+    v: Annotated[np.ndarray, QUANTITIES["v"]]
+    a: Annotated[np.ndarray, QUANTITIES["a"]]
+    u: Annotated[np.ndarray, QUANTITIES["u"]]
+    power: dict[str, Annotated[np.ndarray, QUANTITIES["power"]]]
+    ledger: Ledger
+    desired: Annotated[np.ndarray, QUANTITIES["desired"]] | None
+    deviation: Annotated[np.ndarray, QUANTITIES["deviation"]] | None
+    outcome: Outcome
+    error: ErrorEstimate | None = field(default_factory=NoneType)
+    wrenches: dict[str, Annotated[np.ndarray, Layout((None, 7))]] = field(default_factory=dict)
+    at_stop: Annotated[np.ndarray, QUANTITIES["at_stop"]] | None = field(default_factory=NoneType)
+    remarks: tuple[Remark, ...] = field(default_factory=tuple)
+    extremes: Annotated[np.ndarray, Layout((3, 2, "n"), finite=False)] | None = field(default_factory=NoneType)
+    acting: tuple[str, ...] | None = field(default_factory=NoneType)
+    controller_states: Annotated[np.ndarray, QUANTITIES["controller_states"]] | None = field(default_factory=NoneType)
+    events: tuple[Occurrence, ...] = field(default_factory=tuple)
+    effect_states: dict[str, Annotated[np.ndarray, QUANTITIES["effect_states"]]] = field(default_factory=dict)
+    accuracy: Accuracy | None = field(default_factory=NoneType)
+    effect_torques: dict[str, Annotated[np.ndarray, QUANTITIES["effect_torques"]]] | None = field(
+        default_factory=NoneType
+    )
+    desired_velocity: Annotated[np.ndarray, QUANTITIES["desired_velocity"]] | None = field(default_factory=NoneType)
+
+    @property
+    def tracking_error(self) -> float | None:
+        """Root mean square of the deviation over samples and joints or axes; None without a reference."""
+        return None if self.deviation is None else root_mean_square(self.deviation)
+
+    @property
+    def leak(self) -> str:
+        """Why the energy ledger casts doubt on the run; empty if it does not."""
+        return leak(self.ledger, self.error, self.q)

@@ -1,0 +1,80 @@
+"""Steps, evaluations and times of a run; a requested accuracy and its cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import final
+
+
+@final
+@dataclass(frozen=True)
+class Statistics:
+    """Steps, evaluations and times of a run.
+
+    Attributes:
+        method: Name of the integrator.
+        step_s: Its step, or 0 if it chose its own.
+        steps: Number of steps.
+        evaluations: Evaluations of the equation of motion, those of its Jacobian apart.
+        wall_s: Time of the run itself, in [s].
+        companions_s: Time of the error estimate.
+        engine: Which loop ran, and why if another was possible.
+        compile_s: Time before the run, for the choice of the loop and for compiling it.
+        samples_s: Time after it, for quantities at its samples that are not computed later.
+        companion_evaluations: Evaluations of the error estimate.
+        companion_runs: Companion runs of the error estimate.
+        user_code: Parts of the setup that are user-defined code, by name; each run calls them.
+    """
+
+    method: str
+    step_s: float
+    steps: int
+    evaluations: int
+    wall_s: float
+    companions_s: float = 0.0
+    engine: str = "interpreted"
+    compile_s: float = 0.0
+    samples_s: float = 0.0
+    companion_evaluations: int = 0
+    companion_runs: int = 0
+    user_code: str = ""
+
+
+@final
+@dataclass(frozen=True)
+class Accuracy:
+    """A requested accuracy, the estimated one, and the cost in evaluations of the equation of motion.
+
+    Attributes:
+        requested: Largest error of q over joints and times, in [rad] and [m].
+        estimated: The estimated one.
+        rtol: The tolerance that was chosen, atol a hundredth of it; 0 for a method of fixed step.
+        run: Of the run.
+        pilots: Of the runs before it, with their error estimates.
+        check: Of its own error estimate.
+        digit_more, digit_less: Of a run with an error ten times smaller, or larger, by the order of the method.
+    """
+
+    requested: float
+    estimated: float
+    rtol: float
+    run: int
+    pilots: int
+    check: int
+    digit_more: float
+    digit_less: float
+
+    @property
+    def margin(self) -> float:
+        """The requested over the estimated error: at least 2, or 1 where no tolerance brings more; inf for no error."""
+        return self.requested / self.estimated if self.estimated > 0 else inf
+
+    def __str__(self) -> str:
+        at = f" at rtol {self.rtol:.1e}" if self.rtol else ""
+        return (
+            f"requested {self.requested:.1e}, estimated {self.estimated:.1e}{at}, a margin of {self.margin:.1f};"
+            f" {self.run} evaluations,"
+            f" pilots {self.pilots}, check {self.check}; a digit more about {self.digit_more:.0f}, a digit less"
+            f" {self.digit_less:.0f}"
+        )

@@ -1,0 +1,97 @@
+"""The fields of rollouts: those of `RunData` with a leading axis of runs, and the start, parameters and end of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Annotated, final
+
+import numpy as np
+
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.validate import integer
+from robot_dyn.foundations.values import NOT_STORED, Layout, Value, read_only
+from robot_dyn.simulation.observation.observation import Observed
+from robot_dyn.simulation.observation.remarks import Remark
+from robot_dyn.simulation.results.run_data import QUANTITIES, RunData
+from robot_dyn.simulation.rollouts.sweepable import parts_of_run
+from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.setup.setup import Setup
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Overview(Value):
+    """The overview of a batch.
+
+    Attributes:
+        worst, remarks, tracking_error: As of `Rollouts`.
+    """
+
+    worst: int
+    remarks: tuple[Remark, ...]
+    tracking_error: Annotated[np.ndarray, Layout(("B",))] | None
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class RolloutsData(RunData):
+    """The fields of B runs, as `Rollouts` describes them."""
+
+    q: Annotated[np.ndarray, QUANTITIES["q"].of_runs] | None
+    v: Annotated[np.ndarray, QUANTITIES["v"].of_runs] | None
+    u: Annotated[np.ndarray, QUANTITIES["u"].of_runs] | None
+    kinetic: Annotated[np.ndarray, QUANTITIES["kinetic"].of_runs] | None
+    potential: Annotated[np.ndarray, QUANTITIES["potential"].of_runs] | None
+    work: dict[str, Annotated[np.ndarray, QUANTITIES["work"].of_runs]] | None
+    ended: Annotated[np.ndarray, Layout(("B",))]
+    diverged: Annotated[np.ndarray, Layout(("B",), "bool")]
+    stopped: Annotated[np.ndarray, Layout(("B",), "bool")]
+    advice: tuple[str, ...]
+    steps: Annotated[np.ndarray, Layout(("B",), "int64")]
+    evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
+    sources: tuple[str, ...]
+    params: dict[str, Annotated[np.ndarray, Layout(("B", None))]]
+    setup: Setup | None = field(default=None, metadata=NOT_STORED)
+    uncut: tuple[str, ...] = ()
+    q0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
+    v0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
+    observed: Observed | None = None
+    saved: Overview | None = None
+    numbers: np.ndarray | None = field(default=None, metadata=NOT_STORED)
+
+    def __len__(self) -> int:
+        return len(self.ended)
+
+    def outcome(self, run: int) -> Outcome:
+        """Return how a run ended; raises QueryError if no run has that number."""
+        run = integer("run", run, least=-len(self), most=len(self) - 1)
+        ended = float(self.ended[run])
+        if self.stopped[run]:
+            return Outcome(Ending.STOPPED, ended, "interrupted; all samples up to here are kept")
+        if not self.diverged[run]:
+            return Outcome(Ending.FINISHED, ended, self.advice[run])
+        return Outcome(Ending.DIVERGED, ended, self.advice[run])
+
+    def setup_of(self, run: int) -> Setup:
+        """Return the setup of a single run: `rd.simulate(runs.setup_of(17))` repeats the run with an error estimate.
+
+        Raises:
+            QueryError: If no run has that number, or the runs were read from a file.
+        """
+        setup = self.setup
+        if setup is None:
+            raise QueryError("runs that were read from a file have no setup; run rd.rollouts again, and use its result")
+        run = integer("run", run, least=-len(self), most=len(self) - 1) % len(self)
+        plant, controller = self.parts_of(setup, run)
+        q0 = setup.q0 if self.q0 is None else self.q0[run]
+        v0 = setup.v0 if self.v0 is None else self.v0[run]
+        return replace(setup, plant=plant, controller=controller, q0=q0, v0=v0, estimate_error=True)
+
+    def parts_of(self, setup: Setup, run: int) -> tuple[Plant, Controller | None]:
+        """Plant and controller of a run, with its parameters and noise."""
+        number = run if self.numbers is None else int(self.numbers[run])
+        return parts_of_run(setup, {name: x[run] for name, x in self.params.items()}, number)
