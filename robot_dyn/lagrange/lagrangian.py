@@ -38,7 +38,7 @@ from robot_dyn.foundations.spatial import (
 )
 from robot_dyn.foundations.validate import shaped
 from robot_dyn.lagrange.christoffel import jacobian_derivative
-from robot_dyn.lagrange.linkage import BASE, Configuration, Linkage, linkage
+from robot_dyn.lagrange.linkage import BASE, Configuration, Linkage, linkage_of
 from robot_dyn.lagrange.summand import (
     coriolis_matrix,
     gravity_torque,
@@ -47,7 +47,7 @@ from robot_dyn.lagrange.summand import (
     of_bodies,
     regressor,
 )
-from robot_dyn.lagrange.tree import Described, tree
+from robot_dyn.lagrange.tree import Described, tree_of
 from robot_dyn.queries.batch import answered
 from robot_dyn.queries.dynamics import Axes, Dynamics, acceleration, entry
 from robot_dyn.queries.quantity import ALL
@@ -83,7 +83,7 @@ class Lagrangian(Dynamics, Parametrised):
     @in_arithmetic
     def linkage(self) -> Linkage:
         """The tree in these numbers."""
-        return linkage(tree(self.robot.description, self.robot.edits), self.joint_names, self.arithmetic)
+        return linkage_of(tree_of(self.robot.description, self.robot.edits), self.joint_names, self.arithmetic)
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]

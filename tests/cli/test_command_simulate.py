@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.scene.starters import starter, starters
+from robot_dyn.scene.starters import starter, starter_names
 from tests.command import interrupted_at_work, refusal
 
 COMMAND = [sys.executable, "-c", "from robot_dyn.cli import main; main()"]
@@ -122,7 +122,7 @@ def test_explain_shows_the_equation(scene) -> None:
 
 def test_scene_prints_starters() -> None:
     listed = [line.split(maxsplit=1) for line in run("scene").stdout.splitlines()[1:]]
-    assert [name for name, _ in listed] == list(starters())
+    assert [name for name, _ in listed] == list(starter_names())
     assert all(starter(name).startswith(f"# {what}\n") for name, what in listed)
     assert run("scene", "pendulum").stdout == starter("pendulum")
     wrong = run("scene", "pendulun")

@@ -13,7 +13,7 @@ from robot_dyn.accuracy.costs.step_cost import parts
 from robot_dyn.foundations.errors import ControlError, QueryError
 from robot_dyn.simulation.compiled.build import compiled_equation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.remarks import Kind
+from robot_dyn.simulation.observation.remarks import RemarkKind
 from robot_dyn.simulation.results.error_estimate import Verdict
 from robot_dyn.simulation.setup.schedule import cuts
 from tests.long import long
@@ -268,7 +268,7 @@ def test_chatter_is_seen_where_a_torque_acts_late(late: float) -> None:
         for engine in ("interpreted", "compiled"):
             options = {"integrator": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
             made = rd.simulate(PLANT, Q0, V0, controller=loop, record_period_s=T, **options)  # type: ignore[arg-type]
-            assert Kind.CHATTER in {remark.kind for remark in made.remarks}
+            assert RemarkKind.CHATTER in {remark.kind for remark in made.remarks}
 
 
 def test_ticks_of_two_instants_a_period() -> None:

@@ -13,7 +13,7 @@ from robot_dyn.scene import control, effects, references, scene
 from robot_dyn.scene.effects import BY_KIND
 from robot_dyn.scene.manual import manual
 from robot_dyn.scene.schema import Part
-from robot_dyn.scene.starters import starter, starters
+from robot_dyn.scene.starters import starter, starter_names
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenes.md"
 PARTS = [
@@ -38,7 +38,7 @@ def test_every_key_is_explained(part: type[Part]) -> None:
 def test_every_kind_and_every_key_of_the_starters_is_on_the_page() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert all(f'### `kind = "{kind}"`' in page for kind in BY_KIND)
-    text = "\n".join(starter(name) for name in starters())
+    text = "\n".join(starter(name) for name in starter_names())
     stated = {line.partition("=")[0].strip() for line in text.splitlines() if "=" in line and line[0] not in "#["}
     assert stated and all(f"`{key}`" in page or key == "kind" for key in stated)
 

@@ -17,7 +17,7 @@ from robot_dyn.cli import terminal
 from robot_dyn.foundations.errors import RobotDynError, escaped
 from robot_dyn.scene.lines import line_of
 from robot_dyn.scene.scene import SceneError
-from robot_dyn.scene.starters import starter, starters
+from robot_dyn.scene.starters import starter, starter_names
 from tests.command import refusal
 
 BASE = 'robot = "cart_pole"\nduration_s = 1.0\n'
@@ -79,7 +79,7 @@ def test_a_mistake_is_told_as_people_count(tmp_path: Path, mistake: str) -> None
         assert voice not in told.lower(), told
 
 
-@pytest.mark.parametrize("name", starters())
+@pytest.mark.parametrize("name", starter_names())
 def test_the_line_of_a_key_is_that_which_states_it(name: str) -> None:
     text = starter(name)
     lines = text.splitlines()

@@ -23,7 +23,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.remarks import Kind
+from robot_dyn.simulation.observation.remarks import RemarkKind
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 
@@ -108,7 +108,7 @@ def at_once(setup: rd.Setup) -> Trajectory:
 def test_the_setups_leave_something_to_read() -> None:
     runs = {name: rd.simulate(setup) for name, setup in setups().items()}
     kinds = {remark.kind for run in runs.values() for remark in run.remarks}
-    assert kinds >= {Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.JUMPS}
+    assert kinds >= {RemarkKind.EFFORT_REACHED, RemarkKind.STOP_REACHED, RemarkKind.JUMPS}
     assert runs["steps too long"].ledger.cause and runs["pid, lag"].wrenches and runs["stops"].at_stop is not None
     assert all(runs[name].events for name in ("computed torque", "stops", "held", "payload"))
 

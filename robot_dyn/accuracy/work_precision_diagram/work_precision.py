@@ -32,7 +32,7 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.methods import METHODS, as_method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import format_duration, units
-from robot_dyn.report.environment import environment
+from robot_dyn.report.environment import processor_and_versions
 from robot_dyn.report.result import Result
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.compiled.engine_choice import choose
@@ -230,7 +230,7 @@ def work_precision(
     types = getattr(dynamics, "joint_types", (None,))
     return WorkPrecision(
         getattr(dynamics, "name", type(dynamics).__name__), acting(setup), units("q", types), requested, exact, ladders,
-        tuple(left_out), environment(), budget.seconds, budget.spent, interrupted, later,
+        tuple(left_out), processor_and_versions(), budget.seconds, budget.spent, interrupted, later,
     )  # fmt: skip
 
 

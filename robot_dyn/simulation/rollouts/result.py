@@ -16,7 +16,7 @@ from robot_dyn.foundations.values import NOT_STORED, Layout, Value, read_only
 from robot_dyn.simulation.columns import attributes, by_heading, data_frame, data_set
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
-from robot_dyn.simulation.observation.remarks import lines as lines_of
+from robot_dyn.simulation.observation.remarks import remark_lines as lines_of
 from robot_dyn.simulation.results.provenance import about_the_robot
 from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Statistics, Trajectory

@@ -15,13 +15,13 @@ from robot_dyn.cli.app import Force, Json, PackageDir, Xacro, app, progress
 from robot_dyn.cli.terminal import say, say_json, to_stderr
 from robot_dyn.description.packages import package_folders
 from robot_dyn.foundations.errors import QueryError, RobotDynError
-from robot_dyn.foundations.files import Kind, save
+from robot_dyn.foundations.files import FileKind, save
 
 if TYPE_CHECKING:
     from robot_dyn.tools.doctor.checkup import Checkup
     from robot_dyn.tools.doctor.finding import Finding
 
-_URDF = Kind("a URDF", ".urdf", b"<?xml")
+_URDF = FileKind("a URDF", ".urdf", b"<?xml")
 
 
 class RepairError(RobotDynError):

@@ -25,9 +25,9 @@ from robot_dyn.effects.spring import Spring
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import ProofError
-from robot_dyn.lagrange.linkage import Linkage, linkage
+from robot_dyn.lagrange.linkage import Linkage, linkage_of
 from robot_dyn.lagrange.recursions.newton_euler import newton_euler
-from robot_dyn.lagrange.tree import tree
+from robot_dyn.lagrange.tree import tree_of
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.tools.proof.term import Literals
@@ -95,8 +95,8 @@ class Bodies:
     @cached_property
     def linkage(self) -> Linkage:
         """An equivalent linkage with other frames and fewer parameters, but the same M, C and N."""
-        known = tree(self.robot.description, self.robot.edits)
-        return regrouped(slid(linkage(known, self.robot.joint_names, self.arithmetic)))
+        known = tree_of(self.robot.description, self.robot.edits)
+        return regrouped(slid(linkage_of(known, self.robot.joint_names, self.arithmetic)))
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
         """M a + C v + N, (n,)."""

@@ -23,7 +23,7 @@ from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.quantity import CORIOLIS_TORQUE, N
 from robot_dyn.report.time_budget import Budget
-from robot_dyn.simulation.observation.remarks import Kind
+from robot_dyn.simulation.observation.remarks import RemarkKind
 from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.simulate import simulate
 from robot_dyn.tools.stress.confirm import BEYOND, WITHIN
@@ -166,7 +166,7 @@ def _holds(loaded: Robot, q: np.ndarray, setup: Setup | None, budget: Budget) ->
         run = simulate(setup, on_progress=budget.check)
     except RobotDynError as error:
         return part < 1, f"{said}; not run: {error}"
-    reached = any(each.kind is Kind.EFFORT_REACHED for each in run.remarks)
+    reached = any(each.kind is RemarkKind.EFFORT_REACHED for each in run.remarks)
     off = float(np.abs(run.q[-1] - q).max())
     holds = part < 1 and not reached
     sags = part > 1 and reached

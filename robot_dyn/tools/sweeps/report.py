@@ -12,7 +12,7 @@ import numpy as np
 from robot_dyn.foundations.answer import html_of
 from robot_dyn.foundations.display import page, side_by_side, table, text
 from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.files import Kind, save, target
+from robot_dyn.foundations.files import FileKind, save, target
 from robot_dyn.report.figure import PAGE, ink, inline, styled
 from robot_dyn.tools.sweeps.export import inputs_of
 from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading, is_scene
@@ -20,7 +20,7 @@ from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading, is_scene
 if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.result import SweepResult
 
-_KIND = Kind("a page", ".html", b"<!doctype html>")
+_KIND = FileKind("a page", ".html", b"<!doctype html>")
 _BINS, _CELLS, _MOST_CROSSES = 60, 24, 500
 _WORST = 10
 _PROBABILITIES = (0.05, 0.5, 0.95, 0.99)

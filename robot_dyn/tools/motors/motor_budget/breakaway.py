@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.effects.causes import Causes, causes
+from robot_dyn.effects.causes import Causes, torques_by_cause
 from robot_dyn.effects.effect import numbered
 from robot_dyn.effects.plant import Plant
 from robot_dyn.effects.set_valued import SetValued
@@ -46,7 +46,7 @@ def breakaway(cells: Cells, plant: Plant) -> Breakaway:
     largest = cells.largest_speed
     starts = (np.abs(start) <= _RESTS * largest) & (np.abs(middle) > _RESTS * largest) & (friction > 0)
     cell, joint = np.nonzero(starts)
-    split = causes(plant, *cells.states(cell, np.full(len(cell), -1.0)))
+    split = torques_by_cause(plant, *cells.states(cell, np.full(len(cell), -1.0)))
     row = np.arange(len(cell))
     without = split.tau[row, joint] - _sliding(split, plant)[row, joint]
     return Breakaway(joint, split.t, without + friction[joint] * np.sign(middle[cell, joint]))

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.control.extremes import extremes
+from robot_dyn.control.extremes import extreme_values
 from robot_dyn.control.plan import Plan
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.foundations.errors import PlanError
@@ -86,7 +86,7 @@ def point_to_point(
 
 def check_positions(arm: Robot, reference: PiecewisePolynomial) -> None:
     """Raise PlanError, with joint, time and value, if a motion leaves the position limits."""
-    found = extremes(reference)
+    found = extreme_values(reference)
     for low, bounds, values, times in (
         (True, arm.lower, found.least, found.at_least),
         (False, arm.upper, found.greatest, found.at_greatest),

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.control.extremes import extremes
+from robot_dyn.control.extremes import extreme_values
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.actuator import EffortLimit
 from robot_dyn.effects.carried_payload import CarriedPayload
@@ -45,7 +45,7 @@ def check_effects(plant: Plant) -> None:
 def check_positions(plant: Plant, path: PiecewisePolynomial) -> None:
     """Refuse a path that leaves the joint limits or passes rigid stops."""
     robot: Any = plant.dynamics
-    found = extremes(path)
+    found = extreme_values(path)
     stops = [(each.lower, each.upper) for each in plant.effects if isinstance(each, RigidStops)]
     for lower, upper in ((getattr(robot, "lower", -np.inf), getattr(robot, "upper", np.inf)), *stops):
         lower, upper = np.broadcast_to(lower, robot.n), np.broadcast_to(upper, robot.n)
