@@ -114,7 +114,7 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant) -> Demand:
 
 
 def torques(cells: Cells, plant: Plant, cell: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Torque and velocity at places of cells, (k, n) each; the torque is that of `torques_by_cause`, without its parts."""
+    """Torque and velocity at places of cells, (k, n) each: the torque of `torques_by_cause`, without its parts."""
     t, q, v, a = cells.states(cell, x)
     acts = plant.forces or plant.equation_of_motion.payloads
     exerted = exerted_torques(plant, t, q, v, a).values() if acts else ()
