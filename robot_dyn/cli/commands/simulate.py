@@ -10,7 +10,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Force, Json, Scene, app, bar
+from robot_dyn.cli.application import Force, Json, Scene, app, bar
 from robot_dyn.cli.terminal import put, say, say_json, to_stderr
 from robot_dyn.foundations.answer import Table
 

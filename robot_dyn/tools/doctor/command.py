@@ -11,7 +11,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Force, Json, PackageDir, Xacro, app, progress
+from robot_dyn.cli.application import Force, Json, PackageDir, Xacro, app, progress
 from robot_dyn.cli.terminal import say, say_json, to_stderr
 from robot_dyn.description.packages import package_folders
 from robot_dyn.foundations.errors import QueryError, RobotDynError

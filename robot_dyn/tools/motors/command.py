@@ -8,7 +8,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Csv, Dark, Force, Json, Plot, app, bar
+from robot_dyn.cli.application import Csv, Dark, Force, Json, Plot, app, bar
 from robot_dyn.cli.outcome import give, outputs
 from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 from robot_dyn.foundations.errors import QueryError

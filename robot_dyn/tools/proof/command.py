@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli.app import Json, Scene, app, bar
+from robot_dyn.cli.application import Json, Scene, app, bar
 from robot_dyn.cli.terminal import say, say_json
 
 

@@ -9,7 +9,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Force, Json, Name, app, bar
+from robot_dyn.cli.application import Force, Json, Name, app, bar
 from robot_dyn.cli.outcome import give
 from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from robot_dyn.cli.app import Force, Json, app, bar
+from robot_dyn.cli.application import Force, Json, app, bar
 from robot_dyn.cli.terminal import say, say_json, to_stderr
 from robot_dyn.foundations.errors import SweepError, nearest
 
