@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robot_dyn.foundations.errors import escaped
-from robot_dyn.queries.units import units
+from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.observation.remarks import remark_lines as lines_of
 from robot_dyn.simulation.results.ledger import largest
@@ -24,7 +24,7 @@ _NOTICED = 0.01  # [s]: shorter times are left out
 
 def summary(run: Trajectory) -> str:
     """A few lines: outcome, what acted, ledger, error, tracking, cost."""
-    s, ledger, unit = run.statistics, run.ledger, units("q", joint_types(run))
+    s, ledger, unit = run.statistics, run.ledger, joint_units("q", joint_types(run))
     opening = f"{run.outcome.ending} at t = {run.outcome.t:g} s, {len(run.t)} samples"
     part = f"{ledger.closure:.1e} of the energy exchanged" if ledger.exchanges else "no energy exchanged"
     residual = f"residual {largest(np.abs(ledger.residual)):.2e} J, {part}"
@@ -63,7 +63,7 @@ def summary(run: Trajectory) -> str:
 
 def of_tracking(run: Trajectory | Rollouts, of_frame: bool) -> str:
     """What a tracking error is of, with its unit."""
-    what = "the frame [m]" if of_frame else f"q [{units('q', joint_types(run))}]"
+    what = "the frame [m]" if of_frame else f"q [{joint_units('q', joint_types(run))}]"
     return f"tracking error of {what}"
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from robot_dyn.codegen.parameters import parameters
-from robot_dyn.queries.units import of_joint, unit, units
+from robot_dyn.queries.units import joint_units, of_joint, unit
 from robot_dyn.simulation.columns import LONG_NAMES, Column, Variable
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_squares
@@ -47,7 +47,7 @@ def samples(runs: Rollouts) -> dict[str, Variable]:
     found: dict[str, Variable] = {"t": (("t",), runs.t, {"units": "s", "long_name": LONG_NAMES["t"]})}
     for key in ("q", "v", "u"):
         if (x := getattr(runs, key)) is not None:
-            found[key] = ("run", "t", "joint"), x, {"units": units(key, kinds), "long_name": LONG_NAMES[key]}
+            found[key] = ("run", "t", "joint"), x, {"units": joint_units(key, kinds), "long_name": LONG_NAMES[key]}
     for key in ("kinetic", "potential"):
         if (x := getattr(runs, key)) is not None:
             found[key] = ("run", "t"), x, {"units": "J", "long_name": f"{key} energy"}
@@ -62,7 +62,7 @@ def _of_joints(quantity: str, values: np.ndarray, like: str, types: Types) -> It
 
 
 def _tracking_unit(runs: Rollouts, types: Types) -> str:
-    return "m" if "frame" in runs.about else units("q", types.values())
+    return "m" if "frame" in runs.about else joint_units("q", types.values())
 
 
 def _of_remarks(runs: Rollouts) -> Iterator[Column]:

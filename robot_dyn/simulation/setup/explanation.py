@@ -10,7 +10,7 @@ from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.loop import SIGNALS, Loop
 from robot_dyn.control.reference import Reference
 from robot_dyn.effects.explanation import Explanation, as_they_act, edit_terms, explanation
-from robot_dyn.queries.units import units
+from robot_dyn.queries.units import joint_units
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.setup.setup import Setup
@@ -112,4 +112,4 @@ def _method(setup: Setup) -> Iterator[str]:
     types = getattr(setup.plant.dynamics, "joint_types", (None,) * len(setup.q0))
     for key, values in (("q", setup.q0), ("v", setup.v0)):
         numbers = ", ".join(f"{x:.6g}" for x in values) if values.any() else "0"
-        yield f"  {key} = {numbers} {units(key, types)}"
+        yield f"  {key} = {numbers} {joint_units(key, types)}"

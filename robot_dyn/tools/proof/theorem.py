@@ -16,7 +16,7 @@ from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.foundations.validate import number, numbers
 from robot_dyn.foundations.values import Value
-from robot_dyn.queries.units import units
+from robot_dyn.queries.units import joint_units
 from robot_dyn.tools.proof.hypotheses import numbers_of
 from robot_dyn.tools.proof.node import Node, Packed, on_the_way, unpacked
 
@@ -171,7 +171,7 @@ class Proof(Answer, Value):
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.robot}: " + self._claim
-        heading = ("joint", *(f"{name} [{units(name, self.joint_types)}]" for name in "qv"))
+        heading = ("joint", *(f"{name} [{joint_units(name, self.joint_types)}]" for name in "qv"))
         yield Table(heading, tuple(zip(self.joint_names, self.q, self.v, strict=True)), right=heading[1:])
         if self.why_not:
             yield f"Not proven beyond t = {self.until_s!r} s, because {self.why_not}."
