@@ -39,6 +39,10 @@ def _is_command() -> bool:
 if _is_command() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, _end)  # until main() has imported more
 
+from robot_dyn.foundations.public import public_names  # noqa: E402
+
+__getattr__, __dir__, _ = public_names(__spec__)
+
 
 def main() -> None:
     """Entry point: run the command; report errors in one line."""

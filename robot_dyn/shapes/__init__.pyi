@@ -1,0 +1,8 @@
+# What this folder offers to tools and tests, and where it lives; modules of the core import each other instead.
+from robot_dyn.shapes import surface as surface
+from robot_dyn.shapes.estimate import Estimate as Estimate
+from robot_dyn.shapes.estimate import estimates as estimates
+from robot_dyn.shapes.estimate import shapes_of_lacking as shapes_of_lacking
+from robot_dyn.shapes.masses import Masses as Masses
+from robot_dyn.shapes.mesh_files import MeshError as MeshError
+from robot_dyn.shapes.triangles import Mesh as Mesh
