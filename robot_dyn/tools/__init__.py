@@ -10,6 +10,6 @@ No other folder of the package imports a tool, and no tool imports another. Thei
 points (`robot_dyn.commands`, `robot_dyn.scene_tables` in pyproject.toml), imported when they are used.
 """
 
-from robot_dyn.foundations.public import public_names
+from robot_dyn.foundations import public_names
 
 __getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -11,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from robot_dyn.description.inertia import implausibility
-from robot_dyn.description.structure import Structure, structure_of
+from robot_dyn import Robot
+from robot_dyn.description import Structure, implausibility, structure_of
 from robot_dyn.model import findings as doctor
-from robot_dyn.model.robot import Robot
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Finding, Severity
 

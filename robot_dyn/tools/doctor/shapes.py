@@ -15,15 +15,13 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.description.inertia import MassProperties, combined
-from robot_dyn.description.structure import StatedLink, structure_of
-from robot_dyn.model.robot import Robot
-from robot_dyn.shapes import surface
-from robot_dyn.shapes.mesh_files import MeshError
+from robot_dyn import Robot
+from robot_dyn.description import MassProperties, StatedLink, combined, structure_of
+from robot_dyn.shapes import MeshError, surface
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 from robot_dyn.tools.doctor.literals import NUMBERS
-from robot_dyn.view.geometry.visuals import Piece, solids
+from robot_dyn.view import Piece, solids
 
 _SLACK = 1.1  # of a shape's extent: collision shapes leave out screws
 _LIGHT, _HEAVY = 2.0, 1.2e4  # [kg/m³] of a link and its convex hull: below foam, above lead

@@ -10,9 +10,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.extras import needs
-from robot_dyn.foundations.files import FileKind, file_path, save, table_cell, target
+from robot_dyn.foundations import FileKind, SweepError, file_path, needs, save, table_cell, target
 from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
 from robot_dyn.tools.sweeps.folder.rows import TEXTS
 from robot_dyn.tools.sweeps.plan.specification import specification

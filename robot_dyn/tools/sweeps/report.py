@@ -9,11 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.foundations.answer import html_of
-from robot_dyn.foundations.display import page, side_by_side, table, text
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.files import FileKind, save, target
-from robot_dyn.report.figure import PAGE, ink, inline, styled
+from robot_dyn.foundations import FileKind, SweepError, html_of, page, save, side_by_side, table, target, text
+from robot_dyn.report import PAGE, ink, inline, styled
 from robot_dyn.tools.sweeps.export import inputs_of
 from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading, is_scene
 
@@ -146,7 +143,7 @@ def _edges(x: np.ndarray) -> np.ndarray:
 
 
 def _figure(width: float, height: float) -> tuple[Any, Any]:
-    from robot_dyn.view.plots.shown import Figure
+    from robot_dyn.view import Figure
 
     figure = Figure(figsize=(width, height), facecolor=PAGE["paper"])
     return figure, figure.add_subplot()

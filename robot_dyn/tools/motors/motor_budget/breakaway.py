@@ -12,10 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.effects.causes import Causes, torques_by_cause
-from robot_dyn.effects.effect import numbered
-from robot_dyn.effects.plant import Plant
-from robot_dyn.effects.set_valued import SetValued
+from robot_dyn import Plant
+from robot_dyn.effects import Causes, SetValued, numbered, torques_by_cause
 from robot_dyn.tools.motors.motor_budget.cells import Cells
 
 _RESTS = 1e-9  # of the largest velocity of a joint

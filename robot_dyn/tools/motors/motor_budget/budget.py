@@ -10,20 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.control.extremes import extreme_values
-from robot_dyn.control.plan import Plan
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.actuator import EffortLimit
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.errors import PlanError, QueryError, shown
-from robot_dyn.foundations.validate import instance
-from robot_dyn.model.robot import Robot
-from robot_dyn.queries.units import of_joint
-from robot_dyn.report.environment import processor_and_versions
-from robot_dyn.simulation.observation.remarks import RemarkKind, remark_lines
-from robot_dyn.simulation.results.provenance import robot_of
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn import Plant, Robot, Trajectory
+from robot_dyn.control import PiecewisePolynomial, Plan, extreme_values
+from robot_dyn.effects import EffortLimit
+from robot_dyn.foundations import PlanError, QueryError, instance, shown
+from robot_dyn.queries import of_joint
+from robot_dyn.report import processor_and_versions
+from robot_dyn.simulation import Ending, RemarkKind, remark_lines, robot_of
 from robot_dyn.tools.motors.limits import Limits, limits_of, same_rotor
 from robot_dyn.tools.motors.motor_budget.breakaway import breakaway, static_friction
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, of_run

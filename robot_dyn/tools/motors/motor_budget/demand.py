@@ -12,14 +12,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.control.extremes import extreme_values
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.causes import Causes, exerted_torques, torques_by_cause
-from robot_dyn.effects.effect import Stateful
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.errors import EffectError, QueryError
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn import Plant, Trajectory
+from robot_dyn.control import PiecewisePolynomial, extreme_values
+from robot_dyn.effects import Causes, Stateful, exerted_torques, torques_by_cause
+from robot_dyn.foundations import EffectError, QueryError
+from robot_dyn.simulation import Ending
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, Cells, X, cells
 
 _PEAKS = 4  # local maxima of a quantity that are refined

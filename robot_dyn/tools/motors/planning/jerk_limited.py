@@ -12,14 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.control.extremes import extreme_values
-from robot_dyn.control.plan import Plan
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.foundations.errors import PlanError
-from robot_dyn.foundations.extras import needs
-from robot_dyn.foundations.validate import instance, number, numbers, one_state
-from robot_dyn.model.robot import Robot
-from robot_dyn.queries.units import of_joint
+from robot_dyn import Robot
+from robot_dyn.control import PiecewisePolynomial, Plan, extreme_values
+from robot_dyn.foundations import PlanError, instance, needs, number, numbers, one_state
+from robot_dyn.queries import of_joint
 
 _SAME = 1e-12  # of the duration: breaks of two joints that differ by their rounding
 _BEYOND = 1e-9  # of a position limit [rad, m] that rounding may pass

@@ -6,14 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.control.extremes import extreme_values
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.actuator import EffortLimit
-from robot_dyn.effects.carried_payload import CarriedPayload
-from robot_dyn.effects.effect import Bound, Force, Stateful
-from robot_dyn.effects.plant import Plant
-from robot_dyn.effects.rigid_stops import RigidStops
-from robot_dyn.foundations.errors import PlanError
+from robot_dyn import Plant
+from robot_dyn.control import PiecewisePolynomial, extreme_values
+from robot_dyn.effects import Bound, CarriedPayload, EffortLimit, Force, RigidStops, Stateful
+from robot_dyn.foundations import PlanError
 from robot_dyn.tools.motors.limits import Limits
 
 _TIMES = 0.1234, 7.891  # at which torques must be the same

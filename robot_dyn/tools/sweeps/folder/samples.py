@@ -14,10 +14,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.extras import needs
-from robot_dyn.queries.units import joint_units
-from robot_dyn.simulation.columns import LONG_NAMES
+from robot_dyn.foundations import SweepError, needs
+from robot_dyn.queries import joint_units
+from robot_dyn.simulation import LONG_NAMES
 from robot_dyn.tools.sweeps.folder.files import Files, make_folder, write
 
 _INNER = 64  # runs that are read together, where all are kept

@@ -15,12 +15,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from robot_dyn.control.cartesian import CartesianReference
-from robot_dyn.foundations.errors import SweepError, nearest, shown
-from robot_dyn.foundations.validate import choice
-from robot_dyn.foundations.values import Value
-from robot_dyn.queries.units import joint_types_of, joint_units
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn import Setup
+from robot_dyn.control import CartesianReference
+from robot_dyn.foundations import SweepError, Value, choice, nearest, shown
+from robot_dyn.queries import joint_types_of, joint_units
 from robot_dyn.tools.sweeps.imported import digest_of, imported, path_of
 from robot_dyn.tools.sweeps.plan.runs import Runs
 
