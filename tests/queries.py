@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.queries.quantity import EQUATION, FRAMES
+from robot_dyn.queries import EQUATION, FRAMES
 
 ARGUMENTS = {quantity.name: quantity.arguments for quantity in (EQUATION | FRAMES).values()}
 FRAMED = tuple(FRAMES)

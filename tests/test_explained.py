@@ -14,7 +14,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.codegen.dynamics import CompiledDynamics
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 
 ENGINES = (rd.Robot, rd.Lagrangian, CompiledDynamics)
 

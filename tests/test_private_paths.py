@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.results.provenance import packed, robot_of
+from robot_dyn.simulation import robot_of
+from robot_dyn.simulation.results.provenance import packed
 from robot_dyn.view.document import document
 from tests.drawings import mesh_visual, stl, urdf
 

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from robot_dyn.lagrange.lagrangian import Lagrangian
+from robot_dyn import Lagrangian
 from tests.command import MAIN, ROOT, document, refusal, run, said, spawn
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.queries.units import without_rounding
+from robot_dyn.queries import without_rounding
 from tests.command import ROOT, document, refusal, run, said
 
 Q, V, A = "-0.1,0.7,-0.4,0.3,0.9,-0.6", "0.2,-0.3,0.4,0.5,-0.6,0.7", "1.1,-1.2,1.3,0.4,0.5,-0.6"

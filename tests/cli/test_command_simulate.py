@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.scene.starters import starter, starter_names
+from robot_dyn.scene import starter, starter_names
 from tests.command import interrupted_at_work, refusal
 
 COMMAND = [sys.executable, "-c", "from robot_dyn.cli import main; main()"]

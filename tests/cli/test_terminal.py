@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
-from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation import Ending, Outcome, Remark, RemarkKind
 from tests.command import run
 
 HOSTILE = "a\nrobot-dyn: all is well\x1b[2J\r\u202e"

@@ -18,10 +18,9 @@ from robot_dyn.codegen.engine import SizeWarning
 from robot_dyn.codegen.kernel import Kernel
 from robot_dyn.codegen.self_check import SelfCheckError
 from robot_dyn.codegen.trace.trace import Trace
-from robot_dyn.foundations.errors import OverflowedError, QueryError, SingularError
-from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.scale import floored
-from robot_dyn.queries.quantity import EQUATION
+from robot_dyn.foundations import OverflowedError, QueryError, SingularError
+from robot_dyn.lagrange import floored, magnitudes
+from robot_dyn.queries import EQUATION
 from tests.codegen.arms import ARMS, compiled, states
 from tests.random_trees import RandomTree, trees
 

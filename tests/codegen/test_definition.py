@@ -15,10 +15,10 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.codegen.store.definition import definition
 from robot_dyn.foundations.values import LRUByIdentity
+from robot_dyn.simulation import StateEquation
 from robot_dyn.simulation.compiled import build, programs
 from robot_dyn.simulation.compiled.build import compiled_equation
 from robot_dyn.simulation.compiled.structure import structure
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from tests.codegen.test_kernel import Memory
 
 ARM = rd.load("planar_2r")

@@ -11,7 +11,7 @@ import pytest
 from robot_dyn.codegen import primitives as loops
 from robot_dyn.codegen.loops.call import MachineFunction
 from robot_dyn.codegen.primitives import INSTEAD
-from robot_dyn.foundations.errors import MachineCodeError
+from robot_dyn.foundations import MachineCodeError
 from robot_dyn.integrate import primitives
 from robot_dyn.integrate.primitives import GOING
 

@@ -17,7 +17,7 @@ from robot_dyn.codegen.loops.expressions import EXPRESSIONS
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.loops.statements import STATEMENTS
 from robot_dyn.codegen.primitives import INSTEAD
-from robot_dyn.foundations.errors import MachineCodeError
+from robot_dyn.foundations import MachineCodeError
 from tests.long import long
 
 

@@ -15,8 +15,8 @@ from robot_dyn.codegen import waiting
 from robot_dyn.codegen.loops.call import MachineFunction
 from robot_dyn.codegen.primitives import INSTEAD
 from robot_dyn.codegen.waiting import announced
+from robot_dyn.simulation import StateEquation
 from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
 
 class Screen(io.StringIO):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import polynomial
 
-from robot_dyn.control.extremes import extreme_values
-from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.control import PiecewisePolynomial, extreme_values
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EffectError, ModelWarning
-from robot_dyn.scene.scene import SceneError
+from robot_dyn import ModelWarning
+from robot_dyn.foundations import EffectError, SceneError
 from tests.hostile.kinds import BODY, LIMIT, MOMENTS, POINT, inside, joint
 from tests.hostile.kinds import arm as altered
 

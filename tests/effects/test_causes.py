@@ -8,8 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn.effects.causes import torques_by_cause
-from robot_dyn.foundations.errors import EffectError, QueryError
+from robot_dyn.effects import torques_by_cause
+from robot_dyn.foundations import EffectError, QueryError
 from tests.random_trees import RandomTree, trees
 
 BODY = rd.Payload("tool0", 5.0, (0.1, 0.0, 0.2))

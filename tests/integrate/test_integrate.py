@@ -13,14 +13,21 @@ import pytest
 from flint import arb
 
 import robot_dyn as rd
-from robot_dyn.foundations.arithmetic import Ball
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.integrate.explicit import RK4, ExplicitRungeKutta
-from robot_dyn.integrate.gauss import Gauss
-from robot_dyn.integrate.integrator import Integrator, System, arithmetic_like
-from robot_dyn.integrate.methods import FIXED_STEP, METHODS, method
-from robot_dyn.integrate.tableau import ButcherTableau, Surd
-from robot_dyn.scene.scene import parse_scene
+from robot_dyn.foundations import Ball, QueryError
+from robot_dyn.integrate import (
+    FIXED_STEP,
+    METHODS,
+    ButcherTableau,
+    ExplicitRungeKutta,
+    Gauss,
+    Integrator,
+    Surd,
+    System,
+    method,
+)
+from robot_dyn.integrate.explicit import RK4
+from robot_dyn.integrate.integrator import arithmetic_like
+from robot_dyn.scene import parse_scene
 
 ALL = [method(name) for name in FIXED_STEP]
 STIFF = [each for each in ALL if each.stiff]

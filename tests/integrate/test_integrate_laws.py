@@ -8,15 +8,11 @@ import numpy as np
 import pytest
 from flint import arb
 
-from robot_dyn.foundations.arithmetic import Ball
-from robot_dyn.foundations.errors import OverflowedError, RobotDynError
+from robot_dyn import RobotDynError
+from robot_dyn.foundations import Ball, OverflowedError
+from robot_dyn.integrate import Gauss, IntegrationError, Integrator, Rosenbrock, RosenbrockTable, System, method
 from robot_dyn.integrate.explicit import EXPLICIT_EULER
 from robot_dyn.integrate.fixed_point import MOST_ITERATIONS
-from robot_dyn.integrate.gauss import Gauss
-from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
-from robot_dyn.integrate.methods import method
-from robot_dyn.integrate.rosenbrock import Rosenbrock
-from robot_dyn.integrate.rosenbrock_table import RosenbrockTable
 from tests.integrate.test_integrate import ALL, OSCILLATOR, PENDULUM, RNG, STIFF, name_of, oscillator, pendulum
 from tests.long import long
 

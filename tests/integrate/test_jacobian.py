@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.integrate.integrator import System
+from robot_dyn.integrate import System
+from robot_dyn.simulation import StateEquation
 from robot_dyn.simulation.compiled import build
 from robot_dyn.simulation.compiled.self_check import MachineError, check, jacobian_error
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.segment_table import segment_table
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52

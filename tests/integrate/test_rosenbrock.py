@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.arithmetic import FLOAT64
-from robot_dyn.integrate.integrator import IntegrationError, System
+from robot_dyn.foundations import FLOAT64
+from robot_dyn.integrate import IntegrationError, System
 from robot_dyn.integrate.primitives import factor, solve
 from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
+from robot_dyn.simulation import StateEquation
 from robot_dyn.simulation.compiled import build
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.segment_table import segment_table
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52

@@ -10,8 +10,8 @@ import pytest
 from lxml import html
 
 import robot_dyn as rd
-from robot_dyn.report.result import Result
-from robot_dyn.scene.starters import starter, starter_names
+from robot_dyn.report import Result
+from robot_dyn.scene import starter, starter_names
 from tests.command import document, said
 
 

@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import SceneError
-from robot_dyn.scene.effects import BY_KIND
-from robot_dyn.scene.explain import of_scene
-from robot_dyn.scene.scene import parse_scene, read_both
-from robot_dyn.scene.starters import starter, starter_names
+from robot_dyn.foundations import SceneError
+from robot_dyn.scene import BY_KIND, of_scene, parse_scene, read_both, starter, starter_names
 from tests.long import long
 
 SCENE = """

@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import SceneError
-from robot_dyn.scene import control, effects, references, scene
-from robot_dyn.scene.effects import BY_KIND
+from robot_dyn.foundations import SceneError
+from robot_dyn.scene import BY_KIND, Part, control, effects, references, scene, starter, starter_names
 from robot_dyn.scene.manual import manual
-from robot_dyn.scene.schema import Part
-from robot_dyn.scene.starters import starter, starter_names
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenes.md"
 PARTS = [

@@ -13,11 +13,11 @@ import pytest
 from rich.table import Table
 
 import robot_dyn as rd
+from robot_dyn import RobotDynError
 from robot_dyn.cli import terminal
-from robot_dyn.foundations.errors import RobotDynError, escaped
+from robot_dyn.foundations import SceneError, escaped
+from robot_dyn.scene import starter, starter_names
 from robot_dyn.scene.lines import line_of
-from robot_dyn.scene.scene import SceneError
-from robot_dyn.scene.starters import starter, starter_names
 from tests.command import refusal
 
 BASE = 'robot = "cart_pole"\nduration_s = 1.0\n'

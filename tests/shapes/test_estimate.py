@@ -11,9 +11,8 @@ import pytest
 import trimesh
 
 import robot_dyn as rd
-from robot_dyn.description import solids
-from robot_dyn.description.inertia import MassProperties, combined
-from robot_dyn.foundations.spatial import rotation_rpy
+from robot_dyn.description import MassProperties, combined, solids
+from robot_dyn.foundations import rotation_rpy
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 MEASURED = '<inertial><origin xyz="0.01 0.02 0.3"/><mass value="3.1"/><inertia ixx="0.2" ixy="0.01" ixz="0" iyy="0.3"'
@@ -208,7 +207,7 @@ def test_the_mark_stays_with_the_robot(tmp_path: Path) -> None:
     assert robot.description.text.count(b"<!-- estimated, not measured: ") == 3
     run = rd.simulate(rd.Plant(again), q0=[0.1, 0.2], duration_s=0.01)
     assert "inertia of 3 links estimated from shapes" in run.summary
-    from robot_dyn.view.geometry.visuals import drawing
+    from robot_dyn.view import drawing
 
     assert any("estimated from shapes" in remark for remark in drawing(again).remarks)
 

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from robot_dyn.description import solids
-from robot_dyn.description.inertia import MassProperties, combined
-from robot_dyn.foundations.spatial import rotation_rpy
-from robot_dyn.shapes import primitives, surface
-from robot_dyn.shapes.mesh_files import MeshError
+from robot_dyn.description import MassProperties, combined, solids
+from robot_dyn.foundations import rotation_rpy
+from robot_dyn.shapes import MeshError, primitives, surface
 from robot_dyn.shapes.winding import winding
 
 BOX = (0.3, 0.2, 0.5)

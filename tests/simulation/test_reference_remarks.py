@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
+from robot_dyn.simulation import Remark, RemarkKind
 
 ARM = rd.load("planar_2r")
 PLANT = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3)])

@@ -10,12 +10,12 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.cli import report
-from robot_dyn.foundations.result import json_text
+from robot_dyn.foundations import json_text
+from robot_dyn.simulation import RemarkKind, remark_lines
 from robot_dyn.simulation.observation import observer as observers
 from robot_dyn.simulation.observation.guard_levels import NO_LEVELS
 from robot_dyn.simulation.observation.observation import observation_of
 from robot_dyn.simulation.observation.observer import CHUNK, Observer
-from robot_dyn.simulation.observation.remarks import RemarkKind, remark_lines
 from robot_dyn.view.document import document
 from tests.long import long
 

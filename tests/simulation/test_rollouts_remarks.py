@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.simulation.export.export import export
-from robot_dyn.simulation.observation.remarks import RemarkKind, remark_lines
+from robot_dyn import export
+from robot_dyn.foundations import QueryError
+from robot_dyn.simulation import RemarkKind, remark_lines
 
 COUNTED = (
     RemarkKind.CHATTER,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 from robot_dyn.simulation.setup.size import check_record, samples, segments, steps
 
 ARM = rd.Plant(rd.load("planar_2r"), [rd.effects.ExternalWrench("tip", [1.0] * 6, start_s=0.3, end_s=0.7)])

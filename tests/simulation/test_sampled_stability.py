@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.observation.remarks import RemarkKind
+from robot_dyn.simulation import RemarkKind
 from tests.campaigns.estimates.scenes import RAIL
 from tests.long import long
 from tests.short_loops import Arm, ShortLoop, judge

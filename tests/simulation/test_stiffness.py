@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.integrate.integrator import System
+from robot_dyn.foundations import QueryError
+from robot_dyn.integrate import System
+from robot_dyn.simulation import RemarkKind, StateEquation
 from robot_dyn.simulation.dynamics.fastest_motion import BODIES, fastest
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.remarks import RemarkKind
 
 ARM = rd.load("planar_2r")
 STATE = np.array([0.4, -0.7, 0.13, -0.25])

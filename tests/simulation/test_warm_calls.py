@@ -21,11 +21,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn import Trajectory
+from robot_dyn.simulation import Ending, RemarkKind, StateEquation
 from robot_dyn.simulation.compiled.compiled_state_equation import CompiledStateEquation
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.remarks import RemarkKind
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.outcome import Ending
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.3, -0.4]), np.array([0.5, -0.2])

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn import Robot
 from robot_dyn.description import description, solids
-from robot_dyn.model.robot import Robot
 from robot_dyn.shapes.mesh_files import MAX_BYTES
+from robot_dyn.view import drawing
 from robot_dyn.view.geometry.inertia_boxes import inertia_boxes
-from robot_dyn.view.geometry.visuals import drawing
 from tests.drawings import box, boxes, drawn, mesh_visual, stl, urdf
 from tests.hostile.kinds import ARM, MOMENTS
 

@@ -14,8 +14,8 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn.codegen.parameters import with_parameters
+from robot_dyn.simulation import Remark, RemarkKind
 from robot_dyn.simulation.diagnostics.step_remarks import KINDS
-from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from tests.campaigns.batches.scenes import Batch, batch
 
 UNITS = 8  # of rounding, by which a start is pushed

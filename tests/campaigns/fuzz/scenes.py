@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.scene.starters import starter, starter_names
+from robot_dyn.scene import starter, starter_names
 from tests.campaigns.fuzz.bytes import damage, damage_text
 
 # Parts that no starter has; `double_pendulum` is left out of none, so that every kind meets a small robot too.

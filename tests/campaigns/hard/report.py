@@ -11,7 +11,7 @@ from inspect import cleandoc
 from pathlib import Path
 from typing import final
 
-from robot_dyn.report.environment import processor_and_versions
+from robot_dyn.report import processor_and_versions
 from tests.campaigns.hard.case import Row
 from tests.campaigns.hard.families import FAMILIES
 from tests.campaigns.hard.figure import save

@@ -19,8 +19,7 @@ from functools import partial
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.simulation.dynamics.sampled_loop import linearised
-from robot_dyn.simulation.observation.remarks import RemarkKind, remark_lines
+from robot_dyn.simulation import RemarkKind, linearised, remark_lines
 from tests.campaigns.hard.case import Case, Row
 from tests.loops import growth
 

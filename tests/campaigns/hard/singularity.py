@@ -20,11 +20,9 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.control.cartesian import CartesianReference, line
-from robot_dyn.control.operational_space import POSE, POSITION
-from robot_dyn.control.orientation import orientation_error
-from robot_dyn.foundations.spatial import rotation
-from robot_dyn.simulation.observation.remarks import RemarkKind, remark_lines
+from robot_dyn.control import POSE, POSITION, CartesianReference, line, orientation_error
+from robot_dyn.foundations import rotation
+from robot_dyn.simulation import RemarkKind, remark_lines
 from tests.campaigns.hard.case import Case, Row
 
 TITLE = "Kinematic singularity"

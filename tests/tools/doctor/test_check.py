@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.shapes.masses import Masses
+from robot_dyn.foundations import QueryError
+from robot_dyn.shapes import Masses
 from robot_dyn.tools.doctor import check
 from robot_dyn.tools.doctor.checkup import checked
 from robot_dyn.tools.doctor.finding import Severity

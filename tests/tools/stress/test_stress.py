@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.accuracy.certificate.worst_case_search import random_states
-from robot_dyn.integrate.methods import FIXED_STEP
-from robot_dyn.report.time_budget import Budget
-from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.accuracy import random_states
+from robot_dyn.integrate import FIXED_STEP
+from robot_dyn.report import Budget
+from robot_dyn.simulation import Ending
 from robot_dyn.tools.stress import confirm, runs, steps
 from robot_dyn.tools.stress.finding import JudgedRun
 from robot_dyn.tools.stress.loads import payload_limit

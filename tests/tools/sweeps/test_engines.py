@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps.engines import cluster
 from robot_dyn.tools.sweeps.engines.cluster import Cluster, client_of

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps.folder import files
 from robot_dyn.tools.sweeps.folder.files import Files, remove_abandoned, write
