@@ -111,7 +111,7 @@ class _Picture:
 
 
 @np.errstate(all="ignore")  # what is far out is drawn as far as it can be
-def document(
+def document_of(
     runs: tuple[Trajectory, ...], package_dirs: Iterable[str | Path], frame: str | None, inertia: bool,
     meshes: str = "full",
 ) -> dict[str, Any]:  # fmt: skip
