@@ -13,7 +13,7 @@ import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen.dynamics import CompiledDynamics
+from robot_dyn.codegen import CompiledDynamics
 from robot_dyn.foundations import QueryError
 
 ENGINES = (rd.Robot, rd.Lagrangian, CompiledDynamics)

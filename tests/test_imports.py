@@ -37,7 +37,8 @@ def listed(folder: str) -> dict[str, str]:
     """The names that a folder lists, and the module of each."""
     stub = ast.parse((ROOT / folder.replace(".", "/") / "__init__.pyi").read_text(encoding="utf-8"))
     found = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
-    return {name.name: str(node.module) for node in found for name in node.names}
+    own = {node.name: folder for node in stub.body if isinstance(node, ast.FunctionDef)}
+    return own | {name.name: str(node.module) for node in found for name in node.names}
 
 
 LISTED = {folder: listed(folder) for folder in FOLDERS}

@@ -15,7 +15,7 @@ from robot_dyn.report.save import save_result as save_result
 
 __all__: list[str]
 
-# Not documented: what tools and tests use besides.
+# Names that only tools and tests import.
 from robot_dyn.accuracy.advice import advice_about as advice_about
 from robot_dyn.accuracy.advice import at_rest as at_rest
 from robot_dyn.accuracy.certificate.certificate import Held as Held
@@ -26,3 +26,8 @@ from robot_dyn.accuracy.certificate.implementation import implementations as imp
 from robot_dyn.accuracy.certificate.worst_case_search import Batch as Batch
 from robot_dyn.accuracy.certificate.worst_case_search import Search as Search
 from robot_dyn.accuracy.certificate.worst_case_search import random_states as random_states
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion as ArmMotion
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError as PeerError
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import bare_urdf as bare_urdf
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import desired_motion as desired_motion
+from robot_dyn.accuracy.work_precision_diagram.peers.mujoco_model import mujoco_model as mujoco_model

@@ -36,7 +36,7 @@ from robot_dyn.control.samples.spline import Samples as Samples
 
 __all__: list[str]
 
-# Not documented: what tools and tests use besides.
+# Names that only tools and tests import.
 from robot_dyn.control.extremes import extreme_values as extreme_values
 from robot_dyn.control.operational_space import POSE as POSE
 from robot_dyn.control.operational_space import POSITION as POSITION

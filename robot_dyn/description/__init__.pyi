@@ -1,8 +1,9 @@
-# What this folder offers to tools and tests, and where it lives; modules of the core import each other instead.
+# Names that tools and tests import of this folder, and where they live; modules of the core import modules.
 from robot_dyn.description import catalog as catalog
 from robot_dyn.description import description as description
 from robot_dyn.description.connections import LARGEST as LARGEST
 from robot_dyn.description.description import Description as Description
+from robot_dyn.description.description import check as check
 from robot_dyn.description.inertia import MassProperties as MassProperties
 from robot_dyn.description.inertia import combined as combined
 from robot_dyn.description.inertia import implausibility as implausibility

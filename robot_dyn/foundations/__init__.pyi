@@ -1,4 +1,4 @@
-# What this folder offers to tools and tests, and where it lives; modules of the core import each other instead.
+# Names that tools and tests import of this folder, and where they live; modules of the core import modules.
 from robot_dyn.foundations.answer import Answer as Answer
 from robot_dyn.foundations.answer import Block as Block
 from robot_dyn.foundations.answer import Table as Table
@@ -31,15 +31,12 @@ from robot_dyn.foundations.errors import EditError as EditError
 from robot_dyn.foundations.errors import EffectError as EffectError
 from robot_dyn.foundations.errors import MachineCodeError as MachineCodeError
 from robot_dyn.foundations.errors import MissingExtraError as MissingExtraError
-from robot_dyn.foundations.errors import ModelWarning as ModelWarning
 from robot_dyn.foundations.errors import NotFiniteError as NotFiniteError
 from robot_dyn.foundations.errors import OverflowedError as OverflowedError
 from robot_dyn.foundations.errors import PlanError as PlanError
 from robot_dyn.foundations.errors import PlanWarning as PlanWarning
-from robot_dyn.foundations.errors import PrecisionWarning as PrecisionWarning
 from robot_dyn.foundations.errors import ProofError as ProofError
 from robot_dyn.foundations.errors import QueryError as QueryError
-from robot_dyn.foundations.errors import RobotDynError as RobotDynError
 from robot_dyn.foundations.errors import RobotDynWarning as RobotDynWarning
 from robot_dyn.foundations.errors import SceneError as SceneError
 from robot_dyn.foundations.errors import SingularError as SingularError

@@ -20,6 +20,6 @@ from robot_dyn.integrate.time_stepping import TimeStepping as TimeStepping
 
 __all__: list[str]
 
-# Not documented: what tools and tests use besides.
+# Names that only tools and tests import.
 from robot_dyn.integrate.methods import FIXED_STEP as FIXED_STEP
 from robot_dyn.integrate.methods import METHODS as METHODS

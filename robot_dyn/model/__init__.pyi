@@ -1,3 +1,3 @@
-# What this folder offers to tools and tests, and where it lives; modules of the core import each other instead.
+# Names that tools and tests import of this folder, and where they live; modules of the core import modules.
 from robot_dyn.model import findings as findings
 from robot_dyn.model.gravity import gravity_acts as gravity_acts

@@ -1,4 +1,4 @@
-# What this folder offers to tools and tests, and where it lives; modules of the core import each other instead.
+# Names that tools and tests import of this folder, and where they live; modules of the core import modules.
 from robot_dyn.queries.dynamics import Dynamics as Dynamics
 from robot_dyn.queries.quantity import CORIOLIS_TORQUE as CORIOLIS_TORQUE
 from robot_dyn.queries.quantity import EQUATION as EQUATION

@@ -1,4 +1,4 @@
-# What this folder offers to tools and tests, and where it lives; modules of the core import each other instead.
+# Names that tools and tests import of this folder, and where they live; modules of the core import modules.
 from robot_dyn.report.environment import processor_and_versions as processor_and_versions
 from robot_dyn.report.figure import PAGE as PAGE
 from robot_dyn.report.figure import Colours as Colours

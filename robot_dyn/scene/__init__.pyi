@@ -1,4 +1,4 @@
-# What this folder offers to tools and tests, and where it lives; modules of the core import each other instead.
+# Names that tools and tests import of this folder, and where they live; modules of the core import modules.
 from robot_dyn.scene.effects import BY_KIND as BY_KIND
 from robot_dyn.scene.explain import of_scene as of_scene
 from robot_dyn.scene.scene import parse_scene as parse_scene

@@ -1,4 +1,4 @@
-# What this folder offers to tools and tests, and where it lives; modules of the core import each other instead.
+# Names that tools and tests import of this folder, and where they live; modules of the core import modules.
 from robot_dyn.shapes import surface as surface
 from robot_dyn.shapes.estimate import Estimate as Estimate
 from robot_dyn.shapes.estimate import estimates as estimates

@@ -1,4 +1,5 @@
-# What this folder offers to tools and tests, and where it lives; modules of the core import each other instead.
+# Names that tools and tests import of this folder, and where they live; modules of the core import modules.
+from robot_dyn.view.document import document_of as document_of
 from robot_dyn.view.geometry.visuals import Drawing as Drawing
 from robot_dyn.view.geometry.visuals import Piece as Piece
 from robot_dyn.view.geometry.visuals import drawing as drawing

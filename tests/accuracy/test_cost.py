@@ -18,13 +18,13 @@ from robot_dyn.accuracy.costs import step_cost
 from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Pair, Version, Way, in_turns
 from robot_dyn.accuracy.costs.query_cost import QueryCost
 from robot_dyn.accuracy.costs.text import _cells
+from robot_dyn.codegen import program_of
 from robot_dyn.codegen.parameters import parameters
-from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.foundations import QueryError, json_text
 from robot_dyn.report import Budget
 from robot_dyn.scene import starter
-from robot_dyn.simulation import StateEquation
-from robot_dyn.simulation.compiled.build import compiled_equation, compiled_with_constants
+from robot_dyn.simulation import StateEquation, compiled_equation
+from robot_dyn.simulation.compiled.build import compiled_with_constants
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])

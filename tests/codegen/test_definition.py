@@ -15,9 +15,8 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.codegen.store.definition import definition
 from robot_dyn.foundations.values import LRUByIdentity
-from robot_dyn.simulation import StateEquation
+from robot_dyn.simulation import StateEquation, compiled_equation
 from robot_dyn.simulation.compiled import build, programs
-from robot_dyn.simulation.compiled.build import compiled_equation
 from robot_dyn.simulation.compiled.structure import structure
 from tests.codegen.test_kernel import Memory
 

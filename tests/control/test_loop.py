@@ -11,8 +11,7 @@ from scipy.signal import butter, lfilter, lfilter_zi
 import robot_dyn as rd
 from robot_dyn.accuracy.costs.step_cost import parts
 from robot_dyn.foundations import ControlError, QueryError
-from robot_dyn.simulation import RemarkKind, StateEquation, Verdict
-from robot_dyn.simulation.compiled.build import compiled_equation
+from robot_dyn.simulation import RemarkKind, StateEquation, Verdict, compiled_equation
 from robot_dyn.simulation.setup.schedule import cuts
 from tests.long import long
 from tests.loops import Q0, V0, Exact, exact, matrices, plant

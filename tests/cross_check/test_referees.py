@@ -14,7 +14,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError
-from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError
+from robot_dyn.accuracy import PeerError
 from robot_dyn.lagrange import diagonal_scale, floored, magnitudes, mass_norm, scaled, solved_tolerance
 from tests.campaigns.hard.other_engines import installed
 from tests.long import robots

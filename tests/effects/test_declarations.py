@@ -15,9 +15,8 @@ from robot_dyn import Trajectory
 from robot_dyn.control import Block, Controller
 from robot_dyn.effects import Effect
 from robot_dyn.foundations import EffectError, TraceError, tanh
-from robot_dyn.simulation import StateEquation, Verdict
+from robot_dyn.simulation import MachineError, StateEquation, Verdict
 from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.compiled.self_check import MachineError
 from robot_dyn.simulation.dynamics.declarations import undeclared
 from robot_dyn.simulation.dynamics.smoothness import LOOKS
 

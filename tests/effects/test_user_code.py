@@ -13,7 +13,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn import export
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SceneError, TraceError
-from robot_dyn.simulation.compiled.self_check import MachineError
+from robot_dyn.simulation import MachineError
 from tests.long import long
 
 ARM = rd.load("planar_2r")

@@ -10,10 +10,9 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.integrate import System
-from robot_dyn.simulation import StateEquation
+from robot_dyn.simulation import MachineError, StateEquation, segment_table
 from robot_dyn.simulation.compiled import build
-from robot_dyn.simulation.compiled.self_check import MachineError, check, jacobian_error
-from robot_dyn.simulation.setup.segment_table import segment_table
+from robot_dyn.simulation.compiled.self_check import check, jacobian_error
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52
 ARM = rd.load("planar_2r")

@@ -11,7 +11,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.cross_check import random_state
-from robot_dyn.description.description import check
+from robot_dyn.description import check
 from robot_dyn.lagrange import floored, magnitudes, scaled
 from tests.queries import ARGUMENTS, FRAMED, general
 

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen.trace.right_angles import completed
+from robot_dyn.codegen import completed
 from robot_dyn.control import Stateless
 from robot_dyn.effects import Active
 from robot_dyn.foundations import QueryError, TraceError
 from robot_dyn.integrate import FIXED_STEP
 from robot_dyn.queries import Dynamics
-from robot_dyn.simulation import StateEquation
+from robot_dyn.simulation import MachineError, StateEquation
 from robot_dyn.simulation.compiled.engine_choice import choose
-from robot_dyn.simulation.compiled.self_check import MachineError, check
+from robot_dyn.simulation.compiled.self_check import check
 from robot_dyn.simulation.compiled.trace import SymbolicDynamics
 from tests.long import long
 from tests.own_method import OwnImplicit

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robot_dyn.simulation import RemarkKind
+from robot_dyn.simulation import RemarkKind, observation_of
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level
-from robot_dyn.simulation.observation.observation import observation_of, observe, observed
+from robot_dyn.simulation.observation.observation import observe, observed
 
 N, W, STEPS, H = 2, 3, 400, 1e-3
 

@@ -11,12 +11,11 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.cli import report
 from robot_dyn.foundations import json_text
-from robot_dyn.simulation import RemarkKind, remark_lines
+from robot_dyn.simulation import RemarkKind, observation_of, remark_lines
 from robot_dyn.simulation.observation import observer as observers
 from robot_dyn.simulation.observation.guard_levels import NO_LEVELS
-from robot_dyn.simulation.observation.observation import observation_of
 from robot_dyn.simulation.observation.observer import CHUNK, Observer
-from robot_dyn.view.document import document
+from robot_dyn.view import document_of
 from tests.long import long
 
 INERTIA = 1 / 3  # of the pendulum about its pivot, in [kg m²]
@@ -270,7 +269,7 @@ def test_remarks_are_said_wherever_a_run_is_shown(joint, tmp_path) -> None:
     assert all(line in run.summary for line in said)
     title = " ".join(text.get_text() for text in rd.plot(run, "torques").texts)
     assert all(line in title for line in said)
-    assert document((run,), (), None, False)["remarks"] == said
+    assert document_of((run,), (), None, False)["remarks"] == said
     told = json.loads(json_text(report.run(run)))
     assert [each["text"] for each in told["remarks"]] == [remark.text for remark in run.remarks]
     assert told["extremes"]["u"] == {"least": [-LIMIT], "largest": [LIMIT]}

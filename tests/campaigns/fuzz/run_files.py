@@ -21,8 +21,7 @@ from robot_dyn import RobotDynError, export
 from robot_dyn.scene import starter
 from robot_dyn.simulation import robot_of
 from robot_dyn.simulation.results import archive
-from robot_dyn.view import PLOTS, PlotError
-from robot_dyn.view.document import document
+from robot_dyn.view import PLOTS, PlotError, document_of
 from robot_dyn.view.plots.plots import _view
 from tests.campaigns.fuzz.bytes import WORDS, damage
 
@@ -75,7 +74,7 @@ def attempt(mutant: bytes, folder: Path) -> str:
         for panel in PLOTS.values():
             with suppress(PlotError), np.errstate(all="ignore"):
                 panel(view)
-        document((run,), (), None, False)
+        document_of((run,), (), None, False)
     return "accepted"
 
 

@@ -21,7 +21,7 @@ from functools import partial
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.codegen.trace.right_angles import completed
+from robot_dyn.codegen import completed
 from robot_dyn.lagrange import (
     acceleration_norm,
     diagonal_scale,

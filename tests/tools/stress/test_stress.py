@@ -18,11 +18,10 @@ from robot_dyn.accuracy import random_states
 from robot_dyn.integrate import FIXED_STEP
 from robot_dyn.report import Budget
 from robot_dyn.simulation import Ending
-from robot_dyn.tools.stress import confirm, runs, steps
+from robot_dyn.tools.stress import confirm, runs, steps, stressed
 from robot_dyn.tools.stress.finding import JudgedRun
 from robot_dyn.tools.stress.loads import payload_limit
 from robot_dyn.tools.stress.scenes import FAMILIES, scenes
-from robot_dyn.tools.stress.search import stressed
 from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import BY_PD, FASTEST, pd_gains, worst, worst_configurations
 from tests.cli.test_command_documents import promised
