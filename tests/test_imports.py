@@ -19,7 +19,6 @@ EXCEPTIONS = {
     ("proof", "robot_dyn.codegen.program"): "a proof runs the instructions of compiled programs on sets",
     ("proof", "robot_dyn.codegen.trace.base_parameters"): "the equation of a proof has the fewest parameters",
     ("proof", "robot_dyn.codegen.trace.condition"): "functions of users are traced on nodes with conditions",
-    ("proof", "robot_dyn.codegen.trace.from_casadi"): "functions of users are traced by CasADi",
     ("proof", "robot_dyn.codegen.trace.origins"): "the equation of a proof has the fewest terms",
     ("sweeps", "robot_dyn.simulation.results.archive"): "a chunk of a sweep is stored as a run is",
     ("sweeps", "robot_dyn.simulation.rollouts.batch"): "a sweep records as much of a batch as its figures need",
