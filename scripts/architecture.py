@@ -58,19 +58,20 @@ def executed(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def public_homes() -> dict[str, str]:
-    """The module of each public name, `robot_dyn.x.y`, as `robot_dyn/__init__.pyi` lists them."""
+    """Where each public name is defined, `robot_dyn.x.y.name`, as `robot_dyn/__init__.pyi` lists them."""
     tree = ast.parse((PACKAGE / "__init__.pyi").read_text(encoding="utf-8"))
     nodes = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module)
-    return {each.name: str(node.module) for node in nodes for each in node.names}
+    return {each.name: f"{node.module}.{each.name}" for node in nodes for each in node.names}
 
 
 def imported(path: Path, homes: dict[str, str]) -> Iterator[str]:
-    """Modules that a file imports, in a function or at the top; of `rd.name` that in which the name is defined."""
+    """Modules that a file imports, in a function or at the top; of a name of `rd` that in which it is defined."""
     for node in executed(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (each.name for each in node.names)
         elif isinstance(node, ast.ImportFrom):
-            yield from (f"{node.module}.{each.name}" for each in node.names)
+            names = (f"{node.module}.{each.name}" for each in node.names)
+            yield from (homes.get(name.removeprefix("robot_dyn."), name) for name in names)
         elif isinstance(node, ast.Attribute) and ast.unparse(node.value) == "rd":
             yield homes.get(node.attr, "")
 

@@ -34,7 +34,7 @@ from benchmarks import (
 )
 from benchmarks.measure import Effort, command_line
 
-from robot_dyn.report.environment import environment
+from robot_dyn.report.environment import processor_and_versions
 
 SUBJECTS: dict[str, tuple[Callable[[Effort], None], ...]] = {
     "queries": (queries.queries, queries.lagrangian, queries.right_angles, queries.startup),
@@ -62,7 +62,7 @@ def main() -> None:
     if unknown := set(options.what) - set(SUBJECTS):
         parser.error(f"no subject {', '.join(sorted(unknown))}; there are {', '.join(SUBJECTS)}")
     effort = Effort(2, 0.002) if options.quick else Effort()
-    print(", ".join(f"{name} {value}" for name, value in environment().items()))
+    print(", ".join(f"{name} {value}" for name, value in processor_and_versions().items()))
     for subject in options.what or SUBJECTS:
         for measure in SUBJECTS[subject]:
             measure(effort)

@@ -234,7 +234,9 @@ def hits() -> list[Hit]:
     texts = {path: path.read_text(encoding="utf-8") for path in sorted(package.rglob("*.py"))}
     dotted = {path: ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in texts}
     names = {path: name.removesuffix(".__init__") for path, name in dotted.items()}
-    aliases = aliases_of({names[path]: text for path, text in texts.items()})
+    stubs = {path: path.with_suffix(".pyi") for path in texts}  # which list what a folder exports
+    exports = {path: stub.read_text(encoding="utf-8") if stub.exists() else "" for path, stub in stubs.items()}
+    aliases = aliases_of({names[path]: f"{text}\n{exports[path]}" for path, text in texts.items()})
     all_hits = [hit for path, text in texts.items() for hit in in_code(text, _place(path), aliases[names[path]])]
     pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), *sorted(package.rglob("*.md"))]
     all_hits += [hit for path in pages for hit in in_page(path.read_text(encoding="utf-8"), _place(path))]

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
+from robot_dyn import Robot
 from robot_dyn.description import catalog, description
-from robot_dyn.model.robot import Robot
-from robot_dyn.view.geometry.visuals import Drawing, drawing
+from robot_dyn.view import Drawing, drawing
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 

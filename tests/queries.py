@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.queries.dynamics import QUANTITIES
+from robot_dyn.queries import QUANTITIES
 
 ARGUMENTS = {quantity.name: quantity.arguments for quantity in QUANTITIES.values()}
 FRAMED = tuple(name for name, quantity in QUANTITIES.items() if quantity.framed)

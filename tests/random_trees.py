@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn.description.description import check
+from robot_dyn.description import check
 
 _KINDS = ("revolute", "revolute", "continuous", "prismatic", "fixed")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import count
 
 import robot_dyn as rd
-from robot_dyn.tools.stress.search import stressed
+from robot_dyn.tools.stress import stressed
 
 
 def short_stress(robot: rd.Robot, looks: int = 1000, runs: int = 0, seed: int = 0) -> rd.tools.stress.Stress:

@@ -13,9 +13,9 @@ import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen.dynamics import CompiledDynamics
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.queries.dynamics import QUANTITIES
+from robot_dyn.codegen import CompiledDynamics
+from robot_dyn.foundations import QueryError
+from robot_dyn.queries import QUANTITIES
 
 ENGINES = (rd.Robot, rd.Lagrangian, CompiledDynamics)
 

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.results.provenance import packed, robot_of
-from robot_dyn.view.document import document
+from robot_dyn.simulation import robot_of
+from robot_dyn.simulation.results.provenance import packed
+from robot_dyn.view import document_of
 from tests.drawings import mesh_visual, stl, urdf
 
 
@@ -46,7 +47,7 @@ def test_a_run_finds_its_meshes_from_its_own_folder(arm, tmp_path, runs: str) ->
     folder.mkdir(exist_ok=True)
     file = rd.save_run(run_of(arm), folder / "run.npz")
     assert str(tmp_path) not in inside(file) and "secret" not in inside(file)
-    assert document((rd.load_run(file),), (), None, False)["problems"] == []
+    assert document_of((rd.load_run(file),), (), None, False)["problems"] == []
     moved = tmp_path / "elsewhere"
     os.rename(tmp_path / "secret", moved)
     here = (
@@ -54,7 +55,7 @@ def test_a_run_finds_its_meshes_from_its_own_folder(arm, tmp_path, runs: str) ->
         if file.exists()
         else moved / "robots" / runs / file.name
     )
-    assert document((rd.load_run(here),), (), None, False)["problems"] == []
+    assert document_of((rd.load_run(here),), (), None, False)["problems"] == []
 
 
 def test_a_run_far_from_the_urdf_finds_it_in_the_home_folder(arm, tmp_path, monkeypatch) -> None:
@@ -73,7 +74,7 @@ def test_a_robot_of_the_catalog_is_known_by_its_file_name(tmp_path) -> None:
     assert "site-packages" not in inside(file)
     again = rd.load_run(file)
     assert Path(again.about["source"]).name == "ur5_robot.urdf"
-    assert document((again,), (), None, False)["problems"] == []
+    assert document_of((again,), (), None, False)["problems"] == []
 
 
 def test_a_run_read_again_is_the_same_robot(arm, tmp_path) -> None:
@@ -104,7 +105,7 @@ def test_no_page_and_no_warning_shows_a_path_of_the_machine(arm, tmp_path) -> No
     arm.write_bytes(urdf(visuals))
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        page = document((run_of(arm),), (), None, True)
+        page = document_of((run_of(arm),), (), None, True)
         rd.save_replay(run_of(arm), tmp_path / "page.html")
     assert len(page["problems"]) >= len(ADDRESSES)
     texts = [*page["problems"], *page["notes"], page["title"], page["outcome"], *(str(each.message) for each in told)]

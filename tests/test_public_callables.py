@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import RobotDynError, RobotDynWarning, shown
+from robot_dyn import RobotDynError
+from robot_dyn.foundations import RobotDynWarning, shown
 from tests.campaigns.fuzz.campaign import HangError, limited
 from tests.wrong_arguments import EXTREME, LAX, LONG, NOT_TEXT, Example, examples, public, wrong
 

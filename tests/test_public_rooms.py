@@ -37,14 +37,6 @@ def test_the_docstring_of_a_room_is_a_map_of_its_names(name: str) -> None:
     assert [each for each in room.__all__ if not re.search(rf"\b{each}\b", str(room.__doc__))] == []
 
 
-@pytest.mark.parametrize("name", [name for name in ROOMS if name != "tools"])
-def test_no_public_name_is_that_of_a_module(name: str) -> None:
-    """`from room import name` would give one or the other, by what was imported before."""
-    folder = Path(str(import_module(f"robot_dyn.{name}").__file__)).parent
-    modules = {path.stem for path in folder.iterdir() if path.suffix == ".py" or path.is_dir()}
-    assert not modules & set(import_module(f"robot_dyn.{name}").__all__)
-
-
 def test_names_of_every_day_are_few_and_each_has_a_reason() -> None:
     """The table of docs/developers/decisions/names.md."""
     text = (Path(__file__).parents[1] / "docs/developers/decisions/names.md").read_text(encoding="utf-8")

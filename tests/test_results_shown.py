@@ -17,7 +17,7 @@ from nbclient import NotebookClient
 from nbconvert import HTMLExporter
 
 import robot_dyn as rd
-from robot_dyn.foundations.answer import Answer, Table
+from robot_dyn.foundations import Answer, Table
 
 ARM = rd.load("planar_2r")
 Q = np.array([0.3, 0.4])

@@ -13,11 +13,10 @@ import casadi as ca
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.control.controller import Controller
-from robot_dyn.effects.effect import Bound, Conservative, Drive, Effect, Force, Stateful
-from robot_dyn.foundations.answer import Answer
-from robot_dyn.foundations.arithmetic import Arithmetic
-from robot_dyn.integrate.integrator import System
+from robot_dyn.control import Controller
+from robot_dyn.effects import Bound, Conservative, Drive, Effect, Force, Stateful
+from robot_dyn.foundations import Answer, Arithmetic
+from robot_dyn.integrate import System
 from tests.queries import ARGUMENTS, FRAMED
 
 Example = tuple[Callable[..., Any], dict[str, Any]]

@@ -10,7 +10,7 @@ from typing import Any
 from typer.main import get_command
 
 from robot_dyn.cli import commands as topics
-from robot_dyn.cli.app import app
+from robot_dyn.cli.application import app
 from robot_dyn.cli.groups import GROUPS
 
 TAG = re.compile(r"\[/?[a-z][a-z ]*\]")  # of rich

@@ -14,3 +14,20 @@ from robot_dyn.foundations.arithmetic import radius as radius
 from robot_dyn.report.save import save_result as save_result
 
 __all__: list[str]
+
+# Names that only tools and tests import.
+from robot_dyn.accuracy.advice import advice_about as advice_about
+from robot_dyn.accuracy.advice import at_rest as at_rest
+from robot_dyn.accuracy.certificate.certificate import Held as Held
+from robot_dyn.accuracy.certificate.digit_count import DigitCount as DigitCount
+from robot_dyn.accuracy.certificate.implementation import Implementation as Implementation
+from robot_dyn.accuracy.certificate.implementation import evaluate as evaluate
+from robot_dyn.accuracy.certificate.implementation import implementations as implementations
+from robot_dyn.accuracy.certificate.worst_case_search import Batch as Batch
+from robot_dyn.accuracy.certificate.worst_case_search import Search as Search
+from robot_dyn.accuracy.certificate.worst_case_search import random_states as random_states
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion as ArmMotion
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError as PeerError
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import bare_urdf as bare_urdf
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import desired_motion as desired_motion
+from robot_dyn.accuracy.work_precision_diagram.peers.mujoco_model import mujoco_model as mujoco_model

@@ -23,7 +23,7 @@ from robot_dyn.foundations.errors import QueryError, RobotDynError, escaped
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.queries.units import units
+from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest, jacobian
 from robot_dyn.simulation.dynamics.sampled_loop import linearised, remedy
 from robot_dyn.simulation.dynamics.stability import (
@@ -162,7 +162,7 @@ class Advice(Answer):
         end = self.run.outcome
         if end.ending is not Ending.FINISHED:
             return f"the run {end.ending} at {end.t:.3g} s: {end.advice}"
-        unit = units("q", joint_types(self.run))
+        unit = joint_units("q", joint_types(self.run))
         return f"error of q [{unit}] to expect: {self.run.error}"
 
 

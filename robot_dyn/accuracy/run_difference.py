@@ -13,7 +13,7 @@ from robot_dyn.foundations.answer import Block, Table
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.foundations.validate import instance, number
-from robot_dyn.queries.units import unit, units
+from robot_dyn.queries.units import joint_units, unit
 from robot_dyn.report.result import Result
 from robot_dyn.simulation.comparison.difference import HALF, TOLERANCE, Difference, difference
 from robot_dyn.simulation.comparison.differing_settings import (
@@ -158,7 +158,7 @@ def compare_runs(a: TrajectoryData, b: TrajectoryData, *, tolerance: float = TOL
         instance(name, run, TrajectoryData, "give the trajectory of rd.simulate or rd.load_run, or a run of rollouts")
     tolerance = number("tolerance", tolerance, above=0, error=QueryError)
     found, types = difference(a, b, tolerance), joint_types(a)
-    of_q, (first, second) = units("q", types), run_names(a, b)
+    of_q, (first, second) = joint_units("q", types), run_names(a, b)
     left = [f"{t:g} to {s:g} s, which only {name} has" for name, t, s in _alone(a, b)]
     if not found.estimated:
         left.append("the errors of the runs, since one has no estimate; simulate with estimate_error=True")

@@ -4,7 +4,7 @@ Ctrl-C ends any command with exit code 130; its handler is installed before anyt
 
 commands/        the commands, by topic; those of tools are entry points `robot_dyn.commands`
 groups.py        the commands as --help lists them
-app.py           the application, options that commands share, progress bars; completion.py and interrupts.py
+application.py   the application, options that commands share, progress bars; completion.py and interrupts.py
 robots.py        how the file of a robot is read: options that commands with a robot share
 arguments.py     values of arguments; terminal.py: output, escaped
 report.py        documents and tables of comparisons and runs
@@ -39,6 +39,10 @@ def _is_command() -> bool:
 if _is_command() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, _end)  # until main() has imported more
 
+from robot_dyn.foundations.public import public_names  # noqa: E402
+
+__getattr__, __dir__, _ = public_names(__spec__)
+
 
 def main() -> None:
     """Entry point: run the command; report errors in one line."""
@@ -63,7 +67,7 @@ def _run() -> Any:
 
     from typer.main import get_command
 
-    from robot_dyn.cli.app import app
+    from robot_dyn.cli.application import app
     from robot_dyn.cli.groups import group, without_types_of_flags
     from robot_dyn.cli.terminal import failed, finish, open_streams, to_stderr
     from robot_dyn.foundations.errors import RobotDynError, RobotDynWarning

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robot_dyn.foundations.errors import QueryError, RobotDynError, nearest
-from robot_dyn.foundations.files import Kind, target
+from robot_dyn.foundations.files import FileKind, target
 
 if TYPE_CHECKING:
     import numpy as np
@@ -109,7 +109,7 @@ def vector(option: str, text: str | None, joint_names: tuple[str, ...]) -> np.nd
 
 def output(
     path: str | Path,
-    kinds: Kind | tuple[Kind, ...],
+    kinds: FileKind | tuple[FileKind, ...],
     error: type[RobotDynError],
     inputs: Iterable[str | Path],
     force: bool,

@@ -23,9 +23,9 @@ def robots(incomplete: str) -> list[str]:
 
 def scenes(incomplete: str) -> list[str]:
     """Names of starter scenes."""
-    from robot_dyn.scene.starters import starters
+    from robot_dyn.scene.starters import starter_names
 
-    return [name for name in starters() if name.startswith(incomplete)]
+    return [name for name in starter_names() if name.startswith(incomplete)]
 
 
 def quantities(incomplete: str) -> list[str]:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, final, get_type_hints
 import typer
 
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import PackageDir, Xacro
+from robot_dyn.cli.application import PackageDir, Xacro
 from robot_dyn.foundations.errors import ModelWarning
 
 if TYPE_CHECKING:

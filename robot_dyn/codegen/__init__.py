@@ -13,3 +13,7 @@ loops/                translate plain functions, such as the loops of a run, fro
 primitives            what loops do with whole arrays, by the instructions of array_operations
 waiting               what a user notices of a compile: a message, and Ctrl-C delayed
 """
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, _ = public_names(__spec__)

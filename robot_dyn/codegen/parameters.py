@@ -19,7 +19,7 @@ from robot_dyn.description.edits import Edits
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.coefficients import Coefficient, declared, with_values
-from robot_dyn.lagrange.tree import Described, tree
+from robot_dyn.lagrange.tree import Described, tree_of
 from robot_dyn.model.robot import Robot
 
 Part = tuple[Any, ...]  # ("effect", i), ("controller",), ("reference", attribute), ("robot",) or ("model", attribute)
@@ -179,7 +179,7 @@ def sweepable_parameters(
 def _of_links(robot: Robot) -> dict[str, dict[str, Any]]:
     """Mass and inertia of each link that states some, by link, edited."""
     inertias = {}
-    for link in tree(robot.description, replace(robot.edits, payloads=(), mass_scale="1")).links:
+    for link in tree_of(robot.description, replace(robot.edits, payloads=(), mass_scale="1")).links:
         for body in link.inertials:
             xx, xy, xz, yy, yz, zz = map(float, body.moments)
             inertias[link.name] = {"mass": float(body.mass), "inertia": [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]}

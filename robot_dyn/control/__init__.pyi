@@ -35,3 +35,9 @@ from robot_dyn.control.samples.measured import from_samples as from_samples
 from robot_dyn.control.samples.spline import Samples as Samples
 
 __all__: list[str]
+
+# Names that only tools and tests import.
+from robot_dyn.control.extremes import extreme_values as extreme_values
+from robot_dyn.control.operational_space import POSE as POSE
+from robot_dyn.control.operational_space import POSITION as POSITION
+from robot_dyn.control.reference import polynomial as polynomial

@@ -32,7 +32,7 @@ class Extremes(NamedTuple):
         return np.maximum(-self.least, self.greatest)
 
 
-def extremes(motion: PiecewisePolynomial, order: int = 0) -> Extremes:
+def extreme_values(motion: PiecewisePolynomial, order: int = 0) -> Extremes:
     """The extremes of q (order 0), or of a derivative, between the first and the last break.
 
     Args:

@@ -9,7 +9,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.control.extremes import extremes
+from robot_dyn.control.extremes import extreme_values
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.foundations.answer import Answer, Block, Table
 from robot_dyn.foundations.result import reported
@@ -55,7 +55,7 @@ class Plan(Answer, Value):
     @cached_property
     def peaks(self) -> dict[str, np.ndarray]:
         """Largest absolute velocity, acceleration and jerk of each joint, (n,) each, exact but for rounding."""
-        return {name: extremes(self.reference, order).largest for name, order in _ORDERS.items()}
+        return {name: extreme_values(self.reference, order).largest for name, order in _ORDERS.items()}
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.arm}: {self.method}"

@@ -22,7 +22,7 @@ from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import shorten
 from robot_dyn.foundations.spatial import homogeneous, rotation_rpy
-from robot_dyn.lagrange.tree import tree
+from robot_dyn.lagrange.tree import tree_of
 
 _MOMENTS = np.triu_indices(3)  # Ixx, Ixy, Ixz, Iyy, Iyz, Izz
 _NONE = float(UNBOUNDED)
@@ -71,7 +71,7 @@ def _elements_stated(robot: Any) -> Iterator[str]:
 
 
 def _elements_taken(description: Description) -> Iterator[str]:
-    taken = tree(description, Edits())
+    taken = tree_of(description, Edits())
     yield from (f"link {link.name!r}" for link in taken.links)
     for joint in taken.joints:
         yield _joint(joint.name, joint.kind, joint.parent, joint.child, joint.mimic and joint.mimic.source)
@@ -126,7 +126,7 @@ def _limits(joint: Any) -> np.ndarray:
 
 def _taken(description: Description) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
     """The same numbers from the description, as both implementations use them."""
-    taken = tree(description, Edits())
+    taken = tree_of(description, Edits())
     for link in taken.links:
         where = f"link {link.name!r}"
         for part in link.inertials:

@@ -146,7 +146,7 @@ class Structure:
             yield joint
 
 
-def structure(description: Description, edits: Edits) -> Structure:
+def structure_of(description: Description, edits: Edits) -> Structure:
     """The structure of a description with its edits."""
     file = description.element
     links = {link.get("name"): _link(link.find("inertial")) for link in file.iterfind("link")}

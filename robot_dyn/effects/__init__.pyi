@@ -38,3 +38,9 @@ from robot_dyn.foundations.threshold import Threshold as Threshold
 from robot_dyn.queries.dynamics import Dynamics as Dynamics
 
 __all__: list[str]
+
+# Names that only tools and tests import.
+from robot_dyn.effects.causes import Causes as Causes
+from robot_dyn.effects.causes import exerted_torques as exerted_torques
+from robot_dyn.effects.causes import torques_by_cause as torques_by_cause
+from robot_dyn.effects.effect import numbered as numbered

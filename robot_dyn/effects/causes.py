@@ -67,7 +67,7 @@ class Causes(Answer, Value):
         yield Table(("joint", "t [s]", "unit", "torque", *names), tuple(out))
 
 
-def causes(plant: Plant | Dynamics, t: Any, q: Any, v: Any, a: Any) -> Causes:
+def torques_by_cause(plant: Plant | Dynamics, t: Any, q: Any, v: Any, a: Any) -> Causes:
     """The torque that a motion asks for, by cause; of a run, ask `run.causes()`.
 
     Dry friction exerts nothing on a joint whose velocity is exactly 0, as in `Plant.inverse_dynamics`: what holds it

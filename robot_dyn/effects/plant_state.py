@@ -19,7 +19,7 @@ from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.model.gravity import gravity_acts, no_torque
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import PLANT, C, M
-from robot_dyn.queries.units import numbers_row, units, without_rounding
+from robot_dyn.queries.units import joint_units, numbers_row, without_rounding
 
 
 @final
@@ -68,8 +68,8 @@ class PlantState(Answer, Value):
 
     def blocks(self) -> Iterator[Block]:
         for name in ("q", "v", "a", "tau"):
-            yield f"{name:4}{numbers_row(getattr(self, name))}  [{units(name, self.types)}]"
-        force = units("tau", self.types)
+            yield f"{name:4}{numbers_row(getattr(self, name))}  [{joint_units(name, self.types)}]"
+        force = joint_units("tau", self.types)
         of_M = {"N m": "kg m²", "N": "kg"}.get(force, "kg m², kg m, kg")
         of_C = {"N m": "N m s/rad", "N": "N s/m"}.get(force, "rows times v: N m, N")
         meanings = (("M", "mass matrix", of_M), ("C", "Coriolis matrix", of_C), ("N", "gravity and effects", force))

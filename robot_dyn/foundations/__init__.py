@@ -6,3 +6,7 @@ coefficients, validate, signatures    declared coefficients; checks of arguments
 values, result, answer, display       value objects; results as data, as lines and tables, as HTML
 errors, files, extras, public         errors; safe reading and writing; optional packages; public names of a room
 """
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, _ = public_names(__spec__)

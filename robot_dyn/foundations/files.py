@@ -29,7 +29,7 @@ _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 
 @final
 @dataclass(frozen=True)
-class Kind:
+class FileKind:
     """A kind of file: its name, its suffix, and the first bytes that all files of the kind share."""
 
     name: str
@@ -39,7 +39,7 @@ class Kind:
 
 def target(
     path: str | Path,
-    kinds: Kind | tuple[Kind, ...],
+    kinds: FileKind | tuple[FileKind, ...],
     error: type[RobotDynError],
     inputs: Iterable[str | Path] = (),
     force: bool = True,
@@ -78,7 +78,7 @@ def target(
     return path
 
 
-def _check(path: Path, real: Path, kind: Kind, error: type[RobotDynError], inputs: Iterable[str | Path]) -> None:
+def _check(path: Path, real: Path, kind: FileKind, error: type[RobotDynError], inputs: Iterable[str | Path]) -> None:
     """Check that a file can be written, and that it replaces only a file of its kind."""
     if not real.parent.is_dir():
         raise error(f"{path}: there is no folder {real.parent}; create it first, or give another path")

@@ -19,3 +19,7 @@ from robot_dyn.integrate.tableau import Surd as Surd
 from robot_dyn.integrate.time_stepping import TimeStepping as TimeStepping
 
 __all__: list[str]
+
+# Names that only tools and tests import.
+from robot_dyn.integrate.methods import FIXED_STEP as FIXED_STEP
+from robot_dyn.integrate.methods import METHODS as METHODS

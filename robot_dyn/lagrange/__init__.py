@@ -6,3 +6,7 @@ summand, christoffel, breakdown: what one body or link adds · recursions: the O
 euler_lagrange, generalized_force, rigid_body: any energies, particles, one body
 magnitude, scale: sizes of terms, scales of comparison · exact, digits: true values in balls, correct digits
 """
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, _ = public_names(__spec__)

@@ -20,9 +20,9 @@ from robot_dyn.foundations.arithmetic import Arithmetic, Array, arithmetic_of, i
 from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.foundations.validate import shaped
 from robot_dyn.lagrange.formulas import FORMULAS
-from robot_dyn.lagrange.linkage import Linkage, linkage
+from robot_dyn.lagrange.linkage import Linkage, linkage_of
 from robot_dyn.lagrange.summand import mass_matrix_derivative, of_bodies
-from robot_dyn.lagrange.tree import Described, tree
+from robot_dyn.lagrange.tree import Described, tree_of
 from robot_dyn.queries.batch import answered, into
 from robot_dyn.queries.dynamics import QUANTITIES, Axes, Dynamics, entry
 from robot_dyn.queries.quantity import Quantity
@@ -60,7 +60,7 @@ class Lagrangian(Dynamics[Array], Parametrised):
     @in_arithmetic
     def linkage(self) -> Linkage:
         """The tree in these numbers."""
-        return linkage(tree(self.robot.description, self.robot.edits), self.joint_names, self.arithmetic)
+        return linkage_of(tree_of(self.robot.description, self.robot.edits), self.joint_names, self.arithmetic)
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]

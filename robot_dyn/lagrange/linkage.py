@@ -208,7 +208,7 @@ class Configuration:
         return J
 
 
-def linkage(tree: Tree, joint_names: tuple[str, ...], arithmetic: Arithmetic) -> Linkage:
+def linkage_of(tree: Tree, joint_names: tuple[str, ...], arithmetic: Arithmetic) -> Linkage:
     """The numbers of a tree; coordinates in the order of `joint_names`. To be called in the arithmetic's scope."""
     mimics = {joint.name: joint.mimic for joint in tree.joints if joint.mimic and joint.kind != "fixed"}
     held = {joint.name: arithmetic.number(joint.locked) for joint in tree.joints if joint.locked is not None}

@@ -104,7 +104,7 @@ class Tree:
     gravity: Triple
 
 
-def tree(description: Description, edits: Edits) -> Tree:
+def tree_of(description: Description, edits: Edits) -> Tree:
     """The tree of a description with its edits."""
     file = description.element
     links = (Link(link.get("name"), _inertials(link)) for link in file.iterfind("link"))

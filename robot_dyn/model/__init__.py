@@ -6,3 +6,7 @@ evaluation: checks, batches and mimic joints around a call
 coriolis, regrouped: C without loss of digits · conditioning: M singular or nearly so · gravity: whether it acts
 findings: what is doubtful in a description that loads
 """
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, _ = public_names(__spec__)

@@ -17,7 +17,7 @@ from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.inertia import implausibility
 from robot_dyn.description.mobile_base import stands_on
-from robot_dyn.description.structure import StatedLink, Structure, structure
+from robot_dyn.description.structure import StatedLink, Structure, structure_of
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import shorten
 from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, Regularity
@@ -34,7 +34,7 @@ def findings_of(description: Description, edits: Edits, regularity: Regularity) 
         centres_beyond_reach, long_lengths, large_ratios, welded_base, zero_limits, equal_limits,
         impossible_inertias_of_the_base,
     )  # fmt: skip
-    robot = structure(description, edits)
+    robot = structure_of(description, edits)
     of_kinds = (finding for kind in kinds for finding in kind(robot))
     joint = None if regularity.near else regularity.joint
     singular, near = no_inertia_about_axis(robot, joint), hardly_any_inertia(regularity.near)

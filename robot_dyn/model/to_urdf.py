@@ -23,14 +23,14 @@ from robot_dyn.description.structure import stated_mimics
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import DescriptionError, ModelWarning
-from robot_dyn.foundations.files import Kind, save, target
+from robot_dyn.foundations.files import FileKind, save, target
 from robot_dyn.foundations.spatial import rotation, rotation_rpy, rpy_of
 from robot_dyn.model.pinocchio_model import state_edits
 
 if TYPE_CHECKING:
     from robot_dyn.model.robot import Robot
 
-_URDF = Kind("a URDF", ".urdf", b"<?xml")
+_URDF = FileKind("a URDF", ".urdf", b"<?xml")
 _DRAWN = ("visual", "collision")
 _UNIT_SLACK = 1e-15  # of an axis: its rounding
 

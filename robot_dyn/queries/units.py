@@ -41,7 +41,7 @@ def joint_types_of(dynamics: Any) -> tuple[str | None, ...]:
     return getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * dynamics.n)
 
 
-def units(quantity: str, joint_types: Iterable[str | None]) -> str:
+def joint_units(quantity: str, joint_types: Iterable[str | None]) -> str:
     """The units of a vector over joints, such as "rad or m": each once."""
     of_joints = dict.fromkeys(unit(quantity, each) for each in joint_types)
     both = unit(quantity, None)

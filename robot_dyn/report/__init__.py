@@ -6,3 +6,7 @@ save              save_result: figure, CSV or JSON by the suffix
 environment       versions and processor
 timing            times of calls that take turns; time_budget: how long a measurement may take
 """
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, _ = public_names(__spec__)

@@ -12,7 +12,7 @@ from pathlib import Path
 _PACKAGES = ("robot-dyn", "pin", "numpy", "scipy", "llvmlite", "casadi", "mujoco", "drake", "heyoka")
 
 
-def environment(packages: Iterable[str] = _PACKAGES) -> dict[str, str]:
+def processor_and_versions(packages: Iterable[str] = _PACKAGES) -> dict[str, str]:
     """Processor and versions by name, of the packages that are installed."""
     info = Path("/proc/cpuinfo")  # Linux; elsewhere the name of the architecture must do
     models = re.findall(r"model name\s*: (.*)", info.read_text() if info.exists() else "")

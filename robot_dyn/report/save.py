@@ -14,7 +14,7 @@ from robot_dyn.report.result import Result, drawn
 from robot_dyn.view.plots.figure import THEMES
 from robot_dyn.view.plots.plots import PICTURES
 
-JSON = files.Kind("a result", ".json", b'{\n "robot":')
+JSON = files.FileKind("a result", ".json", b'{\n "robot":')
 
 
 def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Path:
@@ -50,14 +50,14 @@ def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Pa
     return files.save(path, lambda file: file.write(stream.getvalue()), ResultError)
 
 
-def kinds(of: type[Result]) -> tuple[files.Kind, ...]:
+def kinds(of: type[Result]) -> tuple[files.FileKind, ...]:
     """The files that a result of a class can be."""
     return (*(PICTURES if of.diagram else ()), *((table_kind(of),) if of.columns else ()), JSON)
 
 
-def table_kind(of: type[Result]) -> files.Kind:
+def table_kind(of: type[Result]) -> files.FileKind:
     """The CSV table of a class of results."""
-    return files.Kind("a table of results", ".csv", ",".join(of.columns[:2]).encode())
+    return files.FileKind("a table of results", ".csv", ",".join(of.columns[:2]).encode())
 
 
 def table(result: Result) -> str:

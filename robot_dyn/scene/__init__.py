@@ -9,3 +9,7 @@ messages.py, lines.py    error messages, with the line of the key
 explain.py       what a scene integrates, term by term; manual.py writes docs/reference/scenes.md
 starters/        scenes to start from
 """
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, _ = public_names(__spec__)

@@ -13,7 +13,7 @@ from pydantic import ValidationError, WrapValidator
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import RobotDynError, SceneError, nearest, shorten
-from robot_dyn.foundations.files import Kind, read
+from robot_dyn.foundations.files import FileKind, read
 from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
@@ -29,7 +29,7 @@ from robot_dyn.scene.user_effects import Factories, UserEffect, check_factories,
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
 MAX_BYTES = 2**20
-SCENE = Kind("a scene", ".toml")
+SCENE = FileKind("a scene", ".toml")
 
 
 class Start(Part):

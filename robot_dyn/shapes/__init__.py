@@ -7,3 +7,7 @@ closed_parts, winding             parts of a mesh: inside out, cavities, overlap
 elements, addresses               numbers of <visual> and <collision>; from an address to a file
 mesh_files, meshes, triangles     bounded reading of mesh files, and their triangles, which the viewer draws too
 """
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, _ = public_names(__spec__)

@@ -18,7 +18,7 @@ from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.inertia import MassProperties
 from robot_dyn.description.markup import parse
-from robot_dyn.description.structure import StatedLink, Structure, structure
+from robot_dyn.description.structure import StatedLink, Structure, structure_of
 from robot_dyn.foundations.errors import DescriptionError, QueryError
 from robot_dyn.shapes.link_shapes import LinkShape, link_shapes
 from robot_dyn.shapes.masses import Masses
@@ -93,7 +93,7 @@ def shapes_of_lacking(
     Raises:
         DescriptionError: If that of a link that moves cannot be read.
     """
-    stated = structure(description, Edits())
+    stated = structure_of(description, Edits())
     lacking = [name for name, link in stated.links.items() if not any(link.moments)]
     shapes, failed = link_shapes(description, lacking, tuple(package_dirs), allow_overlap=allow_overlap)
     for name, why in failed.items():
@@ -109,7 +109,7 @@ def estimates(
 
     A mass that is given for a link whose shape is unread is a part of the total, and of no equation.
     """
-    stated = structure(description, Edits())
+    stated = structure_of(description, Edits())
     measured = {name: link.mass for name, link in stated.links.items() if link.mass}
     masses.check_links(stated.links, measured)
     for name in masses.of:

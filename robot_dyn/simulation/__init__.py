@@ -1,1 +1,5 @@
 """A plant, a controller, an integrator and a duration → a trajectory that says how far it can be trusted."""
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, _ = public_names(__spec__)

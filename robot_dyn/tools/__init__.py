@@ -6,10 +6,12 @@
     proof    theorems about where an arm will be
     stress   what breaks first on an arm
 
-No other folder of the package imports a tool, and no tool imports another. Their commands and scene tables are entry
-points (`robot_dyn.commands`, `robot_dyn.scene_tables` in pyproject.toml), imported when they are used.
+A tool imports names that a folder of the core lists in its `__init__.pyi`, with the exceptions in
+tests/test_imports.py. No other folder of the package imports a tool, and no tool imports another. Their commands and
+scene tables are entry points (`robot_dyn.commands`, `robot_dyn.scene_tables` in pyproject.toml), imported when they are
+used.
 """
 
-from robot_dyn.foundations.public import public_names
+from robot_dyn.foundations import public_names
 
 __getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -13,3 +13,7 @@ plots/           figures by Matplotlib
 video/           videos of pages
 web/             script, style and HTML of the page, and its text
 """
+
+from robot_dyn.foundations.public import public_names
+
+__getattr__, __dir__, _ = public_names(__spec__)

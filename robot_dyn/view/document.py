@@ -19,7 +19,7 @@ from robot_dyn.foundations.validate import instance, one_state, truth
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Array
 from robot_dyn.simulation.comparison.differing_settings import run_names
-from robot_dyn.simulation.observation.remarks import lines
+from robot_dyn.simulation.observation.remarks import remark_lines
 from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.view import commands
@@ -111,7 +111,7 @@ class _Picture:
 
 
 @np.errstate(all="ignore")  # what is far out is drawn as far as it can be
-def document(
+def document_of(
     runs: tuple[TrajectoryData, ...], package_dirs: Iterable[str | Path], frame: str | None, inertia: bool,
     meshes: str = "full",
 ) -> dict[str, Any]:  # fmt: skip
@@ -142,7 +142,7 @@ def document(
         picture.tracks |= layer.tracks
         notes += [each.prefix + note for note in (*each.notes, *each.drawing.remarks, *layer.notes)]
         problems += [each.prefix + note for note in (*each.problems, *each.drawing.notes)]
-        remarks += [each.prefix + line for line in lines(each.run.remarks)]
+        remarks += [each.prefix + line for line in remark_lines(each.run.remarks)]
     split = _causes(shown)
     return picture.document(
         [*notes, *scale, *([resolution(split)] if split else [])],

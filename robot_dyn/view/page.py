@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, final
 
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.foundations.files import Kind, save, target, why
+from robot_dyn.foundations.files import FileKind, save, target, why
 from robot_dyn.foundations.validate import integer
 from robot_dyn.view.picture import HEIGHT, WIDTH, picture
 from robot_dyn.view.web.text import page_text
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from robot_dyn.view.live.server import Server
 
 _HEIGHT = 720  # of a frame in a notebook, in pixels
-PAGE = Kind("a page", ".html", b"<!DOCTYPE html>")
+PAGE = FileKind("a page", ".html", b"<!DOCTYPE html>")
 
 
 class ReplayError(RobotDynError):

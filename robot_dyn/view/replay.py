@@ -12,7 +12,7 @@ from robot_dyn.foundations.files import target
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Array
 from robot_dyn.simulation.results.run_data import TrajectoryData
-from robot_dyn.view.document import document, still
+from robot_dyn.view.document import document_of, still
 from robot_dyn.view.page import PAGE, Page, ReplayError
 
 
@@ -40,7 +40,7 @@ def replay(
         ReplayError: If a run has no samples.
         QueryError: If a run carries no robot, or `frame` is not one of its links.
     """
-    return _page(document((run, *ghosts), package_dirs, frame, inertia, meshes))
+    return _page(document_of((run, *ghosts), package_dirs, frame, inertia, meshes))
 
 
 def save_replay(
@@ -62,7 +62,7 @@ def save_replay(
         ReplayError: If the file cannot be written.
     """
     file = target(path, PAGE, ReplayError)
-    return _page(document((run, *ghosts), package_dirs, frame, inertia, meshes)).save(file)
+    return _page(document_of((run, *ghosts), package_dirs, frame, inertia, meshes)).save(file)
 
 
 def show(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from robot_dyn.queries.units import format_duration, units
+from robot_dyn.queries.units import format_duration, joint_units
 from robot_dyn.simulation.comparison.difference import comparable
 from robot_dyn.simulation.comparison.differing_settings import differing_settings
 from robot_dyn.simulation.results.provenance import joint_types
@@ -37,7 +37,7 @@ def cost_table(named: Sequence[tuple[str, TrajectoryData]]) -> dict[str, Any]:
 
 
 def _rows(run: TrajectoryData) -> Iterator[tuple[str, str]]:
-    s, unit = run.statistics, units("q", joint_types(run))
+    s, unit = run.statistics, joint_units("q", joint_types(run))
     yield "method", f"{s.method}, step {s.step_s:.4g} s" if s.step_s else s.method
     yield "engine", s.engine
     yield "steps", str(s.steps)

@@ -30,7 +30,7 @@ from benchmarks.measure import command_line, row, table
 from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.inertia import MassProperties
-from robot_dyn.description.structure import structure
+from robot_dyn.description.structure import structure_of
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.spatial import rotation_rpy
 from robot_dyn.shapes.estimate import estimates, marked, shapes_of_lacking
@@ -168,7 +168,7 @@ def judged(maker: str, name: str, robot: rd.Robot, package_dirs: tuple[Path, ...
     total = sum(true[link].mass for link in shapes)
     of_each = Masses({link: true[link].mass for link in shapes})
     known = zip(_KNOWN, (of_each, Masses({}, total=total), Masses({}, density=DENSITY)), strict=True)
-    base, least = structure(robot.description, Edits()).base, _LEAST * sum(body.mass for body in true.values())
+    base, least = structure_of(robot.description, Edits()).base, _LEAST * sum(body.mass for body in true.values())
     moving = [link for link in shapes if link not in base and true[link].mass > least]
     errors = {}
     for what, masses in known:
@@ -181,7 +181,7 @@ def judged(maker: str, name: str, robot: rd.Robot, package_dirs: tuple[Path, ...
 def stated(description: Description) -> dict[str, MassProperties]:
     """Mass properties of each link with a mass and possible moments, in the frame of the link."""
     found = {}
-    links = structure(description, Edits()).links
+    links = structure_of(description, Edits()).links
     for element in description.element.iterfind("link[inertial]"):
         name = element.get("name")
         R = rotation_rpy(np.array(element.find("inertial/origin").get("rpy").split(), dtype=float))
@@ -204,7 +204,7 @@ def _kept(description: Description, links: Any) -> Description:
 
 
 def _length(description: Description) -> float:
-    lengths = [float(np.linalg.norm(joint.xyz)) for joint in structure(description, Edits()).joints.values()]
+    lengths = [float(np.linalg.norm(joint.xyz)) for joint in structure_of(description, Edits()).joints.values()]
     return float(np.median([length for length in lengths if length > 0.02]))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import robot_dyn as rd
 from benchmarks.measure import row, table
 from robot_dyn.description.edits import Edits
-from robot_dyn.description.structure import structure
+from robot_dyn.description.structure import structure_of
 from robot_dyn.foundations.errors import RobotDynError
 
 SHARED = 20.0  # [kg], by the links without a mass of any arm: whether it moves does not depend on it
@@ -60,7 +60,7 @@ def _arms(folder: Path) -> Iterator[Path]:
             robot = _load(path, folder)
         except RobotDynError:
             continue
-        stated = structure(robot.description, Edits())
+        stated = structure_of(robot.description, Edits())
         key = (*((name, link.mass) for name, link in stated.links.items()), *map(str, stated.joints.values()))
         if key in known or not 3 <= len(stated.moving) <= 20:
             continue

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.dynamics.sampled_loop import linearised
+from robot_dyn.simulation import linearised
 from robot_dyn.simulation.dynamics.stability import longest_step
 from tests.campaigns.estimates.advised import blow_up, limited
 from tests.campaigns.estimates.scenes import RAIL

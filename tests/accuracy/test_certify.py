@@ -11,13 +11,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.accuracy.certificate.certificate import Certificate
+from robot_dyn.accuracy import Certificate, DigitCount, Implementation, implementations, random_states
 from robot_dyn.accuracy.certificate.diagram import draw
-from robot_dyn.accuracy.certificate.digit_count import DigitCount
-from robot_dyn.accuracy.certificate.implementation import Implementation, implementations
-from robot_dyn.accuracy.certificate.worst_case_search import random_states
+from robot_dyn.lagrange import articulated_body
 from robot_dyn.lagrange.digits import QUANTITIES
-from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from tests.long import long
 

@@ -13,18 +13,18 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn import RobotDynError
 from robot_dyn.accuracy.costs import step_cost
 from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Pair, Version, Way, in_turns
 from robot_dyn.accuracy.costs.cost import _cells
 from robot_dyn.accuracy.costs.query_cost import QueryCost
+from robot_dyn.codegen import program_of
 from robot_dyn.codegen.parameters import parameters
-from robot_dyn.codegen.trace.from_casadi import program_of
-from robot_dyn.foundations.errors import QueryError, RobotDynError
-from robot_dyn.foundations.result import json_text
-from robot_dyn.report.time_budget import Budget
-from robot_dyn.scene.starters import starter
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.cache import machine_code, machine_code_of_constants
+from robot_dyn.foundations import QueryError, json_text
+from robot_dyn.report import Budget
+from robot_dyn.scene import starter
+from robot_dyn.simulation import StateEquation, machine_code
+from robot_dyn.simulation.engine.cache import machine_code_of_constants
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])

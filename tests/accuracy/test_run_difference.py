@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 from tests.campaigns.run_pairs import one_motion, two_motions
 from tests.cli.test_command_documents import names, promised
 from tests.command import document

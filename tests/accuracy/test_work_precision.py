@@ -17,23 +17,21 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 import robot_dyn as rd
+from robot_dyn.accuracy import ArmMotion, PeerError, desired_motion
 from robot_dyn.accuracy.work_precision_diagram.diagram import most_precise
 from robot_dyn.accuracy.work_precision_diagram.measurement import Rung, Walk, measure
 from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest, own, recorded, whole
 from robot_dyn.accuracy.work_precision_diagram.past_horizon import past_horizon
 from robot_dyn.accuracy.work_precision_diagram.peers import found
-from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError, desired_motion
 from robot_dyn.accuracy.work_precision_diagram.reference_run import HorizonError, Reference, reference
 from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
 from robot_dyn.accuracy.work_precision_diagram.work_precision import programs
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.result import json_text
-from robot_dyn.integrate.explicit import ExplicitRungeKutta
-from robot_dyn.integrate.tableau import ButcherTableau
-from robot_dyn.queries.units import format_duration
-from robot_dyn.report.time_budget import Budget, Limit
-from robot_dyn.scene.scene import parse_scene
-from robot_dyn.scene.starters import starter
+from robot_dyn.foundations import QueryError, json_text
+from robot_dyn.integrate import ButcherTableau, ExplicitRungeKutta
+from robot_dyn.queries import format_duration
+from robot_dyn.report import Budget
+from robot_dyn.report.time_budget import Limit
+from robot_dyn.scene import parse_scene, starter
 from tests.long import long
 
 UNTIL_DONE = Limit(math.inf)

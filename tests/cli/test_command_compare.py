@@ -7,8 +7,9 @@ import re
 
 import pytest
 
-from robot_dyn.lagrange.lagrangian import Lagrangian
+from robot_dyn import Lagrangian
 from tests.command import MAIN, ROOT, document, refusal, run, said, spawn
+from tests.snapshots import assert_text
 
 
 def test_compare_agrees():
@@ -68,13 +69,13 @@ def test_a_implementation_that_says_nan_disagrees_in_valid_json(monkeypatch: pyt
 
 
 @pytest.mark.parametrize(
-    ("args", "message"),
+    "args",
     [
-        ([], r"nothing to compare; give the names of robots, or --all"),
-        (["ur5", "--all"], r"give the names of robots or --all, not both"),
-        (["ur5", "ur6", "--samples", "1"], r"no robot 'ur6'; nearest: ur5.*"),
-        (["pendulum", "--seed", "-1"], r"seed must be a whole number, from 0 to \d+, got -1"),
+        [],
+        ["ur5", "--all"],
+        ["ur5", "ur6", "--samples", "1"],
+        ["pendulum", "--seed", "-1"],
     ],
 )
-def test_compare_without_meaning_is_refused_in_one_line(args: list[str], message: str):
-    assert re.fullmatch(message, refusal(["compare", *args]))
+def test_compare_without_meaning_is_refused_in_one_line(args: list[str]):
+    assert_text("refused_studies", " ".join(["compare", *args]), refusal(["compare", *args]))

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import robot_dyn as rd
-from robot_dyn.scene.starters import starter
+from robot_dyn.scene import starter
 from tests.command import ROOT, document
 
 PROMISE = (ROOT / "docs" / "reference" / "json.md").read_text(encoding="utf-8")

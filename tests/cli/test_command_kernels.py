@@ -56,7 +56,7 @@ def test_a_folder_that_others_can_enter_is_told_and_not_used(folder: Path) -> No
 
 
 def test_explain_counts_instructions_by_effect(tmp_path: Path) -> None:
-    from robot_dyn.scene.starters import starter
+    from robot_dyn.scene import starter
 
     scene = tmp_path / "scene.toml"
     scene.write_text(starter("cart_pole"), encoding="utf-8")

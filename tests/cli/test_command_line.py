@@ -14,6 +14,7 @@ import pytest
 import robot_dyn as rd
 from tests.command import MAIN, interrupted_at_work, refusal, run, said, spawn
 from tests.long import long
+from tests.snapshots import assert_text
 
 COMMANDS = ("list", "info", "query", "compare", "demo")
 
@@ -56,25 +57,35 @@ def test_list_prints_every_name():
 
 
 @pytest.mark.parametrize(
-    ("args", "message"),
+    "args",
     [
-        (["info", "ur6"], r"no robot 'ur6'; nearest: ur5.*"),
-        (["query", "pandas"], r"no robot 'pandas'; nearest: panda.*"),
-        (["info", "nowhere/arm.urdf"], r"no file nowhere/arm\.urdf; looked for /.*"),
-        (["info", "package://legs/leg.urdf"], r"no file for package://legs/leg\.urdf; tried in .*"),
-        (["info", "/"], r"/: is a folder; .*"),
-        (["info", __file__], r".*test_command_line\.py: is not well-formed XML: .*"),
-        (["info", "hector"], r".*: no joint moves.*"),
-        (["info", "ur5", "--lock", "elbow=0"], r"lock: no joint 'elbow' .*nearest: elbow_joint"),
-        (["info", "ur5", "--lock", "elbow_joint"], r"--lock must be JOINT=VALUE, got 'elbow_joint'"),
-        (["info", "ur5", "--lock", "elbow_joint=bent"], r"--lock: 'bent' is not a number"),
-        (["info", "ur5", "--lock", "elbow_joint=nan"], r"lock of 'elbow_joint' must be finite.*"),
-        (["info", "ur5", "--lock", "elbow_joint=1", "--lock", "elbow_joint=2"], r"--lock .* twice: .*elbow_joint.*"),
-        (["info", "pendulum", "--lock", "pivot=0"], r"lock: no joint is left to move.*"),
+        ["info", "ur6"],
+        ["query", "pandas"],
+        ["info", "nowhere/arm.urdf"],
+        ["info", "/"],
+        ["info", "hector"],
+        ["info", "ur5", "--lock", "elbow=0"],
+        ["info", "ur5", "--lock", "elbow_joint"],
+        ["info", "ur5", "--lock", "elbow_joint=bent"],
+        ["info", "ur5", "--lock", "elbow_joint=nan"],
+        ["info", "ur5", "--lock", "elbow_joint=1", "--lock", "elbow_joint=2"],
+        ["info", "pendulum", "--lock", "pivot=0"],
     ],
 )
-def test_refused_in_one_line(args: list[str], message: str):
-    assert re.fullmatch(message, refusal(args))
+def test_refused_in_one_line(args: list[str]):
+    assert_text("refused_commands", " ".join(args), refusal(args))
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("package://legs/leg.urdf", r"no file for package://legs/leg\.urdf; tried in .*"),
+        (__file__, r".*test_command_line\.py: is not well-formed XML: .*"),
+    ],
+)
+def test_a_file_that_is_not_there_or_no_urdf_is_refused_in_one_line(file: str, message: str):
+    """By texts of the machine and of lxml."""
+    assert re.fullmatch(message, refusal(["info", file]))
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.queries.dynamics import QUANTITIES
-from robot_dyn.queries.units import without_rounding
+from robot_dyn.queries import QUANTITIES, without_rounding
 from tests.command import ROOT, document, refusal, run, said
+from tests.snapshots import assert_text
 
 Q, V, A = "-0.1,0.7,-0.4,0.3,0.9,-0.6", "0.2,-0.3,0.4,0.5,-0.6,0.7", "1.1,-1.2,1.3,0.4,0.5,-0.6"
 
@@ -165,20 +165,20 @@ def test_a_payload_is_that_of_the_library():
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    "text",
     [
-        ("tool0", r"--payload must be LINK=MASS@X,Y,Z in kg and m, as tool0=5kg@0,0,0\.1; got 'tool0'"),
-        ("tool0=5@1,2", r"--payload must be LINK=MASS@X,Y,Z in kg and m, .*; got 'tool0=5@1,2'"),
-        ("=5", r"--payload must be LINK=MASS@X,Y,Z in kg and m, .*"),
-        ("tool0=5lb", r"--payload, mass in kg: '5lb' is not a number"),
-        ("tool0=5@0,0,1mm", r"--payload, place in m: '1m' is not a number"),
-        ("tool0=-1", r"payload mass must not be negative, got -1\.0"),
-        ("tool0=1@nan,0,0", r"payload com must be finite, got nan"),
-        ("tool=1", r"payload: no frame 'tool'; nearest: tool0"),
+        "tool0",
+        "tool0=5@1,2",
+        "=5",
+        "tool0=5lb",
+        "tool0=5@0,0,1mm",
+        "tool0=-1",
+        "tool0=1@nan,0,0",
+        "tool=1",
     ],
 )
-def test_a_payload_without_meaning_is_refused(text: str, message: str):
-    assert re.fullmatch(message, refusal(["query", "ur5", "--payload", text]))
+def test_a_payload_without_meaning_is_refused(text: str):
+    assert_text("refused_queries", f"--payload {text}", refusal(["query", "ur5", "--payload", text]))
 
 
 HELD = """robot = "planar_2r"
@@ -283,27 +283,27 @@ def test_query_without_forward_dynamics_names_the_joint():
 
 
 @pytest.mark.parametrize(
-    ("args", "message"),
+    "args",
     [
-        (["--a", A, "--tau", A], r"give --a or --tau, not both.*"),
-        (["--q", "0.1,0.2"], r"--q needs 6 numbers, got 2: shoulder_pan_joint, .*wrist_3_joint"),
-        (["--q", ""], r"--q needs 6 numbers, got 0: .*"),
-        (["--v", V + ",1"], r"--v needs 6 numbers, got 7: .*"),
-        (["--tau", "1,2,3,4,5,six"], r"--tau: 'six' is not a number"),
-        (["--q", "elbow=1"], r"--q: no joint 'elbow'; nearest: elbow_joint"),
-        (["--q", "elbow_joint=1,2"], r"--q must be JOINT=VALUE, got '2'"),
-        (["--q", "elbow_joint=1,elbow_joint=2"], r"--q names a joint twice: .*elbow_joint.*"),
-        (["--q", Q.replace("-0.1", "nan")], r"q must be finite, got nan for joint 'shoulder_pan_joint'"),
-        (["--v", V.replace("0.7", "-inf")], r"v must be finite, got -inf for joint 'wrist_3_joint'"),
-        (["--a", "elbow_joint=1e999"], r"a must be finite, got inf for joint 'elbow_joint'"),
-        (["--tau", "elbow_joint=nan"], r"tau must be finite, got nan for joint 'elbow_joint'"),
-        (["--v", "elbow_joint=1e200"], r"q, v.* are so large that the result overflows"),
-        (["--why", "elbow"], r"why: no joint 'elbow'; nearest: elbow_joint"),
-        (["--effects", "friction"], r"effects='friction'; give effects, or 'urdf'.*"),
+        ["--a", A, "--tau", A],
+        ["--q", "0.1,0.2"],
+        ["--q", ""],
+        ["--v", V + ",1"],
+        ["--tau", "1,2,3,4,5,six"],
+        ["--q", "elbow=1"],
+        ["--q", "elbow_joint=1,2"],
+        ["--q", "elbow_joint=1,elbow_joint=2"],
+        ["--q", Q.replace("-0.1", "nan")],
+        ["--v", V.replace("0.7", "-inf")],
+        ["--a", "elbow_joint=1e999"],
+        ["--tau", "elbow_joint=nan"],
+        ["--v", "elbow_joint=1e200"],
+        ["--why", "elbow"],
+        ["--effects", "friction"],
     ],
 )
-def test_query_without_meaning_is_refused_in_one_line(args: list[str], message: str):
-    assert re.fullmatch(message, refusal(["query", "ur5", *args]))
+def test_query_without_meaning_is_refused_in_one_line(args: list[str]):
+    assert_text("refused_queries", " ".join(args), refusal(["query", "ur5", *args]))
 
 
 def test_what_rounding_leaves_of_a_vector_is_shown_as_0_and_kept_in_json() -> None:

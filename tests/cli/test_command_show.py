@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 import robot_dyn as rd
+from robot_dyn import RobotDynError
 from robot_dyn.cli.commands import demo
-from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.view.plots.plots import PLOTS
+from robot_dyn.view import PLOTS
 from tests.browser import opened
 from tests.command import run, said
 

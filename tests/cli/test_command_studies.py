@@ -11,6 +11,7 @@ import pytest
 import robot_dyn as rd
 from tests.cli.test_command_documents import promised
 from tests.command import document, interrupted_at_work, refusal, run
+from tests.snapshots import assert_text
 
 SCENE = 'robot = "planar_2r"\nduration_s = 0.1\n{}\n[start]\nq = [0.4, 0.9]\n[[effect]]\nkind = "gravity"\n'
 DRAG = '[[effect]]\nkind = "viscous_friction"\ndamping_N_m_s_per_rad = 0.3\n'
@@ -64,29 +65,29 @@ def test_a_robot_swings_freely_from_the_start_that_is_given() -> None:
 
 
 @pytest.mark.parametrize(
-    ("command", "given", "message"),
+    ("command", "given"),
     [
-        ("accuracy", "scene.toml --q 0.1,0.2", r"--q: is for a robot; a scene states its own, so leave it out"),
-        ("accuracy", "scene.toml --method rk5", r"no integration method 'rk5'; nearest: rk4.*"),
-        ("accuracy", "scene.toml --budget 0", r"budget_s must be (positive|above 0), got 0\.0"),
-        ("accuracy", "pendulum --duration -1", r"--duration must be positive, got -1"),
-        ("accuracy", "pendulum -o plot.txt", r"plot\.txt: '\.txt' is not the suffix of a plot; .*"),
-        ("accuracy", "scene.toml --csv scene.toml", r"scene\.toml: '\.toml' is not the suffix of a table .*"),
-        ("accuracy", "scene.toml --csv old.csv", r"old\.csv: exists; add --force to replace it.*"),
-        ("cost", "scene.toml --budget 0", r"budget_s must be .*got 0\.0"),
-        ("cost", "scene.toml -o plot.txt", r"plot\.txt: '\.txt' is not the suffix of a plot; .*"),
-        ("cost", "scene.toml --csv old.csv", r"old\.csv: exists; add --force to replace it.*"),
-        ("cost", "no.toml", r"no\.toml: .*"),
+        ("accuracy", "scene.toml --q 0.1,0.2"),
+        ("accuracy", "scene.toml --method rk5"),
+        ("accuracy", "scene.toml --budget 0"),
+        ("accuracy", "pendulum --duration -1"),
+        ("accuracy", "pendulum -o plot.txt"),
+        ("accuracy", "scene.toml --csv scene.toml"),
+        ("accuracy", "scene.toml --csv old.csv"),
+        ("cost", "scene.toml --budget 0"),
+        ("cost", "scene.toml -o plot.txt"),
+        ("cost", "scene.toml --csv old.csv"),
+        ("cost", "no.toml"),
     ],
 )
 def test_mistakes_are_told_in_one_line_before_the_work(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, given: str, message: str
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, given: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "old.csv").write_text(TABLES[command])
     if given == "no.toml" or "--csv" in given or "-o" in given:
         monkeypatch.setattr(rd.accuracy, {"accuracy": "work_precision"}.get(command, command), None)
-    assert re.fullmatch(message, refusal([command, *given.split()]))
+    assert_text("refused_studies", f"{command} {given}", refusal([command, *given.split()]))
 
 
 WATCHED = {  # where each is at work: behind the first ladder, and before what is timed

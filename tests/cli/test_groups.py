@@ -7,7 +7,7 @@ from importlib.metadata import entry_points
 
 import pytest
 
-from robot_dyn.cli.app import app
+from robot_dyn.cli import app
 from robot_dyn.cli.groups import GROUPS
 from tests.command import said
 

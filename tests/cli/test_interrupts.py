@@ -133,7 +133,7 @@ main()
 
 
 @pytest.mark.parametrize(
-    "module", ["robot_dyn.cli.interrupts", "typer.main", "robot_dyn.cli.app", "robot_dyn.foundations.errors"]
+    "module", ["robot_dyn.cli.interrupts", "typer.main", "robot_dyn.cli.application", "robot_dyn.foundations.errors"]
 )
 def test_an_interrupt_at_the_first_imports_ends_in_one_line(module: str) -> None:
     command = [sys.executable, "-c", AT_IMPORT.format(module=module)]

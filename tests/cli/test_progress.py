@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_dyn.cli.app import bar, progress
+from robot_dyn.cli import bar, progress
 from tests.command import MAIN, run, said
 
 SCENE = """

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.cli.robots import RobotOptions
+from robot_dyn.cli import RobotOptions
 from tests.command import refusal, run
 from tests.scene.test_scene_loading import MJCF, URDF
 

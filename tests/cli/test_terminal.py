@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.observation.remarks import Kind, Remark
-from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation import Ending, Outcome, Remark, RemarkKind
 from tests.command import run
 
 HOSTILE = "a\nrobot-dyn: all is well\x1b[2J\r\u202e"
@@ -61,7 +60,7 @@ def test_a_name_of_a_file_is_one_line(command: tuple[str, ...], swing: rd.Trajec
 
 def test_the_summary_of_a_run_file_has_the_lines_of_a_summary(swing: rd.Trajectory, tmp_path) -> None:
     """Whatever texts are in the file."""
-    remark = Remark(Kind.CHATTER, HOSTILE, "u", 0.0, 0.1, 0.0, 1.0, None, HOSTILE, HOSTILE)
+    remark = Remark(RemarkKind.CHATTER, HOSTILE, "u", 0.0, 0.1, 0.0, 1.0, None, HOSTILE, HOSTILE)
     strange = replace(
         swing, outcome=Outcome(Ending.FINISHED, 0.01, HOSTILE), about=swing.about | {"right_angles": HOSTILE},
         acting=(HOSTILE,), remarks=(remark,), statistics=replace(swing.statistics, method=HOSTILE, engine=HOSTILE),

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.codegen.dynamics import CompiledDynamics
+from robot_dyn.codegen import CompiledDynamics
 
 ARMS = ("ur5", "panda", "mimic_chain", "skew_tree", "planar_2r")
 

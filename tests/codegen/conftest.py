@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_dyn.codegen.store.cache import Store
+from robot_dyn.codegen import Store
 from tests.codegen.entries import KEY, PAYLOAD
 
 

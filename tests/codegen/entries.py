@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_dyn.codegen.store.cache import Store
-from robot_dyn.codegen.store.keys import digest_of_texts
+from robot_dyn.codegen import Store, digest_of_texts
 
 KEY, OTHER = digest_of_texts(["kernel"]), digest_of_texts(["other"])
 PAYLOAD = bytes(range(256)) + b"\n\n end"

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen.trace.symbolic import TraceError
-from robot_dyn.effects.effect import Active
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.effects import Active
+from robot_dyn.foundations import QueryError, TraceError
 
 ARM = rd.load("planar_2r")
 FAST = rd.Compiled(ARM)

@@ -8,16 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
+from robot_dyn.codegen import Trace, completed
 from robot_dyn.codegen.trace.base_parameters import regrouped
 from robot_dyn.codegen.trace.origins import slid
-from robot_dyn.codegen.trace.right_angles import completed
-from robot_dyn.codegen.trace.trace import Trace
-from robot_dyn.lagrange.linkage import Linkage
-from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.recursions.articulated_body import articulated_body
-from robot_dyn.lagrange.recursions.composite_body import composite_body
+from robot_dyn.lagrange import Linkage, articulated_body, composite_body, magnitudes, newton_euler
 from robot_dyn.lagrange.recursions.kinetic_energy import kinetic_energy
-from robot_dyn.lagrange.recursions.newton_euler import newton_euler
 from tests.long import long
 from tests.random_trees import RandomTree, trees
 

@@ -12,10 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from robot_dyn.codegen import CacheWarning, Store, digest_of_texts
 from robot_dyn.codegen.store import cache
-from robot_dyn.codegen.store.cache import CacheWarning, Store
-from robot_dyn.codegen.store.keys import digest_of_texts
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 from tests.codegen.entries import KEY, OTHER, PAYLOAD, as_root, assert_gone, posix
 
 

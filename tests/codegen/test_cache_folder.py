@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from robot_dyn.codegen import CacheWarning, Store
 from robot_dyn.codegen.store import cache
-from robot_dyn.codegen.store.cache import CacheWarning, Store, default_store
+from robot_dyn.codegen.store.cache import default_store
 from tests.codegen.entries import KEY, OTHER, PAYLOAD, as_root, posix
 
 

@@ -13,14 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn.codegen.dynamics import CompiledDynamics
-from robot_dyn.codegen.engine import SizeWarning
-from robot_dyn.codegen.kernel import Kernel
-from robot_dyn.codegen.self_check import SelfCheckError
-from robot_dyn.codegen.trace.trace import Trace
-from robot_dyn.foundations.errors import OverflowedError, QueryError, SingularError
-from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.scale import floored
+from robot_dyn.codegen import CompiledDynamics, Kernel, SelfCheckError, SizeWarning, Trace
+from robot_dyn.foundations import OverflowedError, QueryError, SingularError
+from robot_dyn.lagrange import floored, magnitudes
 from robot_dyn.queries.dynamics import EQUATION
 from tests.codegen.arms import ARMS, compiled, states
 from tests.random_trees import RandomTree, trees

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn import Compiled
+from robot_dyn.codegen import CompiledPlant, Trace
 from robot_dyn.codegen.llvm import machine_code
-from robot_dyn.codegen.plant import Compiled, CompiledPlant
-from robot_dyn.codegen.trace.symbolic import TraceError
-from robot_dyn.codegen.trace.trace import Trace
-from robot_dyn.effects.effect import Active
+from robot_dyn.effects import Active
+from robot_dyn.foundations import TraceError
 from tests.codegen.arms import states
 
 ROBOT = rd.load("planar_2r")

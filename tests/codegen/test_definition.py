@@ -15,9 +15,8 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.codegen.store.definition import definition
 from robot_dyn.foundations.values import LRUByIdentity
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.simulation import StateEquation, machine_code
 from robot_dyn.simulation.engine import cache
-from robot_dyn.simulation.engine.cache import machine_code
 from robot_dyn.simulation.engine.structure import structure
 from tests.codegen.test_kernel import Memory
 

@@ -14,13 +14,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from robot_dyn.codegen.kernel import Kernel
+from robot_dyn.codegen import Kernel, program_of
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.llvm.sine_groups import in_groups
 from robot_dyn.codegen.program import Kind
 from robot_dyn.codegen.threads import shared
-from robot_dyn.codegen.trace.from_casadi import program_of
 from tests.codegen.arms import compiled, states
 
 

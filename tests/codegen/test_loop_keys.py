@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from robot_dyn.codegen import INSTEAD, MachineFunction
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.loops import dependencies as of_loops
-from robot_dyn.codegen.loops.call import MachineFunction
 from robot_dyn.codegen.loops.kinds import kind_of
-from robot_dyn.codegen.primitives import INSTEAD
 from robot_dyn.codegen.store import keys as identity
 from tests.codegen.test_kernel import Memory
 

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from robot_dyn.codegen import INSTEAD, MachineFunction
 from robot_dyn.codegen import primitives as loops
-from robot_dyn.codegen.loops.call import MachineFunction
-from robot_dyn.codegen.primitives import INSTEAD
-from robot_dyn.foundations.errors import MachineCodeError
+from robot_dyn.foundations import MachineCodeError
 from robot_dyn.integrate import primitives
 from robot_dyn.integrate.primitives import GOING
 

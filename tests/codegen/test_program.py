@@ -6,11 +6,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from robot_dyn.codegen.kernel import Kernel
+from robot_dyn.codegen import Kernel, program_of
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.program import Kind, Op, Program, Programs
-from robot_dyn.codegen.trace.from_casadi import OperationError, instructions, program_of
+from robot_dyn.codegen.trace.from_casadi import OperationError, instructions
 
 
 def sample() -> ca.Function:

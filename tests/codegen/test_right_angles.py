@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen.trace.right_angles import completed
-from robot_dyn.scene.explain import of_scene
-from robot_dyn.scene.scene import parse_scene
+from robot_dyn.codegen import completed
+from robot_dyn.scene import of_scene, parse_scene
 
 ARM = """<robot name="arm"><link name="base"/>
 <link name="tip"><inertial><mass value="1.5"/><origin xyz="0.1 0.2 0.3" rpy="1.57079632679 0 0"/>

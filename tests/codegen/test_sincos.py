@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 
-from robot_dyn.codegen.kernel import Kernel
+from robot_dyn.codegen import Kernel, program_of
 from robot_dyn.codegen.llvm.elementary import RANGE
 from robot_dyn.codegen.llvm.one_state import Status
-from robot_dyn.codegen.trace.from_casadi import program_of
 
 
 @cache

@@ -12,12 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from robot_dyn.codegen.loops.call import MachineFunction
+from robot_dyn.codegen import INSTEAD, MachineFunction
 from robot_dyn.codegen.loops.expressions import EXPRESSIONS
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.loops.statements import STATEMENTS
-from robot_dyn.codegen.primitives import INSTEAD
-from robot_dyn.foundations.errors import MachineCodeError
+from robot_dyn.foundations import MachineCodeError
 from tests.long import long
 
 

@@ -11,9 +11,7 @@ from typing import ClassVar
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen import waiting
-from robot_dyn.codegen.loops.call import MachineFunction
-from robot_dyn.codegen.primitives import INSTEAD
+from robot_dyn.codegen import INSTEAD, MachineFunction, waiting
 from robot_dyn.codegen.waiting import announced
 from robot_dyn.simulation.engine.choice import choose
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from llvmlite import ir
 
+from robot_dyn.codegen import program_of
 from robot_dyn.codegen.llvm.elementary import RANGE
 from robot_dyn.codegen.llvm.machine_code import addresses
 from robot_dyn.codegen.llvm.vectors import F32, F64, I64
 from robot_dyn.codegen.llvm.writer import Writer
 from robot_dyn.codegen.store.keys import digest
-from robot_dyn.codegen.trace.from_casadi import program_of
 
 X = ca.SX.sym("x", 3)
 Z = ca.SX.sym("z", 2)

@@ -12,10 +12,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
-from robot_dyn.control.computed_torque import ComputedTorque, FeedForward
-from robot_dyn.control.controller import ControlError, Controller
-from robot_dyn.control.independent_joint import PD, PID, gains_from
-from robot_dyn.control.reference import hold, quintic
+from robot_dyn.control import PD, PID, ComputedTorque, Controller, FeedForward, gains_from, hold, quintic
+from robot_dyn.foundations import ControlError
 
 NONE = np.zeros(0)  # no states
 Q, V, T = np.array([0.4, -0.9, 1.3]), np.array([-0.7, 0.2, 1.1]), 0.6

@@ -7,13 +7,18 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
-from robot_dyn.control.cartesian import circle, line
-from robot_dyn.control.controller import ControlError
-from robot_dyn.control.operational_space import POSE, POSITION, OperationalSpace, TaskDynamics, task_dynamics
-from robot_dyn.control.orientation import orientation_error
-from robot_dyn.control.reference import hold
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.spatial import rotation
+from robot_dyn.control import (
+    POSE,
+    POSITION,
+    OperationalSpace,
+    TaskDynamics,
+    circle,
+    hold,
+    line,
+    orientation_error,
+    task_dynamics,
+)
+from robot_dyn.foundations import ControlError, QueryError, rotation
 
 NONE = np.zeros(0)
 PANDA = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import polynomial
 
-from robot_dyn.control.extremes import extremes
-from robot_dyn.control.reference import PiecewisePolynomial
+from robot_dyn.control import PiecewisePolynomial, extreme_values
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
@@ -17,7 +16,7 @@ def test_extremes_are_those_at_the_roots_of_the_derivative(pieces: int, order: i
     rng = np.random.default_rng(pieces + order)
     breaks = np.cumsum(np.concatenate([[0.3], rng.uniform(0.1, 0.9, pieces)]))
     motion = PiecewisePolynomial(breaks, rng.normal(size=(pieces, 6, 3)))
-    found = extremes(motion, order)
+    found = extreme_values(motion, order)
     for joint in range(3):
         values, times = [], []
         for start, h, table in zip(breaks, np.diff(breaks), motion.coefficients[..., joint], strict=False):
@@ -32,6 +31,6 @@ def test_extremes_are_those_at_the_roots_of_the_derivative(pieces: int, order: i
 
 
 def test_joints_that_rest_have_their_position_as_both() -> None:
-    found = extremes(PiecewisePolynomial([0.0, 1.0, 2.0], np.full((2, 1, 2), [[0.3, -0.4]])))
+    found = extreme_values(PiecewisePolynomial([0.0, 1.0, 2.0], np.full((2, 1, 2), [[0.3, -0.4]])))
     np.testing.assert_array_equal(found.least, [0.3, -0.4])
     np.testing.assert_array_equal(found.greatest, [0.3, -0.4])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import ControlError, PlanError
+from robot_dyn.foundations import ControlError, PlanError
 
 ARM = rd.load("ur5")
 T = np.linspace(0, 2, 81)

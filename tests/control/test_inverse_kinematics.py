@@ -9,10 +9,9 @@ import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.control.orientation import orientation_error
-from robot_dyn.control.pose import InverseKinematics, error_and_jacobian, logarithm
-from robot_dyn.foundations.errors import PlanError, QueryError
-from robot_dyn.foundations.spatial import hat
+from robot_dyn.control import InverseKinematics, orientation_error
+from robot_dyn.control.pose import error_and_jacobian, logarithm
+from robot_dyn.foundations import PlanError, QueryError, hat
 
 # kinova has continuous joints, panda a coupled one
 ARMS = {"ur5": "tool0", "panda": "panda_hand", "kinova": "j2s6s200_end_effector", "xarm7": "link_eef", "z1": "link06"}

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import PlanError
+from robot_dyn.foundations import PlanError
 
 writer = pytest.importorskip("mcap_ros2.writer")
 

@@ -10,11 +10,8 @@ from scipy.signal import butter, lfilter, lfilter_zi
 
 import robot_dyn as rd
 from robot_dyn.accuracy.costs.step_cost import parts
-from robot_dyn.foundations.errors import ControlError, QueryError
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.cache import machine_code
-from robot_dyn.simulation.observation.remarks import Kind
-from robot_dyn.simulation.results.error_estimate import Verdict
+from robot_dyn.foundations import ControlError, QueryError
+from robot_dyn.simulation import RemarkKind, StateEquation, Verdict, machine_code
 from robot_dyn.simulation.setup.schedule import cuts
 from tests.long import long
 from tests.loops import Q0, V0, Exact, exact, matrices, plant
@@ -268,7 +265,7 @@ def test_chatter_is_seen_where_a_torque_acts_late(late: float) -> None:
         for engine in ("interpreted", "compiled"):
             options = {"integrator": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
             made = rd.simulate(PLANT, Q0, V0, controller=loop, record_period_s=T, **options)  # type: ignore[arg-type]
-            assert Kind.CHATTER in {remark.kind for remark in made.remarks}
+            assert RemarkKind.CHATTER in {remark.kind for remark in made.remarks}
 
 
 def test_ticks_of_two_instants_a_period() -> None:

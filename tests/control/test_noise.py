@@ -9,8 +9,7 @@ import pytest
 from scipy.special import ndtr, ndtri
 
 import robot_dyn as rd
-from robot_dyn.codegen.loops.call import MachineFunction
-from robot_dyn.codegen.primitives import INSTEAD
+from robot_dyn.codegen import INSTEAD, MachineFunction
 from robot_dyn.simulation.run.philox import draw, normal, philox
 
 ARM = rd.Plant(rd.load("planar_2r").with_(gravity=(0.0, 0.0, 0.0)))

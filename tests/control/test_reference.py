@@ -6,12 +6,19 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.control.cartesian import CartesianReference, circle, line
-from robot_dyn.control.controller import ControlError
-from robot_dyn.control.orientation import orientation_error, rotation_vector
-from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
-from robot_dyn.control.samples.spline import Samples
-from robot_dyn.foundations.spatial import rotation
+from robot_dyn.control import (
+    CartesianReference,
+    PiecewisePolynomial,
+    Samples,
+    circle,
+    hold,
+    line,
+    orientation_error,
+    quintic,
+    rotation_vector,
+    via_points,
+)
+from robot_dyn.foundations import ControlError, rotation
 
 Q0, Q1 = np.array([0.3, -1.2, 2.0]), np.array([1.1, 0.4, -0.7])
 TIMES = np.array([0.5, 0.9, 2.2, 2.9, 4.4, 5.0])

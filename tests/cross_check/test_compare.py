@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.cross_check.compare import compare, random_state
-from robot_dyn.foundations.errors import DescriptionError, ModelWarning, QueryError
-from robot_dyn.lagrange.lagrangian import Lagrangian
-from robot_dyn.lagrange.linkage import Linkage
+from robot_dyn import Lagrangian, ModelWarning, compare
+from robot_dyn.cross_check import random_state
+from robot_dyn.foundations import DescriptionError, QueryError
+from robot_dyn.lagrange import Linkage
 from tests.long import robots
 
 REFUSED = {"alex_psyonic_hands", "hector", "iris_simple", "ur3_empty"}  # a mimic of nothing; nothing moves; no link

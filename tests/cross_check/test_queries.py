@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen.dynamics import CompiledDynamics
-from robot_dyn.foundations.errors import OverflowedError, QueryError
+from robot_dyn.codegen import CompiledDynamics
+from robot_dyn.foundations import OverflowedError, QueryError
 from robot_dyn.lagrange.formulas import FORMULAS
 from robot_dyn.model.calls import PINOCCHIO
-from robot_dyn.queries.dynamics import EQUATION, QUANTITIES, Dynamics
+from robot_dyn.queries import QUANTITIES, Dynamics
+from robot_dyn.queries.dynamics import EQUATION
 from tests.queries import arguments_of
 
 ENGINES = (rd.Robot, rd.Lagrangian, CompiledDynamics)

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError
-from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.scale import diagonal_scale, floored, mass_norm, scaled, solved_tolerance
+from robot_dyn import RobotDynError
+from robot_dyn.accuracy import PeerError
+from robot_dyn.lagrange import diagonal_scale, floored, magnitudes, mass_norm, scaled, solved_tolerance
 from tests.campaigns.hard.other_engines import installed
 from tests.long import robots
 

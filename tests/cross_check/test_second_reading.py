@@ -10,8 +10,7 @@ from lxml import etree
 
 import robot_dyn as rd
 from robot_dyn.cross_check.second_reading import second_reading
-from robot_dyn.description import description, urdf
-from robot_dyn.description.description import check
+from robot_dyn.description import check, description, urdf
 from tests.campaigns.foreign import macros, markup, robots
 from tests.campaigns.foreign.files import inside
 from tests.command import ROOT

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 import robot_dyn as rd
+from robot_dyn import ModelWarning
 from robot_dyn.description import catalog
-from robot_dyn.foundations.errors import CatalogError, DescriptionError, ModelWarning
+from robot_dyn.foundations import CatalogError, DescriptionError
 
 URDF = Path(__file__).parents[2] / "urdf"
 REFUSED = {

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import DescriptionError, ModelWarning
-from robot_dyn.simulation.results.provenance import origin, robot_of
+from robot_dyn import ModelWarning
+from robot_dyn.foundations import DescriptionError
+from robot_dyn.simulation import robot_of
+from robot_dyn.simulation.results.provenance import origin
 from tests.campaigns.foreign import macros, markup, robots
 from tests.campaigns.foreign.files import Foreign
 

@@ -11,7 +11,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import CatalogError, DescriptionError, ModelWarning
+from robot_dyn import ModelWarning
+from robot_dyn.foundations import CatalogError, DescriptionError
 from tests.hostile.kinds import ARM
 
 # --- text

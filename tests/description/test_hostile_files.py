@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from robot_dyn.foundations.errors import escaped, shorten
+from robot_dyn.foundations import escaped, shorten
 from tests.hostile import entities, limits, mimics, names, numbers, oddities, paths, structure, xml
 from tests.hostile.kinds import SECRET, Kind
 

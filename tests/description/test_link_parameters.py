@@ -9,8 +9,9 @@ import pytest
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EditError, QueryError, RobotDynError
-from robot_dyn.simulation.results.provenance import robot_of
+from robot_dyn import RobotDynError
+from robot_dyn.foundations import EditError, QueryError
+from robot_dyn.simulation import robot_of
 
 TREE = rd.load("skew_tree")
 LINK = "left_lower"

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import DescriptionError, MissingExtraError, ModelWarning
-from robot_dyn.simulation.results.provenance import robot_of
+from robot_dyn import ModelWarning
+from robot_dyn.foundations import DescriptionError, MissingExtraError
+from robot_dyn.simulation import robot_of
 from tests.hostile.kinds import ARM as URDF
 
 mujoco: Any = import_module("mujoco")  # which has no types

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import CatalogError, MissingExtraError
+from robot_dyn.foundations import CatalogError, MissingExtraError
 from tests.hostile.kinds import ARM
 
 UR = "robot_descriptions:ur10e_description"

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn import ModelWarning
 from robot_dyn.description.sources import xacro
-from robot_dyn.foundations.errors import DescriptionError, ModelWarning
+from robot_dyn.foundations import DescriptionError
 from tests.command import document, refusal
 from tests.hostile.kinds import ARM
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EffectError, QueryError, TraceError
+from robot_dyn.foundations import EffectError, QueryError, TraceError
 from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 
 ARM = rd.load("planar_2r")

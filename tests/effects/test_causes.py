@@ -8,8 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn.effects.causes import causes
-from robot_dyn.foundations.errors import EffectError, QueryError
+from robot_dyn.effects import torques_by_cause
+from robot_dyn.foundations import EffectError, QueryError
 from tests.random_trees import RandomTree, trees
 
 BODY = rd.Payload("tool0", 5.0, (0.1, 0.0, 0.2))
@@ -32,7 +32,7 @@ def test_causes_of_random_arms_add_up_to_inverse_dynamics(tree: RandomTree, seed
     friction = rd.effects.ViscousFriction(0.4), rd.effects.DryFriction(0.7, 0.9, 0.05)
     plant = rd.Plant(arm, [*friction, rd.effects.Spring(2.0, 0.1)])
     t, q, v, a = motion(arm.n, seed=seed)
-    split = causes(plant, t, q, v, a)
+    split = torques_by_cause(plant, t, q, v, a)
     tau = np.array([plant.inverse_dynamics(*each) for each in zip(t.tolist(), q, v, a, strict=True)])
     largest = max(np.abs(each).max() for each in split.torques.values())
     assert np.abs(split.tau - tau).max() <= ROUNDING * largest
@@ -47,7 +47,7 @@ def test_each_cause_is_its_term_of_the_equation(arm: str) -> None:
     own = rd.Lagrangian(robot)
     plant = rd.Plant(robot, [rd.effects.ViscousFriction(0.4), rd.effects.Spring(2.0, 0.1)])
     t, q, v, a = motion(robot.n)
-    found = causes(plant, t, q, v, a).torques
+    found = torques_by_cause(plant, t, q, v, a).torques
     expected = {
         "inertia": np.einsum("kij,kj->ki", own.M(q), a),
         "Coriolis": np.einsum("kij,kj->ki", own.C(q, v), v),
@@ -63,7 +63,7 @@ def test_causes_are_differences_of_the_energies() -> None:
     """∂V/∂q, and d/dt ∂K/∂v − ∂K/∂q = M a + C v, by central differences: O(h²) and rounding / h, 1e-8 at h = 1e-5."""
     arm, h = rd.load("panda"), 1e-5
     t, q, v, a = motion(arm.n, 3)
-    found = causes(arm, t, q, v, a).torques
+    found = torques_by_cause(arm, t, q, v, a).torques
     ways = h * np.eye(arm.n)
 
     def slope(f):
@@ -84,7 +84,7 @@ def test_a_payload_that_comes_and_goes_is_one_cause() -> None:
     second = rd.Payload("forearm_link", 2.0, (0.0, 0.1, 0.0))
     plant = rd.Plant(arm, [rd.effects.CarriedPayload(BODY, *t_carried), rd.effects.CarriedPayload(second, 0.5)])
     t, q, v, a = motion(6)
-    split = causes(plant, t, q, v, a)
+    split = torques_by_cause(plant, t, q, v, a)
     carried = (t >= t_carried[0]) & (t < t_carried[1])
     needs = arm.with_(payload=BODY).inverse_dynamics(q, v, a) - arm.inverse_dynamics(q, v, a)
     expected = np.where(carried[:, None], needs, 0.0)
@@ -100,7 +100,7 @@ def test_why_splits_the_same_torque_by_link() -> None:
     """The sums of `rd.why` over the links, and its effects, at one state."""
     plant = rd.Plant(rd.load("ur5").with_(payload=BODY, armature=0.2), [rd.effects.DryFriction(0.7, 0.9, 0.05)])
     t, q, v, a = motion(6, 2)
-    split = causes(plant, t, q, v, a)
+    split = torques_by_cause(plant, t, q, v, a)
     for i, joint in enumerate(plant.dynamics.joint_names):
         why = rd.why(plant, q[1], v[1], a[1], joint, t=float(t[1]))
         sums = [sum(getattr(each, of) for each in why.shares) for of in ("inertia", "coriolis", "gravity")]
@@ -114,15 +114,15 @@ def test_what_a_motion_does_not_determine_is_refused() -> None:
     plant = rd.Plant(rd.load("ur5"), [rd.effects.DahlFriction(50.0, 0.4)])
     t, q, v, a = motion(6)
     with pytest.raises(EffectError, match=r"causes: dahl_friction has states.*simulate the motion"):
-        causes(plant, t, q, v, a)
+        torques_by_cause(plant, t, q, v, a)
     with pytest.raises(QueryError, match=r"v must have shape \(k, 6\) for times t of shape \(k,\)"):
-        causes(plant.dynamics, t, q, v[:3], a)
+        torques_by_cause(plant.dynamics, t, q, v[:3], a)
     with pytest.raises(QueryError, match="a must be finite"):
-        causes(plant.dynamics, t, q, v, a * np.nan)
+        torques_by_cause(plant.dynamics, t, q, v, a * np.nan)
 
 
 def test_the_table_names_the_time_of_the_largest_torque() -> None:
-    split = causes(rd.load("ur5"), *motion(6))
+    split = torques_by_cause(rd.load("ur5"), *motion(6))
     heading, *lines = repr(split).splitlines()[1:]
     assert heading.split() == ["joint", "t", "[s]", "unit", "torque", "inertia", "Coriolis", "gravity"]
     k = int(np.abs(split.tau[:, 2]).argmax())

@@ -11,17 +11,14 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.control.controller import Controller
-from robot_dyn.control.digital_loop.block import Block
-from robot_dyn.effects.effect import Effect
-from robot_dyn.foundations.arithmetic import tanh
-from robot_dyn.foundations.errors import EffectError, TraceError
+from robot_dyn import Trajectory
+from robot_dyn.control import Block, Controller
+from robot_dyn.effects import Effect
+from robot_dyn.foundations import EffectError, TraceError, tanh
+from robot_dyn.simulation import MachineError, Verdict
 from robot_dyn.simulation.dynamics.declarations import undeclared
 from robot_dyn.simulation.dynamics.smoothness import LOOKS
 from robot_dyn.simulation.engine.choice import choose
-from robot_dyn.simulation.engine.self_check import MachineError
-from robot_dyn.simulation.results.error_estimate import Verdict
-from robot_dyn.simulation.results.trajectory import Trajectory
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.9])

@@ -11,8 +11,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.effects.set_valued import settled
-from robot_dyn.foundations.coefficients import coefficient
-from robot_dyn.foundations.errors import EffectError, SingularError
+from robot_dyn.foundations import EffectError, SingularError, coefficient
 from tests.campaigns.estimates.scenes import arms
 from tests.long import long
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EffectError
+from robot_dyn.foundations import EffectError
 from tests.long import long
 
 MASS = 0.7
@@ -195,7 +195,7 @@ def test_effect_states_are_kept_in_run_files_and_tables(tmp_path) -> None:
     for name in ("actuator_lag", "lugre_friction"):
         np.testing.assert_array_equal(again.effect_states[name], run.effect_states[name])
     np.testing.assert_array_equal(again.ledger.stored["lugre_friction"], run.ledger.stored["lugre_friction"])
-    from robot_dyn.simulation.export.export import export
+    from robot_dyn import export
 
     heading = export(run, tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()[0]
     assert heading.endswith("actuator_lag state 1,actuator_lag state 2,lugre_friction state 1,lugre_friction state 2")

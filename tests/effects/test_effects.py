@@ -10,9 +10,9 @@ import pytest
 from flint import arb
 
 import robot_dyn as rd
-from robot_dyn.effects.effect import Active, Bound, Conservative, Dissipative, Effect, Force
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.errors import EffectError, QueryError
+from robot_dyn import Plant
+from robot_dyn.effects import Active, Bound, Conservative, Dissipative, Effect, Force
+from robot_dyn.foundations import EffectError, QueryError
 
 ROBOT = rd.load("cart_pole")
 B, F, V_S = np.array([0.7, 0.2]), np.array([1.4, 0.3]), np.array([0.05, 0.2])

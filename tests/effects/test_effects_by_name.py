@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EffectError
-from robot_dyn.scene.effects import BY_KIND
+from robot_dyn.foundations import EffectError
+from robot_dyn.scene import BY_KIND
 
 ROBOT = rd.load("cart_pole")
 

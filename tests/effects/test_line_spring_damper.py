@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EffectError
-from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.foundations import EffectError
+from robot_dyn.simulation import Ending
 from tests.long import long
 
 TREE = rd.load("skew_tree")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EffectError, QueryError
+from robot_dyn.foundations import EffectError, QueryError
 from tests.campaigns.estimates.held import held_scene
 from tests.campaigns.estimates.scenes import arms
 

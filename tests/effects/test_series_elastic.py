@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EffectError, QueryError
+from robot_dyn.foundations import EffectError, QueryError
 from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 from tests.long import long
 

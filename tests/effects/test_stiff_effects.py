@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.integrate.integrator import System
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.integrate import System
+from robot_dyn.simulation import StateEquation
 from robot_dyn.simulation.engine.interpreted import interpreted, system
 from robot_dyn.simulation.run.watch import Watch
 from tests.long import long

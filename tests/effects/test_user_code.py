@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen.trace.symbolic import TraceError
-from robot_dyn.control.controller import ControlError
-from robot_dyn.foundations.errors import EffectError, QueryError, SceneError
-from robot_dyn.simulation.engine.self_check import MachineError
-from robot_dyn.simulation.export.export import export
+from robot_dyn import export
+from robot_dyn.foundations import ControlError, EffectError, QueryError, SceneError, TraceError
+from robot_dyn.simulation import MachineError
 from tests.long import long
 
 ARM = rd.load("planar_2r")

@@ -9,7 +9,7 @@ import pytest
 from lxml import html
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 from tests.command import run
 
 BODY = rd.Payload("tool0", 5.0, (0.1, 0.0, 0.2))

@@ -8,15 +8,15 @@ import pytest
 from llvmlite import ir
 
 import robot_dyn as rd
+from robot_dyn.codegen import program_of
 from robot_dyn.codegen.llvm.batch import batch_function
 from robot_dyn.codegen.llvm.lock_step import write_function
 from robot_dyn.codegen.llvm.one_state import Limits
 from robot_dyn.codegen.llvm.vectors import F64
-from robot_dyn.codegen.trace.from_casadi import program_of
-from robot_dyn.foundations.arithmetic import FLOAT64
+from robot_dyn.foundations import FLOAT64
 from robot_dyn.foundations.values import LINE, aligned
+from robot_dyn.simulation import StateEquation
 from robot_dyn.simulation.dynamics.loop_state import runs_of
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.observation.guard_levels import guard_levels
 from robot_dyn.simulation.observation.observation import observations_of
 

@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 from flint import arb
 
-from robot_dyn.foundations.arithmetic import FLOAT64, Ball, Float, arithmetic_of, midpoint
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
+from robot_dyn.foundations import (
+    FLOAT64,
+    Ball,
+    Float,
+    NotPositiveDefiniteError,
+    QueryError,
+    arithmetic_of,
+    cholesky_solve,
+    midpoint,
+)
 
 RNG = np.random.default_rng(3)
 

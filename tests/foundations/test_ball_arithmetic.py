@@ -7,9 +7,8 @@ import pytest
 from flint import arb, ctx
 
 import robot_dyn as rd
-from robot_dyn.foundations.arithmetic import Ball
-from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.recursions.articulated_body import articulated_body
+from robot_dyn.foundations import Ball
+from robot_dyn.lagrange import articulated_body, magnitudes
 
 U = np.finfo(np.float64).eps / 2
 ARMS = ["ur5", "panda"]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import quadprog
 
+from robot_dyn.foundations import NotPositiveDefiniteError
 from robot_dyn.foundations.convex import PASSES, active_set, newton, not_found, residual
-from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError
 
 SEEDS = [1, 20261127]
 

@@ -17,8 +17,8 @@ from typing import Any
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import SingularError, UndecidedError
-from robot_dyn.integrate.methods import METHODS
+from robot_dyn.foundations import SingularError, UndecidedError
+from robot_dyn.integrate import METHODS
 from tests.wrong_arguments import Example, examples
 
 OPTIONAL = ("peers", "live", "video")  # need packages that may be absent

@@ -16,14 +16,12 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations import files
-from robot_dyn.foundations.errors import QueryError, RobotDynError
-from robot_dyn.foundations.files import Kind, save, target
-from robot_dyn.simulation.export.export import export
+from robot_dyn import RobotDynError, export
+from robot_dyn.foundations import FileKind, QueryError, files, save, target
 from tests.foundations.faults import failing_at, raising
 from tests.simulation.test_run_file import run  # noqa: F401  the fixture
 
-NOTE = Kind("a note", ".note", b"note")
+NOTE = FileKind("a note", ".note", b"note")
 OLD, NEW = b"note: old", b"note: new, and longer than one buffer " + bytes(100_000)
 
 

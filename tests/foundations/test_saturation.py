@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EffectError
-from robot_dyn.simulation.results.error_estimate import Verdict
+from robot_dyn.foundations import EffectError
+from robot_dyn.simulation import Verdict
 from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 
 ARM = rd.load("planar_2r")

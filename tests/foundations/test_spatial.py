@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from robot_dyn.foundations.spatial import (
+from robot_dyn.foundations import (
     adjoint,
     adjoint_inverse,
     bracket,

@@ -9,9 +9,8 @@ import pytest
 from flint import arb, ctx
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import UndecidedError
-from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
-from robot_dyn.lagrange.recursions.articulated_body import articulated_body
+from robot_dyn.foundations import NotPositiveDefiniteError, UndecidedError, cholesky_solve
+from robot_dyn.lagrange import articulated_body
 
 LINK = """
 <link name="link_{i}"><inertial><origin xyz="0.25 0 0"/><mass value="1.3"/>

@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot_dyn.foundations.errors import OverflowedError, QueryError
-from robot_dyn.integrate.adaptive import Adaptive
-from robot_dyn.integrate.controlled_steps import Status
-from robot_dyn.integrate.integrator import System
+from robot_dyn.foundations import OverflowedError, QueryError
+from robot_dyn.integrate import Adaptive, Status, System
 
 ALL = ["DOP853", "Rosenbrock"]
 OSCILLATOR = System(lambda t, y: np.stack([y[..., 1], -y[..., 0]], axis=-1), 1)

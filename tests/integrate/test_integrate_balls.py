@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 from flint import arb, fmpq
 
-from robot_dyn.foundations.arithmetic import Ball, midpoint, radius
-from robot_dyn.integrate.explicit import ExplicitRungeKutta
-from robot_dyn.integrate.gauss import Gauss
-from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.integrate.tableau import Coefficient, Surd
-from robot_dyn.integrate.time_stepping import TimeStepping
+from robot_dyn.foundations import Ball, midpoint, radius
+from robot_dyn.integrate import ExplicitRungeKutta, Gauss, Integrator, Surd, TimeStepping
+from robot_dyn.integrate.tableau import Coefficient
 from tests.integrate.test_integrate import ANY_ARITHMETIC, OSCILLATOR, PENDULUM, name_of
 
 

@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 from flint import arb
 
-from robot_dyn.foundations.arithmetic import Ball
-from robot_dyn.foundations.errors import OverflowedError, RobotDynError
-from robot_dyn.integrate.explicit import EXPLICIT_EULER
+from robot_dyn import RobotDynError
+from robot_dyn.foundations import Ball, OverflowedError
+from robot_dyn.integrate import Gauss, IntegrationError, Integrator, Rosenbrock, RosenbrockTable, System, method
 from robot_dyn.integrate.fixed_point import MOST_ITERATIONS
-from robot_dyn.integrate.gauss import Gauss
-from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
-from robot_dyn.integrate.methods import method
-from robot_dyn.integrate.rosenbrock import Rosenbrock
-from robot_dyn.integrate.rosenbrock_table import RosenbrockTable
 from tests.integrate.test_integrate import ALL, OSCILLATOR, PENDULUM, RNG, STIFF, name_of, oscillator, pendulum
 from tests.long import long
 
@@ -50,7 +45,7 @@ def test_explicit_euler_gains_energy_by_1_plus_h2_a_step() -> None:
         y = ball.array([0.75, -0.5])
         start = y @ y
         for i in range(n):
-            y = EXPLICIT_EULER.step(OSCILLATOR, i * h, y, h)
+            y = method("explicit_euler").step(OSCILLATOR, i * h, y, h)
         gain = (y @ y) / start - (1 + arb(h) ** 2) ** n
         assert gain.contains(arb(0))
         assert float(gain.rad()) < 1e-50

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot_dyn.integrate.integrator import System
-from robot_dyn.integrate.methods import FIXED_STEP, method
+from robot_dyn.integrate import FIXED_STEP, System, method
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52
 

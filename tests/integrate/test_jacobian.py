@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.integrate.integrator import System
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.cache import machine_code
-from robot_dyn.simulation.engine.self_check import MachineError, check, jacobian_error
-from robot_dyn.simulation.setup.segment_table import segment_table
+from robot_dyn.integrate import System
+from robot_dyn.simulation import MachineError, StateEquation, machine_code, segment_table
+from robot_dyn.simulation.engine.self_check import check, jacobian_error
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52
 ARM = rd.load("planar_2r")

@@ -12,15 +12,13 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.arithmetic import FLOAT64
-from robot_dyn.integrate.integrator import IntegrationError, System
+from robot_dyn.foundations import FLOAT64
+from robot_dyn.integrate import IntegrationError, System, method
 from robot_dyn.integrate.primitives import factor, solve
-from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.cache import machine_code
-from robot_dyn.simulation.setup.segment_table import segment_table
+from robot_dyn.simulation import StateEquation, machine_code, segment_table
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52
+ROSENBROCK_5 = method("rosenbrock_5")
 NUMBERS = ROSENBROCK_5.table.numbers(FLOAT64, 1)
 STAGES = len(NUMBERS.m)
 # u = Γ k leads from the coefficients of the u_i back to those of the k_i [HW II, (7.23) to (7.25)]
@@ -195,8 +193,7 @@ def test_elimination_solves_each_system() -> None:
 
 @pytest.mark.parametrize("runs", [1, 3, 64])
 def test_elimination_in_machine_code_gives_equal_bits(runs: int) -> None:
-    from robot_dyn.codegen.loops.call import MachineFunction
-    from robot_dyn.codegen.primitives import INSTEAD
+    from robot_dyn.codegen import INSTEAD, MachineFunction
 
     def both(A: Any, J: Any, scale: Any, rows: Any, lost: Any, x: Any) -> int:
         factor(A, J, scale, rows, lost)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.integrate.integrator import RightSide
+from robot_dyn.foundations import QueryError
+from robot_dyn.integrate import RightSide, TimeStepping
 from robot_dyn.integrate.primitives import copy
-from robot_dyn.integrate.time_stepping import TimeStepping, problem_rows
+from robot_dyn.integrate.time_stepping import problem_rows
 from tests.campaigns.estimates.scenes import arms
 from tests.foundations.test_convex import minimum, problem
 from tests.long import long

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn.description.description import check
+from robot_dyn.description import check
 
 ENGINES = (lambda robot: robot, rd.Lagrangian)
 POSITIVE = st.floats(0.1, 5.0)

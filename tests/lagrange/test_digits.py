@@ -12,11 +12,10 @@ import pytest
 from flint import arb, ctx
 
 import robot_dyn as rd
+from robot_dyn.lagrange import articulated_body, digits_of, newton_euler
 from robot_dyn.lagrange import exact as exact_module
-from robot_dyn.lagrange.digits import QUANTITIES, digits_of
+from robot_dyn.lagrange.digits import QUANTITIES
 from robot_dyn.lagrange.exact import RESOLUTION, Exact
-from robot_dyn.lagrange.recursions.articulated_body import articulated_body
-from robot_dyn.lagrange.recursions.newton_euler import newton_euler
 from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from tests.campaigns.hard.chains import coincident, text
 

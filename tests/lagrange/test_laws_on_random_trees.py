@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn.cross_check.compare import random_state
-from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.scale import unit_diagonal_condition
+from robot_dyn.cross_check import random_state
+from robot_dyn.lagrange import magnitudes, unit_diagonal_condition
 from tests.long import long
 from tests.random_trees import RandomTree, trees
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.spatial import block_diagonal
-from robot_dyn.lagrange.recursions.composite_body import composite_body
+from robot_dyn.foundations import block_diagonal
+from robot_dyn.lagrange import composite_body, newton_euler
 from robot_dyn.lagrange.recursions.kinetic_energy import kinetic_energy
-from robot_dyn.lagrange.recursions.newton_euler import newton_euler
 from robot_dyn.lagrange.recursions.propagation import accelerations, twists
 
 ROBOTS = ("planar_2r", "ur5", "mimic_chain", "skew_tree", "cart_pole")

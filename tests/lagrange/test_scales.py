@@ -10,10 +10,9 @@ import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.cross_check.compare import random_state
-from robot_dyn.description.description import check
-from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.scale import floored, scaled
+from robot_dyn.cross_check import random_state
+from robot_dyn.description import check
+from robot_dyn.lagrange import floored, magnitudes, scaled
 from tests.queries import ARGUMENTS, FRAMED, general
 
 FAR = {"potential_energy", "placement"}  # have the distance in them by definition

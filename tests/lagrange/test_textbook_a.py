@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from robot_dyn.description.inertia import MassProperties, combined
-from robot_dyn.description.solids import box, cylinder, ellipsoid, from_density, sphere
-from robot_dyn.foundations.spatial import adjoint, adjoint_inverse, hat, homogeneous, rotation, rotation_rpy
-from robot_dyn.lagrange.rigid_body import body_acceleration, kinetic_energy, point_velocity
+from robot_dyn.description import MassProperties, box, combined, cylinder, ellipsoid, from_density, sphere
+from robot_dyn.foundations import adjoint, adjoint_inverse, hat, homogeneous, rotation, rotation_rpy
+from robot_dyn.lagrange import body_acceleration, point_velocity
+from robot_dyn.lagrange.rigid_body import kinetic_energy
 
 SEEDS = range(20)
 BODY = box(1.7, 0.3, 0.5, 0.8).moved(rotation_rpy(np.array([0.4, -0.9, 1.3])), np.zeros(3))  # full inertia, com at 0

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from robot_dyn.description.solids import box, cylinder
-from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.foundations.spatial import bracket, hat, rotation, rotation_rpy
-from robot_dyn.lagrange.euler_lagrange import EulerLagrange, euler_lagrange
-from robot_dyn.lagrange.rigid_body import (
+from robot_dyn import RobotDynError, euler_lagrange
+from robot_dyn.description import box, cylinder
+from robot_dyn.foundations import bracket, hat, rotation, rotation_rpy
+from robot_dyn.lagrange import (
+    EulerLagrange,
     angular_momentum,
     body_acceleration,
     body_wrench,
-    kinetic_energy,
     world_acceleration,
     world_wrench,
 )
+from robot_dyn.lagrange.rigid_body import kinetic_energy
 
 COUNT = 200  # states of a test, as one batch
 X, Y, Z = np.eye(3)

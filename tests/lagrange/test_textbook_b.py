@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.description.solids import box, from_density
-from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.lagrange.euler_lagrange import EulerLagrange, euler_lagrange
-from robot_dyn.lagrange.generalized_force import generalized_force, lagrangian_of_particles
+from robot_dyn import RobotDynError, euler_lagrange
+from robot_dyn.description import box, from_density
+from robot_dyn.lagrange import EulerLagrange, lagrangian_of_particles
+from robot_dyn.lagrange.generalized_force import generalized_force
 
 COUNT = 200  # states of a test, as one batch
 GRAVITY = 9.81

@@ -11,12 +11,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from robot_dyn.description.inertia import MassProperties, combined
-from robot_dyn.description.solids import box, cylinder, from_density
-from robot_dyn.foundations.errors import OverflowedError, QueryError, RobotDynError, SingularError
-from robot_dyn.lagrange.euler_lagrange import euler_lagrange
-from robot_dyn.lagrange.generalized_force import generalized_force, lagrangian_of_particles
-from robot_dyn.lagrange.rigid_body import angular_momentum, body_acceleration, body_wrench, world_wrench
+from robot_dyn import RobotDynError, euler_lagrange
+from robot_dyn.description import MassProperties, box, combined, cylinder, from_density
+from robot_dyn.foundations import OverflowedError, QueryError, SingularError
+from robot_dyn.lagrange import angular_momentum, body_acceleration, body_wrench, lagrangian_of_particles, world_wrench
+from robot_dyn.lagrange.generalized_force import generalized_force
 
 BODY = box(1.7, 0.3, 0.5, 0.8)
 PENDULUM = euler_lagrange(lambda t, q, v: v[0] ** 2 / 2, lambda t, q: -9.81 * ca.cos(q[0]), 1)

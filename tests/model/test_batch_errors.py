@@ -9,16 +9,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import robot_dyn as rd
-from robot_dyn.description.description import check
-from robot_dyn.foundations.errors import (
-    EditError,
-    NotFiniteError,
-    OverflowedError,
-    QueryError,
-    SingularError,
-    UndecidedError,
-)
-from robot_dyn.lagrange.recursions.articulated_body import articulated_body
+from robot_dyn.description import check
+from robot_dyn.foundations import EditError, NotFiniteError, OverflowedError, QueryError, SingularError, UndecidedError
+from robot_dyn.lagrange import articulated_body
 from robot_dyn.queries.dynamics import EQUATION
 from tests.codegen.arms import compiled
 from tests.queries import ARGUMENTS, FRAMED

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn.cross_check.compare import random_state
-from robot_dyn.foundations.errors import DescriptionError
-from robot_dyn.lagrange.magnitude import magnitudes
+from robot_dyn.cross_check import random_state
+from robot_dyn.foundations import DescriptionError
+from robot_dyn.lagrange import magnitudes
 from robot_dyn.model.coriolis import MOST_ROUNDING
 from robot_dyn.model.regrouped import joint_axes, least_inertia, reach, regrouped, rounding
 from tests.lagrange.test_scales import chain

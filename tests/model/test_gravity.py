@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.model.gravity import gravity_acts
+from robot_dyn.model import gravity_acts
 from tests.command import document, said
 
 G = -rd.STANDARD_GRAVITY[2]

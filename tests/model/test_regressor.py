@@ -9,10 +9,9 @@ import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.description.inertial_parameters import parameter_names, parameters, unit_inertias
-from robot_dyn.lagrange.magnitude import magnitudes
+from robot_dyn.description import parameter_names, parameters, unit_inertias
+from robot_dyn.lagrange import floored, magnitudes
 from robot_dyn.lagrange.recursions.regressor import regressor
-from robot_dyn.lagrange.scale import floored
 from tests.queries import general
 
 ROBOTS = ("pendulum", "ur5", "mimic_chain", "skew_tree", "cart_pole")

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 from tests.queries import ARGUMENTS, SEVERAL, arguments_of, ask, general
 
 ROBOTS = ("pendulum", "cart_pole", "ur5", "kinova", "panda", "mimic_chain", "skew_tree")

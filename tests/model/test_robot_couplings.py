@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EditError, OverflowedError
+from robot_dyn.foundations import EditError, OverflowedError
 from tests.queries import general
 
 FINGERS = np.vstack([np.eye(8), np.eye(8)[-1]]), np.zeros(9)

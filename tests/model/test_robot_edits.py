@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EditError
+from robot_dyn.foundations import EditError
 from tests.queries import general
 
 INERTIA = ((0.02, 0.001, -0.002), (0.001, 0.03, 0.003), (-0.002, 0.003, 0.04))

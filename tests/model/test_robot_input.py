@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 from tests.queries import ARGUMENTS, FRAMED, arguments_of, ask
 
 every_robot = pytest.mark.parametrize("name", ("pendulum", "ur5", "panda", "skew_tree"))

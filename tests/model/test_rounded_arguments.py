@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.effects.effect import Active
-from robot_dyn.foundations.arithmetic import midpoint
-from robot_dyn.foundations.errors import OverflowedError
+from robot_dyn.effects import Active
+from robot_dyn.foundations import OverflowedError, midpoint
 
 ARM = rd.load("ur5")
 NEAR = np.array([0.3, -0.2, 0.5, 0.7, -0.4, 0.9])

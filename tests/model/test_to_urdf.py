@@ -13,8 +13,9 @@ import yourdfpy
 from lxml import etree
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import DescriptionError, ModelWarning
-from robot_dyn.view.geometry.visuals import drawing
+from robot_dyn import ModelWarning
+from robot_dyn.foundations import DescriptionError
+from robot_dyn.view import drawing
 from tests.hostile.kinds import ARM, AXIS, LIMIT
 
 LOAD = ((0.004, 0.0003, 0.0), (0.0003, 0.003, 0.0001), (0.0, 0.0001, 0.0025))

@@ -10,8 +10,8 @@ import pytest
 from lxml import html
 
 import robot_dyn as rd
-from robot_dyn.report.result import Result
-from robot_dyn.scene.starters import starter, starters
+from robot_dyn.report import Result
+from robot_dyn.scene import starter, starter_names
 from tests.command import document, said
 
 
@@ -28,7 +28,7 @@ def test_a_scene_is_explained_as_the_command_does(scene: Path) -> None:
     assert document("explain", scene) == json.loads(answer.to_json())
 
 
-@pytest.mark.parametrize("name", starters())
+@pytest.mark.parametrize("name", starter_names())
 def test_a_setup_has_the_terms_of_its_scene(name: str, tmp_path: Path) -> None:
     """Equation, kinds, terms and coefficients as they act do not depend on where the setup came from."""
     path = tmp_path / "scene.toml"

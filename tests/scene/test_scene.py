@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import SceneError
-from robot_dyn.scene.effects import BY_KIND
-from robot_dyn.scene.explain import of_scene
-from robot_dyn.scene.scene import parse_scene, read_both
-from robot_dyn.scene.starters import starter, starters
+from robot_dyn.foundations import SceneError
+from robot_dyn.scene import BY_KIND, of_scene, parse_scene, read_both, starter, starter_names
 from tests.long import long
 
 SCENE = """
@@ -50,7 +47,7 @@ def test_payload_starter_keeps_its_sampled_damping_below_one_reversal(write) -> 
     assert run.remarks == ()
 
 
-@pytest.mark.parametrize("name", starters())
+@pytest.mark.parametrize("name", starter_names())
 def test_starter_runs_and_closes_its_ledger(write, name: str) -> None:
     """At its own settings, cut to half a second: residual ≤ 1e-9 of the energy exchanged; no remark but of stops."""
     setup = rd.read_scene(write(starter(name)))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import SceneError
+from robot_dyn.foundations import SceneError
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 LOAD = {

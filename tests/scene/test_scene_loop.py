@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import SceneError
+from robot_dyn.foundations import SceneError
 from tests.command import run
 
 HEAD = """robot = "planar_2r"

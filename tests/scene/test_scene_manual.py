@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import SceneError
-from robot_dyn.scene import control, effects, references, scene
-from robot_dyn.scene.effects import BY_KIND
+from robot_dyn.foundations import SceneError
+from robot_dyn.scene import BY_KIND, Part, control, effects, references, scene, starter, starter_names
 from robot_dyn.scene.manual import manual
-from robot_dyn.scene.schema import Part
-from robot_dyn.scene.starters import starter, starters
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenes.md"
 PARTS = [
@@ -38,7 +35,7 @@ def test_every_key_is_explained(part: type[Part]) -> None:
 def test_every_kind_and_every_key_of_the_starters_is_on_the_page() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert all(f'### `kind = "{kind}"`' in page for kind in BY_KIND)
-    text = "\n".join(starter(name) for name in starters())
+    text = "\n".join(starter(name) for name in starter_names())
     stated = {line.partition("=")[0].strip() for line in text.splitlines() if "=" in line and line[0] not in "#["}
     assert stated and all(f"`{key}`" in page or key == "kind" for key in stated)
 

@@ -13,50 +13,42 @@ import pytest
 from rich.table import Table
 
 import robot_dyn as rd
+from robot_dyn import RobotDynError
 from robot_dyn.cli import terminal
-from robot_dyn.foundations.errors import RobotDynError, escaped
+from robot_dyn.foundations import SceneError, escaped
+from robot_dyn.scene import starter, starter_names
 from robot_dyn.scene.lines import line_of
-from robot_dyn.scene.scene import SceneError
-from robot_dyn.scene.starters import starter, starters
 from tests.command import refusal
+from tests.snapshots import assert_text
 
 BASE = 'robot = "cart_pole"\nduration_s = 1.0\n'
 GRAVITY = '[[effect]]\nkind = "gravity"\n'
 PD = '[control]\nkind = "pd"\nfrequency_rad_per_s = 3\n'
 
-MISTAKES = {
-    GRAVITY + '\n[[effect]]\nkind = "sprng"\n': r"line 6: effect 2 \(sprng\): kind: no kind 'sprng'; nearest: spring",
-    '[[effect]]\nkin = "gravity"\n': "line 3: effect 1: has no kind; give one of gravity, lock, .*actuator_lag",
-    GRAVITY + '[[effect]]\nkind = "spring"\nstiffness_N_m_per_rad = 1.0\nrest = 1\n': (
-        r"line 8: 'rest' is not a key of effect 2 \(spring\); nearest: rest_rad; keys: kind, .*, rest_rad"
-    ),
-    "color = 3\n": "line 3: 'color' is not a key of a scene; .*duration_s, .*",
-    '[[effect]]\nkind = "spring"\n': r"line 3: effect 1 \(spring\): stiffness_N_m_per_rad: is missing; give it",
-    '[start]\nq = "x"\n': (
-        "line 4: start: q: must be a number, a list of numbers or a table of numbers by joint, got 'x'"
-    ),
-    '[start]\nq = [1.0, "x"]\n': "line 4: start: q 2: must be a number, got 'x'.*",
-    'start = {q = {hinge = "x"}}\n': "line 3: start: q: hinge: must be a number, got 'x'.*",
-    "[start]\nq = [1, 2, 3]\n": r"line 3: start: q must be .*\(2,\).*",
-    GRAVITY
-    + "acceleration_m_s2 = [0, 0]\n": r"line 5: effect 1 \(gravity\): acceleration_m_s2: must have 3 entries, got 2",
-    GRAVITY + "acceleration_m_s2 = [\n0,\n0, 0, 0]\n": r"line 5: .*: must have 3 entries, got 4",
-    'engine = "fast"\n': "line 3: engine: must be 'auto', 'interpreted' or 'compiled', got 'fast'",
-    'estimate_error = "maybe"\n': "line 3: estimate_error: must be true or false, got 'maybe'",
-    "start = 3\n": "line 3: start: must be a table, got 3",
-    "effect = 3\n": "line 3: effect: must be a list, got 3",
-    PD + "[control.model]\nmass = 3\n": "line 7: 'mass' is not a key of control: model; nearest: mass_scale; .*",
+MISTAKES = [
+    GRAVITY + '\n[[effect]]\nkind = "sprng"\n',
+    '[[effect]]\nkind = "spring"\n',
+    GRAVITY + '[[effect]]\nkind = "spring"\nstiffness_N_m_per_rad = 1.0\nrest = 1\n',
+    '[start]\nq = "x"\n',
+    '[start]\nq = [1.0, "x"]\n',
+    'start = {q = {hinge = "x"}}\n',
+    "[start]\nq = [1, 2, 3]\n",
+    GRAVITY + "acceleration_m_s2 = [0, 0]\n",
+    GRAVITY + "acceleration_m_s2 = [\n0,\n0, 0, 0]\n",
+    'engine = "fast"\n',
+    'estimate_error = "maybe"\n',
+    "start = 3\n",
+    "effect = 3\n",
+    PD + "[control.model]\nmass = 3\n",
     PD
     + "[[control.model.effects]]\nkind = 'gravity'\n"
-    + "[[control.model.effects]]\nkind = 'payload'\nframe = 'x'\nmass_kg = -2": (
-        r"line 11: control: model: effects 2 \(payload\): mass_kg: must not be negative, got -2"
-    ),
-    PD + "[reference]\nkind = 'via_points'\ntimes_s = [1, 2]\npoints = [\n[1, 2],\n[1, 'b']]\n": (
-        "line 9: reference: points 2, 2: must be a number, got 'b'"
-    ),
-    GRAVITY + "[[effect]]\nkind = 'spring'\nstiffness_N_m_per_rad = {hing = 1}\n": (
-        r"line 5: effect 2 \(spring\): stiffness: no joint 'hing' .*; nearest: hinge"
-    ),
+    + "[[control.model.effects]]\nkind = 'payload'\nframe = 'x'\nmass_kg = -2",
+    PD + "[reference]\nkind = 'via_points'\ntimes_s = [1, 2]\npoints = [\n[1, 2],\n[1, 'b']]\n",
+    GRAVITY + "[[effect]]\nkind = 'spring'\nstiffness_N_m_per_rad = {hing = 1}\n",
+]
+OF_MANY_KEYS_OR_OF_TOMLLIB = {  # texts that grow with the library, or are of Python's version
+    '[[effect]]\nkin = "gravity"\n': "line 3: effect 1: has no kind; give one of gravity, lock, .*actuator_lag",
+    "color = 3\n": "line 3: 'color' is not a key of a scene; .*duration_s, .*",
     "x = \ny = 3": "line 3, column 5: is not TOML: .*",
     "x = [1, 2": "is not TOML: Unclosed array .*",
     "x = " + "9" * 5000: "is not TOML: .*",
@@ -67,19 +59,22 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
+@pytest.mark.parametrize("mistake", [*MISTAKES, *OF_MANY_KEYS_OR_OF_TOMLLIB])
 def test_a_mistake_is_told_as_people_count(tmp_path: Path, mistake: str) -> None:
     (tmp_path / "scene.toml").write_text(BASE + mistake, encoding="utf-8")
     with pytest.raises(SceneError) as caught:
         rd.read_scene(tmp_path / "scene.toml")
     told = str(caught.value)
     assert told.isprintable() and len(told) < 500
-    assert re.fullmatch(f".*/scene.toml: (?:{MISTAKES[mistake]})", told), told
+    if message := OF_MANY_KEYS_OR_OF_TOMLLIB.get(mistake):
+        assert re.fullmatch(f".*/scene.toml: (?:{message})", told), told
+    else:
+        assert_text("scene_mistakes", mistake, told)
     for voice in ("input", "extra", "pydantic", "none is not", "should"):
         assert voice not in told.lower(), told
 
 
-@pytest.mark.parametrize("name", starters())
+@pytest.mark.parametrize("name", starter_names())
 def test_the_line_of_a_key_is_that_which_states_it(name: str) -> None:
     text = starter(name)
     lines = text.splitlines()

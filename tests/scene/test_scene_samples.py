@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import PlanWarning
-from robot_dyn.scene.scene import SceneError
+from robot_dyn.foundations import PlanWarning, SceneError
 
 SCENE = """robot = "planar_2r"
 duration_s = 0.1

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import ControlError
-from robot_dyn.scene.explain import of_scene
-from robot_dyn.scene.scene import SceneError, read_both
+from robot_dyn.foundations import ControlError, SceneError
+from robot_dyn.scene import of_scene, read_both
 
 SCENE = """robot = "cart_pole"
 duration_s = 0.1

@@ -11,9 +11,11 @@ import pytest
 import trimesh
 
 import robot_dyn as rd
-from robot_dyn.description import solids
-from robot_dyn.description.inertia import MassProperties, combined
-from robot_dyn.foundations.spatial import rotation_rpy
+from robot_dyn.description import MassProperties, combined
+from robot_dyn.description import box as solid_box
+from robot_dyn.description import cylinder as solid_cylinder
+from robot_dyn.description import sphere as solid_sphere
+from robot_dyn.foundations import rotation_rpy
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 MEASURED = '<inertial><origin xyz="0.01 0.02 0.3"/><mass value="3.1"/><inertia ixx="0.2" ixy="0.01" ixz="0" iyy="0.3"'
@@ -61,10 +63,10 @@ def same(a: MassProperties, b: MassProperties, tolerance: float = 1e-12) -> None
 def test_primitives_have_their_closed_forms(tmp_path: Path) -> None:
     """Where its <origin> puts the box; of two elements the sum, by parallel axes."""
     robot = estimated(arm(tmp_path, BOX, BALL, ROD + BOX), density=1000)
-    box = solids.box(1000 * 0.03, 0.3, 0.2, 0.5).moved(rotation_rpy(np.array([0.3, -0.7, 1.1])), [0.1, 0.2, 0.3])
+    box = solid_box(1000 * 0.03, 0.3, 0.2, 0.5).moved(rotation_rpy(np.array([0.3, -0.7, 1.1])), [0.1, 0.2, 0.3])
     same(body(robot, "link1"), box)
-    same(body(robot, "link2"), solids.sphere(1000 * 4 / 3 * pi * 0.008, 0.2))
-    same(body(robot, "link3"), combined([solids.cylinder(1000 * pi * 0.002, 0.05, 0.8), box]))
+    same(body(robot, "link2"), solid_sphere(1000 * 4 / 3 * pi * 0.008, 0.2))
+    same(body(robot, "link3"), combined([solid_cylinder(1000 * pi * 0.002, 0.05, 0.8), box]))
 
 
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "dae"])
@@ -74,7 +76,7 @@ def test_a_closed_mesh_is_the_solid_within_and_scales(tmp_path: Path, suffix: st
     mesh.apply_translation([0.1, 0.05, 0.2])
     mesh.export(tmp_path / f"box.{suffix}")
     robot = estimated(arm(tmp_path, MESH.format(f"box.{suffix}", "2 1 0.5")), mass={"link1": 40.0}, density=900)
-    same(body(robot, "link1"), solids.box(40.0, 0.6, 0.2, 0.25).moved(np.eye(3), [0.2, 0.05, 0.1]), 1e-6)
+    same(body(robot, "link1"), solid_box(40.0, 0.6, 0.2, 0.25).moved(np.eye(3), [0.2, 0.05, 0.1]), 1e-6)
     assert "closed collision mesh" in robot.estimated["link1"]
 
 
@@ -82,7 +84,7 @@ def test_an_open_mesh_is_taken_by_its_convex_hull_and_that_is_said(tmp_path: Pat
     mesh = trimesh.creation.box((0.3, 0.2, 0.5))
     trimesh.Trimesh(mesh.vertices, mesh.faces[1:]).export(tmp_path / "open.stl")
     robot = estimated(arm(tmp_path, MESH.format("open.stl", "1 1 1")), mass={"link1": 40.0})
-    same(body(robot, "link1"), solids.box(40.0, 0.3, 0.2, 0.5), 1e-6)
+    same(body(robot, "link1"), solid_box(40.0, 0.3, 0.2, 0.5), 1e-6)
     assert "open collision mesh, by its convex hull" in robot.estimated["link1"]
 
 
@@ -99,7 +101,7 @@ def test_a_mesh_whose_parts_overlap_is_refused_unless_it_is_allowed(tmp_path: Pa
         ):
             estimated(path, **masses)
     robot = estimated(path, density=1000, allow_overlap=True)
-    box = solids.box(30.0, 0.3, 0.2, 0.5)
+    box = solid_box(30.0, 0.3, 0.2, 0.5)
     same(body(robot, "link1"), combined([box, box.moved(np.eye(3), [0.03, 0, 0])]), 1e-6)
     repaired = rd.tools.doctor.check(path, density=1000, allow_overlap=True).repaired
     assert repaired is not None
@@ -110,7 +112,7 @@ def test_a_mesh_that_is_inside_out_is_turned_and_that_is_reported(tmp_path: Path
     mesh = trimesh.creation.box((0.3, 0.2, 0.5))
     trimesh.Trimesh(mesh.vertices, mesh.faces[:, ::-1], process=False).export(tmp_path / "inside.stl")
     robot = estimated(arm(tmp_path, MESH.format("inside.stl", "1 1 1")), density=1000)
-    same(body(robot, "link1"), solids.box(30.0, 0.3, 0.2, 0.5), 1e-6)
+    same(body(robot, "link1"), solid_box(30.0, 0.3, 0.2, 0.5), 1e-6)
     assert "closed collision mesh (1 part turned" in robot.estimated["link1"]
 
 
@@ -127,7 +129,7 @@ def test_a_mesh_of_text_one_kilometre_from_the_origin_keeps_its_digits(tmp_path:
     text = {"stl": f"solid box {facets} endsolid", "obj": "\n".join(lines)}[suffix]
     (tmp_path / f"far.{suffix}").write_text(text, encoding="utf-8")
     robot = estimated(arm(tmp_path, MESH.format(f"far.{suffix}", "1 1 1")), density=1000)
-    true = solids.box(30.0, 0.3, 0.2, 0.5)
+    true = solid_box(30.0, 0.3, 0.2, 0.5)
     assert body(robot, "link1").mass == pytest.approx(true.mass, rel=1e-11)
     np.testing.assert_allclose(body(robot, "link1").inertia, true.inertia, atol=1e-11 * np.trace(true.inertia))
 
@@ -192,7 +194,7 @@ def test_moments_alone_are_estimated_where_the_mass_is_stated(tmp_path: Path) ->
         '<inertial><origin xyz="0 0 0.1" rpy="0.4 0 0"/><mass value="2.5"/><inertia ixx="0" ixy="0" ixz="0" iyy="0"'
     )
     robot = estimated(arm(tmp_path, ROD + stated + ' iyz="0" izz="0"/></inertial>'), density=700)
-    rod = solids.cylinder(2.5, 0.05, 0.8)
+    rod = solid_cylinder(2.5, 0.05, 0.8)
     same(body(robot, "link1"), MassProperties(2.5, np.array([0, 0, 0.1]), rod.inertia))
     assert robot.estimated["link1"].startswith("moments alone")
 
@@ -208,7 +210,7 @@ def test_the_mark_stays_with_the_robot(tmp_path: Path) -> None:
     assert robot.description.text.count(b"<!-- estimated, not measured: ") == 3
     run = rd.simulate(rd.Plant(again), q0=[0.1, 0.2], duration_s=0.01)
     assert "inertia of 3 links estimated from shapes" in run.summary
-    from robot_dyn.view.geometry.visuals import drawing
+    from robot_dyn.view import drawing
 
     assert any("estimated from shapes" in remark for remark in drawing(again).remarks)
 

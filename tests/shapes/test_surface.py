@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from robot_dyn.description import solids
-from robot_dyn.description.inertia import MassProperties, combined
-from robot_dyn.foundations.spatial import rotation_rpy
-from robot_dyn.shapes import primitives, surface
-from robot_dyn.shapes.mesh_files import MeshError
+from robot_dyn.description import MassProperties, combined
+from robot_dyn.description import box as solid_box
+from robot_dyn.description import cylinder as solid_cylinder
+from robot_dyn.foundations import rotation_rpy
+from robot_dyn.shapes import MeshError, primitives, surface
 from robot_dyn.shapes.winding import winding
 
 BOX = (0.3, 0.2, 0.5)
@@ -54,12 +54,12 @@ def together(*meshes: trimesh.Trimesh) -> trimesh.Trimesh:
 def test_the_solid_in_a_closed_box_is_the_box() -> None:
     mesh = trimesh.creation.box(BOX)
     for body in (solid(mesh), surface.hull(mesh.vertices)):
-        same(body, solids.box(float(np.prod(BOX)), *BOX), EXACT)
+        same(body, solid_box(float(np.prod(BOX)), *BOX), EXACT)
 
 
 def test_cylinders_of_polygons_tend_to_the_cylinder() -> None:
     """The area of a regular polygon of n corners in a circle is less by 2π²/(3 n²): four times less with 2 n."""
-    true = solids.cylinder(pi * 0.1**2 * 0.4, 0.1, 0.4)
+    true = solid_cylinder(pi * 0.1**2 * 0.4, 0.1, 0.4)
     errors = []
     for sections in (32, 64):
         mesh = trimesh.creation.cylinder(0.1, 0.4, sections=sections)
@@ -120,7 +120,7 @@ def test_mass_properties_scale_and_turn_with_the_shape(kind: str) -> None:
 def test_an_open_surface_has_no_solid_and_a_flat_one_no_hull() -> None:
     mesh = trimesh.creation.box(BOX)
     assert surface.solid(mesh.vertices, mesh.faces[1:]) is None
-    same(surface.hull(mesh.vertices), solids.box(float(np.prod(BOX)), *BOX), EXACT)
+    same(surface.hull(mesh.vertices), solid_box(float(np.prod(BOX)), *BOX), EXACT)
     flat = mesh.vertices * (1, 1, 0)
     assert surface.hull(flat) is None and surface.shell(flat[:1], np.zeros((1, 3), dtype=int)) is None
 
@@ -169,7 +169,7 @@ def test_a_cavity_is_subtracted_and_a_body_in_it_is_added(flipped: bool) -> None
     """Boxes of edges 1, 0.6 and 0.3 times those of the outer one: m ~ s³, I ~ s⁵."""
     hollow = together(CUBOID, inside_out(scaled(CUBOID, 0.6)), scaled(CUBOID, 0.3))
     hollow = inside_out(hollow) if flipped else hollow
-    full = solids.box(float(np.prod(BOX)), *BOX)
+    full = solid_box(float(np.prod(BOX)), *BOX)
     mass, inertia = (sum(sign * s**power for sign, s in ((1, 1.0), (-1, 0.6), (1, 0.3))) for power in (3, 5))
     same(solid(hollow), MassProperties(mass * full.mass, full.com, inertia * full.inertia), EXACT)
     found = surface.solid(hollow.vertices, hollow.faces)

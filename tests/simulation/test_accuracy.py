@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError, RobotDynError, SceneError
-from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError
+from robot_dyn import RobotDynError
+from robot_dyn.foundations import QueryError, SceneError
+from robot_dyn.simulation import AccuracyError
 from tests.campaigns.estimates.asked import FAMILIES, answer, asked_scene
 from tests.campaigns.estimates.held import meet
 from tests.campaigns.estimates.truth import truth

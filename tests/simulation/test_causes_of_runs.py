@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 
 BODY = rd.Payload("tool0", 5.0, (0.1, 0.0, 0.2))
 ROUNDING = 1e-12  # of the largest torque

@@ -12,15 +12,14 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen.trace.right_angles import completed
-from robot_dyn.codegen.trace.symbolic import TraceError
-from robot_dyn.control.controller import Stateless
-from robot_dyn.effects.effect import Active
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.integrate.methods import FIXED_STEP
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn.codegen import completed
+from robot_dyn.control import Stateless
+from robot_dyn.effects import Active
+from robot_dyn.foundations import QueryError, TraceError
+from robot_dyn.integrate import FIXED_STEP
+from robot_dyn.simulation import MachineError, StateEquation
 from robot_dyn.simulation.engine.choice import choose
-from robot_dyn.simulation.engine.self_check import MachineError, check
+from robot_dyn.simulation.engine.self_check import check
 from tests.long import long
 from tests.own_method import OwnImplicit
 
@@ -273,7 +272,7 @@ def test_a_second_process_takes_the_machine_code_of_the_store_for_a_short_run(tm
 
 def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
     """The interpreted equation has another gravity than the compiled one: the self check refuses it."""
-    from robot_dyn.simulation.engine.cache import machine_code
+    from robot_dyn.simulation import machine_code
 
     setup = rd.Setup(rd.Plant(ARM), Q)
     made = machine_code(StateEquation(setup.plant, None), rd.integrate.method("rk4"))

@@ -7,8 +7,9 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.cli import report
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estimate
+from robot_dyn.foundations import QueryError
+from robot_dyn.simulation import ErrorEstimate
+from robot_dyn.simulation.results.error_estimate import no_estimate
 from tests.campaigns.estimates.switching import scene_of_all
 from tests.long import long
 

@@ -11,11 +11,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
-from robot_dyn.effects.effect import Active
-from robot_dyn.foundations.arithmetic import tanh
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.effects import Active
+from robot_dyn.foundations import QueryError, tanh
+from robot_dyn.simulation import Verdict
 from robot_dyn.simulation.results import provenance as origin
-from robot_dyn.simulation.results.error_estimate import Verdict
 from tests.campaigns.estimates.judge import FAR, LEAST, MOST, judge
 from tests.campaigns.estimates.layers import judge_layer, slide, slider_truth
 from tests.campaigns.estimates.scenes import FAMILIES, arms
@@ -419,7 +418,7 @@ def test_code_that_acts_between_steps_is_looked_at_there(method) -> None:
 
 
 def test_the_summary_tells_an_estimate_from_a_bound_and_the_time_it_covers() -> None:
-    from robot_dyn.simulation.results.error_estimate import ErrorEstimate
+    from robot_dyn.simulation import ErrorEstimate
 
     t, error = np.array([0.0, 0.008]), np.array([0.0, 2e-9])
     assert str(ErrorEstimate(t, error, 0.008)) == "2.0e-09 (order seen)"

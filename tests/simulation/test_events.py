@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError, TraceError
+from robot_dyn.foundations import QueryError, TraceError
 from tests.campaigns.estimates.scenes import arms
 
 G = 9.80665

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn import export
+from robot_dyn.simulation import Ending, Outcome, RunFileError
 from robot_dyn.simulation.export import netcdf
-from robot_dyn.simulation.export.export import export
-from robot_dyn.simulation.results.run_file import RunFileError
-from robot_dyn.simulation.run.outcome import Ending, Outcome
 
 NAMES = ('a, "b"', "c\nd/ü [rad]")
 NUMBERS = [-0.0, np.nan, np.inf, -np.inf, 5e-324, 1 / 3, np.pi * 1e300, 0.1 + 0.2]

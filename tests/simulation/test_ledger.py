@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.dynamics.state_equation import numbered
+from robot_dyn.effects import numbered
 from tests.long import long
 
 DOUBLE = rd.load("planar_2r")

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 
 G = 9.80665
 PENDULUM = rd.load("pendulum")  # I = 1/3 kg m², m g l/2 = G/2

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.results.acting import at_stop, wrenches
-from robot_dyn.simulation.results.provenance import robot_of
+from robot_dyn.simulation import at_stop, robot_of, wrenches
 
 Q = np.array([[0.3, -1.1, 0.9, -0.6, 1.2, 0.4], [0.5, -0.9, 0.7, -0.3, 1.0, 0.2]])
 F = np.array([12.0, -5.0, 7.0, 0.6, -0.4, 0.9])

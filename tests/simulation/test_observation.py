@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from robot_dyn.simulation import RemarkKind, observation_of
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level
-from robot_dyn.simulation.observation.observation import observation_of, observe, observed
-from robot_dyn.simulation.observation.remarks import Kind
+from robot_dyn.simulation.observation.observation import observe, observed
 
 N, W, STEPS, H = 2, 3, 400, 1e-3
 
@@ -31,7 +31,7 @@ def seen(motion: np.ndarray, levels: GuardLevels, every: int = 1):
 def test_extremes_and_visits_are_those_of_all_steps(motion: np.ndarray) -> None:
     """Bounds differ from run to run, one run has none; durations add steps of 1 ms, to rounding of 400 sums."""
     rng = np.random.default_rng(12)
-    levels = [Level(Kind.BEYOND, row, side, 0.0) for row in range(3 * N) for side in (1, -1)]
+    levels = [Level(RemarkKind.BEYOND, row, side, 0.0) for row in range(3 * N) for side in (1, -1)]
     bounds = np.array([[each.side * size for size in rng.uniform(3, 12, W)] for each in levels])
     bounds[3, 1] = np.nan
     of = seen(motion, GuardLevels(tuple(levels), bounds, bounds))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 from robot_dyn.simulation.setup.options import Options
 from tests.own_method import OwnImplicit
 

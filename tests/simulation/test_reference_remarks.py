@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation import Remark, RemarkKind
 
 ARM = rd.load("planar_2r")
 PLANT = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3)])
@@ -17,7 +17,9 @@ POINTS = np.stack([0.1 + np.sin(3 * TIMES), np.cos(2 * TIMES) - 1.2], axis=1)  #
 START, END = POINTS[0], [0.9, 0.3]
 
 
-def found(kind: Kind, reference: Any, v0: Any = None, plant: rd.Plant = PLANT, kp: Any = 20.0) -> tuple[Remark, ...]:
+def found(
+    kind: RemarkKind, reference: Any, v0: Any = None, plant: rd.Plant = PLANT, kp: Any = 20.0
+) -> tuple[Remark, ...]:
     law = rd.control.PD(reference, kp, 3.0)
     run = rd.simulate(plant, START, v0, duration_s=0.8, controller=law, estimate_error=False, engine="interpreted")
     return tuple(each for each in run.remarks if each.kind is kind)
@@ -26,7 +28,7 @@ def found(kind: Kind, reference: Any, v0: Any = None, plant: rd.Plant = PLANT, k
 def test_way_points_as_samples_jump_in_velocity() -> None:
     """Through five points goes one polynomial of degree 4, whose slope at the start is known."""
     slope = np.array([np.polyder(np.polyfit(TIMES, column, 4))[-1] for column in POINTS.T])
-    remarks = found(Kind.JUMPS, rd.control.Samples(TIMES, POINTS))
+    remarks = found(RemarkKind.JUMPS, rd.control.Samples(TIMES, POINTS))
     assert [(each.joint, each.quantity, each.at, each.limit) for each in remarks] == [("joint_1", "v", 0.0, 0.0)]
     assert remarks[0].value == pytest.approx(slope[0], rel=1e-9) and abs(slope[0]) > 2.5
     assert "joint_1 from 0 to 2.9" in remarks[0].text and "rd.control.via_points" in remarks[0].remedy
@@ -52,7 +54,7 @@ def test_way_points_as_samples_jump_in_velocity() -> None:
 )
 def test_a_reference_that_begins_otherwise_than_the_joint_is_remarked(reference, v0, jumps) -> None:
     """By more than a hundredth of its range, or of its largest velocity."""
-    said = found(Kind.JUMPS, reference, v0)
+    said = found(RemarkKind.JUMPS, reference, v0)
     assert [(each.joint, each.quantity) for each in said] == [each[:2] for each in jumps]
     for each, expected in zip(said, jumps, strict=True):
         assert (each.at, each.value, each.limit) == pytest.approx(expected[2:], abs=1e-12)
@@ -69,7 +71,7 @@ def test_a_joint_that_friction_holds_throughout_is_remarked(stiffness: float, ho
     law = rd.control.PD(rd.control.quintic(q0, [0.3], 0.4), stiffness, 0.0)
     run = rd.simulate(plant, q0, duration_s=0.8, controller=law, estimate_error=False, engine="interpreted")
     assert (np.ptp(run.q) == 0) == holds
-    said = [each for each in run.remarks if each.kind is Kind.HELD]
+    said = [each for each in run.remarks if each.kind is RemarkKind.HELD]
     assert [(each.joint, each.value) for each in said] == [("joint_2", -0.2)] * holds
     if holds:
         assert said[0].limit == pytest.approx(0.5, rel=1e-12)
@@ -83,9 +85,9 @@ def test_a_batch_tells_in_which_runs_a_joint_is_held_or_the_reference_jumps() ->
     setup = rd.Setup(rd.Plant(still, [rd.effects.DryFriction(5.0)]), [-0.2], duration_s=0.6, controller=law)
     starts, stiffness = np.array([[-0.2], [-0.2], [-0.1], [-0.35]]), np.array([9.0, 14.0, 9.5, 8.0])
     runs = rd.rollouts(setup, starts, params={"kp": stiffness}, engine="interpreted")
-    said = {each.kind: each for each in runs.remarks if each.kind in (Kind.JUMPS, Kind.HELD)}
-    assert said[Kind.JUMPS].runs == (3, 2) and "joint_2 from -0.35 to -0.2 rad" in said[Kind.JUMPS].text
-    assert said[Kind.HELD].runs == (0, 2) and said[Kind.HELD].looked == 4
+    said = {each.kind: each for each in runs.remarks if each.kind in (RemarkKind.JUMPS, RemarkKind.HELD)}
+    assert said[RemarkKind.JUMPS].runs == (3, 2) and "joint_2 from -0.35 to -0.2 rad" in said[RemarkKind.JUMPS].text
+    assert said[RemarkKind.HELD].runs == (0, 2) and said[RemarkKind.HELD].looked == 4
     for i in range(4):
         alone = rd.simulate(runs.setup_of(i), estimate_error=False, engine="interpreted").remarks
         assert {each.kind for each in alone} >= {kind for kind in said if i in said[kind].runs}

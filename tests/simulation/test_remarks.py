@@ -10,13 +10,12 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.cli import report
-from robot_dyn.foundations.result import json_text
+from robot_dyn.foundations import json_text
+from robot_dyn.simulation import RemarkKind, observation_of, remark_lines
 from robot_dyn.simulation.observation import observer as observers
 from robot_dyn.simulation.observation.guard_levels import NO_LEVELS
-from robot_dyn.simulation.observation.observation import observation_of
 from robot_dyn.simulation.observation.observer import CHUNK, Observer
-from robot_dyn.simulation.observation.remarks import Kind, lines
-from robot_dyn.view.document import document
+from robot_dyn.view import document_of
 from tests.long import long
 
 INERTIA = 1 / 3  # of the pendulum about its pivot, in [kg m²]
@@ -40,7 +39,7 @@ def damped(joint, ratio: float, **options) -> rd.Setup:
     return rd.Setup(plant, [0.2], [0.02], controller=control, estimate_error=False, **given | options)
 
 
-def kinds(run) -> list[Kind]:
+def kinds(run) -> list[RemarkKind]:
     return [remark.kind for remark in run.remarks]
 
 
@@ -56,30 +55,30 @@ def kinds(run) -> list[Kind]:
 def test_sampled_damping_chatters_above_two(joint, ratio: float, integrator, chatters: bool) -> None:
     """v⁺ = (1 − kd T/M) v at a tick: above 2 it grows, up to where the effort limit holds u at ± LIMIT."""
     run = rd.simulate(damped(joint, ratio, integrator=integrator))
-    assert kinds(run).count(Kind.CHATTER) == chatters
+    assert kinds(run).count(RemarkKind.CHATTER) == chatters
     if chatters:
-        (said,) = (remark for remark in run.remarks if remark.kind is Kind.CHATTER)
+        (said,) = (remark for remark in run.remarks if remark.kind is RemarkKind.CHATTER)
         # from ~1 % of the limit to it, amplitudes grow by 1.2 a tick: some 25 ticks
         assert said.start < 0.05
         assert said.start + said.duration == pytest.approx(0.5 - PERIOD, abs=2 * PERIOD)
         assert said.value == pytest.approx(LIMIT, rel=1e-12)
         assert "kd period_s / M is 2.2" in said.remedy
         np.testing.assert_array_equal(run.extremes[2, :, 0], [-LIMIT, LIMIT])
-        assert Kind.EFFORT_REACHED in kinds(run)
+        assert RemarkKind.EFFORT_REACHED in kinds(run)
 
 
 def test_ringing_that_dies_out_is_no_chatter(joint) -> None:
     """1 − 1.7 = −0.7: below a fiftieth of its start after ln 50 / ln (1/0.7) = 11 ticks, 10 of them are told."""
     slow, quick = (rd.simulate(damped(joint, ratio)) for ratio in (1.85, 1.4))
-    assert Kind.CHATTER in kinds(slow)
-    assert Kind.CHATTER not in kinds(quick)
+    assert RemarkKind.CHATTER in kinds(slow)
+    assert RemarkKind.CHATTER not in kinds(quick)
 
 
 def test_chatter_is_said_by_a_run_that_diverges(joint) -> None:
     """Without a limit it grows until the run ends; the remedy stands beside the outcome."""
     run = rd.simulate(damped(joint, 3.5, duration_s=2.0), plant=rd.Plant(joint))
     assert run.outcome.ending == "diverged"
-    assert Kind.CHATTER in kinds(run)
+    assert RemarkKind.CHATTER in kinds(run)
 
 
 @pytest.mark.parametrize("method", ["rk4", "gauss_4", "semi_implicit_euler", "rosenbrock_5"])
@@ -135,7 +134,7 @@ def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
     )
     run = rd.simulate(setup, record_period_s=0.5, estimate_error=False)
     root = np.roots([kp * a / 2, kd * a, LIMIT - kp * e]).max()
-    (said,) = (remark for remark in run.remarks if remark.kind is Kind.EFFORT_REACHED)
+    (said,) = (remark for remark in run.remarks if remark.kind is RemarkKind.EFFORT_REACHED)
     assert (said.start, said.value) == (0.0, LIMIT)
     assert said.duration == pytest.approx(root, abs=1.5e-3)
 
@@ -157,7 +156,7 @@ def cart():
 def test_what_passes_the_limits_of_the_file_is_said(cart) -> None:
     """Farthest values, times and durations are those of a run that keeps every step."""
     run, every = rd.simulate(cart), rd.simulate(cart, record_period_s=0.0)
-    said = {remark.quantity: remark for remark in run.remarks if remark.kind is Kind.BEYOND}
+    said = {remark.quantity: remark for remark in run.remarks if remark.kind is RemarkKind.BEYOND}
     assert set(said) == {"q", "v", "u"}
     for (quantity, x), limit in zip((("q", every.q), ("v", every.v), ("u", every.u)), (2.0, 5.0, 100.0), strict=True):
         remark, size = said[quantity], np.abs(x[:, 0])
@@ -174,16 +173,16 @@ def test_a_limit_that_the_plant_enforces_is_reached_not_passed(cart) -> None:
     arm = cart.plant.dynamics
     effects = [*rd.effects.joint_stops(arm.lower, arm.upper, 1e6), rd.effects.EffortLimit("urdf")]
     said = {(remark.kind, remark.quantity) for remark in rd.simulate(cart, plant=rd.Plant(arm, effects)).remarks}
-    assert (Kind.EFFORT_REACHED, "u") in said
-    assert (Kind.STOP_REACHED, "q") in said
-    assert not {(Kind.BEYOND, "u"), (Kind.BEYOND, "q")} & said
+    assert (RemarkKind.EFFORT_REACHED, "u") in said
+    assert (RemarkKind.STOP_REACHED, "q") in said
+    assert not {(RemarkKind.BEYOND, "u"), (RemarkKind.BEYOND, "q")} & said
 
 
 def test_a_start_beyond_a_limit_is_said(cart) -> None:
     """From 0 s, though the first step leaves it at once."""
     run = rd.simulate(cart, q0=[2.0 + 1e-6, 0.0], v0=[-1.0, 0.0], controller=None, duration_s=0.1)
     (said,) = run.remarks
-    assert (said.kind, said.start, said.value, said.limit) == (Kind.BEYOND, 0.0, 2.0 + 1e-6, 2.0)
+    assert (said.kind, said.start, said.value, said.limit) == (RemarkKind.BEYOND, 0.0, 2.0 + 1e-6, 2.0)
 
 
 def test_an_adaptive_run_is_watched_at_its_steps() -> None:
@@ -212,7 +211,7 @@ def test_a_record_that_hides_an_oscillation_is_said(joint, per_turn: int, said: 
         record_period_s=turn / per_turn,
         estimate_error=False,
     )
-    assert (kinds(run) == [Kind.COARSE]) == said
+    assert (kinds(run) == [RemarkKind.COARSE]) == said
     if said:
         assert np.ptp(run.q) < 1e-3
         assert run.remarks[0].quantity in ("q", "v")
@@ -233,7 +232,7 @@ class Push(rd.effects.Dissipative):
 def test_an_effect_declared_dissipative_that_does_work_is_said(joint, damping: float) -> None:
     """P = τᵀ v = −b v² is positive for b < 0; v = v₀ exp(−b t / I), so the largest is at the end."""
     run = rd.simulate(rd.Plant(joint, [Push(damping)]), q0=[0.2], v0=[1.5], duration_s=0.5)
-    said = [remark for remark in run.remarks if remark.kind is Kind.GAINS]
+    said = [remark for remark in run.remarks if remark.kind is RemarkKind.GAINS]
     assert bool(said) == (damping < 0)
     if said:
         assert said[0].value == pytest.approx(-damping * (1.5 * np.exp(-damping * 0.5 / INERTIA)) ** 2, rel=1e-6)
@@ -265,12 +264,12 @@ def test_memory_does_not_grow_with_the_run() -> None:
 def test_remarks_are_said_wherever_a_run_is_shown(joint, tmp_path) -> None:
     """Summary, plot, replay page, --json; and they come back from a run file."""
     run = rd.simulate(damped(joint, 2.2))
-    said = lines(run.remarks)
+    said = remark_lines(run.remarks)
     assert len(said) >= 2
     assert all(line in run.summary for line in said)
     title = " ".join(text.get_text() for text in rd.plot(run, "torques").texts)
     assert all(line in title for line in said)
-    assert document((run,), (), None, False)["remarks"] == said
+    assert document_of((run,), (), None, False)["remarks"] == said
     told = json.loads(json_text(report.run(run)))
     assert [each["text"] for each in told["remarks"]] == [remark.text for remark in run.remarks]
     assert told["extremes"]["u"] == {"least": [-LIMIT], "largest": [LIMIT]}
@@ -290,7 +289,7 @@ def test_regularised_friction_that_creeps_is_named_with_its_speed(joint) -> None
     load = {"controller": lambda t, q, v: np.array([tau]), "duration_s": 0.5, "estimate_error": False}
     run = rd.simulate(rd.Plant(joint, [rd.effects.RegularisedCoulombFriction(f, scale)]), [0.1], **load)
     (remark,) = run.remarks
-    assert remark.kind is Kind.CREEPS
+    assert remark.kind is RemarkKind.CREEPS
     assert remark.value == pytest.approx(scale * np.arctanh(tau / f), rel=1e-3)
     assert "under 1.2 of 2 N m; dry_friction would hold" in run.summary
     assert rd.simulate(rd.Plant(joint, [rd.effects.DryFriction(f)]), [0.1], **load).remarks == ()
@@ -321,10 +320,10 @@ def test_a_sampled_loop_that_grows_says_so_though_nothing_chatters(
         joint, [1e-6], duration_s=1000 * period, controller=loop, integrator="rk4", step_s=period, engine=engine,
         estimate_error=False,
     )  # fmt: skip
-    assert Kind.CHATTER not in kinds(run)
-    assert (Kind.UNSTABLE in kinds(run)) == grows
+    assert RemarkKind.CHATTER not in kinds(run)
+    assert (RemarkKind.UNSTABLE in kinds(run)) == grows
     if grows:
-        (said,) = (each for each in run.remarks if each.kind is Kind.UNSTABLE)
+        (said,) = (each for each in run.remarks if each.kind is RemarkKind.UNSTABLE)
         assert said.value == pytest.approx(radius(period), rel=1e-6)
         assert "sampled loop unstable, deviations grow: pivot by 1." in run.summary
         assert float(said.remedy.split("take period_s=")[1].split(",")[0]) < low
@@ -339,9 +338,9 @@ def test_a_task_that_is_damped_says_so_between_samples_too(steps) -> None:
         at = arm.placement(q, frame)[:3, 3]
         law = rd.control.OperationalSpace(arm, frame, rd.control.line(at, at, 1.0), 50.0, 10.0, rows=(0, 2))
         run = rd.simulate(arm, q, duration_s=0.3, controller=law, estimate_error=False, **steps)
-        assert (Kind.DAMPED in kinds(run)) == says
+        assert (RemarkKind.DAMPED in kinds(run)) == says
         if says:
-            (said,) = (each for each in run.remarks if each.kind is Kind.DAMPED)
+            (said,) = (each for each in run.remarks if each.kind is RemarkKind.DAMPED)
             J = arm.jacobian(q, frame)[[0, 2]]
             assert said.value == pytest.approx(np.linalg.eigvalsh(J @ np.linalg.inv(arm.M(q)) @ J.T)[0], rel=1e-6)
             assert said.duration == pytest.approx(0.3)

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.result import UNREPORTED, json_text, plain, reported
-from robot_dyn.report.figure import ResultError
-from robot_dyn.report.result import Result
+from robot_dyn.foundations import UNREPORTED, json_text, plain, reported
+from robot_dyn.report import Result, ResultError
 from robot_dyn.report.save import kinds
 from tests.cli.test_command_documents import names, promised
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen.trace.symbolic import TraceError
-from robot_dyn.effects.effect import Active
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.effects import Active
+from robot_dyn.foundations import QueryError, TraceError
 from robot_dyn.simulation.rollouts import pool
 from tests.command import refusal, said
 

@@ -10,11 +10,18 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.simulation.export.export import export
-from robot_dyn.simulation.observation.remarks import Kind, lines
+from robot_dyn import export
+from robot_dyn.foundations import QueryError
+from robot_dyn.simulation import RemarkKind, remark_lines
 
-COUNTED = (Kind.CHATTER, Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND, Kind.JUMPS, Kind.HELD)
+COUNTED = (
+    RemarkKind.CHATTER,
+    RemarkKind.EFFORT_REACHED,
+    RemarkKind.STOP_REACHED,
+    RemarkKind.BEYOND,
+    RemarkKind.JUMPS,
+    RemarkKind.HELD,
+)
 CART = rd.load("cart_pole")  # 2 m, 5 m/s and 100 N are the limits of its slide
 Q, V, B = np.array([0.1, 0.3]), np.array([0.2, -0.4]), 6
 GOAL = rd.control.quintic(Q, np.array([1.9, 0.8]), 0.5)
@@ -109,15 +116,15 @@ def test_a_batch_tells_of_each_run_what_simulate_does(batch) -> None:
         assert {about for about, remark in told(runs).items() if i in remark.runs} == theirs.keys()
     for about, remark in told(runs).items():
         of = [told(alone[i])[about] for i in remark.runs]
-        size = [x.duration if x.kind is Kind.EFFORT_REACHED else abs(x.value - (x.limit or 0.0)) for x in of]
+        size = [x.duration if x.kind is RemarkKind.EFFORT_REACHED else abs(x.value - (x.limit or 0.0)) for x in of]
         seen = by_instants(runs, about)
         assert size[0] >= max(size) * (1 - (5e-3 if seen else 1e-9))
         assert remark.text.endswith(" (at samples and 200 instants)") if seen else remark.text == of[0].text
         assert remark.looked == B
-        if remark.kind is Kind.STOP_REACHED:  # how far beyond it, as runs are compared
+        if remark.kind is RemarkKind.STOP_REACHED:  # how far beyond it, as runs are compared
             assert f" {remark.value:.4g} of {remark.limit:.4g} " in remark.text
-        assert f"{remark.text} (run {remark.runs[0]}; {len(of)} of {B} runs)" in "; ".join(lines([remark]))
-    assert all(line in runs.summary for line in lines(runs.remarks))
+        assert f"{remark.text} (run {remark.runs[0]}; {len(of)} of {B} runs)" in "; ".join(remark_lines([remark]))
+    assert all(line in runs.summary for line in remark_lines(runs.remarks))
     assert f"rd.simulate(runs.setup_of({runs.worst})) repeats it" in runs.summary
     assert "not observed" not in runs.summary
 
@@ -185,7 +192,7 @@ def test_a_sampled_loop_is_linearised_in_the_worst_run() -> None:
     given, params = SCENES["chattering"]
     runs = rd.rollouts(given, params=params)
     remark, theirs = (
-        next(each for each in of.remarks if each.kind is Kind.UNSTABLE)
+        next(each for each in of.remarks if each.kind is RemarkKind.UNSTABLE)
         for of in (runs, rd.simulate(runs.setup_of(runs.worst), estimate_error=False, engine="compiled"))
     )
     assert remark.runs == (runs.worst,) and remark.joint == theirs.joint
@@ -216,7 +223,7 @@ def test_a_batch_of_one_speaks_of_a_run() -> None:
     runs = rd.rollouts(given, params={name: x[:1] for name, x in params.items()})
     alone = rd.simulate(runs.setup_of(0), estimate_error=False, engine="compiled")
     assert runs.summary.startswith("1 run of 9 samples to t = 0.8 s; 0 diverged, 0 stopped\n")
-    theirs = lines(each for each in alone.remarks if each.kind in (*COUNTED, Kind.UNSTABLE))
+    theirs = remark_lines(each for each in alone.remarks if each.kind in (*COUNTED, RemarkKind.UNSTABLE))
     theirs += [line for line in alone.summary.splitlines() if line.startswith("tracking error of q [")]
     assert len(theirs) >= 3 and set(theirs) <= set(runs.summary.splitlines())
 
@@ -228,7 +235,7 @@ def test_a_limit_of_no_effort_is_reached_all_the_time_once() -> None:
     )
     runs = rd.rollouts(replace(given, integrator=rd.integrate.method("rk4")))
     for remarks in (runs.remarks, rd.simulate(given, estimate_error=False).remarks):
-        (at,) = (each for each in remarks if each.kind is Kind.EFFORT_REACHED and each.joint == "slide")
+        (at,) = (each for each in remarks if each.kind is RemarkKind.EFFORT_REACHED and each.joint == "slide")
         assert at.duration == pytest.approx(0.2, rel=1e-9)
 
 
@@ -240,6 +247,6 @@ def test_growth_over_a_run_counts_its_periods() -> None:
         setup = rd.Setup(
             rd.Plant(arm), [1e-3], None, duration, rd.control.PD(goal, 40.0, 100.0, period_s=0.1), estimate_error=False
         )
-        (told[duration],) = (each for each in rd.simulate(setup).remarks if each.kind is Kind.UNSTABLE)
+        (told[duration],) = (each for each in rd.simulate(setup).remarks if each.kind is RemarkKind.UNSTABLE)
     assert f"by {told[0.3].value ** 3:.4g} over the run" in told[0.3].text
     assert 600 * np.log10(told[60.0].value) > 300 and "by more than 1e+299 over the run" in told[60.0].text

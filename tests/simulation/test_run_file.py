@@ -15,11 +15,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.scene.starters import starter
-from robot_dyn.simulation.export.export import export
+from robot_dyn import export
+from robot_dyn.scene import starter
+from robot_dyn.simulation import Ending, Outcome, RunFileError
 from robot_dyn.simulation.results import archive
-from robot_dyn.simulation.results.run_file import RunFileError
-from robot_dyn.simulation.run.outcome import Ending, Outcome
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 from robot_dyn.simulation.setup.setup import segments, steps
 from robot_dyn.simulation.setup.size import check_record, samples
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.observation.remarks import Kind
+from robot_dyn.simulation import RemarkKind
 from tests.campaigns.estimates.scenes import RAIL
 from tests.long import long
 from tests.short_loops import Arm, ShortLoop, judge
@@ -132,7 +132,7 @@ def test_a_run_that_its_step_ends_under_a_stable_loop_says_so() -> None:
     )
     assert run.outcome.ending == "diverged"
     assert "take a smaller step than 0.001 s" in run.outcome.advice
-    assert Kind.UNSTABLE not in {each.kind for each in run.remarks}
+    assert RemarkKind.UNSTABLE not in {each.kind for each in run.remarks}
 
 
 def test_sampling_is_told_apart_from_an_arm_that_falls_anyway() -> None:
@@ -149,7 +149,7 @@ def test_sampling_is_told_apart_from_an_arm_that_falls_anyway() -> None:
         run = rd.simulate(
             plant, [np.pi - 0.01], duration_s=0.3, controller=law, integrator="rk4", step_s=1e-3, estimate_error=False
         )
-        return [each.remedy for each in run.remarks if each.kind is Kind.UNSTABLE]
+        return [each.remedy for each in run.remarks if each.kind is RemarkKind.UNSTABLE]
 
     (remedy,) = remarks(1.5 * limit)
     told = re.search(r"at ([\d.]+) per second; sampling adds to that beyond ([\d.]+) s: take period_s=([\d.]+)", remedy)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.effects.effect import Active
+from robot_dyn.effects import Active
 
 DOUBLE = rd.load("planar_2r")
 PLANT = rd.Plant(DOUBLE, [rd.effects.ViscousFriction([0.4, 0.2])])

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.control.controller import ControlError, Stateless
-from robot_dyn.effects.effect import Active, Conservative
-from robot_dyn.foundations.errors import EffectError, QueryError
+from robot_dyn.control import Stateless
+from robot_dyn.effects import Active, Conservative
+from robot_dyn.foundations import ControlError, EffectError, QueryError
 from robot_dyn.simulation.run.event_run import EventRun
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from tests.long import long

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.integrate.integrator import System
+from robot_dyn.foundations import QueryError
+from robot_dyn.integrate import System
+from robot_dyn.simulation import RemarkKind, StateEquation
 from robot_dyn.simulation.dynamics.fastest_motion import BODIES, fastest
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.remarks import Kind
 
 ARM = rd.load("planar_2r")
 STATE = np.array([0.4, -0.7, 0.13, -0.25])
@@ -61,7 +60,7 @@ def test_a_run_says_that_stability_bounds_its_steps() -> None:
     options: dict[str, Any] = {"q0": STATE[:2], "duration_s": 0.1, "engine": "compiled", "estimate_error": False}
     options |= {"integrator": "DOP853"}
     stiff = rd.simulate(rd.Plant(ARM, [rd.effects.ViscousFriction([1.0, 1e4])]), **options)
-    (remark,) = (each for each in stiff.remarks if each.kind is Kind.STIFF)
+    (remark,) = (each for each in stiff.remarks if each.kind is RemarkKind.STIFF)
     assert stiff.statistics.steps > 1000
     assert remark.joint == "joint_2"
     assert "steps bounded by stability: the fastest motion decays with" in stiff.summary
@@ -70,7 +69,7 @@ def test_a_run_says_that_stability_bounds_its_steps() -> None:
         ARM, **options | {"duration_s": 20.0, "integrator": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)}
     )
     assert short.statistics.steps > 1000
-    assert not [each for each in short.remarks if each.kind is Kind.STIFF]
+    assert not [each for each in short.remarks if each.kind is RemarkKind.STIFF]
 
 
 @pytest.mark.parametrize("engine", ["compiled", "interpreted"])
@@ -91,7 +90,7 @@ def test_a_stiff_run_is_made_by_the_stiff_method_unless_another_is_named() -> No
     assert np.abs(chosen.q - named.q).max() < 3 * (
         chosen.error.largest + named.error.largest
     )  # estimates may be 0.3 of it
-    (remark,) = (each for each in chosen.remarks if each.kind is Kind.STIFF)
+    (remark,) = (each for each in chosen.remarks if each.kind is RemarkKind.STIFF)
     assert remark.joint == "joint_2"
     assert "by 'viscous_friction'; made by Rosenbrock in place of DOP853" in chosen.summary
 

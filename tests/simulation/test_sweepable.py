@@ -11,8 +11,8 @@ import pytest
 from lxml import html
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.scene.starters import starter
+from robot_dyn.foundations import QueryError
+from robot_dyn.scene import starter
 from tests.command import document, said
 
 

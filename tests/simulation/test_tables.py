@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations import QueryError
 
 CART = rd.load("cart_pole")  # a joint that slides, and one that turns
 GOAL = rd.control.quintic([0.1, 0.3], [0.4, -0.2], 0.5)

@@ -11,27 +11,21 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen.loops.call import MachineFunction
+from robot_dyn import Setup
+from robot_dyn.codegen import INSTEAD, MachineFunction
 from robot_dyn.codegen.loops.source import SubsetError
-from robot_dyn.codegen.primitives import INSTEAD
-from robot_dyn.foundations.arithmetic import FLOAT64
-from robot_dyn.foundations.errors import MachineCodeError
+from robot_dyn.foundations import FLOAT64, MachineCodeError
+from robot_dyn.integrate import FIXED_STEP, PlainMethod, Stepper, method
 from robot_dyn.integrate.adaptive import ADAPTIVE
-from robot_dyn.integrate.integrator import PlainMethod, Stepper
-from robot_dyn.integrate.methods import FIXED_STEP, method
 from robot_dyn.integrate.primitives import evaluate
+from robot_dyn.simulation import StateEquation, machine_code, observation_of, segment_table
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now, rules_of, runs_of
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.cache import machine_code
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.observation.guard_levels import guard_levels
-from robot_dyn.simulation.observation.observation import observation_of
 from robot_dyn.simulation.run.fixed_step import samples_at_most
 from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.recording import records_of
 from robot_dyn.simulation.run.time_loop import time_loop
-from robot_dyn.simulation.setup.segment_table import segment_table
-from robot_dyn.simulation.setup.setup import Setup
 from tests.campaigns.estimates.scenes import arms
 from tests.long import long
 

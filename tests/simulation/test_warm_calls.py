@@ -21,11 +21,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
+from robot_dyn import Trajectory
+from robot_dyn.simulation import Ending, RemarkKind, StateEquation
 from robot_dyn.simulation.engine.machine_code import MachineCode
-from robot_dyn.simulation.observation.remarks import Kind
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.outcome import Ending
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.3, -0.4]), np.array([0.5, -0.2])
@@ -108,7 +106,7 @@ def at_once(setup: rd.Setup) -> Trajectory:
 def test_the_setups_leave_something_to_read() -> None:
     runs = {name: rd.simulate(setup) for name, setup in setups().items()}
     kinds = {remark.kind for run in runs.values() for remark in run.remarks}
-    assert kinds >= {Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.JUMPS}
+    assert kinds >= {RemarkKind.EFFORT_REACHED, RemarkKind.STOP_REACHED, RemarkKind.JUMPS}
     assert runs["steps too long"].ledger.cause and runs["pid, lag"].wrenches and runs["stops"].at_stop is not None
     assert all(runs[name].events for name in ("computed torque", "stops", "held", "payload"))
 

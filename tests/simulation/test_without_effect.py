@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.control.controller import ControlError
-from robot_dyn.effects.effect import Active, Effect
-from robot_dyn.foundations.errors import CatalogError, EditError, EffectError, QueryError
-from robot_dyn.scene.scene import SceneError
+from robot_dyn.effects import Active, Effect
+from robot_dyn.foundations import CatalogError, ControlError, EditError, EffectError, QueryError, SceneError
 
 ARM = rd.load("planar_2r")
 UR5 = rd.load("ur5")

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.simulation.results.ledger import Ledger
+from robot_dyn.simulation import Ledger
 
 
 @cache

@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 import robot_dyn as rd
-from robot_dyn.shapes.triangles import Mesh, welded
+from robot_dyn.shapes import Mesh
+from robot_dyn.shapes.triangles import welded
 from robot_dyn.view.geometry.coarse import CELLS, coarse
 
 

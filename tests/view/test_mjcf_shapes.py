@@ -13,8 +13,8 @@ import pytest
 import trimesh
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import ModelWarning
-from robot_dyn.view.geometry.visuals import Piece, drawing
+from robot_dyn import ModelWarning
+from robot_dyn.view import Piece, drawing
 
 mujoco: Any = import_module("mujoco")  # which has no types
 ARM = """<mujoco model="drawn">

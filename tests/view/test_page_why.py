@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.view.page import Page
+from robot_dyn.view import Page
 from tests.browser import View, opened
 
 STEPS = 2 * 32767  # the numbers of the page are whole steps, two of them half of one off

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn import plot, save_plot
+from robot_dyn.foundations import QueryError
+from robot_dyn.view import PlotError
 from robot_dyn.view.plots.batch import BATCH_PLOTS, LEVELS
-from robot_dyn.view.plots.plots import PlotError, plot, save_plot
 from tests.view.plotted import cart_pole, lines
 
 COUNT, LOST = 40, [5, 9, 30]

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.view.plots.plots import PLOTS, plot, save_plot
+from robot_dyn import plot, save_plot
+from robot_dyn.foundations import QueryError
+from robot_dyn.view import PLOTS
 from tests.view.plotted import cart_pole, cells, lines, many, stretched, ur5
 
 MM = 25.4  # in an inch

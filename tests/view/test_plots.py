@@ -11,10 +11,11 @@ from matplotlib import rcParams
 from matplotlib.colors import to_rgb
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.simulation.results.ledger import Ledger
-from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.view.plots.plots import MOST_JOINTS, PLOTS, PlotError, plot, save_plot
+from robot_dyn import plot, save_plot
+from robot_dyn.foundations import QueryError
+from robot_dyn.simulation import Ending, Ledger, Outcome
+from robot_dyn.view import PLOTS, PlotError
+from robot_dyn.view.plots.plots import MOST_JOINTS
 from tests.view.plotted import cart_pole, cells, lines, many, stretched, ur5
 
 

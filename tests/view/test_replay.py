@@ -10,7 +10,7 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.queries.units import format_duration
+from robot_dyn.queries import format_duration
 from tests.browser import opened, until
 
 UR5_Q = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4])

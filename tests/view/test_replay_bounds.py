@@ -11,7 +11,7 @@ import trimesh
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
-from robot_dyn.description.catalog import find, resolve
+from robot_dyn.description import catalog
 from tests.browser import opened
 from tests.long import long
 
@@ -31,7 +31,7 @@ def box_of_link(arm: rd.Robot, link: str, q: np.ndarray, source: Path) -> np.nda
         place = trimesh.transformations.euler_matrix(*rpy, "sxyz")
         place[:3, 3] = xyz
         name = mesh.get("filename")
-        path = resolve(name, source) if name.startswith("package://") else source.parent / name
+        path = catalog.resolve(name, source) if name.startswith("package://") else source.parent / name
         vertices = trimesh.load_scene(path, process=False).to_geometry().vertices
         unit = re.search(r'<unit[^>]*meter="([^"]*)"', path.read_text("utf-8", "replace"))
         if path.suffix.lower() == ".dae" and unit:
@@ -44,7 +44,7 @@ def box_of_link(arm: rd.Robot, link: str, q: np.ndarray, source: Path) -> np.nda
 @pytest.mark.parametrize("name, least", [("ur5", 7), *long([("panda", 10), ("kinova", 9), ("twodofs", 1)])])
 def test_each_link_fills_the_box_that_trimesh_gives(browser, tmp_path, name: str, least: int) -> None:
     """Single precision of coordinates and placements in a scene of about 1 m: 2e-6."""
-    arm, source = rd.load(name), find(name)
+    arm, source = rd.load(name), catalog.find(name)
     q = np.linspace(0.2, 0.7, arm.n)
     run = rd.simulate(rd.Plant(arm), q0=q, duration_s=0.002, estimate_error=False)
     checked = 0

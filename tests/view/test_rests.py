@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.view.plots.plots import plot
+from robot_dyn import plot
 from robot_dyn.view.rests import rests
 from tests.browser import opened
 from tests.campaigns.estimates.scenes import arms

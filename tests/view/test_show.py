@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.view.document import document
+from robot_dyn.view import document_of
 from robot_dyn.view.scenery import scenery, upright
 from tests.browser import opened
 from tests.command import run, said
@@ -51,7 +51,7 @@ def test_a_plane_is_seen_from_its_front_whatever_its_size(size: float) -> None:
 
 def labels(robot: rd.Robot) -> str:
     run = rd.simulate(robot, q0=[0.3, -0.5], duration_s=0.01, estimate_error=False)
-    return document((run,), (), None, False, "full")["gravity"]
+    return document_of((run,), (), None, False, "full")["gravity"]
 
 
 def test_gravity_is_said_and_so_is_its_absence() -> None:

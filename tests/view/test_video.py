@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import VideoError
+from robot_dyn.foundations import VideoError
 from robot_dyn.view.video import encoders
 from robot_dyn.view.video.frames import frame_times
 from tests.browser import chromium, opened

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import VideoError
+from robot_dyn.foundations import VideoError
 from robot_dyn.view.video import browser as driven
 from robot_dyn.view.video import installed
 from tests.browser import chromium

@@ -7,9 +7,9 @@ import pytest
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
+from robot_dyn import Robot
 from robot_dyn.description import description
-from robot_dyn.model.robot import Robot
-from robot_dyn.view.geometry.visuals import drawing
+from robot_dyn.view import drawing
 from tests.drawings import WRITTEN_FOR_GAZEBO, Z_UP, box, boxes, stated_boxes
 from tests.long import long
 

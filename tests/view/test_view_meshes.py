@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.description import description, solids
-from robot_dyn.model.robot import Robot
+from robot_dyn import Robot
+from robot_dyn.description import box as solid_box
+from robot_dyn.description import description
 from robot_dyn.shapes.mesh_files import MAX_BYTES
+from robot_dyn.view import drawing
 from robot_dyn.view.geometry.inertia_boxes import inertia_boxes
-from robot_dyn.view.geometry.visuals import drawing
 from tests.drawings import box, boxes, drawn, mesh_visual, stl, urdf
 from tests.hostile.kinds import ARM, MOMENTS
 
@@ -231,7 +232,7 @@ def test_inertia_boxes_have_the_mass_and_moments_of_their_bodies(name: str) -> N
         if bent is not None:
             continue
         edges = np.ptp(mesh.vertices, axis=0).astype(float)
-        uniform = solids.box(body.mass, *edges).moved(pose[:3, :3], pose[:3, 3])
+        uniform = solid_box(body.mass, *edges).moved(pose[:3, :3], pose[:3, 3])
         assert np.allclose(uniform.com, body.lever, atol=1e-12), link
         assert np.abs(uniform.inertia - body.inertia).max() <= 2e-6 * np.abs(body.inertia).max(), link
 

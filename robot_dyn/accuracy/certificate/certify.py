@@ -29,7 +29,7 @@ from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import M
 from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
-from robot_dyn.report.environment import environment
+from robot_dyn.report.environment import processor_and_versions
 from robot_dyn.report.timing import in_turns, repeatable
 
 _AT_LEAST_S = 1e-3  # of a loop that is timed
@@ -92,7 +92,8 @@ def certify(
         left_out.append("what was to come when it was interrupted")
     return Certificate(
         robot.name, robot.joint_names, tuple(held), digit_count.decimals, digit_count.right_angles,
-        _condition(robot, states, given, rng), digit_count.bits, tuple(left_out), environment(), seed, interrupted,
+        _condition(robot, states, given, rng), digit_count.bits, tuple(left_out), processor_and_versions(), seed,
+        interrupted,
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from robot_dyn.foundations.validate import choice, function, integer, number
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import format_duration
-from robot_dyn.report.environment import environment
+from robot_dyn.report.environment import processor_and_versions
 from robot_dyn.report.result import Result
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.results.acting import acting
@@ -162,8 +162,8 @@ def cost(
     dynamics: Any = setup.plant.dynamics
     return Cost(
         getattr(dynamics, "name", type(dynamics).__name__), acting(setup),
-        tuple(pair.alternative() for pair in pairs), tuple(left_out), environment(), budget.seconds, budget.spent,
-        interrupted,
+        tuple(pair.alternative() for pair in pairs), tuple(left_out), processor_and_versions(), budget.seconds,
+        budget.spent, interrupted,
     )  # fmt: skip
 
 

@@ -30,8 +30,8 @@ from robot_dyn.foundations.validate import function, instance, integer, number, 
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.methods import METHODS, as_method
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.queries.units import format_duration, units
-from robot_dyn.report.environment import environment
+from robot_dyn.queries.units import format_duration, joint_units
+from robot_dyn.report.environment import processor_and_versions
 from robot_dyn.report.result import Result
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.engine.choice import choose
@@ -244,8 +244,8 @@ def work_precision(
     dynamics: Any = setup.plant.dynamics
     types = getattr(dynamics, "joint_types", (None,))
     return WorkPrecision(
-        getattr(dynamics, "name", type(dynamics).__name__), acting(setup), units("q", types), requested, exact, ladders,
-        tuple(left_out), environment(), budget.seconds, budget.spent, interrupted, later,
+        getattr(dynamics, "name", type(dynamics).__name__), acting(setup), joint_units("q", types), requested, exact,
+        ladders, tuple(left_out), processor_and_versions(), budget.seconds, budget.spent, interrupted, later,
     )  # fmt: skip
 
 

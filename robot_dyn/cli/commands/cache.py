@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from robot_dyn.cli.app import Json, app
+from robot_dyn.cli.application import Json, app
 from robot_dyn.cli.terminal import say, say_json
 from robot_dyn.foundations.answer import Table
 

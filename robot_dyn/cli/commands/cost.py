@@ -10,7 +10,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Budget, Csv, Dark, Force, Json, Name, Plot, Repeats, Scene, app, bar
+from robot_dyn.cli.application import Budget, Csv, Dark, Force, Json, Name, Plot, Repeats, Scene, app, bar
 from robot_dyn.cli.outcome import give, outputs
 from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 from robot_dyn.cli.terminal import say, say_json

@@ -10,7 +10,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Force, app, bar
+from robot_dyn.cli.application import Force, app, bar
 from robot_dyn.cli.terminal import say
 from robot_dyn.foundations.errors import QueryError, RobotDynError
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli.app import Csv, Dark, Force, Json, Plot, app
+from robot_dyn.cli.application import Csv, Dark, Force, Json, Plot, app
 from robot_dyn.cli.outcome import give, outputs
 
 

@@ -8,7 +8,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Force, app, bar
+from robot_dyn.cli.application import Force, app, bar
 from robot_dyn.cli.terminal import say, size_of
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Json, Name, app, progress
+from robot_dyn.cli.application import Json, Name, app, progress
 from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 from robot_dyn.cli.terminal import say, say_json
 from robot_dyn.foundations.errors import QueryError, RobotDynError

@@ -10,7 +10,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Dark, Force, Name, PackageDir, app, bar
+from robot_dyn.cli.application import Dark, Force, Name, PackageDir, app, bar
 from robot_dyn.cli.arguments import output as checked_output
 from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
 from robot_dyn.cli.terminal import say, size_of

@@ -10,7 +10,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Force, Json, Scene, app, bar
+from robot_dyn.cli.application import Force, Json, Scene, app, bar
 from robot_dyn.cli.terminal import put, say, say_json, to_stderr
 from robot_dyn.foundations.answer import Table
 
@@ -76,9 +76,9 @@ def scene(
     ] = None,
 ) -> None:
     """Print a scene file to start from, as `robot-dyn scene pendulum > pendulum.toml`."""
-    from robot_dyn.scene.starters import opening, starter, starters
+    from robot_dyn.scene.starters import opening, starter, starter_names
 
     if name:
         put(starter(name))
     else:
-        say(Table(("scene", "what it is"), tuple((each, opening(each)) for each in starters()), wrap=True))
+        say(Table(("scene", "what it is"), tuple((each, opening(each)) for each in starter_names()), wrap=True))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.control.extremes import extremes
+from robot_dyn.control.extremes import extreme_values
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.control.samples.columns import Columns
 from robot_dyn.control.samples.turns import Turns, joined_turns, whole_turns
@@ -50,7 +50,7 @@ def findings(arm: Robot, turns: Turns, reference: PiecewisePolynomial, ends: str
     table = turns.table
     yield from _of_times(arm, table, reference)
     speed = np.diff(table.q, axis=0) / np.diff(table.t)[:, None]
-    within, velocity = extremes(reference), extremes(reference, 1)
+    within, velocity = extreme_values(reference), extreme_values(reference, 1)
     for i in range(arm.n):
         name, unit = arm.joint_names[i], of_joint("rad", arm.joint_types[i])
         if not table.given[i]:

@@ -7,15 +7,15 @@ from importlib.resources import files
 from robot_dyn.foundations.errors import SceneError, nearest
 
 
-def starters() -> tuple[str, ...]:
+def starter_names() -> tuple[str, ...]:
     """Names of the starter scenes."""
     return tuple(sorted(file.name.removesuffix(".toml") for file in files(__name__).iterdir() if ".toml" in file.name))
 
 
 def starter(name: str) -> str:
     """The text of a starter scene; raises SceneError for an unknown name."""
-    if name not in starters():
-        raise SceneError(f"no scene {name!r}; {nearest(name, starters())}")
+    if name not in starter_names():
+        raise SceneError(f"no scene {name!r}; {nearest(name, starter_names())}")
     return (files(__name__) / f"{name}.toml").read_text(encoding="utf-8")
 
 

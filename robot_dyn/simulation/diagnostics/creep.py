@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from robot_dyn.effects.friction import RegularisedCoulombFriction
-from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.setup.setup import Setup
 
 _LAST, _LEAST = 0.1, 5  # part of the run that is looked at, and samples in it
@@ -41,6 +41,6 @@ def creeping(setup: Setup, t: np.ndarray, v: np.ndarray, units: list[tuple[str, 
             name, (_, of_v, of_u) = setup.plant.dynamics.joint_names[i], units[i]
             text = f"{name} at {mean[i]:.3g} {of_v}, under {part[i] * level[i]:.3g} of {level[i]:.3g} {of_u}"
             yield Remark(
-                Kind.CREEPS, name, "v", start, lasted, float(t[-1]), float(mean[i]), None, text,
+                RemarkKind.CREEPS, name, "v", start, lasted, float(t[-1]), float(mean[i]), None, text,
                 "dry_friction would hold what is below its level",
             )  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 
 from robot_dyn.control.operational_space import OperationalSpace, task_dynamics
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -52,7 +52,7 @@ def _of(task: OperationalSpace, t: np.ndarray, q: np.ndarray) -> Iterator[Remark
         f" of threshold {task.threshold:.2g} at {when:.4g} s)"
     )
     yield Remark(
-        Kind.DAMPED, task.frame, "q", start, duration, when, least, float(task.threshold), text,
+        RemarkKind.DAMPED, task.frame, "q", start, duration, when, least, float(task.threshold), text,
         "it does not follow along that direction: keep the reference within reach, or take a larger threshold for"
         " smaller torques",
     )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.dry_friction import DryFriction
-from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.setup.setup import Setup
 
 _JUMP = 0.01  # of the range of a reference, or of its largest velocity
@@ -45,7 +45,7 @@ def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterato
             begins, at_start = float(begin[i]), float(there[gaps[:, i].argmax(), i])
             text = f"{quantity} of {names[i]} from {at_start:.4g} to {begins:.4g} {units[i][row]} at {t:.4g} s"
             yield Remark(
-                Kind.JUMPS, names[i], quantity, t, 0.0, t, begins, at_start, text,
+                RemarkKind.JUMPS, names[i], quantity, t, 0.0, t, begins, at_start, text,
                 "let it begin where and as fast as the joint does; rd.control.via_points(…) starts at rest",
             ), gaps[:, i]  # fmt: skip
 
@@ -73,7 +73,7 @@ def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Ite
         most = float(np.nan_to_num(np.abs(extremes[2, :, i])).max())
         text = f"{name} at {setup.q0[i]:.4g} {unit}, its reference moves by {span[i]:.3g}, |u| up to {most:.3g} {of_u}"
         yield Remark(
-            Kind.HELD, name, "q", 0.0, float(t[-1]), 0.0, float(setup.q0[i]), float(span[i]), text,
+            RemarkKind.HELD, name, "q", 0.0, float(t[-1]), 0.0, float(setup.q0[i]), float(span[i]), text,
             "the control demands less than friction holds: take larger gains, or less friction",
         )  # fmt: skip
 

@@ -22,12 +22,12 @@ from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level, guard_levels
 from robot_dyn.simulation.observation.observation import Observation, Observed, Visit, observation_of
 from robot_dyn.simulation.observation.observer import Observer
-from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.setup.setup import Setup
 
 Units = list[tuple[str, str, str]]  # of q, v and u of each joint
 QUANTITIES = ("q", "v", "u")
-KINDS = Kind.EFFORT_REACHED, Kind.STOP_REACHED, Kind.BEYOND  # of levels, in the order of a summary
+KINDS = RemarkKind.EFFORT_REACHED, RemarkKind.STOP_REACHED, RemarkKind.BEYOND  # of levels, in the order of a summary
 _HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window leave out
 _ROUNDING = 1e-9  # of a quantity: a smaller range is noise
 
@@ -119,7 +119,7 @@ def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Itera
         at = int(np.nanargmax(P))
         text = f"{name} {P[at]:.4g} W at {t[at]:.4g} s"
         yield Remark(
-            Kind.GAINS, name, "power", float(t[at]), 0.0, float(t[at]), float(P[at]), 0.0, text,
+            RemarkKind.GAINS, name, "power", float(t[at]), 0.0, float(t[at]), float(P[at]), 0.0, text,
             "declare it Active, or see to the sign of its torque",
         )  # fmt: skip
 
@@ -146,15 +146,15 @@ def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit], in
         far = f"{most.value:.4g} of {level.limit:.4g}{unit} at {most.at:.4g} s"
         spent = f"for {duration:.3g} s from {start:.4g} s"
         texts = {
-            Kind.BEYOND: far,
-            Kind.STOP_REACHED: f"{far}, {spent}",
-            Kind.EFFORT_REACHED: f"{spent} ({abs(level.limit):.4g}{unit})",
+            RemarkKind.BEYOND: far,
+            RemarkKind.STOP_REACHED: f"{far}, {spent}",
+            RemarkKind.EFFORT_REACHED: f"{spent} ({abs(level.limit):.4g}{unit})",
         }
         seen = f" (at samples and {instants} instants)" if QUANTITIES[quantity] == "u" and instants else ""
         text = f"{names[joint]} {texts[level.kind]}{seen}"
         yield Remark(
             level.kind, names[joint], QUANTITIES[quantity], start, duration, most.at, most.value, level.limit, text,
-            "nothing in the plant enforces them" if level.kind is Kind.BEYOND else "",
+            "nothing in the plant enforces them" if level.kind is RemarkKind.BEYOND else "",
         )  # fmt: skip
 
 
@@ -165,7 +165,7 @@ def _chatter(
         unit = f" {units[joint][2]}".rstrip()
         text = f"{names[joint]} ±{episode.amplitude:.3g}{unit} from {episode.start:.4g} s for {episode.duration:.3g} s"
         yield Remark(
-            Kind.CHATTER, names[joint], "u", episode.start, episode.duration, episode.start, episode.amplitude,
+            RemarkKind.CHATTER, names[joint], "u", episode.start, episode.duration, episode.start, episode.amplitude,
             None, text, remedy(episode),
         )  # fmt: skip
 
@@ -239,6 +239,6 @@ def _coarse(setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray
         at = (start + end) / 2
         text = f"{quantity} of {names[joint]} {value[window, row]:.4g}{unit} near {at:.4g} s (sampled: {seen:.4g})"
         yield Remark(
-            Kind.COARSE, names[joint], quantity, start, end - start, at, float(value[window, row]), seen, text,
+            RemarkKind.COARSE, names[joint], quantity, start, end - start, at, float(value[window, row]), seen, text,
             "take a shorter record_period_s",
         )  # fmt: skip

@@ -19,7 +19,7 @@ import numpy as np
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.simulation.dynamics.sampled_loop import SampledLoop, linearised, remedy
 from robot_dyn.simulation.dynamics.stability import after, below, periods, shown
-from robot_dyn.simulation.observation.remarks import Kind, Remark, lines
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind, remark_lines
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -94,7 +94,7 @@ def _remark(setup: Setup, found: Growing) -> Remark:
         f"{joint} by {shown(found.factor)} in each period of {period:.4g} s about the state at {t:.4g} s, by"
         f" {shown(after(found.factor, periods(setup.duration_s, period)))} over the run"
     )
-    return Remark(Kind.UNSTABLE, joint, "q", t, 0.0, t, found.factor, 1.0, text, found.remedy(period))
+    return Remark(RemarkKind.UNSTABLE, joint, "q", t, 0.0, t, found.factor, 1.0, text, found.remedy(period))
 
 
 def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outcome:
@@ -102,8 +102,8 @@ def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outc
     if outcome.ending is not Ending.DIVERGED or setup.controller is None:
         return outcome
     for remark in remarks:
-        if remark.kind is Kind.UNSTABLE:
+        if remark.kind is RemarkKind.UNSTABLE:
             elapsed = periods(outcome.t, setup.controller.period_s)
             if elapsed * log(remark.value) > log(_EXPLAINS):
-                return replace(outcome, advice=lines([remark])[0])
+                return replace(outcome, advice=remark_lines([remark])[0])
     return outcome

@@ -19,7 +19,7 @@ from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, LEAST_RTOL, STIFF, Adaptive
 from robot_dyn.integrate.explicit import RK4
 from robot_dyn.simulation.dynamics.fastest_motion import fastest
-from robot_dyn.simulation.observation.remarks import Kind
+from robot_dyn.simulation.observation.remarks import RemarkKind
 from robot_dyn.simulation.results.statistics import Accuracy
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
@@ -143,7 +143,7 @@ def _stiff(setup: Setup) -> bool:
 
 def _stable_at_most(trial: Trajectory) -> bool:
     """Whether stability limits the steps."""
-    return any(each.kind is Kind.STIFF for each in trial.remarks)
+    return any(each.kind is RemarkKind.STIFF for each in trial.remarks)
 
 
 def _decides(setup: Setup, trial: Trajectory) -> bool:

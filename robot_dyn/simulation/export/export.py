@@ -9,7 +9,7 @@ from typing import Any, BinaryIO, final
 
 from robot_dyn.foundations.errors import shown
 from robot_dyn.foundations.extras import needs
-from robot_dyn.foundations.files import Kind, file_path, save, target
+from robot_dyn.foundations.files import FileKind, file_path, save, target
 from robot_dyn.simulation.columns import EXTRA, Column
 from robot_dyn.simulation.export import csv_table, mcap_log, netcdf, parquet
 from robot_dyn.simulation.results.run_data import RunData
@@ -22,22 +22,22 @@ from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 class Format:
     """A format: its kind of file, what writes it, and the packages that this needs."""
 
-    kind: Kind
+    kind: FileKind
     write: Callable[[Any, list[Column], BinaryIO], object]
     packages: tuple[str, ...] = ()
 
 
-TABLE = Kind("a table of a run", ".csv", b"t [s]")
+TABLE = FileKind("a table of a run", ".csv", b"t [s]")
 _OF_BOTH = (
-    Format(Kind("a Parquet file", ".parquet", b"PAR1"), parquet.write, ("pyarrow",)),
-    Format(Kind("a netCDF file", ".nc", b"CDF\x02"), netcdf.write, ("xarray",)),
+    Format(FileKind("a Parquet file", ".parquet", b"PAR1"), parquet.write, ("pyarrow",)),
+    Format(FileKind("a netCDF file", ".nc", b"CDF\x02"), netcdf.write, ("xarray",)),
 )
-_LOG = Format(Kind("an MCAP log", ".mcap", b"\x89MCAP0\r\n"), mcap_log.write, ("mcap", "mcap_ros2.writer"))
+_LOG = Format(FileKind("an MCAP log", ".mcap", b"\x89MCAP0\r\n"), mcap_log.write, ("mcap", "mcap_ros2.writer"))
 _OF_RUN = (Format(TABLE, csv_table.write), *_OF_BOTH, _LOG)
-_OF_RUNS = (Format(Kind("a table of runs", ".csv", b"run,"), csv_table.write), *_OF_BOTH)
+_OF_RUNS = (Format(FileKind("a table of runs", ".csv", b"run,"), csv_table.write), *_OF_BOTH)
 
 
-def kinds(run: RunData) -> tuple[Kind, ...]:
+def kinds(run: RunData) -> tuple[FileKind, ...]:
     """The kinds of file that a run, or a batch, can be exported to."""
     return tuple(each.kind for each in _formats(run).values())
 

@@ -14,7 +14,7 @@ from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.observation.remarks import Kind
+from robot_dyn.simulation.observation.remarks import RemarkKind
 
 _ROUNDING = 1e-9  # of a limit: nearer to it is at it
 _NONE = 1e9  # stops and limits beyond it do not exist
@@ -32,7 +32,7 @@ class Level:
         limit: The limit as stated.
     """
 
-    kind: Kind
+    kind: RemarkKind
     row: int
     side: int
     limit: float
@@ -80,26 +80,26 @@ def guard_levels(dynamics: Any, effects: Iterable[Effect], controller: Controlle
 
 def _bounds(
     dynamics: Any, effects: tuple[Effect, ...], controller: Controller | None
-) -> Iterator[tuple[Kind, int, int, np.ndarray, float]]:
+) -> Iterator[tuple[RemarkKind, int, int, np.ndarray, float]]:
     """Kind, 0, 1, 2 for q, v, u, side, bounds (n,) or (W, n), and the part of a bound by which it must be passed."""
     n, robot = dynamics.n, getattr(dynamics, "robot", dynamics)
     effort: Any = np.inf if controller is None else controller.saturation
     for limit in (effect.limit for effect in effects if isinstance(effect, EffortLimit)):
         effort = np.minimum(effort, limit)
-    yield from ((Kind.EFFORT_REACHED, 2, side, side * effort, -_ROUNDING) for side in (1, -1))
+    yield from ((RemarkKind.EFFORT_REACHED, 2, side, side * effort, -_ROUNDING) for side in (1, -1))
     lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
     for stop in (effect for effect in effects if isinstance(effect, JointStopSpring)):
         acts = stop.stiffness > 0
         lower = np.where(acts, np.maximum(lower, stop.lower), lower)
         upper = np.where(acts, np.minimum(upper, stop.upper), upper)
-    yield Kind.STOP_REACHED, 0, 1, upper, 0.0
-    yield Kind.STOP_REACHED, 0, -1, lower, 0.0
+    yield RemarkKind.STOP_REACHED, 0, 1, upper, 0.0
+    yield RemarkKind.STOP_REACHED, 0, -1, lower, 0.0
     if not isinstance(robot, Robot):
         return
     # a soft stop is overrun a little: what it holds is told as a stop reached; lower = upper = 0: none is stated
     free = robot.lower >= robot.upper
-    yield Kind.BEYOND, 0, 1, np.where(free | (upper <= robot.upper + _ROUNDING), np.inf, robot.upper), _ROUNDING
-    yield Kind.BEYOND, 0, -1, np.where(free | (lower >= robot.lower - _ROUNDING), -np.inf, robot.lower), _ROUNDING
+    yield RemarkKind.BEYOND, 0, 1, np.where(free | (upper <= robot.upper + _ROUNDING), np.inf, robot.upper), _ROUNDING
+    yield RemarkKind.BEYOND, 0, -1, np.where(free | (lower >= robot.lower - _ROUNDING), -np.inf, robot.lower), _ROUNDING
     for row, stated in ((1, robot.velocity_limit), (2, robot.effort_limit)):
         stated = np.where(stated > 0, stated, np.inf)  # 0: none is stated
-        yield from ((Kind.BEYOND, row, side, side * stated, _ROUNDING) for side in (1, -1))
+        yield from ((RemarkKind.BEYOND, row, side, side * stated, _ROUNDING) for side in (1, -1))

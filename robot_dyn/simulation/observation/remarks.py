@@ -16,7 +16,7 @@ from typing import final
 _NAMED = 3  # joints in a line
 
 
-class Kind(StrEnum):
+class RemarkKind(StrEnum):
     """What a remark is about."""
 
     CHATTER = "chatter"
@@ -35,19 +35,19 @@ class Kind(StrEnum):
 
 
 _HEADINGS = {
-    Kind.CHATTER: "actuation reverses at every tick",
-    Kind.EFFORT_REACHED: "effort limit reached",
-    Kind.STOP_REACHED: "joint stop reached",
-    Kind.BEYOND: "beyond the file's limits",
-    Kind.COARSE: "record too coarse",
-    Kind.GAINS: "a dissipative effect does positive work",
-    Kind.CREEPS: "regularised friction creeps",
-    Kind.ACCUMULATE: "events accumulate",
-    Kind.STIFF: "steps bounded by stability",
-    Kind.UNSTABLE: "sampled loop unstable, deviations grow",
-    Kind.DAMPED: "task damped near a singularity",
-    Kind.JUMPS: "reference does not begin as the joint does",
-    Kind.HELD: "held by friction at every step",
+    RemarkKind.CHATTER: "actuation reverses at every tick",
+    RemarkKind.EFFORT_REACHED: "effort limit reached",
+    RemarkKind.STOP_REACHED: "joint stop reached",
+    RemarkKind.BEYOND: "beyond the file's limits",
+    RemarkKind.COARSE: "record too coarse",
+    RemarkKind.GAINS: "a dissipative effect does positive work",
+    RemarkKind.CREEPS: "regularised friction creeps",
+    RemarkKind.ACCUMULATE: "events accumulate",
+    RemarkKind.STIFF: "steps bounded by stability",
+    RemarkKind.UNSTABLE: "sampled loop unstable, deviations grow",
+    RemarkKind.DAMPED: "task damped near a singularity",
+    RemarkKind.JUMPS: "reference does not begin as the joint does",
+    RemarkKind.HELD: "held by friction at every step",
 }
 
 
@@ -72,7 +72,7 @@ class Remark:
         looked: Of a batch, how many runs were looked at.
     """
 
-    kind: Kind
+    kind: RemarkKind
     joint: str
     quantity: str
     start: float
@@ -86,15 +86,15 @@ class Remark:
     looked: int = 0
 
 
-def lines(remarks: Iterable[Remark]) -> list[str]:
+def remark_lines(remarks: Iterable[Remark]) -> list[str]:
     """A line for each kind: its joints, and what to do."""
-    said: dict[Kind, list[Remark]] = {}
+    said: dict[RemarkKind, list[Remark]] = {}
     for remark in remarks:
         said.setdefault(remark.kind, []).append(remark)
     return [_line(kind, each) for kind, each in said.items()]
 
 
-def _line(kind: Kind, remarks: list[Remark]) -> str:
+def _line(kind: RemarkKind, remarks: list[Remark]) -> str:
     texts = [remark.text + _of_runs(remark) for remark in remarks[:_NAMED]]
     more = f", and {len(remarks) - _NAMED} more" if len(remarks) > _NAMED else ""
     remedy = f"; {remarks[0].remedy}" if remarks[0].remedy else ""

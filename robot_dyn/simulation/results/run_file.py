@@ -15,7 +15,7 @@ from typing import Any, Generic, TypeVar, final
 import numpy as np
 
 from robot_dyn.foundations.errors import RobotDynError, shorten
-from robot_dyn.foundations.files import Kind, file_path, reading, save, target
+from robot_dyn.foundations.files import FileKind, file_path, reading, save, target
 from robot_dyn.foundations.validate import integer
 from robot_dyn.simulation.results.archive import DIGEST, Archive, ArchiveError, Header, write
 from robot_dyn.simulation.results.provenance import packed, unpacked
@@ -34,7 +34,7 @@ from robot_dyn.simulation.setup.setup import LONGEST_S
 
 FORMAT = 6
 ROLLOUTS_FORMAT = "rollouts 4"
-RUN = Kind("a run file", ".npz", b"PK\x03\x04")
+RUN = FileKind("a run file", ".npz", b"PK\x03\x04")
 MAX_BYTES = 4 * 2**30  # of the arrays of a run that is read, unless more is requested
 _MAX_TEXT = 2**28  # bytes of `about`, 4 a character; the largest URDF that loads has 2^24
 

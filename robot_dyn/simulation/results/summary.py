@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from robot_dyn.foundations.errors import escaped
-from robot_dyn.queries.units import units
+from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.events.occurrence import Occurrence
-from robot_dyn.simulation.observation.remarks import lines as lines_of
+from robot_dyn.simulation.observation.remarks import remark_lines as lines_of
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.provenance import about_the_robot, joint_types
 from robot_dyn.simulation.results.run_data import RunData, TrajectoryData
@@ -19,7 +19,7 @@ _NOTICED = 0.01  # [s]: shorter times are left out
 
 def summary(run: TrajectoryData) -> str:
     """A few lines: outcome, what acted, ledger, error, tracking, cost."""
-    s, ledger, unit = run.statistics, run.ledger, units("q", joint_types(run))
+    s, ledger, unit = run.statistics, run.ledger, joint_units("q", joint_types(run))
     opening = f"{run.outcome.ending} at t = {run.outcome.t:g} s, {len(run.t)} samples"
     part = f"{ledger.closure:.1e} of the energy exchanged" if ledger.exchanges else "no energy exchanged"
     residual = f"residual {largest(np.abs(ledger.residual)):.2e} J, {part}"
@@ -58,7 +58,7 @@ def summary(run: TrajectoryData) -> str:
 
 def of_tracking(run: RunData, of_frame: bool) -> str:
     """What a tracking error is of, with its unit."""
-    what = "the frame [m]" if of_frame else f"q [{units('q', joint_types(run))}]"
+    what = "the frame [m]" if of_frame else f"q [{joint_units('q', joint_types(run))}]"
     return f"tracking error of {what}"
 
 

@@ -15,13 +15,13 @@ from robot_dyn.simulation.diagnostics.step_remarks import KINDS, Units, against,
 from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.observation import Observed
-from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_square, tracking_of
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 from robot_dyn.simulation.setup.setup import Setup
 
-OF_REFERENCES = Kind.JUMPS, Kind.HELD
+OF_REFERENCES = RemarkKind.JUMPS, RemarkKind.HELD
 _JUDGED = 8  # runs that diverged: each loop is linearised about a start of its own
 
 
@@ -61,7 +61,7 @@ def of_some(runs: RolloutsData, numbers: range, whole: Overview) -> Overview:
     remedies = {each.kind: each.remedy for each in whole.remarks}
     remarks: list[Remark] = []
     if runs.observed is not None:
-        remarks += counted(runs, runs.observed, lambda _: lambda _: remedies[Kind.CHATTER])
+        remarks += counted(runs, runs.observed, lambda _: lambda _: remedies[RemarkKind.CHATTER])
     remarks += _of_whole(whole, numbers)
     alone = (each for each in whole.remarks if each.looked == 1 != len(numbers) and each.runs[0] in numbers)
     remarks += (replace(each, runs=(numbers.index(each.runs[0]),)) for each in alone)
@@ -122,7 +122,7 @@ def counted(runs: RolloutsData, of: Observed, remedy: Callable[[int], Callable[[
         some = ~np.isnan(duration).all(axis=1)
         if some.any():
             beyond = np.abs(value - of.limits[:, both])
-            size = np.nansum(duration, axis=1) if kind is Kind.EFFORT_REACHED else np.fmax.reduce(beyond, axis=1)
+            size = np.nansum(duration, axis=1) if kind is RemarkKind.EFFORT_REACHED else np.fmax.reduce(beyond, axis=1)
             worst = int(np.nanargmax(np.where(some, size, np.nan)))
             visits = {x: visit for x, visit in of.visits_of(worst).items() if (x.kind, x.row) == (kind, row)}
             (remark,) = of_steps(*named, visits, {}, remedy(worst), int(of.instants[worst]))
@@ -171,9 +171,9 @@ def worst_of(runs: RolloutsData, remarks: tuple[Remark, ...], errors: np.ndarray
     if runs.diverged.any():
         return int(np.where(runs.diverged, runs.ended, np.inf).argmin())
     for remark in remarks:
-        if remark.kind is Kind.CHATTER:
+        if remark.kind is RemarkKind.CHATTER:
             return remark.runs[0]
-    beyond = [each for each in remarks if each.kind is Kind.BEYOND and each.limit]
+    beyond = [each for each in remarks if each.kind is RemarkKind.BEYOND and each.limit]
     if beyond:
         return max(beyond, key=lambda each: abs(each.value / (each.limit or 1.0) - 1)).runs[0]
     return 0 if errors is None or np.isnan(errors).all() else int(np.nanargmax(errors))

@@ -13,7 +13,7 @@ import numpy as np
 from robot_dyn.foundations.errors import QueryError, escaped
 from robot_dyn.simulation.columns import Column, Variable
 from robot_dyn.simulation.observation.remarks import Remark
-from robot_dyn.simulation.observation.remarks import lines as lines_of
+from robot_dyn.simulation.observation.remarks import remark_lines as lines_of
 from robot_dyn.simulation.results.provenance import about_the_robot
 from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Trajectory

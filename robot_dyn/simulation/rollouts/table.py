@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from robot_dyn.codegen.parameters import parameters
-from robot_dyn.queries.units import of_joint, unit, units
+from robot_dyn.queries.units import joint_units, of_joint, unit
 from robot_dyn.simulation.columns import Column, Variable
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.provenance import joint_types
@@ -51,7 +51,7 @@ def samples(runs: RolloutsData) -> dict[str, Variable]:
         for name, x in values.items() if isinstance(values, dict) else (("", values),):
             if x is not None:
                 over = ("t",) if key == "t" else ("run", "t", "joint")[: x.ndim]
-                about = {"units": units(row.unit, kinds) if row.of_joints else row.unit, "long_name": row.title}
+                about = {"units": joint_units(row.unit, kinds) if row.of_joints else row.unit, "long_name": row.title}
                 about |= {"long_name": f"{row.title} of {name}"} if name else {}
                 found[f"{key}_{name}" if name else key] = over, x, about
     return found
@@ -63,7 +63,7 @@ def _of_joints(quantity: str, values: np.ndarray, like: str, types: Types) -> It
 
 
 def _tracking_unit(runs: RolloutsData, types: Types) -> str:
-    return "m" if "frame" in runs.about else units("q", types.values())
+    return "m" if "frame" in runs.about else joint_units("q", types.values())
 
 
 def _of_remarks(remarks: tuple[Remark, ...], count: int) -> Iterator[Column]:

@@ -12,7 +12,7 @@ from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.adaptive import EXPLICIT, STIFF
 from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.run.outcome import Stiff
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -51,4 +51,4 @@ def bounds(motion: Fastest, h: float) -> bool:
 def remark(motion: Fastest, start: float, end: float, at: float, remedy: str) -> Remark:
     """That stability bounds the steps from `start` to `end`, as seen at time `at`."""
     size = abs(motion.eigenvalue)
-    return Remark(Kind.STIFF, motion.joint, "v", start, end - start, at, size, None, str(motion), remedy)
+    return Remark(RemarkKind.STIFF, motion.joint, "v", start, end - start, at, size, None, str(motion), remedy)

@@ -22,7 +22,7 @@ from robot_dyn.simulation.events.modes import Modes
 from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.events.sides import Sides, keep_numbers, sides_of
 from robot_dyn.simulation.events.switching import Switching
-from robot_dyn.simulation.observation.remarks import Kind, Remark
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.run.driver import Driver
 from robot_dyn.simulation.run.outcome import Accumulation
 from robot_dyn.simulation.run.watch import DivergedError
@@ -178,7 +178,7 @@ class SwitchedRun(Driver):
         speed = float(np.abs(y[self.rules.n : 2 * self.rules.n]).max())
         text = f"{what}, at t = {t:.6g} s"
         remedy = f"made by time stepping with steps of {STEP_S} s, without an estimate of its error"
-        return Accumulation(Remark(Kind.ACCUMULATE, joint, "v", first, t - first, t, speed, None, text, remedy))
+        return Accumulation(Remark(RemarkKind.ACCUMULATE, joint, "v", first, t - first, t, speed, None, text, remedy))
 
     def _renew_switches(self, t: float) -> None:
         """The switching functions of the state reached."""

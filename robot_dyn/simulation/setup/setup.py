@@ -21,7 +21,7 @@ from robot_dyn.foundations.validate import LEAST_EXACT, choice, duration, instan
 from robot_dyn.foundations.values import Caching, Value
 from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
-from robot_dyn.queries.units import units
+from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.dynamics.declarations import is_value, undeclared
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.checks import check_method, check_model, check_start, least_accuracy
@@ -339,4 +339,4 @@ def _method(setup: Setup) -> Iterator[str]:
     types = getattr(setup.plant.dynamics, "joint_types", (None,) * len(setup.q0))
     for key, values in (("q", setup.q0), ("v", setup.v0)):
         numbers = ", ".join(f"{x:.6g}" for x in values) if values.any() else "0"
-        yield f"  {key} = {numbers} {units(key, types)}"
+        yield f"  {key} = {numbers} {joint_units(key, types)}"

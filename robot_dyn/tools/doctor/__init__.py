@@ -11,6 +11,6 @@ shapes, estimate                  the same against the shapes of links
 command                           the command `check`
 """
 
-from robot_dyn.foundations.public import public_names
+from robot_dyn.foundations import public_names
 
 __getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -3,3 +3,7 @@ from robot_dyn.tools.doctor.checkup import Checkup as Checkup
 from robot_dyn.tools.doctor.checkup import check as check
 
 __all__: list[str]
+
+# Names that only tools and tests import.
+from robot_dyn.tools.doctor.checkup import checked as checked
+from robot_dyn.tools.doctor.finding import Severity as Severity

@@ -10,14 +10,10 @@ from typing import Any, NamedTuple, final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.description import catalog, description
-from robot_dyn.description.packages import searched
-from robot_dyn.foundations.answer import Answer, Block
-from robot_dyn.foundations.errors import DescriptionError, QueryError
-from robot_dyn.foundations.result import UNREPORTED, reported
-from robot_dyn.foundations.validate import truth
-from robot_dyn.model.robot import Robot
-from robot_dyn.shapes.masses import Masses
+from robot_dyn import Robot
+from robot_dyn.description import catalog, description, searched
+from robot_dyn.foundations import UNREPORTED, Answer, Block, DescriptionError, QueryError, reported, truth
+from robot_dyn.shapes import Masses
 from robot_dyn.tools.doctor import (
     axes,
     gravity_load,
@@ -84,7 +80,7 @@ class Checkup(Answer):
         yield from (f"  {report.sentence(each)}" for each in report.grouped(self.findings))
 
     def _repr_html_(self) -> str:
-        from robot_dyn.foundations.display import page, table
+        from robot_dyn.foundations import page, table
 
         rows = ((x.severity.value, x.where, x.line, x.what, x.remedy) for x in self.findings)
         return page(self.sentence, table(("", "where", "line", "what", "remedy"), rows) if self.findings else "")
@@ -121,7 +117,7 @@ def check(
         raise QueryError("allow_overlap is for estimates; give mass, total_mass or density, or leave it out")
     known = None if nothing else Masses({} if mass is None else mass, total_mass, density, allow_overlap)
     if xacro is not None:
-        from robot_dyn.description.sources.xacro import expand
+        from robot_dyn.description import expand
 
         text, warned = expand(path, xacro, package_dirs)
         return _without_lines(checked(text, str(path), package_dirs, known, units), map(_assumed, warned))

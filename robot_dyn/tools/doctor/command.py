@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Force, Json, PackageDir, Xacro, app, progress
-from robot_dyn.cli.terminal import say, say_json, to_stderr
-from robot_dyn.description.packages import package_folders
-from robot_dyn.foundations.errors import QueryError, RobotDynError
-from robot_dyn.foundations.files import Kind, save
+from robot_dyn import RobotDynError
+from robot_dyn.cli import Force, Json, PackageDir, Xacro, app, arguments, completion, progress, say, say_json, to_stderr
+from robot_dyn.description import package_folders
+from robot_dyn.foundations import FileKind, QueryError, save
 
 if TYPE_CHECKING:
     from robot_dyn.tools.doctor.checkup import Checkup
     from robot_dyn.tools.doctor.finding import Finding
 
-_URDF = Kind("a URDF", ".urdf", b"<?xml")
+_URDF = FileKind("a URDF", ".urdf", b"<?xml")
 
 
 class RepairError(RobotDynError):
@@ -65,7 +63,7 @@ def check(
     as_json: Json = False,
 ) -> None:
     """Check URDF files: inertias, units, limits, names, shapes; exit code 1 if errors are left."""
-    from robot_dyn.foundations.result import plain
+    from robot_dyn.foundations import plain
     from robot_dyn.tools.doctor.finding import Severity
 
     estimated = {"--mass": mass or None, "--total-mass": total_mass, "--density": density}

@@ -9,9 +9,8 @@ from typing import Any, final
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.description.markup import parse
-from robot_dyn.description.urdf import other_format
-from robot_dyn.foundations.errors import DescriptionError
+from robot_dyn.description import other_format, parse
+from robot_dyn.foundations import DescriptionError
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 
 _NOT_IN_M = ("limit", "dynamics", "calibration", "safety_controller")

@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robot_dyn.description.description import Description
-from robot_dyn.shapes.estimate import Estimate, estimates, shapes_of_lacking
-from robot_dyn.shapes.masses import Masses
+from robot_dyn.description import Description
+from robot_dyn.shapes import Estimate, Masses, estimates, shapes_of_lacking
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, final
 
-from robot_dyn.foundations.errors import shorten
-from robot_dyn.foundations.result import UNREPORTED
+from robot_dyn.foundations import UNREPORTED, shorten
 
 
 class Severity(Enum):

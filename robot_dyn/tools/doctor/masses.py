@@ -11,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from robot_dyn.description.inertia import implausibility
-from robot_dyn.description.structure import Structure, structure
+from robot_dyn import Robot
+from robot_dyn.description import Structure, implausibility, structure_of
 from robot_dyn.model import findings as doctor
-from robot_dyn.model.robot import Robot
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Finding, Severity
 
@@ -36,7 +35,7 @@ _KINDS = (
 
 def masses(document: Document, robot: Robot) -> Iterator[Finding]:
     """What is wrong with the masses and inertias of a robot that loads."""
-    stated = structure(robot.description, robot.edits)
+    stated = structure_of(robot.description, robot.edits)
     for found in (*_in_words(robot, stated), *_massless(document, robot, stated)):
         yield replace(found, line=document.line(found.where, ""))
     yield from _rods_and_points(document, stated)
@@ -47,7 +46,7 @@ def masses(document: Document, robot: Robot) -> Iterator[Finding]:
 def beyond_reach(document: Document, robot: Robot, found: Iterable[Finding]) -> Iterator[Finding]:
     """Inertias out of proportion to the robot, unless the shape of the link has shown them already."""
     shown = {each.where for each in found if each.kind == "inertia_shape"}
-    for text in doctor.inertias_beyond_reach(structure(robot.description, robot.edits)):
+    for text in doctor.inertias_beyond_reach(structure_of(robot.description, robot.edits)):
         each = _of_words(Severity.ERROR, "inertia_far", text)
         if each.where not in shown:
             yield replace(each, line=document.line(each.where, ""))

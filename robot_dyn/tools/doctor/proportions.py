@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.description.structure import BEYOND, GIMBAL, SEVERAL, TOOL
+from robot_dyn.description import BEYOND, GIMBAL, SEVERAL, TOOL
 from robot_dyn.tools.doctor.document import Document, parsed
 from robot_dyn.tools.doctor.finding import Finding, Severity
 

@@ -15,15 +15,13 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.description.inertia import MassProperties, combined
-from robot_dyn.description.structure import StatedLink, structure
-from robot_dyn.model.robot import Robot
-from robot_dyn.shapes import surface
-from robot_dyn.shapes.mesh_files import MeshError
+from robot_dyn import Robot
+from robot_dyn.description import MassProperties, StatedLink, combined, structure_of
+from robot_dyn.shapes import MeshError, surface
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 from robot_dyn.tools.doctor.literals import NUMBERS
-from robot_dyn.view.geometry.visuals import Piece, solids
+from robot_dyn.view import Piece, solids
 
 _SLACK = 1.1  # of a shape's extent: collision shapes leave out screws
 _LIGHT, _HEAVY = 2.0, 1.2e4  # [kg/m³] of a link and its convex hull: below foam, above lead
@@ -105,7 +103,7 @@ def _of_piece(piece: Piece) -> MassProperties | None:
 
 def misfits(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
     """Masses and inertias that their shapes have at no density."""
-    stated, reach = structure(robot.description, robot.edits), _reach(robot)
+    stated, reach = structure_of(robot.description, robot.edits), _reach(robot)
     links = stated.links
     for name, shape in of.items():
         link, size = links[name], float(np.ptp(shape.points, axis=0).max())
@@ -124,7 +122,7 @@ def misfits(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[
 
 def of_one_density(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
     """A note if the masses of nearly all links are their volumes times one density, as programs of CAD write them."""
-    links = structure(robot.description, robot.edits).links
+    links = structure_of(robot.description, robot.edits).links
     known = {name: links[name].mass for name in of if links[name].mass > 0 and name not in robot.description.estimated}
     density = {name: mass / unit.mass for name, mass in known.items() if (unit := of[name].unit) is not None}
     if len(density) < _FEWEST:
@@ -150,7 +148,7 @@ def _farthest(points: np.ndarray) -> float:
 
 def _reach(robot: Robot) -> float:
     """The sum of the distances between joints, in [m]; 1 m if they coincide."""
-    total = sum(hypot(*map(float, joint.xyz)) for joint in structure(robot.description, robot.edits).joints.values())
+    total = sum(hypot(*map(float, joint.xyz)) for joint in structure_of(robot.description, robot.edits).joints.values())
     return total or 1.0
 
 
@@ -228,7 +226,7 @@ def _scaled(text: str, power: int) -> str:
 
 def outside(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
     """Centres of mass beyond the box around the shapes of their link."""
-    stated = structure(robot.description, robot.edits)
+    stated = structure_of(robot.description, robot.edits)
     for name, shape in of.items():
         link, (low, high) = stated.links[name], (shape.points.min(axis=0), shape.points.max(axis=0))
         room = 0.1 * float(np.max(high - low)) + 0.01  # [m]: of a thin flange, the rest is hidden in its neighbour

@@ -9,6 +9,6 @@ Each motion is a `rd.control.Plan`, whose reference controllers follow.
 robot_dyn/tools/motors/README.md lists the files.
 """
 
-from robot_dyn.foundations.public import public_names
+from robot_dyn.foundations import public_names
 
 __getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -7,14 +7,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.app import Csv, Dark, Force, Json, Plot, app, bar
-from robot_dyn.cli.outcome import give, outputs
-from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.cli import (
+    AS_STATED,
+    Csv,
+    Dark,
+    Force,
+    Json,
+    Plot,
+    RobotOptions,
+    app,
+    arguments,
+    bar,
+    completion,
+    give,
+    outputs,
+    takes_robot,
+)
+from robot_dyn.foundations import QueryError
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.results.trajectory import Trajectory
+    from robot_dyn import Trajectory
     from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 
 _RUNS = ".toml", ".npz"

@@ -8,11 +8,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.effects.actuator import EffortLimit
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.coefficients import check_coefficients, coefficient, declared
-from robot_dyn.foundations.errors import EffectError, PlanError
-from robot_dyn.foundations.validate import instance
+from robot_dyn import Plant
+from robot_dyn.effects import EffortLimit
+from robot_dyn.foundations import EffectError, PlanError, check_coefficients, coefficient, declared, instance
 from robot_dyn.tools.motors.motors_file import Motors
 
 _SAME_ROTOR = 0.01  # difference of inertias, in their size

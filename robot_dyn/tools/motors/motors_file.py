@@ -18,8 +18,7 @@ from math import inf, pi
 from pathlib import Path
 from typing import Any, final
 
-from robot_dyn.foundations.errors import PlanError, nearest, shorten
-from robot_dyn.foundations.files import read
+from robot_dyn.foundations import PlanError, nearest, read, shorten
 
 _MOST_BYTES = 2**20
 _HEAD = re.compile(r"\s*([a-z_ ]+?)\s*(?:\[(.*?)\])?\s*")

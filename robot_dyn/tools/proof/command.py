@@ -7,8 +7,7 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli.app import Json, Scene, app, bar
-from robot_dyn.cli.terminal import say, say_json
+from robot_dyn.cli import Json, Scene, app, bar, say, say_json
 
 
 @app.command(rich_help_panel="Trust it", short_help="Prove where the arm of a scene will be.")

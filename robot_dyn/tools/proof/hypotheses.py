@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from robot_dyn.foundations.arithmetic import Ball
-from robot_dyn.foundations.errors import QueryError, shown
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn import Setup
+from robot_dyn.foundations import Ball, QueryError, shown
 from robot_dyn.tools.proof.enclosure.balls import upper
 from robot_dyn.tools.proof.enclosure.lohner import box
 from robot_dyn.tools.proof.enclosure.step import State

@@ -12,24 +12,13 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn import Robot, Setup
 from robot_dyn.codegen.trace.base_parameters import regrouped
 from robot_dyn.codegen.trace.origins import slid
-from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
-from robot_dyn.control.controller import Controller
-from robot_dyn.control.independent_joint import PD
-from robot_dyn.control.reference import PiecewisePolynomial, polynomial
-from robot_dyn.effects.carried_payload import CarriedPayload
-from robot_dyn.effects.effect import Effect
-from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
-from robot_dyn.effects.spring import Spring
-from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.coefficients import with_values
-from robot_dyn.foundations.errors import ProofError
-from robot_dyn.lagrange.linkage import Linkage, linkage
-from robot_dyn.lagrange.recursions.newton_euler import newton_euler
-from robot_dyn.lagrange.tree import tree
-from robot_dyn.model.robot import Robot
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.control import PD, ComputedTorque, Controller, FeedForward, PDGravity, PiecewisePolynomial, polynomial
+from robot_dyn.effects import CarriedPayload, Effect, RegularisedCoulombFriction, Spring, ViscousFriction
+from robot_dyn.foundations import Array, ProofError, with_values
+from robot_dyn.lagrange import Linkage, linkage_of, newton_euler, tree_of
 from robot_dyn.tools.proof.term import Literals
 
 _EFFECTS = (ViscousFriction, RegularisedCoulombFriction, Spring)
@@ -95,8 +84,8 @@ class Bodies:
     @cached_property
     def linkage(self) -> Linkage:
         """An equivalent linkage with other frames and fewer parameters, but the same M, C and N."""
-        known = tree(self.robot.description, self.robot.edits)
-        return regrouped(slid(linkage(known, self.robot.joint_names, self.arithmetic)))
+        known = tree_of(self.robot.description, self.robot.edits)
+        return regrouped(slid(linkage_of(known, self.robot.joint_names, self.arithmetic)))
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
         """M a + C v + N, (n,)."""

@@ -10,10 +10,8 @@ from typing import Any
 
 from flint import ctx
 
-from robot_dyn.foundations.arithmetic import Ball
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.validate import duration, function, instance, integer, number
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn import Setup
+from robot_dyn.foundations import Ball, QueryError, duration, function, instance, integer, number
 from robot_dyn.tools.proof.enclosure.balls import NotProvenError
 from robot_dyn.tools.proof.enclosure.step import State, effort, proven_step
 from robot_dyn.tools.proof.hypotheses import assumed, start

@@ -14,10 +14,10 @@ from typing import Any, final
 import casadi as ca
 from flint import arb, ctx
 
+from robot_dyn.codegen import program_of
 from robot_dyn.codegen.program import Kind, Program
-from robot_dyn.codegen.trace.from_casadi import program_of
-from robot_dyn.foundations.errors import ProofError
-from robot_dyn.lagrange.recursions.composite_body import composite_body
+from robot_dyn.foundations import ProofError
+from robot_dyn.lagrange import composite_body
 from robot_dyn.tools.proof.motion import Bodies, Motion
 from robot_dyn.tools.proof.term import Literals, expressions
 

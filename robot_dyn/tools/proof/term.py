@@ -17,7 +17,7 @@ import numpy as np
 from flint import arb
 
 from robot_dyn.codegen.trace.condition import Node
-from robot_dyn.foundations.arithmetic import Arithmetic, Array, Ball
+from robot_dyn.foundations import Arithmetic, Array, Ball
 
 BITS = 400  # of the constants: what they are rounded to, far below all else
 BALLS = Ball(BITS)

@@ -10,13 +10,20 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.answer import Answer, Block, Table
-from robot_dyn.foundations.arithmetic import Array, Ball
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.result import UNREPORTED, reported
-from robot_dyn.foundations.validate import number, numbers
-from robot_dyn.foundations.values import Value
-from robot_dyn.queries.units import units
+from robot_dyn.foundations import (
+    UNREPORTED,
+    Answer,
+    Array,
+    Ball,
+    Block,
+    QueryError,
+    Table,
+    Value,
+    number,
+    numbers,
+    reported,
+)
+from robot_dyn.queries import joint_units
 from robot_dyn.tools.proof.hypotheses import numbers_of
 from robot_dyn.tools.proof.node import Node, Packed, on_the_way, unpacked
 
@@ -171,7 +178,7 @@ class Proof(Answer, Value):
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.robot}: " + self._claim
-        heading = ("joint", *(f"{name} [{units(name, self.joint_types)}]" for name in "qv"))
+        heading = ("joint", *(f"{name} [{joint_units(name, self.joint_types)}]" for name in "qv"))
         yield Table(heading, tuple(zip(self.joint_names, self.q, self.v, strict=True)), right=heading[1:])
         if self.why_not:
             yield f"Not proven beyond t = {self.until_s!r} s, because {self.why_not}."
@@ -182,7 +189,7 @@ class Proof(Answer, Value):
 
     @property
     def drawing(self) -> str:
-        from robot_dyn.foundations.display import plot
+        from robot_dyn.foundations import plot
 
         t, radius = self.radii
         if self.steps < 2:

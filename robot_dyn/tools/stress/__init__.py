@@ -12,6 +12,6 @@ text                     its text
 command                  the command `stress`
 """
 
-from robot_dyn.foundations.public import public_names
+from robot_dyn.foundations import public_names
 
 __getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -8,10 +8,7 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli import arguments
-from robot_dyn.cli.app import Force, Json, Name, app, bar
-from robot_dyn.cli.outcome import give
-from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
+from robot_dyn.cli import AS_STATED, Force, Json, Name, RobotOptions, app, arguments, bar, give, takes_robot
 
 
 @app.command(rich_help_panel="Trust it", short_help="Look for what breaks first on an arm.")
@@ -36,8 +33,7 @@ def stress(
 
     Ctrl-C ends it and keeps what was found.
     """
-    from robot_dyn.report.figure import ResultError
-    from robot_dyn.report.save import JSON
+    from robot_dyn.report import JSON, ResultError
 
     inputs = [robot] if os.path.isfile(robot) else []
     paths = [arguments.output(output, JSON, ResultError, inputs, force)] if output else []

@@ -10,11 +10,9 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.report.time_budget import Budget
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.simulate import simulate
+from robot_dyn import Setup, Trajectory, simulate
+from robot_dyn.report import Budget
+from robot_dyn.simulation import Ending
 
 WITHIN, BEYOND = 0.98, 1.02  # of a limit
 MOST = 1e3  # by which a push may grow within a limit, as the advisor counts it

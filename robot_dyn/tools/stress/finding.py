@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import final
 
-from robot_dyn.foundations.result import UNREPORTED, reported
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn import Setup
+from robot_dyn.foundations import UNREPORTED, reported
 
 
 @final

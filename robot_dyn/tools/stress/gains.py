@@ -11,13 +11,11 @@ from math import inf, sqrt
 
 import numpy as np
 
-from robot_dyn.accuracy.advice import advice_about, at_rest
-from robot_dyn.control.computed_torque import PDGravity
-from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.report.time_budget import Budget
-from robot_dyn.simulation.dynamics.sampled_loop import linearised
-from robot_dyn.simulation.dynamics.stability import Stability
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn import RobotDynError, Setup
+from robot_dyn.accuracy import advice_about, at_rest
+from robot_dyn.control import PDGravity
+from robot_dyn.report import Budget
+from robot_dyn.simulation import Stability, linearised
 from robot_dyn.tools.stress.confirm import BEYOND, WITHIN, pushed, run_from_near
 from robot_dyn.tools.stress.finding import Limit
 from robot_dyn.tools.stress.work import Work

@@ -11,21 +11,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.accuracy.certificate.implementation import evaluate
-from robot_dyn.accuracy.certificate.worst_case_search import Batch
-from robot_dyn.control.computed_torque import PDGravity
-from robot_dyn.control.reference import hold
-from robot_dyn.description.edits import Payload
-from robot_dyn.effects.actuator import EffortLimit
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.lagrange.lagrangian import Lagrangian
-from robot_dyn.model.robot import Robot
+from robot_dyn import Lagrangian, Payload, Plant, Robot, RobotDynError, Setup, simulate
+from robot_dyn.accuracy import Batch, evaluate
+from robot_dyn.control import PDGravity, hold
+from robot_dyn.effects import EffortLimit
 from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, N
-from robot_dyn.report.time_budget import Budget
-from robot_dyn.simulation.observation.remarks import Kind
-from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.simulate import simulate
+from robot_dyn.report import Budget
+from robot_dyn.simulation import RemarkKind
 from robot_dyn.tools.stress.confirm import BEYOND, WITHIN
 from robot_dyn.tools.stress.finding import Limit
 from robot_dyn.tools.stress.work import Work
@@ -166,7 +158,7 @@ def _holds(loaded: Robot, q: np.ndarray, setup: Setup | None, budget: Budget) ->
         run = simulate(setup, on_progress=budget.check)
     except RobotDynError as error:
         return part < 1, f"{said}; not run: {error}"
-    reached = any(each.kind is Kind.EFFORT_REACHED for each in run.remarks)
+    reached = any(each.kind is RemarkKind.EFFORT_REACHED for each in run.remarks)
     off = float(np.abs(run.q[-1] - q).max())
     holds = part < 1 and not reached
     sags = part > 1 and reached

@@ -10,15 +10,12 @@ from math import log10
 
 import numpy as np
 
-from robot_dyn.accuracy.certificate.certificate import Held
-from robot_dyn.accuracy.certificate.digit_count import DigitCount
-from robot_dyn.accuracy.certificate.implementation import Implementation, implementations
-from robot_dyn.accuracy.certificate.worst_case_search import Batch
-from robot_dyn.lagrange.digits import digits_of
-from robot_dyn.model.robot import Robot
+from robot_dyn import Robot
+from robot_dyn.accuracy import Batch, DigitCount, Held, Implementation, implementations
+from robot_dyn.lagrange import digits_of
+from robot_dyn.queries import Quantity
 from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, INVERSE_DYNAMICS
-from robot_dyn.queries.quantity import Quantity
-from robot_dyn.report.time_budget import Budget
+from robot_dyn.report import Budget
 from robot_dyn.tools.stress.finding import WorstCase
 from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import KEPT, listed, shrunk_state

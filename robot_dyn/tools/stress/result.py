@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import final
 
-from robot_dyn.foundations.answer import Block
-from robot_dyn.foundations.result import reported
-from robot_dyn.report.result import Result
+from robot_dyn.foundations import Block, reported
+from robot_dyn.report import Result
 from robot_dyn.tools.stress.finding import JudgedRun, Limit, WorstCase
 from robot_dyn.tools.stress.text import stress_tables
 
@@ -48,7 +47,7 @@ class Stress(Result):
 
     @property
     def drawing(self) -> str:
-        from robot_dyn.foundations.display import levels
+        from robot_dyn.foundations import levels
 
         steps = {f"{each.what} {each.joint}": each.value for each in self.limits if each.of == "step"}
         return levels("largest step that is stable [s]", steps, inf)

@@ -11,15 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from robot_dyn.accuracy.certificate.worst_case_search import Batch
-from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.integrate.adaptive import Adaptive
-from robot_dyn.model.robot import Robot
-from robot_dyn.report.time_budget import Budget
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.simulate import simulate
+from robot_dyn import Robot, RobotDynError, Setup, Trajectory, simulate
+from robot_dyn.accuracy import Batch
+from robot_dyn.integrate import Adaptive
+from robot_dyn.report import Budget
+from robot_dyn.simulation import Ending
 from robot_dyn.tools.stress.confirm import LEAST, says
 from robot_dyn.tools.stress.finding import JudgedRun
 from robot_dyn.tools.stress.scenes import scenes

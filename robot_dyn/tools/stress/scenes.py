@@ -9,22 +9,12 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.accuracy.certificate.implementation import evaluate
-from robot_dyn.accuracy.certificate.worst_case_search import Batch
-from robot_dyn.control.independent_joint import PD, gains_from
-from robot_dyn.control.reference import quintic
-from robot_dyn.effects.dry_friction import DryFriction
-from robot_dyn.effects.effect import Effect
-from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
-from robot_dyn.effects.joint_limit import joint_stops
-from robot_dyn.effects.plant import Plant
-from robot_dyn.effects.rigid_stops import RigidStops
-from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.integrate.adaptive import Adaptive
-from robot_dyn.integrate.methods import method
-from robot_dyn.model.robot import Robot
+from robot_dyn import Plant, Robot, RobotDynError, Setup
+from robot_dyn.accuracy import Batch, evaluate
+from robot_dyn.control import PD, gains_from, quintic
+from robot_dyn.effects import DryFriction, Effect, RegularisedCoulombFriction, RigidStops, ViscousFriction, joint_stops
+from robot_dyn.integrate import Adaptive, method
 from robot_dyn.queries.dynamics import M
-from robot_dyn.simulation.setup.setup import Setup
 
 FAMILIES = ("swing", "friction", "dry friction", "stops", "rigid stops", "PD", "sampled PD")
 _METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8", "gauss_4", "rosenbrock_5")

@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.accuracy.certificate.worst_case_search import random_states
-from robot_dyn.foundations.validate import function, instance, integer, number
-from robot_dyn.model.robot import Robot
-from robot_dyn.report.environment import environment
-from robot_dyn.report.time_budget import Budget
+from robot_dyn import Robot
+from robot_dyn.accuracy import random_states
+from robot_dyn.foundations import function, instance, integer, number
+from robot_dyn.report import Budget, processor_and_versions
 from robot_dyn.tools.stress.finding import JudgedRun, Limit, WorstCase
 from robot_dyn.tools.stress.gains import gain_limit
 from robot_dyn.tools.stress.loads import payload_limit, speed_limit
@@ -84,7 +83,7 @@ def stressed(
 
     return Stress(
         robot.name, robot.joint_names, of(WorstCase), of(Limit), of(JudgedRun), (*_unlimited(robot), *work.left_out),
-        tuple(work.out_of_time), environment(), samples, seed, budget.spent, interrupted,
+        tuple(work.out_of_time), processor_and_versions(), samples, seed, budget.spent, interrupted,
     )  # fmt: skip
 
 

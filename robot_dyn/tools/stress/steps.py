@@ -12,20 +12,13 @@ from math import isfinite
 
 import numpy as np
 
-from robot_dyn.accuracy.advice import Advice, advice_about, at_rest
-from robot_dyn.control.computed_torque import PDGravity
-from robot_dyn.control.reference import hold
-from robot_dyn.effects.friction import ViscousFriction
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.integrate.gauss import Gauss
-from robot_dyn.integrate.methods import FIXED_STEP, method
-from robot_dyn.model.robot import Robot
-from robot_dyn.report.time_budget import Budget
-from robot_dyn.simulation.dynamics.fastest_motion import jacobian
-from robot_dyn.simulation.dynamics.stability import step_map
-from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn import Plant, Robot, RobotDynError, Setup
+from robot_dyn.accuracy import Advice, advice_about, at_rest
+from robot_dyn.control import PDGravity, hold
+from robot_dyn.effects import ViscousFriction
+from robot_dyn.integrate import FIXED_STEP, Gauss, method
+from robot_dyn.report import Budget
+from robot_dyn.simulation import StateEquation, jacobian, step_map
 from robot_dyn.tools.stress.confirm import BEYOND, WITHIN, pushed, run_from_near
 from robot_dyn.tools.stress.finding import Limit
 from robot_dyn.tools.stress.work import Work

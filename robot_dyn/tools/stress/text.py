@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from robot_dyn.foundations.answer import Block, Table
+from robot_dyn.foundations import Block, Table
 from robot_dyn.tools.stress.finding import JudgedRun, Limit, WorstCase
 
 if TYPE_CHECKING:

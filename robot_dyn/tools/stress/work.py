@@ -7,8 +7,8 @@ from typing import TypeVar, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.report.time_budget import Budget, OvertimeError
+from robot_dyn import RobotDynError
+from robot_dyn.report import Budget, OvertimeError
 
 T = TypeVar("T")
 _REASONS = {

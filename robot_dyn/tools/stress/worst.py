@@ -9,15 +9,13 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from robot_dyn.accuracy.certificate.implementation import evaluate
-from robot_dyn.accuracy.certificate.worst_case_search import Batch, Search
-from robot_dyn.control.independent_joint import gains_from
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.errors import OverflowedError
-from robot_dyn.lagrange.scale import unit_diagonal_conditions
-from robot_dyn.model.robot import Robot
+from robot_dyn import Plant, Robot
+from robot_dyn.accuracy import Batch, Search, evaluate
+from robot_dyn.control import gains_from
+from robot_dyn.foundations import OverflowedError
+from robot_dyn.lagrange import unit_diagonal_conditions
 from robot_dyn.queries.dynamics import M, N
-from robot_dyn.report.time_budget import Budget
+from robot_dyn.report import Budget
 from robot_dyn.tools.stress.finding import WorstCase
 from robot_dyn.tools.stress.shrink import shrunk
 from robot_dyn.tools.stress.work import Work

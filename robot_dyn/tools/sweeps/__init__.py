@@ -12,6 +12,6 @@ A sweep is a folder: what is done has a file, what has none is left to do, and a
 docs/how_to/sweep.md is a first sweep; robot_dyn/tools/sweeps/README.md lists the files of this room.
 """
 
-from robot_dyn.foundations.public import public_names
+from robot_dyn.foundations import public_names
 
 __getattr__, __dir__, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from robot_dyn.cli.app import Force, Json, app, bar
-from robot_dyn.cli.terminal import say, say_json, to_stderr
-from robot_dyn.foundations.errors import SweepError, nearest
+from robot_dyn.cli import Force, Json, app, bar, say, say_json, to_stderr
+from robot_dyn.foundations import SweepError, nearest
 
 if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.plan.sweep import Sweep

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import isinf, isnan
 from typing import final
 
-from robot_dyn.foundations.answer import Answer, Block
+from robot_dyn.foundations import Answer, Block
 
 
 @final

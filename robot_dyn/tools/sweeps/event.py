@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robot_dyn.foundations.errors import SweepError, nearest
+from robot_dyn.foundations import SweepError, nearest
 from robot_dyn.tools.sweeps.expression import Expression, Truth
 from robot_dyn.tools.sweeps.folder.folder import Folder
 from robot_dyn.tools.sweeps.folder.rows import FINISHED

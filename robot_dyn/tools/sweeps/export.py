@@ -10,15 +10,13 @@ from typing import BinaryIO
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.extras import needs
-from robot_dyn.foundations.files import Kind, file_path, save, table_cell, target
+from robot_dyn.foundations import FileKind, SweepError, file_path, needs, save, table_cell, target
 from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
 from robot_dyn.tools.sweeps.folder.rows import TEXTS
 from robot_dyn.tools.sweeps.plan.specification import specification
 from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, Sweep, heading
 
-_CSV, _PARQUET = Kind("a table of runs", ".csv", b"run,"), Kind("a table", ".parquet", b"PAR1")
+_CSV, _PARQUET = FileKind("a table of runs", ".csv", b"run,"), FileKind("a table", ".parquet", b"PAR1")
 
 
 def export(sweep: Sweep, folder: Folder, path: str | Path, force: bool) -> Path:

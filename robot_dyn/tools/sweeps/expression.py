@@ -16,7 +16,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError, nearest, shorten, shown
+from robot_dyn.foundations import SweepError, nearest, shorten, shown
 
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?![\w.])|(?P<operator><=|>=|==|!=|[<>|&!()])"

@@ -17,7 +17,7 @@ from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import Any, final
 
-from robot_dyn.foundations.errors import SweepError, shown
+from robot_dyn.foundations import SweepError, shown
 
 _PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 

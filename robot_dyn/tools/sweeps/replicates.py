@@ -15,8 +15,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.validate import real
+from robot_dyn.foundations import SweepError, real
 
 _MOST = 2**20  # scramblings; more are a mistake, such as numbers of runs
 

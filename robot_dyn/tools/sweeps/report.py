@@ -9,18 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.foundations.answer import html_of
-from robot_dyn.foundations.display import page, side_by_side, table, text
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.files import Kind, save, target
-from robot_dyn.report.figure import PAGE, ink, inline, styled
+from robot_dyn.foundations import FileKind, SweepError, html_of, page, save, side_by_side, table, target, text
+from robot_dyn.report import PAGE, ink, inline, styled
 from robot_dyn.tools.sweeps.export import inputs_of
 from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading, is_scene
 
 if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.result import SweepResult
 
-_KIND = Kind("a page", ".html", b"<!doctype html>")
+_KIND = FileKind("a page", ".html", b"<!doctype html>")
 _BINS, _CELLS, _MOST_CROSSES = 60, 24, 500
 _WORST = 10
 _PROBABILITIES = (0.05, 0.5, 0.95, 0.99)
@@ -146,7 +143,7 @@ def _edges(x: np.ndarray) -> np.ndarray:
 
 
 def _figure(width: float, height: float) -> tuple[Any, Any]:
-    from robot_dyn.view.plots.shown import Figure
+    from robot_dyn.view import Figure
 
     figure = Figure(figsize=(width, height), facecolor=PAGE["paper"])
     return figure, figure.add_subplot()

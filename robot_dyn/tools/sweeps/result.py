@@ -9,12 +9,8 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.answer import Answer, Block
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.result import UNREPORTED, reported
-from robot_dyn.foundations.validate import choice, integer, truth
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn import Setup, Trajectory
+from robot_dyn.foundations import UNREPORTED, Answer, Block, SweepError, choice, integer, reported, truth
 from robot_dyn.tools.sweeps import counts
 from robot_dyn.tools.sweeps.event import happened
 from robot_dyn.tools.sweeps.folder.folder import Folder, read_all

@@ -12,10 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.codegen.threads import thread_count
-from robot_dyn.foundations.errors import SceneError, SweepError, shown
-from robot_dyn.foundations.files import check_folder, file_path
-from robot_dyn.foundations.validate import integer
+from robot_dyn.codegen import thread_count
+from robot_dyn.foundations import SceneError, SweepError, check_folder, file_path, integer, shown
 from robot_dyn.tools.sweeps.engines.share import share as share_of
 from robot_dyn.tools.sweeps.engines.threads import Threads
 from robot_dyn.tools.sweeps.folder.chunk_file import Columns

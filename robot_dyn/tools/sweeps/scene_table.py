@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from robot_dyn.scene.schema import Part
+from robot_dyn.scene import Part
 
 
 class SweepTable(Part):

@@ -16,9 +16,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.answer import Answer, Block, Table
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.validate import numbers
+from robot_dyn.foundations import Answer, Block, SweepError, Table, numbers
 from robot_dyn.tools.sweeps.estimate import Estimate, text
 from robot_dyn.tools.sweeps.replicates import Groups, groups_of, jackknife
 from robot_dyn.tools.sweeps.statistics import check_figure, check_finished, check_level

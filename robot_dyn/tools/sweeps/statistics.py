@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError, shown
-from robot_dyn.foundations.validate import float64, integer, number, numbers
+from robot_dyn.foundations import SweepError, float64, integer, number, numbers, shown
 from robot_dyn.tools.sweeps.estimate import Estimate
 from robot_dyn.tools.sweeps.replicates import (
     Groups,

@@ -14,7 +14,7 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
 from robot_dyn.description.inertia import implausibility
-from robot_dyn.description.structure import structure
+from robot_dyn.description.structure import structure_of
 from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.model.robot import Robot
 from robot_dyn.shapes.triangles import Mesh
@@ -32,7 +32,7 @@ def inertia_boxes(robot: Robot) -> Iterator[tuple[str, ndarray, Mesh, str | None
     would need an edge of negative square; that edge is drawn thin. A box far beyond the robot is drawn as long as the
     robot's longest link.
     """
-    stated = structure(robot.description, robot.edits)
+    stated = structure_of(robot.description, robot.edits)
     for frame in robot.model.frames:
         joint = frame.parentJoint
         if frame.type != pin.FrameType.BODY or not joint or not frame.placement.isIdentity(0):

@@ -15,7 +15,7 @@ from robot_dyn.foundations.errors import DescriptionError, QueryError, shorten
 from robot_dyn.foundations.errors import shown as text_of
 from robot_dyn.foundations.validate import choice, instance, number, shaped
 from robot_dyn.foundations.values import several
-from robot_dyn.simulation.observation.remarks import lines
+from robot_dyn.simulation.observation.remarks import remark_lines
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.run.outcome import Ending
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 MOST_JOINTS = 64  # that one figure shows
 PICTURES = (
-    files.Kind("a plot", ".png", b"\x89PNG"),
-    files.Kind("a plot", ".svg", b"<?xml"),
-    files.Kind("a plot", ".pdf", b"%PDF"),
+    files.FileKind("a plot", ".png", b"\x89PNG"),
+    files.FileKind("a plot", ".svg", b"<?xml"),
+    files.FileKind("a plot", ".pdf", b"%PDF"),
 )
 STYLES = ("screen", "paper")
 
@@ -174,7 +174,9 @@ def _opening(run: TrajectoryData, style: Style) -> list[tuple[str, str]]:
     end = run.outcome
     title = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
     ink, orange = style.colours["ink"], style.colours["lines"][1]
-    return [(text, ink) for text in (title, end.advice) if text] + [(text, orange) for text in lines(run.remarks)]
+    return [(text, ink) for text in (title, end.advice) if text] + [
+        (text, orange) for text in remark_lines(run.remarks)
+    ]
 
 
 def _columns(run: TrajectoryData | RolloutsData, shown: Collection[str]) -> tuple[int, ...]:

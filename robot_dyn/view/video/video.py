@@ -10,14 +10,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from robot_dyn.foundations.errors import VideoError
-from robot_dyn.foundations.files import Kind, save, target
+from robot_dyn.foundations.files import FileKind, save, target
 from robot_dyn.foundations.validate import function, integer, truth
 from robot_dyn.view.video import encoders
 from robot_dyn.view.video.browser import browser
 from robot_dyn.view.video.frames import frame_times, frames, load
 from robot_dyn.view.video.installed import installed
 
-KINDS = Kind("an MP4 video", ".mp4", b"\0\0\0"), Kind("a GIF", ".gif", b"GIF8")
+KINDS = FileKind("an MP4 video", ".mp4", b"\0\0\0"), FileKind("a GIF", ".gif", b"GIF8")
 _FPS, _MOST_FPS = {".mp4": 60, ".gif": 25}, {".mp4": 240, ".gif": 50}  # browsers slow down GIFs of more
 _MOST_FRAMES = 20_000
 _MOST_PIXELS = 5 * 10**8  # of a GIF, whose frames are held in memory

@@ -14,8 +14,8 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn.codegen.parameters import with_parameters
+from robot_dyn.simulation import Remark, RemarkKind
 from robot_dyn.simulation.diagnostics.step_remarks import KINDS
-from robot_dyn.simulation.observation.remarks import Kind, Remark
 from tests.campaigns.batches.scenes import Batch, batch
 
 UNITS = 8  # of rounding, by which a start is pushed
@@ -89,7 +89,7 @@ def counted(runs: rd.Rollouts, remark: Remark) -> bool:
     """Whether a remark is one that is made on each run of a batch as well; an actuation may be seen at instants."""
     observed = runs.observed
     at_instants = remark.quantity == "u" and observed is not None and observed.instants.any()
-    return remark.kind in (*KINDS, Kind.CHATTER, Kind.JUMPS, Kind.HELD) and not at_instants
+    return remark.kind in (*KINDS, RemarkKind.CHATTER, RemarkKind.JUMPS, RemarkKind.HELD) and not at_instants
 
 
 def pushed(setup: rd.Setup) -> list[rd.Trajectory]:

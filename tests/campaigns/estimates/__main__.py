@@ -16,7 +16,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from statistics import fmean
 
-from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError
+from robot_dyn.simulation import AccuracyError
 from tests.campaigns.estimates.asked import Answer, answer
 from tests.campaigns.estimates.held import FAMILIES, meet
 from tests.campaigns.estimates.judge import FAR, LEAST, MOST, judge

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations import with_values
 from tests.campaigns.estimates.scenes import arms
 
 METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError
+from robot_dyn.simulation import AccuracyError
 from tests.campaigns.estimates.scenes import Scene, arms, scene
 from tests.campaigns.estimates.truth import truth
 

@@ -12,7 +12,7 @@ from unittest import mock
 
 import numpy as np
 
-from robot_dyn.scene.starters import starter
+from robot_dyn.scene import starter
 from tests.campaigns.fuzz.bytes import WORDS
 
 CODES = (0, 1, 2)

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from robot_dyn.codegen.store.cache import Store
-from robot_dyn.codegen.store.keys import digest_of_texts
+from robot_dyn.codegen import Store, digest_of_texts
 from tests.campaigns.fuzz.bytes import damage
 
 PAYLOADS = {digest_of_texts(["kernel", str(i)]): bytes(range(200)) * (1 + 5 * i) for i in range(3)}

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.foundations.errors import RobotDynError, RobotDynWarning
+from robot_dyn import RobotDynError
+from robot_dyn.foundations import RobotDynWarning
 
 FUZZERS = ("urdf", "run_files", "scenes", "arguments", "queries", "cache")
 CASES = int(os.environ.get("ROBOT_DYN_FUZZ_CASES", "60"))  # of each of six fuzzers in the suite

@@ -17,13 +17,12 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.scene.starters import starter
-from robot_dyn.simulation.export.export import export
+from robot_dyn import RobotDynError, export
+from robot_dyn.scene import starter
+from robot_dyn.simulation import robot_of
 from robot_dyn.simulation.results import archive
-from robot_dyn.simulation.results.provenance import robot_of
-from robot_dyn.view.document import document
-from robot_dyn.view.plots.plots import PLOTS, PlotError, _view
+from robot_dyn.view import PLOTS, PlotError, document_of
+from robot_dyn.view.plots.plots import _view
 from tests.campaigns.fuzz.bytes import WORDS, damage
 
 ODD = [None, True, -1, 0.5, 10**400, float("nan"), "", "x", "\ud800", "\x1b[31m", [], {}, [[]], {"a": 1}]
@@ -75,7 +74,7 @@ def attempt(mutant: bytes, folder: Path) -> str:
         for panel in PLOTS.values():
             with suppress(PlotError), np.errstate(all="ignore"):
                 panel(view)
-        document((run,), (), None, False)
+        document_of((run,), (), None, False)
     return "accepted"
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.scene.starters import starter, starters
+from robot_dyn.scene import starter, starter_names
 from tests.campaigns.fuzz.bytes import damage, damage_text
 
 # Parts that no starter has; `double_pendulum` is left out of none, so that every kind meets a small robot too.
@@ -59,7 +59,7 @@ points = [[0.1], [0.2]]
 
 def seeds(folder: Path) -> list[str]:
     """The starters, on small robots, and one with the parts that they lack."""
-    return [*(starter(name) for name in starters()), MORE, MORE]
+    return [*(starter(name) for name in starter_names()), MORE, MORE]
 
 
 def mutate(rng: np.random.Generator, seed: str) -> bytes:

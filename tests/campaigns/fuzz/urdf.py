@@ -12,9 +12,9 @@ import numpy as np
 from lxml import etree
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import OverflowedError, SingularError
+from robot_dyn.foundations import OverflowedError, SingularError
 from robot_dyn.tools.doctor.literals import NUMBERS as NUMBERS_OF
-from robot_dyn.view.geometry.visuals import drawing
+from robot_dyn.view import drawing
 from tests.broken_files import SOUND
 from tests.campaigns.fuzz.bytes import damage, damage_text
 

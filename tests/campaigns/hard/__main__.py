@@ -15,7 +15,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from time import process_time
 
-from robot_dyn.foundations.errors import ModelWarning
+from robot_dyn import ModelWarning
 from tests.campaigns.hard.case import Row
 from tests.campaigns.hard.families import FAMILIES
 from tests.campaigns.hard.report import Result, summarise, write

@@ -19,19 +19,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.foundations.arithmetic import midpoint, radius
-from robot_dyn.foundations.errors import DescriptionError, PrecisionWarning, SingularError
-from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.scale import (
+from robot_dyn import PrecisionWarning
+from robot_dyn.foundations import DescriptionError, SingularError, midpoint, radius
+from robot_dyn.lagrange import (
     acceleration_norm,
     diagonal_scale,
     floored,
+    magnitudes,
     mass_norm,
     scaled,
     unit_diagonal_condition,
 )
+from robot_dyn.queries import Quantity
 from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
-from robot_dyn.queries.quantity import Quantity
 from tests.campaigns.hard.case import Case, Row
 from tests.campaigns.hard.chains import CHAINS, FOLDER, LONG, file_of
 

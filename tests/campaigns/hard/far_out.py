@@ -15,13 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.codegen.trace.right_angles import completed
-from robot_dyn.foundations.arithmetic import midpoint
-from robot_dyn.foundations.errors import NotFiniteError, RobotDynError
-from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.scale import diagonal_scale, floored, scaled
+from robot_dyn import RobotDynError
+from robot_dyn.codegen import completed
+from robot_dyn.foundations import NotFiniteError, midpoint
+from robot_dyn.lagrange import diagonal_scale, floored, magnitudes, scaled
+from robot_dyn.queries import Quantity
 from robot_dyn.queries.dynamics import INVERSE_DYNAMICS, M, N
-from robot_dyn.queries.quantity import Quantity
 from tests.campaigns.hard.case import Case, Row
 from tests.campaigns.hard.conditioning import SUMS, U
 

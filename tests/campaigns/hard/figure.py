@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from robot_dyn.report.figure import styled
+from robot_dyn.report import styled
 from robot_dyn.view.plots.figure import THEMES
 from tests.campaigns.hard.case import Row
 

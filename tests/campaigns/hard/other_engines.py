@@ -13,8 +13,7 @@ import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
-from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError, bare_urdf
-from robot_dyn.accuracy.work_precision_diagram.peers.mujoco_model import mujoco_model
+from robot_dyn.accuracy import PeerError, bare_urdf, mujoco_model
 
 
 class MuJoCo:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError
+from robot_dyn.accuracy import PeerError
 from tests.campaigns.hard.case import OURS, Case, Row
 from tests.campaigns.hard.chains import planar, text
 from tests.campaigns.hard.other_engines import Drake, MuJoCo, PyBullet, installed

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError
-from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn import RobotDynError
+from robot_dyn.accuracy import PeerError
 from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, INVERSE_DYNAMICS, M
 from tests.campaigns.hard.case import OURS, Case, Row
 from tests.campaigns.hard.chains import CHAINS, LONG

@@ -11,7 +11,7 @@ from inspect import cleandoc
 from pathlib import Path
 from typing import final
 
-from robot_dyn.report.environment import environment
+from robot_dyn.report import processor_and_versions
 from tests.campaigns.hard.case import Row
 from tests.campaigns.hard.families import FAMILIES
 from tests.campaigns.hard.figure import save
@@ -48,7 +48,7 @@ def write(result: Result, folder: Path) -> None:
     known.setdefault(result.family, {})[result.case] = {
         "seed": result.seed,
         "seconds": round(result.seconds, 1),
-        "environment": environment(),
+        "environment": processor_and_versions(),
         "rows": [_finite(asdict(row)) | {"verdict": row.verdict} for row in result.rows],
     }
     known = {

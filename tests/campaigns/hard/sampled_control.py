@@ -19,8 +19,7 @@ from functools import partial
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.simulation.dynamics.sampled_loop import linearised
-from robot_dyn.simulation.observation.remarks import Kind, lines
+from robot_dyn.simulation import RemarkKind, linearised, remark_lines
 from tests.campaigns.hard.case import Case, Row
 from tests.loops import growth
 
@@ -65,8 +64,8 @@ def run_at(arm: rd.Robot, q: np.ndarray, law: rd.control.Controller, period: flo
 
 def words(run: rd.Trajectory) -> str:
     """What the summary says of a loop that is unstable."""
-    of = [each for each in run.remarks if each.kind in (Kind.UNSTABLE, Kind.CHATTER)]
-    return "; ".join([run.outcome.advice] * bool(run.outcome.advice) + lines(of))
+    of = [each for each in run.remarks if each.kind in (RemarkKind.UNSTABLE, RemarkKind.CHATTER)]
+    return "; ".join([run.outcome.advice] * bool(run.outcome.advice) + remark_lines(of))
 
 
 def limit_of(name: str, kind: str, seed: int) -> Iterator[Row]:
@@ -103,7 +102,7 @@ def _wound_up(name: str, seed: int) -> Iterator[Row]:
     e, z = np.abs(q + 1.0 - run.q), np.abs(run.controller_states)
     asked = law.kp * e + law.kd * np.abs(run.v) + law.tracking_time_s * law.ki * e
     yield Row(case, "integral over its bound", float((z / (limit + asked.max(axis=0))).max()), 1 + 1e-12)
-    reached = {each.joint for each in run.remarks if each.kind is Kind.EFFORT_REACHED}
+    reached = {each.joint for each in run.remarks if each.kind is RemarkKind.EFFORT_REACHED}
     cut = {name for name, u, most in zip(arm.joint_names, run.u.T, limit, strict=True) if (np.abs(u) >= most).any()}
     yield Row(case, "joints at their limit that are not said", float(len(cut - reached)), 0.0)
 

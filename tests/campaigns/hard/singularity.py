@@ -20,11 +20,9 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.control.cartesian import CartesianReference, line
-from robot_dyn.control.operational_space import POSE, POSITION
-from robot_dyn.control.orientation import orientation_error
-from robot_dyn.foundations.spatial import rotation
-from robot_dyn.simulation.observation.remarks import Kind, lines
+from robot_dyn.control import POSE, POSITION, CartesianReference, line, orientation_error
+from robot_dyn.foundations import rotation
+from robot_dyn.simulation import RemarkKind, remark_lines
 from tests.campaigns.hard.case import Case, Row
 
 TITLE = "Kinematic singularity"
@@ -155,8 +153,8 @@ def _path(name: str, path: Path, seed: int) -> Iterator[Row]:
     law = control(robot, path, reference(robot, path, start), start)
     run = rd.simulate(robot, start, controller=law, **options)
     away = rd.simulate(robot, other, controller=control(robot, path, beside, other), **options)
-    told = [each for each in run.remarks if each.kind is Kind.DAMPED]
-    said = "; ".join([run.outcome.advice] * bool(run.outcome.advice) + lines(told))
+    told = [each for each in run.remarks if each.kind is RemarkKind.DAMPED]
+    said = "; ".join([run.outcome.advice] * bool(run.outcome.advice) + remark_lines(told))
     for symbol, row in (("v", 1), ("τ", 2)):
         largest = [float(np.abs(each.extremes[row]).max()) for each in (run, away)]
         yield Row(name, f"|{symbol}| over that of the path {AWAY} m away", largest[0] / largest[1], MOST, said)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn import RobotDynError
 from tests.campaigns.hard.case import Case, Row
 from tests.campaigns.hard.stiff_motion import SAMPLES, Motion, damper, dry, of_arm, spring, stop
 

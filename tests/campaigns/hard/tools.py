@@ -21,18 +21,18 @@ from functools import partial
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.codegen.trace.right_angles import completed
-from robot_dyn.lagrange.magnitude import magnitudes
-from robot_dyn.lagrange.scale import (
+from robot_dyn.codegen import completed
+from robot_dyn.lagrange import (
     acceleration_norm,
     diagonal_scale,
     floored,
+    magnitudes,
     mass_norm,
     scaled,
     unit_diagonal_condition,
 )
+from robot_dyn.queries import Quantity
 from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
-from robot_dyn.queries.quantity import Quantity
 from tests.campaigns.hard.case import Case, Row
 from tests.campaigns.hard.conditioning import U
 

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
-from robot_dyn.codegen.trace.right_angles import completed
-from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn import RobotDynError
+from robot_dyn.codegen import completed
 from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, M, N
 from tests.campaigns.estimates.truth import truth
 from tests.campaigns.hard import conditioning, far_out, sampled_control, tools

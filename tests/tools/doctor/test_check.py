@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.shapes.masses import Masses
-from robot_dyn.tools.doctor import check
-from robot_dyn.tools.doctor.checkup import checked
-from robot_dyn.tools.doctor.finding import Severity
+from robot_dyn.foundations import QueryError
+from robot_dyn.shapes import Masses
+from robot_dyn.tools.doctor import Severity, check, checked
 from tests.broken_files import BROKEN, LINKS, SOUND
 from tests.cli.test_command_documents import PROMISE
 from tests.command import run

@@ -7,7 +7,7 @@ import pytest
 from benchmarks import planted_faults
 from lxml import etree
 
-from robot_dyn.tools.doctor.checkup import checked
+from robot_dyn.tools.doctor import checked
 from tests.broken_files import SOUND
 
 UNSEEN = {"mass × 10", "mesh in mm"}  # without meshes; a box of ten times its mass may be of steel

@@ -14,7 +14,7 @@ import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import EditError, EffectError, MissingExtraError, PlanError, QueryError
+from robot_dyn.foundations import EditError, EffectError, MissingExtraError, PlanError, QueryError
 from robot_dyn.tools.motors import budget
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, X
 from robot_dyn.tools.motors.motor_budget.pace import least_pace

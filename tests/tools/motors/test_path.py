@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import MissingExtraError, PlanError
+from robot_dyn.foundations import MissingExtraError, PlanError
 from robot_dyn.tools.motors.planning.geometric_path import in_time, through
 
 LIMITS = {"effort": 20.0, "velocity": 3.0}  # for arms whose files state none

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import MissingExtraError, PlanError
+from robot_dyn.foundations import MissingExtraError, PlanError
 
 ARM = rd.load("ur5")
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn import RobotDynError
 from robot_dyn.tools import sweeps as sw
 from tests.tools.sweeps.children import outcome_of
 from tests.tools.sweeps.swept import swept

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools.sweeps import designs
 from robot_dyn.tools.sweeps.designs.base import REPLICATES
 from robot_dyn.tools.sweeps.designs.halton import scipy_halton

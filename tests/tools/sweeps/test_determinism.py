@@ -9,7 +9,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps.plan.work import Work
+from robot_dyn.tools.sweeps import Work
 from tests.tools.sweeps.swept import SCENE, scene, swept
 
 NOISE = '\n[[control.position]]\nkind = "noise"\ndeviation_rad = 0.01\n'

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools.sweeps import distributions as ds
 
 Q = np.array([0.3, -1.1, 0.7])

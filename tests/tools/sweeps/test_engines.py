@@ -14,14 +14,14 @@ from typing import Any
 
 import pytest
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
+from robot_dyn.tools.sweeps import Work, begun
 from robot_dyn.tools.sweeps.engines import cluster
 from robot_dyn.tools.sweeps.engines.cluster import Cluster, client_of
 from robot_dyn.tools.sweeps.engines.share import share
 from robot_dyn.tools.sweeps.engines.threads import Threads
-from robot_dyn.tools.sweeps.plan.work import Stopped, Work
-from robot_dyn.tools.sweeps.run_sweep import begun
+from robot_dyn.tools.sweeps.plan.work import Stopped
 from tests.tools.sweeps.children import outcome_of
 from tests.tools.sweeps.swept import swept
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools.sweeps.expression import Expression
 
 NAN = float("nan")

@@ -13,13 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
+from robot_dyn.tools.sweeps import Work, begun
 from robot_dyn.tools.sweeps.folder import files
 from robot_dyn.tools.sweeps.folder.files import Files, remove_abandoned, write
 from robot_dyn.tools.sweeps.folder.folder import MOST_FILES, Folder
-from robot_dyn.tools.sweeps.plan.work import Work
-from robot_dyn.tools.sweeps.run_sweep import begun
 from tests.tools.sweeps.swept import swept
 
 CALLS = ("open", "write", "sync", "close", "rename", "sync_folder")

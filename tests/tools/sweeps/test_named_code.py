@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from tests import command
 from tests.tools.sweeps.swept import VARY, scene

@@ -12,9 +12,9 @@ import pytest
 from scipy import stats
 
 import robot_dyn as rd
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps.plan.work import Work
+from robot_dyn.tools.sweeps import Work
 from tests.tools.sweeps.swept import SCENE, VARY, scene, swept
 
 WEAK = """

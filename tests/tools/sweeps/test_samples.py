@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from tests.tools.sweeps.swept import VARY, swept
 

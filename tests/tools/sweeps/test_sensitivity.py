@@ -13,10 +13,9 @@ import pytest
 from SALib.analyze import pawn, rbd_fast, sobol
 from scipy.stats import f_oneway, randint
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps import designs, sensitivity
-from robot_dyn.tools.sweeps.designs.base import Design
+from robot_dyn.tools.sweeps import Design, designs, sensitivity
 from tests.tools.sweeps.swept import of_figure
 
 NAMES = ("x1", "x2", "x3")

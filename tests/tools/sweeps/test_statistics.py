@@ -13,10 +13,9 @@ import pytest
 from scipy.special import ndtri
 from scipy.stats import binom, binomtest, quantile_test, ttest_1samp
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps import designs, statistics
-from robot_dyn.tools.sweeps.estimate import Estimate
+from robot_dyn.tools.sweeps import Estimate, designs, statistics
 from robot_dyn.tools.sweeps.replicates import groups_of, jackknife
 from tests.tools.sweeps.swept import of_figure
 

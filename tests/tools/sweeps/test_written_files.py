@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.files import check_folder, table_cell
+from robot_dyn.foundations import SweepError, check_folder, table_cell
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import run_sweep
 from tests import command

@@ -12,10 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.effects.causes import Causes, causes
-from robot_dyn.effects.effect import numbered
-from robot_dyn.effects.plant import Plant
-from robot_dyn.effects.set_valued import SetValued
+from robot_dyn import Plant
+from robot_dyn.effects import Causes, SetValued, numbered, torques_by_cause
 from robot_dyn.tools.motors.motor_budget.cells import Cells
 
 _RESTS = 1e-9  # of the largest velocity of a joint
@@ -46,7 +44,7 @@ def breakaway(cells: Cells, plant: Plant) -> Breakaway:
     largest = cells.largest_speed
     starts = (np.abs(start) <= _RESTS * largest) & (np.abs(middle) > _RESTS * largest) & (friction > 0)
     cell, joint = np.nonzero(starts)
-    split = causes(plant, *cells.states(cell, np.full(len(cell), -1.0)))
+    split = torques_by_cause(plant, *cells.states(cell, np.full(len(cell), -1.0)))
     row = np.arange(len(cell))
     without = split.tau[row, joint] - _sliding(split, plant)[row, joint]
     return Breakaway(joint, split.t, without + friction[joint] * np.sign(middle[cell, joint]))

@@ -10,20 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.control.extremes import extremes
-from robot_dyn.control.plan import Plan
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.actuator import EffortLimit
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.errors import PlanError, QueryError, shown
-from robot_dyn.foundations.validate import instance
-from robot_dyn.model.robot import Robot
-from robot_dyn.queries.units import of_joint
-from robot_dyn.report.environment import environment
-from robot_dyn.simulation.observation.remarks import Kind, lines
-from robot_dyn.simulation.results.provenance import robot_of
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn import Plant, Robot, Trajectory
+from robot_dyn.control import PiecewisePolynomial, Plan, extreme_values
+from robot_dyn.effects import EffortLimit
+from robot_dyn.foundations import PlanError, QueryError, instance, shown
+from robot_dyn.queries import of_joint
+from robot_dyn.report import processor_and_versions
+from robot_dyn.simulation import Ending, RemarkKind, remark_lines, robot_of
 from robot_dyn.tools.motors.limits import Limits, limits_of, same_rotor
 from robot_dyn.tools.motors.motor_budget.breakaway import breakaway, static_friction
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, of_run
@@ -159,9 +152,9 @@ def _of_run(run: Trajectory, given: _Given) -> MotorBudget:
     simulated = _simulated_rotors(run, robot)
     given = given._replace(motors=_with_rotors(given.motors, simulated))
     limits, continuous = given.limits(Plant(robot))
-    cut = frozenset(each.joint for each in run.remarks if each.kind == Kind.EFFORT_REACHED)
+    cut = frozenset(each.joint for each in run.remarks if each.kind == RemarkKind.EFFORT_REACHED)
     found = joint_budgets(demand, limits, continuous, np.full(robot.n, nan), None, cut)
-    findings = lines(each for each in run.remarks if each.kind in (Kind.EFFORT_REACHED, Kind.COARSE))
+    findings = remark_lines(each for each in run.remarks if each.kind in (RemarkKind.EFFORT_REACHED, RemarkKind.COARSE))
     if run.outcome.ending == Ending.STOPPED:
         findings.append(f"the run was stopped at {run.outcome.t:.6g} s; the budget is of what was simulated")
     left = ["torque at which joints break away: a run does not hold its static friction"]
@@ -221,7 +214,7 @@ def _result(
         error=demand.error,
         findings=(*findings, *_unknown(joints)),
         left_out=left_out,
-        environment=environment(("robot-dyn", "pin", "numpy")),
+        environment=processor_and_versions(("robot-dyn", "pin", "numpy")),
         demand=demand,
         case=case,
     )
@@ -239,7 +232,7 @@ def _unknown(joints: tuple[JointBudget, ...]) -> Iterator[str]:
 
 def _outside(motion: PiecewisePolynomial, robot: Robot) -> Iterator[str]:
     """Positions beyond the limits of the joints."""
-    found = extremes(motion)
+    found = extreme_values(motion)
     for i, name in enumerate(robot.joint_names):
         low, high = robot.lower[i] - found.least[i], found.greatest[i] - robot.upper[i]
         if max(low, high) > _BEYOND:

@@ -13,8 +13,8 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.control.reference import PiecewisePolynomial, polynomial
-from robot_dyn.effects.plant import Plant
+from robot_dyn import Plant
+from robot_dyn.control import PiecewisePolynomial, polynomial
 from robot_dyn.tools.motors.planning.geometric_path import turning_points
 
 FEWEST = 400  # cells of a motion

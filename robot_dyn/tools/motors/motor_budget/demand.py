@@ -12,14 +12,11 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.control.extremes import extremes
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.causes import Causes, causes, exerted_torques
-from robot_dyn.effects.effect import Stateful
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.errors import EffectError, QueryError
-from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn import Plant, Trajectory
+from robot_dyn.control import PiecewisePolynomial, extreme_values
+from robot_dyn.effects import Causes, Stateful, exerted_torques, torques_by_cause
+from robot_dyn.foundations import EffectError, QueryError
+from robot_dyn.simulation import Ending
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, Cells, X, cells
 
 _PEAKS = 4  # local maxima of a quantity that are refined
@@ -102,8 +99,8 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant) -> Demand:
     order = np.lexsort((x, cell))
     cell, x = cell[order], x[order]
     t, q, v, a = made.states(cell, x)
-    split = causes(plant, t, q, v, a)
-    fastest = extremes(made.motion, 1)
+    split = torques_by_cause(plant, t, q, v, a)
+    fastest = extreme_values(made.motion, 1)
     at = np.where(-fastest.least > fastest.greatest, fastest.at_least, fastest.at_greatest)
     gap = float(made.length.max() * np.diff(X).max() / 2)
     return Demand(
@@ -114,7 +111,7 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant) -> Demand:
 
 
 def torques(cells: Cells, plant: Plant, cell: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Torque and velocity at places of cells, (k, n) each; the torque is that of `causes`, without its parts."""
+    """Torque and velocity at places of cells, (k, n) each: the torque of `torques_by_cause`, without its parts."""
     t, q, v, a = cells.states(cell, x)
     acts = plant.forces or plant.equation_of_motion.payloads
     exerted = exerted_torques(plant, t, q, v, a).values() if acts else ()

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.queries.units import of_joint
-from robot_dyn.report.figure import Colours, ResultError, heading_room, ink, key, legend, lines, sheet, styled
+from robot_dyn.queries import of_joint
+from robot_dyn.report import Colours, ResultError, heading_room, ink, key, legend, lines, sheet, styled
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget
-from robot_dyn.view.plots.figure import NEAR, shortened
+from robot_dyn.view import NEAR, shortened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

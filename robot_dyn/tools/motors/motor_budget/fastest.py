@@ -15,13 +15,10 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.control.plan import Plan
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.answer import Answer, Block
-from robot_dyn.foundations.errors import PlanError
-from robot_dyn.foundations.result import UNREPORTED, reported
-from robot_dyn.queries.units import of_joint
+from robot_dyn import Plant
+from robot_dyn.control import PiecewisePolynomial, Plan
+from robot_dyn.foundations import UNREPORTED, Answer, Block, PlanError, reported
+from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.budget import budget
 from robot_dyn.tools.motors.motor_budget.cells import at_rest_exactly

@@ -9,8 +9,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.result import reported
-from robot_dyn.queries.units import of_joint
+from robot_dyn.foundations import reported
+from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.breakaway import Breakaway
 from robot_dyn.tools.motors.motor_budget.demand import Demand

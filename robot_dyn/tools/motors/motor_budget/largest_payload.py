@@ -17,12 +17,10 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.description.edits import Payload
-from robot_dyn.description.urdf import LARGEST
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.answer import Answer, Block
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn import Payload, Plant
+from robot_dyn.control import PiecewisePolynomial
+from robot_dyn.description import LARGEST
+from robot_dyn.foundations import Answer, Block, QueryError
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.breakaway import breakaway
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, torques

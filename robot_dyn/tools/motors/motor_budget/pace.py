@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.plant import Plant
+from robot_dyn import Plant
+from robot_dyn.control import PiecewisePolynomial
 from robot_dyn.tools.motors.motor_budget.demand import root_mean_squares
 from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
 

@@ -7,13 +7,11 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING, Any, ClassVar, final
 
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.answer import Block, Table, number_or_dash
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.result import UNREPORTED, reported
-from robot_dyn.queries.units import of_joint, without_rounding
-from robot_dyn.report.result import Result
+from robot_dyn import Plant
+from robot_dyn.control import PiecewisePolynomial
+from robot_dyn.foundations import UNREPORTED, Block, QueryError, Table, number_or_dash, reported
+from robot_dyn.queries import of_joint, without_rounding
+from robot_dyn.report import Result
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.demand import Demand
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget

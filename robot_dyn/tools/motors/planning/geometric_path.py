@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.foundations import validate
-from robot_dyn.foundations.errors import PlanError
+from robot_dyn.control import PiecewisePolynomial
+from robot_dyn.foundations import PlanError
+from robot_dyn.foundations import numbers as checked_numbers
 
 _MOST_POINTS = 2000
 _SLOWEST = 1e-3  # of |q'|, in the path's mean: where it vanishes, s is no measure of the way
 _CORNER = 1e-9  # jump of q', in |q'|
 _FARTHEST = 1e100  # [rad] or [m]: squares do not overflow
-numbers = partial(validate.numbers, error=PlanError)
+numbers = partial(checked_numbers, error=PlanError)
 
 
 def geometric_path(given: Any, joint_names: tuple[str, ...]) -> PiecewisePolynomial:
@@ -121,6 +121,6 @@ def in_time(path: PiecewisePolynomial, s: np.ndarray, x: np.ndarray) -> Piecewis
 
 
 def _derivative(table: np.ndarray, order: int, s: np.ndarray) -> np.ndarray:
-    from robot_dyn.control.reference import polynomial
+    from robot_dyn.control import polynomial
 
     return polynomial(table, s[:, None])[order]

@@ -12,14 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.control.extremes import extremes
-from robot_dyn.control.plan import Plan
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.foundations.errors import PlanError
-from robot_dyn.foundations.extras import needs
-from robot_dyn.foundations.validate import instance, number, numbers, one_state
-from robot_dyn.model.robot import Robot
-from robot_dyn.queries.units import of_joint
+from robot_dyn import Robot
+from robot_dyn.control import PiecewisePolynomial, Plan, extreme_values
+from robot_dyn.foundations import PlanError, instance, needs, number, numbers, one_state
+from robot_dyn.queries import of_joint
 
 _SAME = 1e-12  # of the duration: breaks of two joints that differ by their rounding
 _BEYOND = 1e-9  # of a position limit [rad, m] that rounding may pass
@@ -86,7 +82,7 @@ def point_to_point(
 
 def check_positions(arm: Robot, reference: PiecewisePolynomial) -> None:
     """Raise PlanError, with joint, time and value, if a motion leaves the position limits."""
-    found = extremes(reference)
+    found = extreme_values(reference)
     for low, bounds, values, times in (
         (True, arm.lower, found.least, found.at_least),
         (False, arm.upper, found.greatest, found.at_greatest),

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.control.plan import Plan
-from robot_dyn.control.reference import PiecewisePolynomial, hold
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.errors import PlanError
-from robot_dyn.foundations.validate import number
+from robot_dyn import Plant
+from robot_dyn.control import PiecewisePolynomial, Plan, hold
+from robot_dyn.foundations import PlanError, number
 from robot_dyn.tools.motors.limits import Limits, limits_of
 from robot_dyn.tools.motors.motors_file import Motors
 from robot_dyn.tools.motors.planning.geometric_path import geometric_path, in_time, turning_points

@@ -9,13 +9,9 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.control.plan import Plan
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.answer import Answer, Block, Table
-from robot_dyn.foundations.display import legend, plot
-from robot_dyn.foundations.result import UNREPORTED
-from robot_dyn.foundations.values import Value, read_only
+from robot_dyn import Plant
+from robot_dyn.control import PiecewisePolynomial, Plan
+from robot_dyn.foundations import UNREPORTED, Answer, Block, Table, Value, legend, plot, read_only
 from robot_dyn.tools.motors.limits import Limits
 
 JUDGED = 10_000  # times of a motion, in the middle of as many equal parts of it

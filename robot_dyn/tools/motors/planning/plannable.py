@@ -6,14 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.control.extremes import extremes
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.actuator import EffortLimit
-from robot_dyn.effects.carried_payload import CarriedPayload
-from robot_dyn.effects.effect import Bound, Force, Stateful
-from robot_dyn.effects.plant import Plant
-from robot_dyn.effects.rigid_stops import RigidStops
-from robot_dyn.foundations.errors import PlanError
+from robot_dyn import Plant
+from robot_dyn.control import PiecewisePolynomial, extreme_values
+from robot_dyn.effects import Bound, CarriedPayload, EffortLimit, Force, RigidStops, Stateful
+from robot_dyn.foundations import PlanError
 from robot_dyn.tools.motors.limits import Limits
 
 _TIMES = 0.1234, 7.891  # at which torques must be the same
@@ -45,7 +41,7 @@ def check_effects(plant: Plant) -> None:
 def check_positions(plant: Plant, path: PiecewisePolynomial) -> None:
     """Refuse a path that leaves the joint limits or passes rigid stops."""
     robot: Any = plant.dynamics
-    found = extremes(path)
+    found = extreme_values(path)
     stops = [(each.lower, each.upper) for each in plant.effects if isinstance(each, RigidStops)]
     for lower, upper in ((getattr(robot, "lower", -np.inf), getattr(robot, "upper", np.inf)), *stops):
         lower, upper = np.broadcast_to(lower, robot.n), np.broadcast_to(upper, robot.n)

@@ -16,9 +16,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.extras import needs
+from robot_dyn import Plant
+from robot_dyn.control import PiecewisePolynomial
+from robot_dyn.foundations import needs
 from robot_dyn.tools.motors.limits import Limits
 
 IMPOSED = np.array([1e-6, 0.5, 1 - 1e-6])  # where in a cell; not at its ends, where the sign of a velocity may change

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.validate import integer
-from robot_dyn.foundations.values import Value
+from robot_dyn.foundations import SweepError, Value, integer
 
 REPLICATES = 16
 """Independent scramblings of a design, from which intervals come: Student's t with 15 degrees of freedom."""

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.validate import choice, integer
+from robot_dyn.foundations import SweepError, choice, integer
 from robot_dyn.tools.sweeps.designs.base import Design
 from robot_dyn.tools.sweeps.designs.grid import Grid
 from robot_dyn.tools.sweeps.designs.halton import Halton

@@ -13,7 +13,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools.sweeps.designs.base import REPLICATES, Replicated, check_multiple, source
 
 Permutations = list[np.ndarray]  # by dimension, shape (digits, base, R), of R scramblings

@@ -17,7 +17,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools.sweeps.designs.base import REPLICATES, Replicated, check_power, source
 
 BITS = 53

@@ -9,9 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.validate import numbers
-from robot_dyn.foundations.values import Value
+from robot_dyn.foundations import SweepError, Value, numbers
 
 LEAST, MOST = 2.0**-54, 1 - 2.0**-53
 """Between which numbers are taken: F⁻¹(0) may be infinite."""

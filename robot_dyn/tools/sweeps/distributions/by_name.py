@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from robot_dyn.foundations.errors import SweepError, nearest, shown
+from robot_dyn.foundations import SweepError, nearest, shown
 from robot_dyn.tools.sweeps.distributions.base import Distribution
 from robot_dyn.tools.sweeps.distributions.bounded import Triangular, Uniform
 from robot_dyn.tools.sweeps.distributions.choices import Choice

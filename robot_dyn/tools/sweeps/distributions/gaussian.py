@@ -7,7 +7,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools.sweeps.distributions.base import MOST, Distribution
 
 

@@ -8,8 +8,7 @@ from typing import Any, ClassVar, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError, shown
-from robot_dyn.foundations.validate import numbers
+from robot_dyn.foundations import SweepError, numbers, shown
 from robot_dyn.tools.sweeps.distributions.base import LEAST, MOST, Distribution, said
 
 

@@ -20,8 +20,8 @@ from queue import Empty, Queue
 from typing import Any, final
 from urllib.parse import urlsplit
 
-from robot_dyn.foundations.errors import RobotDynError, SweepError, shown
-from robot_dyn.foundations.extras import needs
+from robot_dyn import RobotDynError
+from robot_dyn.foundations import SweepError, needs, shown
 from robot_dyn.tools.sweeps.folder.files import write
 from robot_dyn.tools.sweeps.folder.folder import Folder
 from robot_dyn.tools.sweeps.imported import NOTHING, Named

@@ -8,7 +8,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError, shown
+from robot_dyn.foundations import SweepError, shown
 
 
 @final

@@ -12,9 +12,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.extras import needs
-from robot_dyn.foundations.files import reading
+from robot_dyn.foundations import SweepError, needs, reading
 from robot_dyn.simulation.results.archive import Archive, ArchiveError, write
 from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows
 

@@ -15,8 +15,7 @@ from pathlib import Path
 from time import time
 from typing import final
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.files import sync_folder, why
+from robot_dyn.foundations import SweepError, sync_folder, why
 
 _OLD_S = 86_400.0
 _UNFINISHED = re.compile(r"\..+\.(?P<host>[\w-]+)\.(?P<process>\d+)\.[0-9a-f]{8}\.unfinished")

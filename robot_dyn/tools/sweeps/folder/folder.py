@@ -19,8 +19,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.files import read, why
+from robot_dyn.foundations import SweepError, read, why
 from robot_dyn.tools.sweeps.folder.chunk_file import FORMAT, Columns, Format
 from robot_dyn.tools.sweeps.folder.files import Exclusive, Files, make_folder, remove_abandoned, write
 from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows

@@ -9,7 +9,7 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.foundations.values import Value
+from robot_dyn.foundations import Value
 
 FINISHED, DIVERGED, RAISED = range(3)
 TEXTS = ("reason", "remarks")  # columns of them

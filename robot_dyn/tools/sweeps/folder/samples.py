@@ -14,9 +14,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.extras import needs
-from robot_dyn.queries.units import units
+from robot_dyn.foundations import SweepError, needs
+from robot_dyn.queries import joint_units
 from robot_dyn.simulation.results.run_data import QUANTITIES
 from robot_dyn.tools.sweeps.folder.files import Files, make_folder, write
 
@@ -98,7 +97,7 @@ class SampleStore:
         needs("zarr", extra=_EXTRA)
         found = xarray.open_zarr(self.path, consolidated=False, chunks=None)
         for name in self.names:
-            found[name].attrs |= {"units": units(name, joint_types), "long_name": QUANTITIES[name].title}
+            found[name].attrs |= {"units": joint_units(name, joint_types), "long_name": QUANTITIES[name].title}
         return found.assign_coords(run=np.arange(self.runs), joint=list(found.attrs.pop("joint")))
 
     def _array(self, zarr: Any, store: Any, name: str, t: np.ndarray, joints: tuple[str, ...]) -> Any:

@@ -15,12 +15,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from robot_dyn.control.cartesian import CartesianReference
-from robot_dyn.foundations.errors import SweepError, nearest, shown
-from robot_dyn.foundations.validate import choice
-from robot_dyn.foundations.values import Value
-from robot_dyn.queries.units import joint_types_of, units
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn import Setup
+from robot_dyn.control import CartesianReference
+from robot_dyn.foundations import SweepError, Value, choice, nearest, shown
+from robot_dyn.queries import joint_types_of, joint_units
 from robot_dyn.tools.sweeps.imported import digest_of, imported, path_of
 from robot_dyn.tools.sweeps.plan.runs import Runs
 
@@ -274,7 +272,9 @@ def _unit(of_what: str, joint: str | None, setup: Setup) -> str:
         return "m"
     dynamics = setup.plant.dynamics
     of_joint = dict(zip(dynamics.joint_names, joint_types_of(dynamics), strict=True))
-    return units("q" if of_what == "error" else of_what, of_joint.values() if joint is None else [of_joint.get(joint)])
+    return joint_units(
+        "q" if of_what == "error" else of_what, of_joint.values() if joint is None else [of_joint.get(joint)]
+    )
 
 
 def _number(path: str, value: Any) -> float:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from robot_dyn.foundations.errors import SweepError, shown
-from robot_dyn.scene.scene import read_both
+from robot_dyn.foundations import SweepError, shown
+from robot_dyn.scene import read_both
 from robot_dyn.tools.sweeps.plan.sweep import Sweep
 from robot_dyn.tools.sweeps.plan.texts import distribution_of, figure_of, samples_of_text
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from time import process_time
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.tools.sweeps.folder.rows import RAISED
 from robot_dyn.tools.sweeps.plan.sweep import Sweep

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.values import Value, read_only
-from robot_dyn.simulation.results.samples import tracking_of
+from robot_dyn.foundations import Value, read_only
+from robot_dyn.simulation import tracking_of
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.results.trajectory import Trajectory
-    from robot_dyn.simulation.rollouts.result import Rollouts
+    from robot_dyn import Rollouts, Trajectory
 
 
 @final

@@ -7,9 +7,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import SweepError
-from robot_dyn.foundations.validate import choice, integer, truth
-from robot_dyn.foundations.values import Value
+from robot_dyn.foundations import SweepError, Value, choice, integer, truth
 
 RECORDED = ("q", "v", "u")
 

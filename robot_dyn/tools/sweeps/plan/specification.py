@@ -14,10 +14,10 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.codegen.store.keys import processor_of_code, version_of
-from robot_dyn.foundations.errors import SweepError, nearest, shorten, shown
-from robot_dyn.simulation.setup.settings import settings_of
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn import Setup
+from robot_dyn.codegen import processor_of_code, version_of
+from robot_dyn.foundations import SweepError, nearest, shorten, shown
+from robot_dyn.simulation import settings_of
 from robot_dyn.tools.sweeps import distributions
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_named, digest_of
 from robot_dyn.tools.sweeps.plan import figures

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn, final
 
-from robot_dyn.foundations.errors import SweepError
+from robot_dyn.foundations import SweepError
 
 
 @final

@@ -10,13 +10,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.answer import Answer, Block, Table
-from robot_dyn.foundations.errors import QueryError, RobotDynError, SweepError, shown
-from robot_dyn.foundations.validate import integer
-from robot_dyn.foundations.values import Caching, Value
-from robot_dyn.queries.units import joint_types_of, unit
-from robot_dyn.simulation.rollouts.sweepable import sweepable
-from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn import RobotDynError, Setup, sweepable
+from robot_dyn.foundations import Answer, Block, Caching, QueryError, SweepError, Table, Value, integer, shown
+from robot_dyn.queries import joint_types_of, unit
 from robot_dyn.tools.sweeps.designs import Design, design
 from robot_dyn.tools.sweeps.distributions import Distribution, distribution
 from robot_dyn.tools.sweeps.folder.rows import TEXTS

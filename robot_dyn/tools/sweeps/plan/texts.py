@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from inspect import signature
 from typing import Any
 
-from robot_dyn.foundations.errors import SweepError, nearest, shorten
+from robot_dyn.foundations import SweepError, nearest, shorten
 from robot_dyn.tools.sweeps import distributions
 from robot_dyn.tools.sweeps.distributions import Distribution
 from robot_dyn.tools.sweeps.plan import figures

@@ -1,0 +1,25 @@
+# Names that tools and tests import of this folder, and where they live; modules of the core import modules.
+from robot_dyn.lagrange.digits import digits_of as digits_of
+from robot_dyn.lagrange.euler_lagrange import EulerLagrange as EulerLagrange
+from robot_dyn.lagrange.generalized_force import lagrangian_of_particles as lagrangian_of_particles
+from robot_dyn.lagrange.linkage import Linkage as Linkage
+from robot_dyn.lagrange.linkage import linkage_of as linkage_of
+from robot_dyn.lagrange.magnitude import magnitudes as magnitudes
+from robot_dyn.lagrange.recursions.articulated_body import articulated_body as articulated_body
+from robot_dyn.lagrange.recursions.composite_body import composite_body as composite_body
+from robot_dyn.lagrange.recursions.newton_euler import newton_euler as newton_euler
+from robot_dyn.lagrange.rigid_body import angular_momentum as angular_momentum
+from robot_dyn.lagrange.rigid_body import body_acceleration as body_acceleration
+from robot_dyn.lagrange.rigid_body import body_wrench as body_wrench
+from robot_dyn.lagrange.rigid_body import point_velocity as point_velocity
+from robot_dyn.lagrange.rigid_body import world_acceleration as world_acceleration
+from robot_dyn.lagrange.rigid_body import world_wrench as world_wrench
+from robot_dyn.lagrange.scale import acceleration_norm as acceleration_norm
+from robot_dyn.lagrange.scale import diagonal_scale as diagonal_scale
+from robot_dyn.lagrange.scale import floored as floored
+from robot_dyn.lagrange.scale import mass_norm as mass_norm
+from robot_dyn.lagrange.scale import scaled as scaled
+from robot_dyn.lagrange.scale import solved_tolerance as solved_tolerance
+from robot_dyn.lagrange.scale import unit_diagonal_condition as unit_diagonal_condition
+from robot_dyn.lagrange.scale import unit_diagonal_conditions as unit_diagonal_conditions
+from robot_dyn.lagrange.tree import tree_of as tree_of

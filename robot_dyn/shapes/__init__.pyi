@@ -1,0 +1,8 @@
+# Names that tools and tests import of this folder, and where they live; modules of the core import modules.
+from robot_dyn.shapes import surface as surface
+from robot_dyn.shapes.estimate import Estimate as Estimate
+from robot_dyn.shapes.estimate import estimates as estimates
+from robot_dyn.shapes.estimate import shapes_of_lacking as shapes_of_lacking
+from robot_dyn.shapes.masses import Masses as Masses
+from robot_dyn.shapes.mesh_files import MeshError as MeshError
+from robot_dyn.shapes.triangles import Mesh as Mesh

@@ -1,0 +1,26 @@
+# Names that tools and tests import of this folder, and where they live; modules of the core import modules.
+from robot_dyn.simulation.dynamics.fastest_motion import jacobian as jacobian
+from robot_dyn.simulation.dynamics.sampled_loop import linearised as linearised
+from robot_dyn.simulation.dynamics.stability import Stability as Stability
+from robot_dyn.simulation.dynamics.stability import step_map as step_map
+from robot_dyn.simulation.dynamics.state_equation import StateEquation as StateEquation
+from robot_dyn.simulation.engine.cache import machine_code as machine_code
+from robot_dyn.simulation.engine.self_check import MachineError as MachineError
+from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError as AccuracyError
+from robot_dyn.simulation.observation.observation import observation_of as observation_of
+from robot_dyn.simulation.observation.remarks import Remark as Remark
+from robot_dyn.simulation.observation.remarks import RemarkKind as RemarkKind
+from robot_dyn.simulation.observation.remarks import remark_lines as remark_lines
+from robot_dyn.simulation.results.acting import at_stop as at_stop
+from robot_dyn.simulation.results.acting import wrenches as wrenches
+from robot_dyn.simulation.results.error_estimate import ErrorEstimate as ErrorEstimate
+from robot_dyn.simulation.results.error_estimate import Verdict as Verdict
+from robot_dyn.simulation.results.ledger import Ledger as Ledger
+from robot_dyn.simulation.results.provenance import robot_of as robot_of
+from robot_dyn.simulation.results.run_file import RunFileError as RunFileError
+from robot_dyn.simulation.results.samples import tracking_of as tracking_of
+from robot_dyn.simulation.run.outcome import Ending as Ending
+from robot_dyn.simulation.run.outcome import Outcome as Outcome
+from robot_dyn.simulation.setup.segment_table import segment_table as segment_table
+from robot_dyn.simulation.setup.settings import settings_of as settings_of
+from robot_dyn.simulation.setup.size import MOST_BYTES as MOST_BYTES
