@@ -61,6 +61,7 @@ nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 
 autodoc_typehints = "signature"
+autodoc_type_aliases = {"ArrayLike": "numpy.typing.ArrayLike"}  # its definition is long
 autodoc_member_order = "bysource"
 autodoc_class_signature = "mixed"
 napoleon_numpy_docstring = False

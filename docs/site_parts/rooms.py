@@ -9,6 +9,7 @@ from textwrap import dedent
 from types import ModuleType
 
 import robot_dyn
+from robot_dyn.queries.dynamics import Dynamics
 
 
 def page(room: str) -> str:
@@ -60,7 +61,8 @@ def entry(module: ModuleType, name: str) -> str:
         return f":py:obj:`robot_dyn.{name}` is documented with the names of every day.\n\n"
     if inspect.isclass(value):
         kind = "autoexception" if issubclass(value, BaseException) else "autoclass"
-        return f".. {kind}:: {full}\n   :members:\n   :show-inheritance:\n\n"
+        queries = "   :inherited-members:\n" * (issubclass(value, Dynamics) and value is not Dynamics)
+        return f".. {kind}:: {full}\n   :members:\n{queries}   :show-inheritance:\n\n"
     if callable(value):
         return f".. autofunction:: {full}\n\n"
     return f".. py:data:: {full}\n   :value: {value!r}\n\n"

@@ -1,4 +1,4 @@
-"""Compiled: a robot's equations as machine code, M(q) a + C(q, v) v + N(q) = τ, behind the Dynamics protocol."""
+"""Compiled: a robot's equations as machine code, M(q) a + C(q, v) v + N(q) = τ."""
 
 from __future__ import annotations
 

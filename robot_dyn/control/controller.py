@@ -91,12 +91,7 @@ class Controller(Value, ABC):
     @property
     def models(self) -> dict[str, Dynamics]:
         """Its models of the arm, by attribute, or by path."""
-        others = np.ndarray, float, int, str, Reference, tuple, dict, Controller, type(None)
-        return {  # an instance check of a protocol is slower
-            name: value
-            for name, value in self._attributes()
-            if not isinstance(value, others) and isinstance(value, Dynamics)
-        }
+        return {name: value for name, value in self._attributes() if isinstance(value, Dynamics)}
 
     def _attributes(self) -> Iterator[tuple[str, Any]]:
         """Its attributes, and those of controllers in it by path."""
@@ -259,7 +254,7 @@ class Stateless(Controller):
 
 def check_model(model: Any) -> None:
     """Raise a ControlError unless it is the dynamics of an arm."""
-    if isinstance(model, type) or not isinstance(model, Dynamics):
+    if not isinstance(model, Dynamics):
         raise ControlError(f"model: give a robot, such as rd.load('ur5'), got {shown(model)}")
 
 

@@ -21,7 +21,7 @@ class Agreement:
     """How well Pinocchio and the library's Lagrangian agree on one quantity, at the worst of all states and entries.
 
     Attributes:
-        quantity: Its name in the `Dynamics` protocol, or the identity that was checked.
+        quantity: Its name among the queries of `Dynamics`, or the identity that was checked.
         error: Difference on its scale.
         tolerance: What is allowed.
         entry: Joints or frame of the entry.

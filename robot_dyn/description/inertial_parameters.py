@@ -40,29 +40,6 @@ class Parametrised(Protocol):
         """
         ...
 
-    def regressor(self, q: Array, v: Array, a: Array, *, errors: str = "raise") -> Array:
-        """Regressor of the joint torques, Y(q, v, a) with M a + C v + N = Y θ + armature · a, θ `inertial_parameters`.
-
-        Y holds geometry, gravity and couplings and no mass: θ can be identified from measured torques, except for
-        combinations that no motion distinguishes, for which Y is rank-deficient.
-
-        Args:
-            q: Positions, shape (..., n), in [rad] or [m] by joint.
-            v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            a: Accelerations, shape (..., n), in [rad/s²] or [m/s²].
-            errors: "raise", or "nan" for NaN in place of the states of a batch that have no answer.
-
-        Returns:
-            Matrix, shape (..., n, 10 N); its columns have the units of torque by parameter.
-
-        Raises:
-            QueryError: If an argument has the wrong shape or is not finite.
-            OverflowedError: If the answer would not be finite.
-
-        Source: Atkeson, An, Hollerbach 1986; Siciliano et al. 2009, §7.2.2.
-        """
-        ...
-
 
 def ordered(joint_names: Sequence[str], moving: Iterable[str]) -> tuple[str, ...]:
     """All joints that move in the order of their bodies' parameters: the independent ones, then the coupled ones."""

@@ -41,7 +41,7 @@ class Plant:
     def __init__(self, dynamics: Dynamics, effects: Iterable[Effect] | str = ()) -> None:
         if isinstance(getattr(dynamics, "plant", None), Plant):
             raise EffectError(f"got a {type(dynamics).__name__} for a plant: give the Plant, engine='compiled'")
-        if isinstance(dynamics, type) or not isinstance(dynamics, Dynamics):
+        if not isinstance(dynamics, Dynamics):
             raise EffectError(f"dynamics: give a robot, such as rd.load('ur5'), got {shown(dynamics)}")
         object.__setattr__(self, "dynamics", dynamics)
         if isinstance(effects, str):

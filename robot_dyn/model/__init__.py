@@ -1,7 +1,7 @@
 """The thin layer over Pinocchio: `Robot` gives M, C, N, inverse and forward dynamics by CRBA, RNEA and ABA.
 
 robot: the class · calls: Pinocchio's call for each query · loading: `load` · from_pinocchio: of a `pinocchio.Model`
-mechanism: the model and what a file states · pinocchio_model: how that model is built
+pinocchio_model: how the model is built
 evaluation: checks, batches and mimic joints around a call
 coriolis, regrouped: C without loss of digits · conditioning: M singular or nearly so · gravity: whether it acts
 findings: what is doubtful in a description that loads

@@ -1,4 +1,4 @@
-"""Robot: a URDF arm with the Dynamics protocol, M(q) a + C(q, v) v + N(q) = τ, computed by Pinocchio.
+"""Robot: the dynamics of a URDF arm, M(q) a + C(q, v) v + N(q) = τ, computed by Pinocchio.
 
 A thin layer over CRBA, RNEA and ABA [Featherstone 2008, ch. 5–7], and C by `coriolis`. One state of float64 goes
 straight to Pinocchio, after checks of a fraction of a microsecond; coupled joints, lists and batches to `evaluation`.

@@ -111,7 +111,7 @@ class Trace:
         }
 
     def quantity(self, name: str) -> Traced:
-        """A quantity of the `Dynamics` protocol, or "forward_dynamics_derivatives": ∂a/∂q, ∂a/∂v, ∂a/∂τ."""
+        """A query of `Dynamics`, or "forward_dynamics_derivatives": ∂a/∂q, ∂a/∂v, ∂a/∂τ."""
         functions = self.formulations(name)
         counts = {formulation: instructions(function) for formulation, function in functions.items()}
         least = min(counts, key=counts.__getitem__)
