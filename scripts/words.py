@@ -24,12 +24,12 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 590,
-    "as of": 172,
-    "what without noun": 666,
+    "opening": 587,
+    "as of": 156,
+    "what without noun": 662,
     "is told": 22,
-    "says that": 117,
-    "tells that": 7,
+    "says that": 116,
+    "tells that": 6,
     "goes on": 20,
     "looks": 92,
     "believes": 28,
@@ -47,7 +47,7 @@ CEILINGS = {
     "the same holds": 2,
     "each": 881,
     "arguments": 97,
-    "Any": 2864,
+    "Any": 2862,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.
