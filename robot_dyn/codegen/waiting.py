@@ -1,4 +1,4 @@
-"""What a user notices of a compile: a line on stderr while it lasts, and Ctrl-C, which waits until the compile ends."""
+"""What a user notices of a compile: time, a line on stderr while it lasts, and Ctrl-C, which waits until it ends."""
 
 from __future__ import annotations
 
@@ -10,6 +10,15 @@ from contextlib import contextmanager
 from threading import Timer
 
 _IN_TERMINAL_S, _IN_NOTEBOOK_S = 1.0, 2.0  # what is kept in a notebook's output should be worth a line
+
+
+class _Compiling(threading.local):
+    """Time that this thread has spent on loading and compiling loops, in [s]; a run's first call does so."""
+
+    seconds = 0.0
+
+
+COMPILING = _Compiling()
 
 
 @contextmanager

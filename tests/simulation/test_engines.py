@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Any, final
 
 import numpy as np
 import pytest
@@ -20,6 +20,8 @@ from robot_dyn.integrate import FIXED_STEP
 from robot_dyn.simulation import MachineError, StateEquation
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.engine.self_check import check
+from robot_dyn.simulation.run.make_run import make_run
+from robot_dyn.simulation.run.watch import Watch
 from tests.long import long
 from tests.own_method import OwnImplicit
 
@@ -295,3 +297,40 @@ def test_interpreted_runs_import_no_compiler(tmp_path) -> None:
         "assert not {'casadi', 'llvmlite'} & set(sys.modules), 'imported'"
     )
     subprocess.run([sys.executable, "-c", code], check=True, env=os.environ | {"ROBOT_DYN_CACHE": str(tmp_path)})
+
+
+class Borrowed:
+    """An engine of no class of the library: it returns what another one returns."""
+
+    def __init__(self, engine: Any) -> None:
+        self.engine = engine
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.engine, name)
+
+
+@pytest.mark.parametrize("engine", ["interpreted", "compiled"])
+def test_a_run_takes_any_engine(engine: str) -> None:
+    """A run reads the protocol alone, also where it restarts its functions at events."""
+    plant = rd.Plant(ARM, [rd.effects.DryFriction([0.2, 0.1])])
+    setup = rd.Setup(plant, Q, duration_s=0.3, engine=engine, estimate_error=False)
+    runs = [make_run(setup, each).record() for each in (choose(setup), Borrowed(choose(setup)))]
+    assert len(runs[0].events) > 0
+    np.testing.assert_array_equal(runs[0].y, runs[1].y)
+
+
+def test_both_engines_have_the_same_functions() -> None:
+    """y', u, K, V, masses and loads of one state; to 1e-12 of their size, some hundred roundings."""
+    plant = rd.Plant(ARM, [rd.effects.DryFriction([0.2, 0.1]), rd.effects.ViscousFriction(0.4)])
+    setup = rd.Setup(plant, Q, [0.3, -0.8], engine="compiled")
+    equation, n = setup.equation, ARM.n
+    sizes = {"rate": equation.size + n, "energy": 2, "bodies": n * n + n}
+    y, p = equation.start(setup.q0, setup.v0)[:, None], np.array([0.0, 1.0])
+    results = []
+    for engine in (choose(setup), choose(replace(setup, engine="interpreted"))):
+        _, functions, numbers, _ = engine.evaluated(equation, Watch(setup, equation))
+        out = {name: np.empty((size, 1)) for name, size in sizes.items()}
+        for name, x in out.items():
+            getattr(functions, name)(0.2, y, p, numbers[:, None], x)
+        results.append(np.concatenate([*out.values()]))
+    np.testing.assert_allclose(results[0], results[1], rtol=1e-12, atol=1e-12)

@@ -20,27 +20,13 @@ from robot_dyn.codegen.loops.kinds import Kind, Number, Static, TupleKind, unpac
 from robot_dyn.codegen.loops.packing import Packed, pack
 from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.store.keys import digest, sources_of_the_translator
-from robot_dyn.codegen.waiting import announced, interrupts_later
+from robot_dyn.codegen.waiting import COMPILING, announced, interrupts_later
 from robot_dyn.foundations.errors import MachineCodeError
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
 _LETTERS: Mapping[str, str] = {"float": "f", "int": "i", "uint": "u", "bool": "b"}
 _NUMBERS = {letter: Number(name) for name, letter in _LETTERS.items()}
 QUICK = Passes(level=1, effort=1)  # the work is behind addresses
-
-
-class _Spent(threading.local):
-    """For each thread: what another one compiles does not count as time of this one's run."""
-
-    seconds = 0.0
-
-
-_spent = _Spent()
-
-
-def spent_on_loops() -> float:
-    """Time that this thread has spent on loading and compiling functions, in [s]; a run's first call does so."""
-    return _spent.seconds
 
 
 @final
@@ -112,7 +98,7 @@ class MachineFunction:
                 with announced(f"compiling {self.about}, once for this version"):
                     self._known[known] = self._compiled(known)
             self._known[place] = self._known[known]
-        _spent.seconds += perf_counter() - began
+        COMPILING.seconds += perf_counter() - began
         return self._known[place]
 
     def _compiled(self, kinds: tuple[Kind, ...]) -> tuple[Any, Kind]:

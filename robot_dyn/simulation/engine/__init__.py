@@ -1,9 +1,7 @@
-"""The engines of a run: what evaluates its state equation and takes its steps, machine code or Python.
+"""The engines of a run: its state equation in Python, or as machine code.
 
-- choice: machine code or Python for a setup, by a count of evaluations.
-- interpreted: the state equation as Python functions for a time loop.
-- structure: what machine code depends on besides parameters; trace: the equation in symbols; programs: both, stored.
-- cache: from a state equation to a `CompiledStateEquation` (machine_code), cached by structure.
-- functions: its functions as programs and addresses; loop: the time loops, one for each method.
-- self_check: the comparison with the interpreted equation before use.
+- engine: the protocol `Engine`, with the functions that a time loop calls; interpreted, machine_code: both engines.
+- choice: one of them for a setup, by a count of evaluations; self_check: machine code compared with Python before use.
+- cache: machine code in this process and in the store; structure: the key; trace: the equation in symbols.
+- loop: the time loops as machine code, one for each method.
 """

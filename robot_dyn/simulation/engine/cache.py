@@ -20,28 +20,25 @@ from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import TraceError
 from robot_dyn.foundations.values import LRUByIdentity
+from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.machine_code import CompiledFunctions, MachineCode
 from robot_dyn.simulation.engine.structure import changeable, of_library, structure
 
+Method = Integrator | Adaptive
 _MOST_INSTRUCTIONS = 100_000  # some ten seconds of compiling
 
 _robots, _symbols, _functions, _interpreted = (LRUByIdentity() for _ in range(4))
 
 
 class Traces(NamedTuple):
-    """What is traced of a state equation.
+    """Options of a trace: `extras` in a sample, see `trace`; the Jacobian; steps in which velocities may jump."""
 
-    Attributes:
-        extras: See `trace`.
-        jacobian: Whether the method needs that of the rate.
-        nonsmooth: Whether velocities may jump within steps.
-    """
-
-    extras: tuple[str, ...] | None = None
-    jacobian: bool = False
-    nonsmooth: bool = False
+    extras: tuple[str, ...] | None
+    jacobian: bool
+    nonsmooth: bool
 
 
 class Identified(NamedTuple):
@@ -51,26 +48,27 @@ class Identified(NamedTuple):
         equation: The equation itself.
         compiled_form: The equation that is compiled: in a mode, of a robot with right angles written out in full.
         known: Its parameters.
-        described: Its structure, and where the parameters stand.
-        objects: What stands in it by identity.
-        lasting: Whether `described` identifies all of it, in another process too.
+        described: Its structure, the places of its parameters, and the options of its trace.
+        objects: Objects in it that are described by identity.
+        lasting: True if `described` identifies all of it, in another process too.
     """
 
     equation: StateEquation
     compiled_form: StateEquation
     known: tuple[Parameter, ...]
-    described: tuple[Any, ...]
-    objects: tuple[Any, ...]
+    described: tuple[object, tuple[object, ...], Traces]
+    objects: tuple[object, ...]
     lasting: bool
 
-    def key(self, what: Traces) -> str:
-        """Of its programs in a store."""
-        return digest(["programs", sources_of_programs(), repr(self.described), repr(what)], processor=False)
+    @property
+    def key(self) -> str:
+        """Key of its programs in a store."""
+        return digest(["programs", sources_of_programs(), repr(self.described)], processor=False)
 
 
 def machine_code(
     equation: StateEquation,
-    method: Any = None,
+    method: Method | None = None,
     *,
     lanes: int = 1,
     extras: tuple[str, ...] | None = None,
@@ -94,47 +92,39 @@ def machine_code(
     Raises:
         TraceError: If a part of the equation cannot be compiled; names it, with the remedy.
     """
-    what = traces_of(method, extras, jacobian)
-    identified = identify(equation, what, swept)
-    return _with_loop(identified, _functions_of(identified, what, lanes, swept), method, lanes, cuts, detects, swept)
+    identified = identify(equation, method, extras, swept, jacobian)
+    return _with_loop(identified, _functions_of(identified, lanes, swept), method, lanes, cuts, detects, swept)
 
 
-def traces_of(method: Any, extras: tuple[str, ...] | None = None, jacobian: bool = False) -> Traces:
-    """Return what is traced for a method, which may be None; arguments as in `machine_code`."""
-    needed = (False, False) if method is None else (method.needs_jacobian, method.nonsmooth)
-    return Traces(extras, jacobian or needed[0], needed[1])
-
-
-def existing(identified: Identified, what: Traces, method: Any, cuts: bool) -> MachineCode | None:
+def existing(identified: Identified, method: Method, cuts: bool) -> MachineCode | None:
     """Return the machine code of a single run if it is in this process or in the store; or None.
 
     Args:
         identified: Its state equation.
-        what: What is traced of it.
         method: As in `machine_code`.
         cuts: As in `machine_code`.
     """
     programs = None
-    if _functions.known(identified.objects, (identified.described, 1, (), what)) is None:
-        programs = _stored(identified, what)
+    if _functions.known(identified.objects, (identified.described, 1, ())) is None:
+        programs = _stored(identified)
         if programs is None:
             return None
-    code = _with_loop(identified, _functions_of(identified, what, programs=programs), method, cuts=cuts)
+    code = _with_loop(identified, _functions_of(identified, programs=programs), method, cuts=cuts)
     return code if code.is_kept() else None
 
 
 def _functions_of(
-    identified: Identified, what: Traces, lanes: int = 1, swept: tuple[str, ...] = (), programs: Programs | None = None
+    identified: Identified, lanes: int = 1, swept: tuple[str, ...] = (), programs: Programs | None = None
 ) -> CompiledFunctions:
     """The functions of a structure, cached."""
     equation, known = identified.compiled_form, identified.known
 
     def compute() -> CompiledFunctions:
         shared, name = _shared(equation, known, lanes, swept), equation.plant.dynamics.name  # pyright: ignore
-        return CompiledFunctions(programs or _programs_of(identified, what), lanes, name, shared, changeable(equation))
+        return CompiledFunctions(programs or _programs_of(identified), lanes, name, shared, changeable(equation))
 
     names = tuple(name for name in dict.fromkeys(each.name for each in known) if name in swept)
-    functions = _functions.get(identified.objects, (identified.described, lanes, names, what), compute)
+    functions = _functions.get(identified.objects, (identified.described, lanes, names), compute)
     if (count := functions.programs.instructions) > _MOST_INSTRUCTIONS:
         raise TraceError(
             f"the run takes {count} instructions, more than the {_MOST_INSTRUCTIONS} worth compiling;"
@@ -166,7 +156,7 @@ def with_numbers(code: MachineCode, equation: StateEquation) -> MachineCode:
     return replace(code, equation=equation, compiled_form=compiled_form, known=known)
 
 
-def machine_code_of_constants(equation: StateEquation, method: Any, *, lanes: int = 1) -> MachineCode:
+def machine_code_of_constants(equation: StateEquation, method: Method, *, lanes: int = 1) -> MachineCode:
     """Return a state equation as machine code whose numbers are constants: none of them can be changed.
 
     Args:
@@ -177,11 +167,11 @@ def machine_code_of_constants(equation: StateEquation, method: Any, *, lanes: in
     Raises:
         TraceError: As in `machine_code`.
     """
-    what = traces_of(method, None if lanes == 1 else ())
+    what = _traces(method, None if lanes == 1 else ())
     compiled_form = _compiled_form(equation, what.nonsmooth)
     programs = _traced(compiled_form, (), what, constants=True)
     functions = CompiledFunctions(programs, lanes, compiled_form.plant.dynamics.name)  # pyright: ignore
-    identified = Identified(equation, compiled_form, (), (), (), False)
+    identified = Identified(equation, compiled_form, (), ((), (), what), (), False)
     return _with_loop(identified, functions, method, lanes)
 
 
@@ -198,22 +188,27 @@ def _shared(
     return {k: first + i for i, k in enumerate(numbers)}
 
 
-def identify(equation: StateEquation, what: Traces, swept: tuple[str, ...] = ()) -> Identified:
-    """Return a state equation with its structure.
-
-    Args:
-        equation: Any.
-        what: What is traced of it.
-        swept: Names of the parameters that differ from run to run.
+def identify(
+    equation: StateEquation, method: Method | None, extras: tuple[str, ...] | None = None, swept: tuple[str, ...] = (),
+    jacobian: bool = False,
+) -> Identified:  # fmt: skip
+    """Return a state equation with its structure; arguments as in `machine_code`.
 
     Raises:
         TraceError: If its bodies cannot be compiled.
     """
+    what = _traces(method, extras, jacobian)
     compiled_form = _compiled_form(equation, what.nonsmooth)
     known = _parameters(compiled_form, swept)
     described, objects, lasting = structure(compiled_form)
     places = tuple(each.place for each in known)
-    return Identified(equation, compiled_form, known, (described, places), objects, lasting)
+    return Identified(equation, compiled_form, known, (described, places, what), objects, lasting)
+
+
+def _traces(method: Method | None, extras: tuple[str, ...] | None, jacobian: bool = False) -> Traces:
+    if method is None:
+        return Traces(extras, jacobian, False)
+    return Traces(extras, jacobian or method.needs_jacobian, method.nonsmooth)
 
 
 def _compiled_form(equation: StateEquation, nonsmooth: bool) -> StateEquation:
@@ -250,31 +245,31 @@ def robot_to_compile(dynamics: Any) -> Robot:
     return _robots.get((dynamics,), (), compute) or dynamics
 
 
-def _stored(identified: Identified, what: Traces) -> Programs | None:
+def _stored(identified: Identified) -> Programs | None:
     """The programs in the store; None if they are not there, or the structure is known in this process alone."""
     store = default_store() if identified.lasting else None
-    payload = None if store is None else store.load(identified.key(what))
+    payload = None if store is None else store.load(identified.key)
     return None if payload is None else Programs.read(payload.decode())
 
 
-def interpreted_before(identified: Identified, what: Traces) -> list[float]:
+def interpreted_before(identified: Identified) -> list[float]:
     """The count of evaluations that runs of a structure have taken without machine code."""
-    return _interpreted.get(identified.objects, (identified.described, what), lambda: [0.0])
+    return _interpreted.get(identified.objects, (identified.described,), lambda: [0.0])
 
 
-def _programs_of(identified: Identified, what: Traces) -> Programs:
+def _programs_of(identified: Identified) -> Programs:
     """The programs of a state equation.
 
     Raises:
         TraceError: If a part of it cannot be compiled; names it.
     """
-    if (programs := _stored(identified, what)) is not None:
+    if (programs := _stored(identified)) is not None:
         return programs
-    programs = _traced(identified.compiled_form, identified.known, what)
+    programs = _traced(identified.compiled_form, identified.known, identified.described[2])
     store = default_store() if identified.lasting else None
     equation = identified.compiled_form
     if store is not None and structure(equation).described == identified.described[0]:  # a trace may have changed it
-        store.save(identified.key(what), str(programs).encode(), f"the equations of {equation.plant.dynamics.name}")  # pyright: ignore
+        store.save(identified.key, str(programs).encode(), f"the equations of {equation.plant.dynamics.name}")  # pyright: ignore
     return programs
 
 

@@ -19,7 +19,6 @@ from robot_dyn.simulation.engine.cache import (
     identify,
     interpreted_before,
     machine_code,
-    traces_of,
     with_numbers,
 )
 from robot_dyn.simulation.engine.engine import Engine
@@ -57,13 +56,12 @@ def _chosen(setup: Setup, seen: float) -> Engine:
     if not required and (parts := setup.undeclared):  # they may do what a trace would lose
         return _interpreted(setup, " ".join((named(parts[0][0]), parts[0][1])))
     try:
-        what = traces_of(setup.integrator)
-        identified = identify(setup.equation, what)
-        code = existing(identified, what, setup.integrator, setup.finds_events)
+        identified = identify(setup.equation, setup.integrator)
+        code = existing(identified, setup.integrator, setup.finds_events)
         if code is not None:
             check(code, setup)
             return code
-        if not required and not _is_worthwhile(setup, interpreted_before(identified, what), seen):
+        if not required and not _is_worthwhile(setup, interpreted_before(identified), seen):
             most = _COMPILED / _in_all(setup, setup.equation.size) if setup.integrator.controls_error else inf
             return _interpreted(setup, "short: compiling is not worthwhile", most)
         return checked(setup, lambda: _of_one_run(setup))

@@ -6,17 +6,17 @@ engine = choose(setup);   run = make_run(setup, engine);   recording = run.recor
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.holding import Places
 from robot_dyn.simulation.setup.setup import Setup
 
 Advance = Callable[..., int]
+T = TypeVar("T")
 
 
 class Watched(Protocol):
@@ -24,11 +24,11 @@ class Watched(Protocol):
 
     setup: Setup
 
-    def tick(self, t: float, y: Array) -> tuple[Array, Array | None]:
+    def tick(self, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """Run one controller tick."""
         ...
 
-    def answer(self, t: float, y: Array, ask: Callable[[], Any]) -> Any:
+    def answer(self, t: float, y: np.ndarray, ask: Callable[[], T]) -> T:
         """Return the result of `ask`; raise the error that ends the run if the equations cannot be evaluated."""
         ...
 
@@ -73,7 +73,6 @@ class Engine(Protocol):
         most_steps: Steps after which the loop returns: 1 to report progress at each of them.
         most_threads: Threads that may run it side by side.
         most_evaluations: Evaluations after which another engine is to be chosen.
-        compiling_s: Time that this thread has spent on compiling loops, in [s].
     """
 
     exact_right_angles: ClassVar[bool]
@@ -88,11 +87,9 @@ class Engine(Protocol):
     def most_steps(self) -> float: ...
     @property
     def most_evaluations(self) -> float: ...
-    @property
-    def compiling_s(self) -> float: ...
 
     def evaluated(self, equation: StateEquation, watch: Watched) -> Evaluated:
-        """Return the functions of an equation that differs from its own in coefficients or what is carried.
+        """Return the functions of an equation that differs from its own in coefficients or payloads.
 
         Args:
             equation: The state equation.
@@ -101,7 +98,7 @@ class Engine(Protocol):
         ...
 
     def places(self) -> Places:
-        """Return where the mode of what holds joints stands among the run parameters."""
+        """Return the places of the mode of held joints among the run parameters."""
         ...
 
     def loop(self, plain: Callable[[], Advance]) -> Advance:

@@ -36,7 +36,6 @@ class Interpreted:
     doubtful: ClassVar[float] = inf
     most_threads: ClassVar[float] = 1
     most_steps: float = field(default=1, init=False)
-    compiling_s: float = field(default=0.0, init=False)
 
     def evaluated(self, equation: StateEquation, watch: Watched) -> Evaluated:
         """Return the functions of an equation; see `Engine`."""
@@ -47,7 +46,7 @@ class Interpreted:
         return Evaluated(functions, functions, numbers, False)
 
     def places(self) -> Places:
-        """Return where the mode stands: the run parameters are the mode and nothing else."""
+        """Return the places of the mode: the run parameters are the mode and nothing else."""
         n = self.equation.plant.dynamics.n
         return alone(n, n * self.equation.sampled)
 
@@ -64,11 +63,12 @@ def interpreted(equation: StateEquation, watch: Watched) -> Functions:
     """
     n, m = equation.plant.dynamics.n, equation.size
 
+    def at(t: float, y: Array, p: Array, run_parameters: Array) -> tuple[float, Array, Array | None]:
+        """Time within the segment, state, and torques in zero-order hold."""
+        return min(max(t, p[0]), p[1]), _state(y), run_parameters[:n, 0].copy() if equation.sampled else None
+
     def rate(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
-        made, u = equation.rate(
-            min(max(t, p[0]), p[1]), _state(y), run_parameters[:n, 0].copy() if equation.sampled else None
-        )
-        out[:m, 0], out[m:, 0] = made, u
+        out[:m, 0], out[m:, 0] = equation.rate(*at(t, y, p, run_parameters))
 
     def tick(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
         after, held = watch.tick(t, _state(y))
@@ -80,29 +80,24 @@ def interpreted(equation: StateEquation, watch: Watched) -> Functions:
         out[:, 0] = watch.answer(t, x, lambda: equation.energies(t, q, v))
 
     def sampled(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
-        sample(
-            equation, min(max(t, p[0]), p[1]), _state(y), run_parameters[:n, 0] if equation.sampled else None, out[:, 0]
-        )
+        sample(equation, *at(t, y, p, run_parameters), out[:, 0])
 
     def jacobian(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
         end = p[1] if t - p[0] < p[1] - t else p[0]
         out[:, :, 0] = system(functions, equation, p, run_parameters, exact=False).derivatives(t, y[:, 0], end)
 
     def step(t: float, x: Array, p: Array, run_parameters: Array, out: Array) -> None:
-        held = run_parameters[:n, 0].copy() if equation.sampled else None
-        made = stepped(equation, min(max(t, p[0]), p[1]), _state(x), held)
+        made = stepped(equation, *at(t, x, p, run_parameters))
         out[: len(made), 0] = made
 
     def of_behind(t: float, x: Array, p: Array, found: Array, out: Array) -> None:
         out[:, 0] = behind(equation, x[:, 0], found[:, 0])
 
     def of_bodies(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
-        held = run_parameters[:n, 0].copy() if equation.sampled else None
-        out[:, 0] = bodies(equation, min(max(t, p[0]), p[1]), _state(y), held)
+        out[:, 0] = bodies(equation, *at(t, y, p, run_parameters))
 
     def events(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
-        held = run_parameters[:n, 0].copy() if equation.sampled else None
-        out[:, 0] = equation.event_values(min(max(t, p[0]), p[1]), _state(y), held)
+        out[:, 0] = equation.event_values(*at(t, y, p, run_parameters))
 
     functions = Functions(rate, tick, energy, sampled, jacobian, events, step, of_behind, bodies=of_bodies)
     return functions

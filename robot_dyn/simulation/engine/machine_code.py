@@ -132,13 +132,6 @@ class MachineCode:
         """Steps after which the loop returns; see `Engine`."""
         return 1 if self.machine_loop is None else inf
 
-    @property
-    def compiling_s(self) -> float:
-        """Time that this thread has spent on compiling loops, in [s]."""
-        from robot_dyn.codegen.loops.call import spent_on_loops
-
-        return spent_on_loops()
-
     def evaluated(self, equation: StateEquation, watch: Watched) -> Evaluated:
         """Return the functions of an equation, with its numbers; see `Engine`."""
         in_python = self.in_python
@@ -154,7 +147,7 @@ class MachineCode:
         return latest[1]
 
     def places(self) -> Places:
-        """Return where the mode stands among the parameters of effects; see `Engine`."""
+        """Return the places of the mode among the parameters of effects; see `Engine`."""
         plant = self.equation.plant
         return places(self.known, plant.effects, plant.dynamics.n * self.equation.sampled)
 

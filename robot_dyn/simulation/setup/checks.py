@@ -41,7 +41,7 @@ def check_method(plant: Plant, method: Any, events: tuple[Event, ...], finds_eve
 
 
 def check_start(
-    plant: Plant, controller: Controller | None, events: tuple[Event, ...], q0: Array, v0: Array
+    plant: Plant, controller: Controller | None, events: tuple[Event, ...], q0: np.ndarray, v0: np.ndarray
 ) -> None:  # fmt: skip
     """Check that effects, controller and events have an answer at the start, between rigid stops.
 
@@ -63,7 +63,7 @@ def check_start(
         plant.forward_dynamics(0.0, q0, v0, nothing)  # a singular M is reported here
 
 
-def check_model(plant: Dynamics, controller: Controller, q0: Array) -> None:
+def check_model(plant: Dynamics, controller: Controller, q0: np.ndarray) -> None:
     """Check that a controller means the joints and links of the plant; a file with only other names may fit too."""
     for model in controller.models.values():
         pairs = tuple(zip(model.joint_names, plant.joint_names, strict=False))

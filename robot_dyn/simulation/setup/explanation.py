@@ -1,4 +1,4 @@
-"""The control of a setup in words: its law, what it consists of, its models and references."""
+"""The control of a setup in words: its law, parts, models and references."""
 
 from __future__ import annotations
 

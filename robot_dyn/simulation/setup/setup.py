@@ -112,7 +112,7 @@ class Setup(Value, Caching):
             check_model(self.plant.dynamics, self.controller, self.q0)
         _check_segments(self)
         check_method(self.plant, self.integrator, self.events, self.finds_events)
-        check_start(self.plant, self.controller, self.events, self.q0, self.v0)
+        check_start(self.plant, self.controller, self.events, self.q0, self.v0)  # pyright: ignore[reportArgumentType]
 
     def _check_accuracy(self) -> None:
         """That an accuracy is one, and that nothing else chooses method or tolerance."""
@@ -304,7 +304,7 @@ def gibibytes(size: float) -> str:
 
 
 def explanation_of(setup: Setup) -> Explanation:
-    """Return what a setup integrates, in words: the equation of motion, what acts, control, method and start."""
+    """Explain a setup in words: the equation of motion, effects, control, method and start."""
     plant, controller = explanation(setup.plant), setup.controller
     return replace(
         plant,
