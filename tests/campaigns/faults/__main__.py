@@ -28,7 +28,7 @@ from queue import SimpleQueue
 from time import monotonic
 
 from tests.campaigns.faults.homes import tests_of
-from tests.campaigns.faults.sites import KINDS, Site, files, ported, sites
+from tests.campaigns.faults.sites import KINDS, Site, files, is_python, ported, sites
 
 BUILD = Path(__file__).parents[3] / "build" / "faults"
 LEFT_OUT = (".venv", ".git", "build", "dist", "__pycache__", ".ruff_cache", ".hypothesis")
@@ -133,7 +133,9 @@ def drawn(tree: Path, seed: int) -> Iterator[Site]:
         for kind in KINDS:
             if folders := waiting[kind]:
                 folder = rng.choice(sorted(folders))
-                yield folders[folder].pop(rng.randrange(len(folders[folder])))
+                site = folders[folder].pop(rng.randrange(len(folders[folder])))
+                if is_python(site.planted((tree / "robot_dyn" / site.file).read_bytes())):
+                    yield site
                 if not folders[folder]:
                     del folders[folder]
 

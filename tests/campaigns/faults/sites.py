@@ -79,8 +79,7 @@ def sites(tree: Path, file: str) -> list[Site]:
             )
             site = Site(kind, file, scope, text, counts[kind], ast.unparse(node), after, span)
             counts[kind] += 1
-            if _is_python(site.planted(source)):
-                found.append(site)
+            found.append(site)
     return found
 
 
@@ -231,7 +230,8 @@ def _is_text(node: ast.expr) -> bool:
     )
 
 
-def _is_python(source: bytes) -> bool:
+def is_python(source: bytes) -> bool:
+    """Whether a file with a fault is still one of Python."""
     try:
         compile(source, "planted", "exec")
     except (SyntaxError, ValueError):
