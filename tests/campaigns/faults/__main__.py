@@ -42,6 +42,7 @@ class Copy:
     tree: Path
     folder: Path
     limit_s: float
+    most: int
     broken: set[str] = field(default_factory=set)
 
     @property
@@ -58,7 +59,7 @@ class Copy:
     def answer(self, site: Site, first: str = "") -> tuple[str, str, float]:
         """What the tests say of a fault: caught, survived, or slow; the test that says so; seconds."""
         start = monotonic()
-        asked = tests_of(self.tree, site.file, site.scope, first)
+        asked = tests_of(self.tree, site.file, site.scope, first)[: self.most]
         with self.with_fault(site):
             while True:
                 code, test = self.run(asked, self.limit_s - (monotonic() - start))
@@ -147,7 +148,8 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=200, help="faults that are in both trees")
     parser.add_argument("--seed", type=int, default=46)
     parser.add_argument("--minutes", type=float, default=60.0, help="no fault is begun after them")
-    parser.add_argument("--limit", type=float, default=90.0, help="seconds of the tests of one fault in one tree")
+    parser.add_argument("--limit", type=float, default=120.0, help="seconds of the tests of one fault in one tree")
+    parser.add_argument("--files", type=int, default=8, help="files of tests that are asked about one fault")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--all", action="store_true", help="ask the new tests about faults that the old ones miss, too")
     parser.add_argument("--write", type=Path, default=BUILD)
@@ -170,7 +172,8 @@ def main() -> int:
     copies: SimpleQueue[tuple[Copy, Copy]] = SimpleQueue()
     for worker in range(options.workers):
         both = [
-            Copy(tree, options.write / f"{name}_{worker}", options.limit) for tree, name in ((old, "old"), (new, "new"))
+            Copy(tree, options.write / f"{name}_{worker}", options.limit, options.files)
+            for tree, name in ((old, "old"), (new, "new"))
         ]
         for each in both:
             shutil.rmtree(each.folder, ignore_errors=True)  # the tree may have changed since
