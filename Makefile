@@ -9,21 +9,19 @@ demo: .venv/installed
 	$(BIN)/robot-dyn demo --force
 
 # the many processes that tests start share their byte code
-test test-long: export PYTHONDONTWRITEBYTECODE :=
+test test-long stress: export PYTHONDONTWRITEBYTECODE :=
 
 test: .venv/installed
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
-# the cases that tests mark as long: the whole catalog, all methods, more seeds
+# the cases that tests mark as long: more of the catalog, all methods, more seeds
 test-long: .venv/installed
-	$(BIN)/python -m pytest -n auto --dist worksteal -m long
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "long and not stress"
 
-# hours: all hard cases and their figures in build/hard_cases; error estimates on 600 random scenes. With a fixed seed and
-# with that of the day, which each prints.
+# hours: the cases that tests mark as stress and all campaigns, with seeds of the day; the report is build/stress/report.md,
+# hard cases and their figures are in build/hard_cases
 stress: .venv/installed
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.campaigns.hard --full --write --seed $$(date +%Y%m%d)
-	$(BIN)/python -m tests.campaigns.estimates --scenes 600 --seed 1
-	$(BIN)/python -m tests.campaigns.estimates --scenes 600 --seed $$(date +%Y%m%d)
+	$(BIN)/python -m tests.campaigns
 
 # what CI asks for besides the tests
 check: .venv/installed

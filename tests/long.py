@@ -1,4 +1,4 @@
-"""Cases that `make test` leaves to `make test-long`."""
+"""Cases that `make test` leaves to `make test-long`, and those that both leave to `make stress`."""
 
 from __future__ import annotations
 
@@ -14,18 +14,25 @@ EIGHT = ("anymal_b", "cart_pole", "kinova", "mimic_chain", "panda", "planar_2r",
 
 def long(cases: Iterable[Any]) -> list[Any]:
     """Parameters marked as long; a case of several arguments is a tuple or a `pytest.param`."""
-    return [_long(case if hasattr(case, "marks") else pytest.param(*_arguments(case))) for case in cases]
+    return _marked(cases, pytest.mark.long)
+
+
+def stress(cases: Iterable[Any]) -> list[Any]:
+    """Parameters marked for `make stress`, written as those of `long`."""
+    return _marked(cases, pytest.mark.stress)
+
+
+def _marked(cases: Iterable[Any], mark: pytest.MarkDecorator) -> list[Any]:
+    made = [case if hasattr(case, "marks") else pytest.param(*_arguments(case)) for case in cases]
+    return [pytest.param(*case.values, id=case.id, marks=[*case.marks, mark]) for case in made]
 
 
 def _arguments(case: Any) -> Iterable[Any]:
     return case if type(case) is tuple else [case]
 
 
-def _long(case: Any) -> Any:
-    return pytest.param(*case.values, id=case.id, marks=[*case.marks, pytest.mark.long])
-
-
 def robots(without: Collection[str] = ()) -> list[Any]:
-    """Names of the catalog; all are long but eight, of which some are trees, slide, are coupled or float."""
+    """Names of the catalog: eight, of which some are trees, slide, are coupled or float; a third of the others long."""
     names = [name for name in rd.list_robots() if name not in without]
-    return [*(name for name in names if name in EIGHT), *long(name for name in names if name not in EIGHT)]
+    others = [name for name in names if name not in EIGHT]
+    return [*(name for name in names if name in EIGHT), *long(others[::3]), *stress(others[1::3] + others[2::3])]

@@ -6,6 +6,7 @@ import ast
 import re
 import sys
 import tomllib
+from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -19,6 +20,7 @@ HOMES = {"pinocchio": ["pin"]}  # its wheel puts the module beside site-packages
 BY_PATH = {"example-robot-data", "meshcat", "pycollada"}
 
 
+@cache
 def imported(folder: str) -> dict[str, str]:
     """Top-level modules that the files of a folder import and Python does not have, each with one such file."""
     found: dict[str, str] = {}

@@ -12,6 +12,7 @@ from nbclient import NotebookClient
 from nbconvert import HTMLExporter
 
 from tests.browser import View
+from tests.long import long
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = [DOCS / "start" / "ten_minutes.md", DOCS / "explanation" / "which_method.md"]  # whose cells the site shows too
@@ -45,7 +46,7 @@ def test_a_notebook_is_short(path: Path) -> None:
     assert [each for each in sentences if len(each.split()) > MOST_WORDS] == []
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [NOTEBOOKS[0], *long(NOTEBOOKS[1:])], ids=lambda path: path.stem)
 def test_a_notebook_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, browser: Any) -> None:
     """In a kernel of this Python, without settings of the user; a cell that raises fails the test."""
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))

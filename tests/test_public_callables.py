@@ -13,9 +13,21 @@ import robot_dyn as rd
 from robot_dyn import RobotDynError
 from robot_dyn.foundations import RobotDynWarning, shown
 from tests.campaigns.fuzz.campaign import HangError, limited
+from tests.long import long
 from tests.wrong_arguments import EXTREME, LAX, LONG, NOT_TEXT, Example, examples, public, wrong
 
 LIMIT_S = 20  # of one call; the machine may be busy
+MEASURE = {
+    "advise",
+    "budget",
+    "certify",
+    "cost",
+    "from_scene",
+    "path",
+    "prove",
+    "save_plot",
+    "work_precision",
+}  # seconds
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +54,7 @@ def test_wrong_arguments_are_refused(known: dict[str, Example], name: str) -> No
     assert not bad, "\n".join(bad)
 
 
-@pytest.mark.parametrize("name", sorted(public()))
+@pytest.mark.parametrize("name", [*sorted({*public()} - MEASURE), *long(sorted(MEASURE))])
 def test_extreme_arguments_are_answered_or_refused(known: dict[str, Example], name: str) -> None:
     """Arrays without axes, scalars of NumPy, None, denormal and huge numbers, NUL in paths."""
     function, arguments = known[name]

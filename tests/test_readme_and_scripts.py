@@ -16,7 +16,7 @@ import pytest
 
 from tests import command as here
 from tests.browser import chromium
-from tests.long import long
+from tests.long import long, stress
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -98,13 +98,16 @@ SCRIPTS = [
 ]
 
 
+SLOW = [["architecture.py"], ["before.py"], ["replay_pictures.py"]]
+
+
 @pytest.mark.parametrize(
     "command",
     [
         ["benchmark.py", "energy"],
-        ["benchmark.py", "sweeps"],
-        *SCRIPTS,
-        *long([["benchmark.py", "plans"], ["benchmark.py"]]),
+        *(command for command in SCRIPTS if command not in SLOW),
+        *long([["benchmark.py", "sweeps"], ["benchmark.py", "plans"], *SLOW]),
+        *stress([["benchmark.py"]]),
     ],
     ids=" ".join,
 )

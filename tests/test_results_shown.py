@@ -18,6 +18,7 @@ from nbconvert import HTMLExporter
 
 import robot_dyn as rd
 from robot_dyn.foundations import Answer, Table
+from tests.long import long
 
 ARM = rd.load("planar_2r")
 Q = np.array([0.3, 0.4])
@@ -152,7 +153,7 @@ def executed(*cells: str) -> Any:
     return NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
 
 
-@pytest.mark.parametrize("before", ["", "%matplotlib inline", "import matplotlib.pyplot as plt"])
+@pytest.mark.parametrize("before", ["", *long(["%matplotlib inline", "import matplotlib.pyplot as plt"])])
 def test_a_figure_that_a_cell_returns_is_one_picture(before: str) -> None:
     (output,) = executed(before, f"rd.plot({RUN}, 'joints')").cells[-1].outputs
     assert output.output_type == "execute_result" and set(output.data) == {"image/png", "text/plain"}

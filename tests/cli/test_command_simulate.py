@@ -13,15 +13,11 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.scene import starter, starter_names
-from tests.command import interrupted_at_work, refusal
+from tests.command import interrupted_at_work, refusal, run
 from tests.snapshots import assert_text
 
 COMMAND = [sys.executable, "-c", "from robot_dyn.cli import main; main()"]
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "reference" / "json.md").read_text(encoding="utf-8")
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False)
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from robot_dyn.codegen.loops.expressions import EXPRESSIONS
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.loops.statements import STATEMENTS
 from robot_dyn.foundations import MachineCodeError
-from tests.long import long
+from tests.long import long, stress
 
 
 def compiled(function: Any) -> Any:
@@ -157,7 +157,9 @@ def same(x: Any, y: Any) -> None:
             np.testing.assert_array_equal(np.signbit(a[~np.isnan(a)]), np.signbit(b[~np.isnan(b)]))
 
 
-@pytest.mark.parametrize("seeds", [range(10), *long([range(10, 200)])], ids=["10", "200"])
+@pytest.mark.parametrize(
+    "seeds", [range(10), *long([range(10, 60)]), *stress([range(60, 200)])], ids=["10", "60", "200"]
+)
 def test_random_programs_do_what_python_does(seeds: range) -> None:
     """From 4 general starts: results and every array, to the last bit. Scalars are NumPy's, by IEEE 754."""
     compared = 0

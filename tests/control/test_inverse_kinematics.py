@@ -12,6 +12,7 @@ import robot_dyn as rd
 from robot_dyn.control import InverseKinematics, orientation_error
 from robot_dyn.control.pose import error_and_jacobian, logarithm
 from robot_dyn.foundations import PlanError, QueryError, hat
+from tests.long import long, stress
 
 # kinova has continuous joints, panda a coupled one
 ARMS = {"ur5": "tool0", "panda": "panda_hand", "kinova": "j2s6s200_end_effector", "xarm7": "link_eef", "z1": "link06"}
@@ -50,10 +51,10 @@ def test_poses_of_positions_within_the_limits_are_reached(name: str) -> None:
     assert reached(name, 20) == 1
 
 
-@pytest.mark.long
+@pytest.mark.parametrize("poses", [*long([100]), *stress([1000])])
 @pytest.mark.parametrize("name", ARMS)
-def test_of_a_thousand_poses_99_of_100_are_reached(name: str) -> None:
-    assert reached(name, 1000) >= 0.99
+def test_99_of_100_poses_are_reached(name: str, poses: int) -> None:
+    assert reached(name, poses) >= 0.99
 
 
 @pytest.mark.parametrize("name", ARMS)

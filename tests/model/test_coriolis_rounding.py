@@ -18,10 +18,12 @@ from robot_dyn.lagrange import magnitudes
 from robot_dyn.model.coriolis import MOST_ROUNDING
 from robot_dyn.model.regrouped import joint_axes, least_inertia, reach, regrouped, rounding
 from tests.lagrange.test_scales import chain
+from tests.long import long, stress
 from tests.random_trees import RandomTree, trees
 
 SEEDS = st.integers(0, 2**32 - 1)
 SOME = ("ur5", "panda", "z1", "ur10", "kinova", "so101", "talos_left_arm", "mimic_chain")
+NAMES = rd.list_robots()
 
 
 def states(robot: rd.Robot, seed: int, count: int) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -61,9 +63,8 @@ def test_rounding_of_the_regrouped_model_is_below_its_bound(name: str) -> None:
     assert excess(robot, regrouped(robot.model), 1, 8) <= 1
 
 
-@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
-@pytest.mark.parametrize("name", rd.list_robots())
+@pytest.mark.parametrize("name", [*long(NAMES[::4]), *stress(name for k, name in enumerate(NAMES) if k % 4)])
 def test_rounding_is_below_its_bound_on_the_catalog(name: str) -> None:
     try:
         robot = rd.load(name)
@@ -84,7 +85,7 @@ def test_rounding_is_below_its_bound_on_random_trees(tree: RandomTree, seed: int
     assert excess(robot, regrouped(robot.model), seed, 2) <= 1
 
 
-@pytest.mark.long
+@pytest.mark.stress
 @settings(max_examples=200)
 @given(trees(), SEEDS)
 def test_rounding_is_below_its_bound_on_200_random_trees(tree: RandomTree, seed: int) -> None:

@@ -14,6 +14,7 @@ import pytest
 
 from robot_dyn import RobotDynError
 from robot_dyn.tools import sweeps as sw
+from tests.long import long
 from tests.tools.sweeps.children import outcome_of
 from tests.tools.sweeps.swept import swept
 
@@ -149,11 +150,15 @@ def test_damaged_samples_are_refused(copy: Path, damage: Damage) -> None:
     ("damage", "question"),
     [
         pytest.param(pipe("sweep.json"), "table()", id="specification, pipe"),
-        pytest.param(zeros("design.npy"), "table()", id="design, zeros"),
-        pytest.param(zeros(ROWS), "table()", id="rows, zeros"),
         pytest.param(zeros(SHARD), "samples().q.values", id="shard, zeros"),
-        pytest.param(pipe("samples/q/zarr.json"), "samples().q.values", id="array, pipe", marks=HANGS),
-        pytest.param(zeros("samples/t/zarr.json"), "samples().q.values", id="times, zeros", marks=HANGS),
+        *long(
+            [
+                pytest.param(zeros("design.npy"), "table()", id="design, zeros"),
+                pytest.param(zeros(ROWS), "table()", id="rows, zeros"),
+                pytest.param(pipe("samples/q/zarr.json"), "samples().q.values", id="array, pipe", marks=HANGS),
+                pytest.param(zeros("samples/t/zarr.json"), "samples().q.values", id="times, zeros", marks=HANGS),
+            ]
+        ),
     ],
 )
 def test_what_is_not_a_regular_file_is_refused_at_once(

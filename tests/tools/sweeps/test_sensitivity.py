@@ -16,6 +16,7 @@ from scipy.stats import f_oneway, randint
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import Design, designs, sensitivity
+from tests.long import long
 from tests.tools.sweeps.swept import of_figure
 
 NAMES = ("x1", "x2", "x3")
@@ -84,7 +85,7 @@ def test_first_order_of_given_data_is_the_correlation_ratio_of_the_analysis_of_v
     assert made.low < made.estimate < made.high
 
 
-@pytest.mark.parametrize("name", ["random", "sobol", "latin"])
+@pytest.mark.parametrize("name", ["random", *long(["sobol", "latin"])])
 @pytest.mark.parametrize("bend", [0.0, 1.0])
 def test_intervals_of_given_data_hold_the_index_of_a_bend_and_of_a_jump(name: str, bend: float) -> None:
     """Of |u₁ − 1/3| + u₂/50 and [u₁ > 0.37] + 0.3 u₂: a fit of finite degree explains too little of either.
