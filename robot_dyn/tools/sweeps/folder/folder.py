@@ -1,7 +1,7 @@
 """The folder of a sweep: its specification, and a file for each chunk that is done. What has no file is left to do.
 
 sweep.json                   the specification
-design.npy                   rows of the design, where they were given as a table
+design.npy                   rows of the design
 rows/000123.parquet          a chunk; of more than 20 000 chunks rows/0004/080123.parquet
 samples/                     samples of runs, where they are kept
 """
@@ -178,25 +178,22 @@ def has_specification(path: Path) -> bool:
     return (path / _SPECIFICATION).is_file()
 
 
-def read_specification(path: Path) -> tuple[str, np.ndarray | None]:
-    """The text of the specification of a folder, and the rows of its design if they were given.
+def read_specification(path: Path) -> tuple[str, np.ndarray]:
+    """The text of the specification of a folder, and the rows of its design.
 
     Raises:
         SweepError: If the folder holds no sweep, or it cannot be read.
     """
     remedy = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
     text = read(path / _SPECIFICATION, _MOST_TEXT, SweepError, remedy).decode("utf-8", "replace")
-    table = None
-    if (path / _DESIGN).exists():
-        data = read(path / _DESIGN, _MOST_TABLE, SweepError, remedy)
-        try:
-            table = np.load(io.BytesIO(data), allow_pickle=False)
-        except (ValueError, EOFError) as error:
-            raise SweepError(f"{path / _DESIGN}: is not a table of numbers ({error})") from None
-    return text, table
+    data = read(path / _DESIGN, _MOST_TABLE, SweepError, remedy)
+    try:
+        return text, np.load(io.BytesIO(data), allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        raise SweepError(f"{path / _DESIGN}: is not a table of numbers ({error})") from None
 
 
-def begin(path: Path, text: str, table: np.ndarray | None, files: Files | None = None) -> bool:
+def begin(path: Path, text: str, rows: np.ndarray, files: Files | None = None) -> bool:
     """Write the specification of a new sweep; False if another process was first.
 
     Raises:
@@ -208,10 +205,9 @@ def begin(path: Path, text: str, table: np.ndarray | None, files: Files | None =
     if strange and _SPECIFICATION not in strange:
         raise SweepError(f"{path}: holds other files, such as {strange[0]}; give a new folder")
     try:
-        if table is not None:
-            stream = io.BytesIO()
-            np.save(stream, table, allow_pickle=False)
-            write(path / _DESIGN, stream.getvalue(), files)
+        stream = io.BytesIO()
+        np.save(stream, rows, allow_pickle=False)
+        write(path / _DESIGN, stream.getvalue(), files)
         write(path / _SPECIFICATION, text.encode(), files or Exclusive())
     except FileExistsError:
         return False

@@ -26,7 +26,7 @@ from robot_dyn.tools.sweeps.plan.samples import samples
 from robot_dyn.tools.sweeps.plan.stated import StatedScene, stated_scene
 from robot_dyn.tools.sweeps.plan.sweep import Sweep, is_scene
 
-FORMAT = 3
+FORMAT = 4
 _PLACES = ("scene",)  # that may differ: where the scene lies
 
 
@@ -72,10 +72,16 @@ class Specification:
         """The same in chunks of so many runs."""
         return Specification(self.data | {"chunk": runs})
 
-    def check_same(self, other: Specification, where: str) -> None:
-        """Raise SweepError unless another specification has all that this one states; names the first difference."""
+    def check_same(self, other: Specification, where: str, versions: bool = True) -> None:
+        """Raise SweepError unless another specification has all that this one states; names the first difference.
+
+        Args:
+            other: The specification.
+            where: The file of this one, for the message.
+            versions: Whether versions of packages are compared too: they matter where rows are computed.
+        """
         for name, here, there in _differences(self.data, other.data, ""):
-            if name not in _PLACES:
+            if name not in _PLACES and (versions or not name.startswith("versions.")):
                 raise SweepError(
                     f"{where}: holds another sweep: {name} is {shorten(here)} there, {shorten(there)} here; give"
                     " another folder, or the sweep that was begun"
@@ -84,15 +90,13 @@ class Specification:
 
 def specification(sweep: Sweep) -> Specification:
     """The specification of a sweep, without the size of its chunks."""
-    given = isinstance(sweep.design, str)
-    table = {} if given else {"table_sha256": sha256(np.ascontiguousarray(sweep.design, float).tobytes()).hexdigest()}
     data = {
         "format": FORMAT,
         "scene": sweep.source,
         "setup": _stated_setup(sweep),
         "runs": int(sweep.runs),
-        "design": sweep.design if given else "table",
-        **table,
+        "design": sweep.points.name,
+        "rows_sha256": sha256(np.ascontiguousarray(sweep.points.rows).tobytes()).hexdigest(),
         "seed": int(sweep.seed),
         "vary": {name: each.to_dict() for name, each in sweep.vary.items()},
         "order": list(sweep.vary),
@@ -105,7 +109,7 @@ def specification(sweep: Sweep) -> Specification:
 
 
 def sweep_of(
-    data: Mapping[str, Any], table: np.ndarray | None, where: str, named: Named = NOTHING, folder: Path | None = None
+    data: Mapping[str, Any], rows: np.ndarray, where: str, named: Named = NOTHING, folder: Path | None = None
 ) -> Sweep:
     """Return the sweep of a specification, with its scene as it is now.
 
@@ -113,7 +117,7 @@ def sweep_of(
 
     Args:
         data: The specification.
-        table: Rows of the design, if they are stored.
+        rows: Of the design.
         where: Its file, for messages.
         named: What the reader of the folder names.
         folder: The folder, from which nothing is imported.
@@ -129,10 +133,11 @@ def sweep_of(
         of = {name: _figure_of(name, stated, named, folder) for name, stated in data["figures"].items()}
         if unknown := named.figures.keys() - {name for name, figure in of.items() if isinstance(figure, UserFigure)}:
             raise SweepError(f"{where}: no function is the figure {shown(min(unknown))}; {nearest(min(unknown), of)}")
-        design = data["design"] if table is None else table
+        named_design = data["design"] != "table"
+        design, drawn = (data["design"], rows) if named_design else (rows, None)
         kept = data["samples"]
         kept = kept and samples(*kept["names"], every=kept["every"], failed=kept["failed"])
-        return Sweep(scene, data["runs"], vary, of, design, data["seed"], data["storage"], kept)
+        return Sweep(scene, data["runs"], vary, of, design, data["seed"], data["storage"], kept, drawn)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise SweepError(f"{where}: is not the specification of a sweep ({error!r})") from None
 

@@ -17,7 +17,7 @@ from robot_dyn.foundations.values import Caching, Value
 from robot_dyn.queries.units import joint_types_of, unit
 from robot_dyn.simulation.rollouts.sweepable import sweepable
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.tools.sweeps.designs import Design, design
+from robot_dyn.tools.sweeps.designs import Design, design, given
 from robot_dyn.tools.sweeps.distributions import Distribution, distribution
 from robot_dyn.tools.sweeps.folder.rows import TEXTS
 from robot_dyn.tools.sweeps.imported import imported, path_of
@@ -50,6 +50,7 @@ class Sweep(Answer, Value, Caching):
         seed: Of the design.
         storage: "parquet" or "npz"; None for Parquet where pyarrow is installed.
         samples: What to keep of the motion: "q", or `samples("q", "u", every=100)`; nothing by default.
+        drawn: The rows of the design, (N, d), as a folder keeps them; None to draw them by name and seed.
 
     Raises:
         SweepError: If an argument is not allowed; names it.
@@ -64,6 +65,7 @@ class Sweep(Answer, Value, Caching):
     seed: int = 0
     storage: str | None = None
     samples: Samples | None = None
+    drawn: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -82,7 +84,7 @@ class Sweep(Answer, Value, Caching):
             raise SweepError(f"storage must be one of {', '.join(FORMATS)}, got {shown(self.storage)}")
         set_(self, "storage", self.storage or _best_format())
         set_(self, "samples", samples_of(self.samples))
-        self.rows  # noqa: B018  that a design has so many rows
+        _ = self.points  # refused if the design does not have so many rows
         self._check_names()
 
     @cached_property
@@ -96,9 +98,12 @@ class Sweep(Answer, Value, Caching):
         return made
 
     @cached_property
-    def rows(self) -> Design:
-        """The design."""
-        return design(self.design, self.runs, sum(each.size for each in self.vary.values()), self.seed)
+    def points(self) -> Design:
+        """The design, drawn once."""
+        dimensions = sum(each.size for each in self.vary.values())
+        if self.drawn is not None and isinstance(self.design, str):
+            return given(self.drawn, self.runs, dimensions, self.design)
+        return design(self.design, self.runs, dimensions, self.seed)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -141,7 +146,7 @@ class Sweep(Answer, Value, Caching):
 
     def values(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """What varies in runs start, …, stop − 1, by name, (k, size)."""
-        u, first, found = self.rows.rows(start, stop), 0, {}
+        u, first, found = self.points.rows[start:stop], 0, {}
         for name, each in self.vary.items():
             found[name] = each.values(np.ascontiguousarray(u[:, first : first + each.size])).reshape(stop - start, -1)
             first += each.size
