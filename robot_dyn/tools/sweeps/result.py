@@ -169,7 +169,7 @@ class SweepResult(Answer):
         if self.folder.samples is None:
             raise SweepError("no samples are kept: give the Sweep samples='q', or sw.samples('q', every=100)")
         self._check_complete()
-        self.folder.check_samples(bits=False)
+        self.folder.check_samples()
         return self.folder.samples.open(self.sweep.joint_types)
 
     def export(self, path: str | Path, *, force: bool = False) -> Path:
@@ -214,7 +214,7 @@ class SweepResult(Answer):
             SweepError: If a file is missing, damaged, or was changed.
         """
         self._check_complete()
-        self.folder.check_samples(bits=True)
+        self.folder.check_samples()
         return digest_of(read_all(self.folder))
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -23,6 +22,7 @@ from robot_dyn.tools.sweeps.plan.pilot import pilot
 from robot_dyn.tools.sweeps.plan.specification import (
     Specification,
     names_of,
+    parsed,
     processor,
     specification,
     sweep_of,
@@ -128,10 +128,7 @@ def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Work]:
     check_places(path)
     text, rows = read_specification(path)
     where = str(path / "sweep.json")
-    try:
-        stored = Specification(json.loads(text))
-    except ValueError as error:
-        raise SweepError(f"{where}: is not JSON ({error})") from None
+    stored = parsed(text, where)
     try:
         sweep = sweep_of(stored.data, rows, where, names, path)
     except SceneError as error:
@@ -152,7 +149,7 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
             store.create(Work(sweep).times(), sweep.setup.plant.dynamics.joint_names)
         if begin(path, stated.text, sweep.points.rows):
             return _folder(path, sweep, stated)
-    stored = Specification(json.loads(read_specification(path)[0]))
+    stored = parsed(read_specification(path)[0], where)
     stored.check_same(own.with_chunk(chunk or stored.chunk), where)
     return _folder(path, sweep, stored)
 

@@ -123,14 +123,16 @@ def _parquet(rows: Rows, footer: dict[str, Any]) -> bytes:
     table = pa.table(columns)
     table = table.replace_schema_metadata({_FOOTER: json.dumps(footer)})
     stream = io.BytesIO()
-    parquet.write_table(table, stream, compression="zstd", compression_level=1, use_dictionary=list(TEXTS))
+    parquet.write_table(
+        table, stream, compression="zstd", compression_level=1, use_dictionary=list(TEXTS), write_page_checksum=True
+    )
     return stream.getvalue()
 
 
 def _read_parquet(path: Path, names: Sequence[str] | None) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     parquet = needs("pyarrow.parquet", extra="data")
     with reading(path, SweepError, _REMEDY) as stream, _of(path):
-        file = parquet.ParquetFile(stream)
+        file = parquet.ParquetFile(stream, page_checksum_verification=True)
         footer = json.loads(file.schema_arrow.metadata[_FOOTER.encode()])
         wanted = [name for name in file.schema_arrow.names if name != "run"] if names is None else list(names)
         read = file.read(columns=wanted, use_threads=False)

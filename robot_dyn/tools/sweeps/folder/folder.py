@@ -11,7 +11,6 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -86,11 +85,18 @@ class Folder:
         found = np.zeros(self.count, bool)
         suffix = self.format.suffix
         for folder in self.subfolders:
-            with suppress(FileNotFoundError), os.scandir(folder) as entries:
-                for each in entries:
-                    stem = each.name.removesuffix(suffix)
-                    if stem.isdigit() and stem != each.name and int(stem) < self.count:
-                        found[int(stem)] = True
+            try:
+                names = os.listdir(folder)
+            except FileNotFoundError:
+                continue
+            except OSError as error:
+                raise SweepError(
+                    f"{folder}: is not a folder of rows ({why(error)}); remove it, and run again"
+                ) from None
+            for name in names:
+                stem = name.removesuffix(suffix)
+                if stem.isdigit() and stem != name and int(stem) < self.count:
+                    found[int(stem)] = True
         return found
 
     def missing(self) -> np.ndarray:
@@ -136,11 +142,11 @@ class Folder:
         self._check(self.file(chunk), chunk, footer)
         return footer
 
-    def check_samples(self, bits: bool) -> None:
-        """Raise SweepError where samples that were written are missing, or, if `bits`, have changed."""
+    def check_samples(self) -> None:
+        """Raise SweepError where samples that were written are missing or have changed."""
         if self.samples is not None:
             for chunk in range(self.count):
-                self.samples.check(chunk, self.footer(chunk)["samples"], bits)
+                self.samples.check(chunk, self.footer(chunk)["samples"])
 
     def columns(self, names: Iterable[str]) -> dict[str, np.ndarray]:
         """Columns of all rows, (N,); errors as of `read`."""
