@@ -115,7 +115,7 @@ def _read_npz(path: Path, names: Sequence[str] | None) -> tuple[dict[str, np.nda
 
 
 def _parquet(rows: Rows, footer: dict[str, Any]) -> bytes:
-    pa, parquet = needs("pyarrow", extra="data"), needs("pyarrow.parquet", extra="data")
+    pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="data")
     columns = {"run": np.arange(rows.start, rows.start + len(rows))} | rows.columns
     for name in TEXTS:
         texts, codes = _dictionary(getattr(rows, name))
@@ -130,7 +130,7 @@ def _parquet(rows: Rows, footer: dict[str, Any]) -> bytes:
 
 
 def _read_parquet(path: Path, names: Sequence[str] | None) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    parquet = needs("pyarrow.parquet", extra="data")
+    parquet = needs("pyarrow.parquet", extra="sweeps")
     with reading(path, SweepError, _REMEDY) as stream, _of(path):
         file = parquet.ParquetFile(stream, page_checksum_verification=True)
         footer = json.loads(file.schema_arrow.metadata[_FOOTER.encode()])

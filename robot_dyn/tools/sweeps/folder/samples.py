@@ -23,7 +23,7 @@ from robot_dyn.simulation.columns import LONG_NAMES
 from robot_dyn.tools.sweeps.folder.files import Files, make_folder, write
 
 _INNER = 64  # runs that are read together, where all are kept
-_EXTRA = "data"
+_EXTRA = "sweeps"
 
 
 @final
@@ -111,7 +111,7 @@ class SampleStore:
 
     def open(self, joint_types: tuple[str | None, ...]) -> Any:
         """All as a lazy `xarray.Dataset` over run, t and joint, with units."""
-        xarray = needs("xarray", extra="data")
+        xarray = needs("xarray", extra="sweeps")
         needs("zarr", extra=_EXTRA)
         with self._reading():
             found = xarray.open_zarr(self.path, consolidated=False, chunks=None)
