@@ -51,7 +51,7 @@ SUBJECTS: dict[str, tuple[Callable[[Effort], None], ...]] = {
     "estimates": (estimates.estimates,),
     "proofs": (proofs.proofs,),
     "plans": (plans.point_to_point, plans.paths, plans.poses, plans.poses_beside_pink),
-    "sweeps": (sweeps.coverage, sweeps.exact_coverage, sweeps.indices, sweeps.costs, pendulum_sweeps.pendulum),
+    "sweeps": (sweeps.coverage, sweeps.indices, sweeps.costs, pendulum_sweeps.pendulum),
 }
 
 

@@ -240,7 +240,8 @@ def read_start(path: str | Path, count: int, error: type[RobotDynError], remedy:
     """The first bytes of a regular file, all if it has fewer; errors as in `reading`."""
     with reading(path, error, remedy) as stream:
         try:
-            return stream.read(count)
+            size = os.fstat(stream.fileno()).st_size  # a read asks for all of its bound at once
+            return stream.read(min(count, size + 1))
         except OSError as cause:
             raise error(f"{path}: cannot be read ({why(cause)}); {remedy}") from None
 

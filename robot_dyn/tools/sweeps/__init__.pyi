@@ -1,10 +1,10 @@
 # The public names of this room and where they live: type checkers read this file, and __init__.py does.
 from robot_dyn.foundations.errors import SweepError as SweepError
-from robot_dyn.tools.sweeps.distributions.by_name import choice as choice
-from robot_dyn.tools.sweeps.distributions.by_name import lognormal as lognormal
-from robot_dyn.tools.sweeps.distributions.by_name import normal as normal
-from robot_dyn.tools.sweeps.distributions.by_name import triangular as triangular
-from robot_dyn.tools.sweeps.distributions.by_name import uniform as uniform
+from robot_dyn.tools.sweeps.distributions import choice as choice
+from robot_dyn.tools.sweeps.distributions import lognormal as lognormal
+from robot_dyn.tools.sweeps.distributions import normal as normal
+from robot_dyn.tools.sweeps.distributions import triangular as triangular
+from robot_dyn.tools.sweeps.distributions import uniform as uniform
 from robot_dyn.tools.sweeps.estimate import Estimate as Estimate
 from robot_dyn.tools.sweeps.plan.figures import final as final
 from robot_dyn.tools.sweeps.plan.figures import peak as peak
@@ -21,6 +21,6 @@ from robot_dyn.tools.sweeps.sensitivity import Sensitivity as Sensitivity
 __all__: list[str]
 
 # Names that only tools and tests import.
-from robot_dyn.tools.sweeps.designs.base import Design as Design
+from robot_dyn.tools.sweeps.designs import Design as Design
 from robot_dyn.tools.sweeps.plan.work import Work as Work
 from robot_dyn.tools.sweeps.run_sweep import begun as begun

@@ -58,7 +58,7 @@ def _cell(value: object) -> str:
 
 
 def _parquet(sweep: Sweep, tables: Iterator[Mapping[str, np.ndarray]], stream: BinaryIO) -> None:
-    pa, parquet = needs("pyarrow", extra="data"), needs("pyarrow.parquet", extra="data")
+    pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="data")
     writer = None
     for each in tables:
         strings = {name: pa.array(each[name].astype(str).tolist(), pa.string()) for name in ("outcome", *TEXTS)}

@@ -13,6 +13,7 @@ from robot_dyn.foundations import FileKind, SweepError, html_of, page, save, sid
 from robot_dyn.report import PAGE, ink, inline, styled
 from robot_dyn.tools.sweeps.export import inputs_of
 from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading, is_scene
+from robot_dyn.tools.sweeps.sensitivity import bins
 
 if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.result import SweepResult
@@ -54,30 +55,33 @@ def report(result: SweepResult) -> str:
         parts.append(f"<p>{escape(shown)}; cells without runs are empty, each cross is a run that failed.</p>")
         parts.append(_failure_map(headings, [x[name] for name in names], failed))
     for name in result.sweep.figures:
-        parts += _of_figure(result, name, x[name])
+        parts += _of_figure(result, name, x[name], failed)
     body = page(result.title, *parts)
     return _HEAD.format(title=escape(result.title), body=body)
 
 
 def strongest(failed: np.ndarray, x: np.ndarray) -> tuple[int, int]:
-    """The two columns of x (N, d) on which failure depends most: by the variance of its share over 16 bins of each."""
-    explained = []
+    """The two columns of x (N, d) on which failure depends most: the least p-values of χ² over values or bins."""
+    from scipy.stats import chi2_contingency
+
+    found: list[tuple[Any, Any]] = []
     for column in x.T:
-        edges = np.quantile(column, np.arange(1, 16) / 16)
-        bins = np.searchsorted(edges, column, side="right")
-        sizes = np.maximum(np.bincount(bins, minlength=16), 1)
-        shares = np.bincount(bins, failed, 16) / sizes
-        explained.append(float(np.sum(sizes * (shares - failed.mean()) ** 2)))
-    first, second = np.argsort(-np.array(explained), kind="stable")[:2].tolist()
+        counts = np.array([np.bincount(bins(column), weights=each) for each in (failed, ~failed)])
+        if counts.shape[1] > 1:
+            statistic, p, freedom = map(float, tuple(chi2_contingency(counts))[:3])
+        else:
+            statistic, p, freedom = 0.0, 1.0, 1
+        found.append((p, -statistic / freedom))  # many strong ones have a p-value of 0
+    first, second = sorted(range(len(found)), key=found.__getitem__)[:2]
     return first, second
 
 
-def _of_figure(result: SweepResult, name: str, x: np.ndarray) -> Iterator[str]:
+def _of_figure(result: SweepResult, name: str, x: np.ndarray, failed: np.ndarray) -> Iterator[str]:
     """Distribution, quantiles and worst runs of a figure."""
     title = heading(result.sweep, name)
     yield f"<h2>{escape(title)}</h2>"
     finite = x[np.isfinite(x)]
-    quantiles = result.quantiles(name, _PROBABILITIES)
+    quantiles = result.quantiles(name, _PROBABILITIES, given="known" if (np.isnan(x) & ~failed).any() else None)
     rows = [(each.statistic, each.estimate, each.low, each.high) for each in quantiles]
     level = f"{100 * quantiles[0].level:g} % interval from"
     parts = [table(("", "estimate", level, "to"), rows), text(f"{quantiles[0].n} runs, {quantiles[0].failed} failed")]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from robot_dyn import Setup, Trajectory
-from robot_dyn.foundations import UNREPORTED, Answer, Block, SweepError, choice, integer, reported, truth
+from robot_dyn.foundations import UNREPORTED, Answer, Block, SweepError, choice, integer, reported, shown, truth
 from robot_dyn.tools.sweeps import counts
 from robot_dyn.tools.sweeps.event import happened
 from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.sensitivity import Sensitivity
 
 _SHOWN = 5  # reasons, and worst runs
+_GIVEN = "finished", "known"
 
 
 @final
@@ -66,19 +67,25 @@ class SweepResult(Answer):
         return {name: found[name] for name in names}
 
     def quantiles(
-        self, figure: str, probabilities: Any = (0.05, 0.5, 0.95), level: float = 0.95
+        self, figure: str, probabilities: Any = (0.05, 0.5, 0.95), level: float = 0.95, given: str | None = None
     ) -> tuple[Estimate, ...]:
-        """Quantiles of a figure over all runs, with intervals; runs that failed count as +∞.
+        """Quantiles of a figure with their intervals; a run that failed counts as +∞.
 
         Args:
             figure: Its name, or that of another column.
             probabilities: Of the quantiles, each in (0, 1).
             level: Of the intervals.
+            given: "finished" for those among the runs that finished, "known" among those that have a value.
+
+        Raises:
+            SweepError: If an argument is not allowed, or a run that finished has no value and `given` is not "known".
         """
         from robot_dyn.tools.sweeps import statistics
 
-        found = statistics.quantiles(self._figure(figure), probabilities, level, self._replicate)
-        return tuple(self._named(each, figure) for each in found)
+        x, keep, failed = self._asked(figure, given)
+        x = np.where(np.isnan(x), np.inf, x)[keep]
+        found = statistics.quantiles(x, probabilities, level, self._scrambling(keep), failed=failed)
+        return tuple(self._named(each, figure, given) for each in found)
 
     def probability(self, event: str, level: float = 0.95, given: str | None = None) -> Estimate:
         """Probability of an event, such as "diverged | error > 0.1", with its interval.
@@ -95,38 +102,44 @@ class SweepResult(Answer):
         from robot_dyn.tools.sweeps import statistics
 
         self._check_complete()
-        truth, replicate = happened(self.sweep, self.folder, event), self._replicate
+        truth, failed = happened(self.sweep, self.folder, event), self._failed
         known = truth.certain == truth.possible
-        keep = known if statistics.checked_given(given) == "known" else self._given(given)
+        keep = known if _checked(given) == "known" else np.ones(len(failed), bool) if given is None else ~failed
         if (unknown := ~known & keep).any():
             remedy = f"write 'failed | {event}', or ask with given='finished'"
-            if (unknown & self._given("finished")).any():
+            if (unknown & ~failed).any():
                 remedy = "some finished, and have no figure: ask with given='known'"
             raise SweepError(
                 f"{event!r} is unknown in {int(unknown.sum())} runs, such as run {int(unknown.argmax())}: {remedy}"
             )
-        failed = int((self._outcome() != FINISHED).sum()) if given is None else 0
-        of = None if replicate is None else replicate[keep]
-        found = statistics.probability(truth.certain[keep], level, of, failed=failed)
-        return replace(found, statistic=f"probability of {event}{'' if given is None else ' given finished'}")
+        count = int((failed & keep).sum())
+        found = statistics.probability(truth.certain[keep], level, self._scrambling(keep), failed=count)
+        return replace(found, statistic=f"probability of {event}{_among(given)}")
 
     def mean(self, figure: str, level: float = 0.95, given: str | None = None) -> Estimate:
-        """Mean of a figure with its interval, of all runs; `given` "finished" or "known" as of `probability`."""
+        """Mean of a figure with its interval; `given` as in `quantiles`, needed where runs failed."""
         from robot_dyn.tools.sweeps import statistics
 
-        return self._named(statistics.mean(self._values(figure, given), level, self._replicate, given=given), figure)
+        x, keep, failed = self._finite(figure, "mean", given)
+        found = statistics.mean(x[keep], level, self._scrambling(keep), failed=failed)
+        return self._named(found, figure, given)
 
     def sensitivity(self, figure: str, level: float = 0.95, given: str | None = None) -> Sensitivity:
-        """Which of what varies matters: first and total Sobol' indices of design "saltelli", else of given data."""
+        """What matters of what varies; `given` as in `mean`.
+
+        First-order and total Sobol' indices of design "saltelli", else rank correlations and PAWN indices.
+        """
         from robot_dyn.tools.sweeps import sensitivity
 
-        y, names, design = self._values(figure, given), self.sweep.dimensions, self.sweep.rows
-        if isinstance(self.sweep.design, str) and self.sweep.design == "saltelli":
-            found = sensitivity.saltelli(y, names, self._replicate, level, given=given)
+        x, keep, failed = self._finite(figure, "sensitivity", given)
+        if self.sweep.points.name == "saltelli":
+            scrambling = self.sweep.points.scrambling
+            found = sensitivity.saltelli(x, keep, self.sweep.dimensions, scrambling, level, failed=failed)
         else:
-            x = design.rows(0, self.sweep.runs)
-            found = sensitivity.given_data(y, x, names, level, self._replicate, given=given)
-        return replace(found, figure=heading(self.sweep, figure))
+            values = self.folder.columns(self.sweep.columns)
+            columns = np.column_stack([values[name] for name in self.sweep.columns])
+            found = sensitivity.by_values(x[keep], columns[keep], self.sweep.columns, failed=failed)
+        return replace(found, figure=heading(self.sweep, figure), given=given)
 
     def worst(self, figure: str, count: int = 5, given: str | None = None) -> tuple[int, ...]:
         """Numbers of the runs with the largest values of a figure; `run(i)` repeats one.
@@ -135,10 +148,10 @@ class SweepResult(Answer):
         it is "known".
         """
         count = integer("count", count, least=1, most=self.sweep.runs, error=SweepError)
-        from robot_dyn.tools.sweeps.statistics import checked_given
-
         x = self._figure(figure)
-        keep = np.isfinite(x) if checked_given(given) == "known" else self._given(given)
+        keep = (
+            np.isfinite(x) if _checked(given) == "known" else np.ones(len(x), bool) if given is None else ~self._failed
+        )
         runs, x = np.flatnonzero(keep), x[keep]
         order = np.argsort(-np.where(np.isnan(x), np.inf, x), kind="stable")
         return tuple(runs[order[:count]].tolist())
@@ -152,7 +165,7 @@ class SweepResult(Answer):
         if self.folder.samples is None:
             raise SweepError("no samples are kept: give the Sweep samples='q', or sw.samples('q', every=100)")
         self._check_complete()
-        self.folder.check_samples(bits=False)
+        self.folder.check_samples()
         return self.folder.samples.open(self.sweep.joint_types)
 
     def export(self, path: str | Path, *, force: bool = False) -> Path:
@@ -197,7 +210,7 @@ class SweepResult(Answer):
             SweepError: If a file is missing, damaged, or was changed.
         """
         self._check_complete()
-        self.folder.check_samples(bits=True)
+        self.folder.check_samples()
         return digest_of(read_all(self.folder))
 
     @property
@@ -271,26 +284,58 @@ class SweepResult(Answer):
         known = (*self.sweep.figures, *self.sweep.columns, "ended")
         return self.folder.columns((choice("figure", name, known, error=SweepError),))[name]
 
-    def _values(self, name: str, given: str | None) -> np.ndarray:
-        """A figure of all runs; SweepError if one that finished is asked for, and has none."""
-        x = self._figure(name)
-        if isinstance(given, str) and given == "finished" and (none := ~np.isfinite(x) & self._given(given)).any():
+    @property
+    def _failed(self) -> np.ndarray:
+        """Which runs diverged or raised, (N,)."""
+        return self._outcome() != FINISHED
+
+    def _asked(self, name: str, given: str | None) -> tuple[np.ndarray, np.ndarray, int]:
+        """A figure of all runs, which of them are asked about, and how many of these failed.
+
+        Raises:
+            SweepError: If one that finished is asked for, and has no value.
+        """
+        x, failed = self._figure(name), self._failed
+        unknown = np.isnan(x)
+        keep = ~unknown if _checked(given) == "known" else np.ones(len(x), bool) if given is None else ~failed
+        if (none := keep & unknown & ~failed).any():
             raise SweepError(
                 f"{name!r} has no value in {int(none.sum())} runs that finished, such as run {int(none.argmax())}: ask"
                 " with given='known', which leaves them out"
             )
-        return x
+        return x, keep, int((failed & (keep if given is None else ~keep)).sum())
 
-    def _named(self, found: Estimate, figure: str) -> Estimate:
-        """With the figure it is of, and its unit."""
-        return replace(found, statistic=f"{found.statistic} of {heading(self.sweep, figure)}")
+    def _finite(self, name: str, what: str, given: str | None) -> tuple[np.ndarray, np.ndarray, int]:
+        """As `_asked`; SweepError if a run that is asked about failed, or its value is not finite."""
+        x, keep, failed = self._asked(name, given)
+        if lost := int((keep & np.isnan(x)).sum()):
+            raise SweepError(
+                f"{lost} of {len(x)} runs failed: a {what} of those that finished is given='finished', of those with a"
+                " value given='known'"
+            )
+        if (infinite := keep & np.isinf(x)).any():
+            raise SweepError(
+                f"{name!r} is infinite in {int(infinite.sum())} runs, such as run {int(infinite.argmax())}: it has no"
+                f" {what}; quantiles and probabilities count it"
+            )
+        return x, keep, failed
 
-    def _given(self, given: str | None) -> np.ndarray:
-        """Which runs are asked about, (N,)."""
-        return np.ones(self.sweep.runs, bool) if given is None else self._outcome() == FINISHED
+    def _named(self, found: Estimate, figure: str, given: str | None) -> Estimate:
+        """With the figure it is of, its unit, and which runs were asked about."""
+        return replace(found, statistic=f"{found.statistic} of {heading(self.sweep, figure)}{_among(given)}")
 
-    @property
-    def _replicate(self) -> np.ndarray | None:
-        """The scrambling of each run; None of independent ones."""
-        design = self.sweep.rows
-        return None if design.independent else design.replicate_of(np.arange(self.sweep.runs))
+    def _scrambling(self, keep: np.ndarray) -> np.ndarray | None:
+        """The scrambling of each run that is asked about; None of independent ones."""
+        design = self.sweep.points
+        return None if design.independent else design.scrambling[keep]
+
+
+def _checked(given: Any) -> str | None:
+    """What `given` may be; SweepError otherwise."""
+    if given is not None and not (isinstance(given, str) and given in _GIVEN):
+        raise SweepError(f"given must be {', '.join(map(repr, _GIVEN))} or None, got {shown(given)}")
+    return given
+
+
+def _among(given: str | None) -> str:
+    return "" if given is None else f" given {given}"

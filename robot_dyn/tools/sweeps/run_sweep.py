@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from shutil import disk_usage
 from time import perf_counter
 from typing import Any
-
-import numpy as np
 
 from robot_dyn.codegen import thread_count
 from robot_dyn.foundations import SceneError, SweepError, check_folder, file_path, integer, shown
@@ -23,6 +20,7 @@ from robot_dyn.tools.sweeps.plan.pilot import pilot
 from robot_dyn.tools.sweeps.plan.specification import (
     Specification,
     names_of,
+    parsed,
     processor,
     specification,
     sweep_of,
@@ -126,17 +124,14 @@ def read(
 def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Work]:
     """The folder of a sweep, and its work; arguments and errors as of `read`."""
     check_places(path)
-    text, table = read_specification(path)
+    text, rows = read_specification(path)
     where = str(path / "sweep.json")
+    stored = parsed(text, where)
     try:
-        stored = Specification(json.loads(text))
-    except ValueError as error:
-        raise SweepError(f"{where}: is not JSON ({error})") from None
-    try:
-        sweep = sweep_of(stored.data, table, where, names, path)
+        sweep = sweep_of(stored.data, rows, where, names, path)
     except SceneError as error:
         raise SweepError(f"{where}: {error}; sw.read(folder, scene=…), --scene, where it lies now") from None
-    stored.check_same(specification(sweep).with_chunk(stored.chunk), where)
+    stored.check_same(specification(sweep).with_chunk(stored.chunk), where, versions=False)
     return _folder(path, sweep, stored), Work(sweep)
 
 
@@ -150,10 +145,9 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
         stated = own.with_chunk(pilot(sweep, chunk))
         if (store := _folder(path, sweep, stated).samples) is not None:
             store.create(Work(sweep).times(), sweep.setup.plant.dynamics.joint_names)
-        table = None if isinstance(sweep.design, str) else np.asarray(sweep.design, float)
-        if begin(path, stated.text, table):
+        if begin(path, stated.text, sweep.points.rows):
             return _folder(path, sweep, stated)
-    stored = Specification(json.loads(read_specification(path)[0]))
+    stored = parsed(read_specification(path)[0], where)
     stored.check_same(own.with_chunk(chunk or stored.chunk), where)
     return _folder(path, sweep, stored)
 

@@ -82,17 +82,17 @@ def test_parameters_are_copies() -> None:
     mean = Q.copy()
     made = ds.normal(mean=mean, sd=0.1)
     mean += 1
-    np.testing.assert_array_equal(made.mean, Q)
-    assert not made.mean.flags.writeable
+    np.testing.assert_array_equal(made.parameters["mean"], Q)
+    assert not made.parameters["mean"].flags.writeable
 
 
 WRONG: dict[str, Callable[[], Any]] = {
     "low of uniform must be at most high, got 2 and 1": lambda: ds.uniform(low=2, high=1),
-    "lengths differ in normal: mean \\(3,\\), sd \\(2,\\)": lambda: ds.normal(mean=Q, sd=[1.0, 2.0]),
+    "lengths differ in normal": lambda: ds.normal(mean=Q, sd=[1.0, 2.0]),
     "sd of normal must not be negative, got -1": lambda: ds.normal(mean=0, sd=-1.0),
     "mean of normal must be finite": lambda: ds.normal(mean=np.nan, sd=1.0),
     "median of lognormal must be positive": lambda: ds.lognormal(median=0.0, sigma_of_log=1.0),
-    "are so large that its values overflow": lambda: ds.lognormal(median=1.0, sigma_of_log=100.0),
+    "lognormal has no finite values between": lambda: ds.lognormal(median=1.0, sigma_of_log=100.0),
     "mode of triangular must be at most high": lambda: ds.triangular(low=0, mode=2, high=1),
     "the values of choice must be real numbers": lambda: ds.choice(["a", "b"]),
     "the values of choice must have shape": lambda: ds.choice([]),
@@ -100,16 +100,12 @@ WRONG: dict[str, Callable[[], Any]] = {
     "a distribution must be .*got <scipy.stats._mult": lambda: ds.distribution(stats.multivariate_normal([0, 0])),
     "a distribution must be .*gamma_gen": lambda: ds.distribution(stats.gamma),
     "a distribution must be .*rv_histogram": lambda: ds.distribution(stats.rv_histogram(np.histogram([1.0, 2.0]))),
-    "scipy.stats.gamma has no finite values .* parameter 0 -2": lambda: ds.distribution(stats.gamma(-2.0)),
+    "scipy.stats.gamma has no finite values .*gamma.-2": lambda: ds.distribution(stats.gamma(-2.0)),
     "lengths differ in scipy.stats.gamma": lambda: ds.distribution(stats.gamma([1.0, 2.0], scale=Q)),
     "no distribution 'unifrm'; nearest: uniform": lambda: ds.from_dict({"distribution": "unifrm"}),
     "uniform takes low, high, got low$": lambda: ds.from_dict({"distribution": "uniform", "low": 1}),
-    "has no distribution 'os' of one": lambda: ds.from_dict(
-        {"distribution": "scipy.stats", "of": "os", "args": [], "kwds": {}}
-    ),
-    "gamma does not take foo 1": lambda: ds.from_dict(
-        {"distribution": "scipy.stats", "of": "gamma", "args": [], "kwds": {"foo": 1}}
-    ),
+    "has no distribution 'os' of one": lambda: ds.from_dict({"distribution": "scipy.stats.os"}),
+    "does not take scipy.stats.gamma.foo=1": lambda: ds.from_dict({"distribution": "scipy.stats.gamma", "foo": 1}),
     "a stored distribution is a table": lambda: ds.from_dict([1, 2]),  # pyright: ignore[reportArgumentType]
     "u of normal must have shape \\(k, 3\\)": lambda: ds.normal(mean=Q, sd=1.0).values([[0.5]]),
     "u of uniform must be below 1": lambda: ds.uniform(low=0, high=1).values([[1.0]]),

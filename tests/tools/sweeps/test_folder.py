@@ -9,13 +9,14 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps import Work, begun
+from robot_dyn.tools.sweeps import Work, begun, run_sweep
 from robot_dyn.tools.sweeps.folder import files
 from robot_dyn.tools.sweeps.folder.files import Files, remove_abandoned, write
 from robot_dyn.tools.sweeps.folder.folder import MOST_FILES, Folder
@@ -187,7 +188,7 @@ def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
     with pytest.raises(FileExistsError):
         write(tmp_path / "out" / "sweep.json", b"{}", files.Exclusive())
     assert (tmp_path / "out" / "sweep.json").read_text() == text
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["sweep.json"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["design.npy", "sweep.json"]
 
 
 def test_a_folder_is_moved_with_its_scene(tmp_path: Path) -> None:
@@ -203,9 +204,10 @@ def test_a_folder_is_moved_with_its_scene(tmp_path: Path) -> None:
         sw.read(folder, scene)
 
 
-def test_a_disk_without_room_is_said_before_the_start(tmp_path: Path) -> None:
-    sweep = swept(tmp_path, 10**14, design="random")
-    assert sweep.bytes_expected == 10**14 * (8 * 9 + 9)  # 5 numbers that vary, 3 figures, the end; outcome, texts
-    with pytest.raises(SweepError, match=r"the sweep will take 7\.54e\+06 GiB, and .* has"):
+def test_a_disk_without_room_is_said_before_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sweep = swept(tmp_path, 1000, design="random")
+    assert sweep.bytes_expected == 1000 * (8 * 9 + 9)  # 5 numbers that vary, 3 figures, the end; outcome, texts
+    monkeypatch.setattr(run_sweep, "disk_usage", lambda _: SimpleNamespace(free=80_000))
+    with pytest.raises(SweepError, match=r"the sweep will take .* GiB, and .* has"):
         sw.run(sweep, tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -22,7 +22,7 @@ from urllib.parse import urlsplit
 
 from robot_dyn import RobotDynError
 from robot_dyn.foundations import SweepError, needs, shown
-from robot_dyn.tools.sweeps.folder.files import write
+from robot_dyn.tools.sweeps.folder.files import temporary_name, write
 from robot_dyn.tools.sweeps.folder.folder import Folder
 from robot_dyn.tools.sweeps.imported import NOTHING, Named
 from robot_dyn.tools.sweeps.plan.specification import versions
@@ -80,12 +80,9 @@ def client_of(cluster: Any) -> Iterator[Any]:
         processes, threads = _local(cluster)
         with (
             needs("dask.config", extra="cluster").set(_LOCAL),
-            distributed.LocalCluster(
-                n_workers=processes, threads_per_worker=threads, host="127.0.0.1", dashboard_address="127.0.0.1:0",
-                protocol="tcp://", memory_limit=0, processes=True, silence_logs=50,
-            ) as local,
+            _started(distributed, processes, threads) as local,
             distributed.Client(local, set_as_default=False) as client,
-        ):  # fmt: skip
+        ):
             yield client
     elif isinstance(cluster, str) and "://" in cluster:
         _check_address(cluster)
@@ -96,6 +93,17 @@ def client_of(cluster: Any) -> Iterator[Any]:
             f"cluster: give 'local:2', the address of a scheduler such as 'tls://host:8786', or a"
             f" distributed.Client, got {shown(cluster)}"
         )
+
+
+def _started(distributed: Any, processes: int, threads: int) -> Any:
+    """A cluster on this machine; SweepError if it cannot start, as where there is no shared memory."""
+    try:
+        return distributed.LocalCluster(
+            n_workers=processes, threads_per_worker=threads, host="127.0.0.1", dashboard_address="127.0.0.1:0",
+            protocol="tcp://", memory_limit=0, processes=True, silence_logs=50,
+        )  # fmt: skip
+    except (OSError, RuntimeError) as error:
+        raise SweepError(f"cluster: Dask cannot start here ({error}); leave cluster out, to use threads") from None
 
 
 def _connected(distributed: Any, address: str) -> Any:
@@ -141,7 +149,8 @@ class Cluster:
     def __init__(self, client: Any, folder: Folder, names: Named = NOTHING) -> None:
         self._client, self._folder = client, folder
         path = folder.path.absolute()
-        token = f".token-{os.urandom(8).hex()}"
+        self._key = f"token-{os.urandom(8).hex()}"
+        token = temporary_name(self._key)
         figures = tuple(names.figures.items())
         self._ticket = Ticket(str(path), folder.digest, token, tuple(versions().items()), names.scene, figures)
 
@@ -170,7 +179,7 @@ class Cluster:
                         " the same folder and cluster=None"
                     )
         finally:
-            for each in self._folder.path.glob(f"{self._ticket.token}*"):
+            for each in self._folder.path.glob(f".{self._key}.*"):
                 each.unlink(missing_ok=True)
 
     def _handshake(self) -> None:
@@ -229,7 +238,7 @@ def make_chunk(ticket: Ticket, chunk: int) -> None:
 def _answer(ticket: Ticket) -> str:
     """Write a token beside that of the driver; its name."""
     _check(ticket)
-    name = f"{ticket.token}.{socket.gethostname()}.{os.getpid()}"
+    name = temporary_name(ticket.token.split(".")[1])
     write(Path(ticket.folder) / name, ticket.token.encode())
     return name
 

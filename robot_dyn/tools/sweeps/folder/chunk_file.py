@@ -113,7 +113,7 @@ def _read_npz(path: Path, names: Sequence[str] | None) -> tuple[dict[str, np.nda
 
 
 def _parquet(rows: Rows, footer: dict[str, Any]) -> bytes:
-    pa, parquet = needs("pyarrow", extra="data"), needs("pyarrow.parquet", extra="data")
+    pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="data")
     columns = {"run": np.arange(rows.start, rows.start + len(rows))} | rows.columns
     for name in TEXTS:
         texts, codes = _dictionary(getattr(rows, name))
@@ -121,14 +121,16 @@ def _parquet(rows: Rows, footer: dict[str, Any]) -> bytes:
     table = pa.table(columns)
     table = table.replace_schema_metadata({_FOOTER: json.dumps(footer)})
     stream = io.BytesIO()
-    parquet.write_table(table, stream, compression="zstd", compression_level=1, use_dictionary=list(TEXTS))
+    parquet.write_table(
+        table, stream, compression="zstd", compression_level=1, use_dictionary=list(TEXTS), write_page_checksum=True
+    )
     return stream.getvalue()
 
 
 def _read_parquet(path: Path, names: Sequence[str] | None) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    parquet = needs("pyarrow.parquet", extra="data")
+    parquet = needs("pyarrow.parquet", extra="sweeps")
     with reading(path, SweepError, _REMEDY) as stream, _of(path):
-        file = parquet.ParquetFile(stream)
+        file = parquet.ParquetFile(stream, page_checksum_verification=True)
         footer = json.loads(file.schema_arrow.metadata[_FOOTER.encode()])
         wanted = [name for name in file.schema_arrow.names if name != "run"] if names is None else list(names)
         read = file.read(columns=wanted, use_threads=False)

@@ -66,7 +66,7 @@ def write(path: Path, data: bytes, files: Files | None = None) -> None:
         OSError: If it cannot be written.
     """
     files = files or Files()
-    beside = path.with_name(f".{path.name}.{_HOST}.{os.getpid()}.{os.urandom(4).hex()}.unfinished")
+    beside = path.with_name(temporary_name(path.name))
     try:
         handle = files.open(beside)
         try:
@@ -82,6 +82,11 @@ def write(path: Path, data: bytes, files: Files | None = None) -> None:
             beside.unlink()
         raise
     files.sync_folder(path.parent)
+
+
+def temporary_name(stem: str) -> str:
+    """A new name of a file that `remove_abandoned` removes once this process has died."""
+    return f".{stem}.{_HOST}.{os.getpid()}.{os.urandom(4).hex()}.unfinished"
 
 
 def make_folder(path: Path) -> None:

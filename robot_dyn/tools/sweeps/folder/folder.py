@@ -1,7 +1,7 @@
 """The folder of a sweep: its specification, and a file for each chunk that is done. What has no file is left to do.
 
 sweep.json                   the specification
-design.npy                   rows of the design, where they were given as a table
+design.npy                   rows of the design
 rows/000123.parquet          a chunk; of more than 20 000 chunks rows/0004/080123.parquet
 samples/                     samples of runs, where they are kept
 """
@@ -11,7 +11,6 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -85,11 +84,18 @@ class Folder:
         found = np.zeros(self.count, bool)
         suffix = self.format.suffix
         for folder in self.subfolders:
-            with suppress(FileNotFoundError), os.scandir(folder) as entries:
-                for each in entries:
-                    stem = each.name.removesuffix(suffix)
-                    if stem.isdigit() and stem != each.name and int(stem) < self.count:
-                        found[int(stem)] = True
+            try:
+                names = os.listdir(folder)
+            except FileNotFoundError:
+                continue
+            except OSError as error:
+                raise SweepError(
+                    f"{folder}: is not a folder of rows ({why(error)}); remove it, and run again"
+                ) from None
+            for name in names:
+                stem = name.removesuffix(suffix)
+                if stem.isdigit() and stem != name and int(stem) < self.count:
+                    found[int(stem)] = True
         return found
 
     def missing(self) -> np.ndarray:
@@ -135,11 +141,11 @@ class Folder:
         self._check(self.file(chunk), chunk, footer)
         return footer
 
-    def check_samples(self, bits: bool) -> None:
-        """Raise SweepError where samples that were written are missing, or, if `bits`, have changed."""
+    def check_samples(self) -> None:
+        """Raise SweepError where samples that were written are missing or have changed."""
         if self.samples is not None:
             for chunk in range(self.count):
-                self.samples.check(chunk, self.footer(chunk)["samples"], bits)
+                self.samples.check(chunk, self.footer(chunk)["samples"])
 
     def columns(self, names: Iterable[str]) -> dict[str, np.ndarray]:
         """Columns of all rows, (N,); errors as of `read`."""
@@ -177,25 +183,22 @@ def has_specification(path: Path) -> bool:
     return (path / _SPECIFICATION).is_file()
 
 
-def read_specification(path: Path) -> tuple[str, np.ndarray | None]:
-    """The text of the specification of a folder, and the rows of its design if they were given.
+def read_specification(path: Path) -> tuple[str, np.ndarray]:
+    """The text of the specification of a folder, and the rows of its design.
 
     Raises:
         SweepError: If the folder holds no sweep, or it cannot be read.
     """
     remedy = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
     text = read(path / _SPECIFICATION, _MOST_TEXT, SweepError, remedy).decode("utf-8", "replace")
-    table = None
-    if (path / _DESIGN).exists():
-        data = read(path / _DESIGN, _MOST_TABLE, SweepError, remedy)
-        try:
-            table = np.load(io.BytesIO(data), allow_pickle=False)
-        except (ValueError, EOFError) as error:
-            raise SweepError(f"{path / _DESIGN}: is not a table of numbers ({error})") from None
-    return text, table
+    data = read(path / _DESIGN, _MOST_TABLE, SweepError, remedy)
+    try:
+        return text, np.load(io.BytesIO(data), allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        raise SweepError(f"{path / _DESIGN}: is not a table of numbers ({error})") from None
 
 
-def begin(path: Path, text: str, table: np.ndarray | None, files: Files | None = None) -> bool:
+def begin(path: Path, text: str, rows: np.ndarray, files: Files | None = None) -> bool:
     """Write the specification of a new sweep; False if another process was first.
 
     Raises:
@@ -207,10 +210,9 @@ def begin(path: Path, text: str, table: np.ndarray | None, files: Files | None =
     if strange and _SPECIFICATION not in strange:
         raise SweepError(f"{path}: holds other files, such as {strange[0]}; give a new folder")
     try:
-        if table is not None:
-            stream = io.BytesIO()
-            np.save(stream, table, allow_pickle=False)
-            write(path / _DESIGN, stream.getvalue(), files)
+        stream = io.BytesIO()
+        np.save(stream, rows, allow_pickle=False)
+        write(path / _DESIGN, stream.getvalue(), files)
         write(path / _SPECIFICATION, text.encode(), files or Exclusive())
     except FileExistsError:
         return False

@@ -6,21 +6,22 @@ place of a run in an array is its number; runs that are not kept are nan, and ta
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
-from hashlib import sha256
+from hashlib import file_digest, sha256
 from pathlib import Path
 from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import SweepError, needs
+from robot_dyn.foundations import SweepError, needs, reading, why
 from robot_dyn.queries import joint_units
 from robot_dyn.simulation.results.run_data import QUANTITIES
 from robot_dyn.tools.sweeps.folder.files import Files, make_folder, write
 
 _INNER = 64  # runs that are read together, where all are kept
-_EXTRA = "data"
+_EXTRA = "sweeps"
 
 
 @final
@@ -55,7 +56,8 @@ class SampleStore:
     def times(self) -> np.ndarray:
         """Of the samples, (m,), in [s]."""
         zarr = needs("zarr", extra=_EXTRA)
-        return zarr.open_group(self.path, mode="r")["t"][:]
+        with self._reading():
+            return zarr.open_group(self.path, mode="r")["t"][:]
 
     def write(self, chunk: int, kept: Mapping[str, np.ndarray], files: Files) -> dict[str, str]:
         """Write the samples (k, m, n) of the runs of a chunk, nan where they are not kept; OSError if that fails.
@@ -78,27 +80,42 @@ class SampleStore:
                 digests[name] = sha256(data).hexdigest()
         return digests
 
-    def check(self, chunk: int, digests: Mapping[str, str], bits: bool) -> None:
-        """Raise SweepError where a file of a chunk is missing, or, if `bits`, is not what was written."""
+    def check(self, chunk: int, digests: Mapping[str, str]) -> None:
+        """Raise SweepError where a file of a chunk is missing, or is not what was written."""
         remedy = f"remove the rows of chunk {chunk}, and run the sweep again"
         for name, digest in digests.items():
             path = self._shard(name, chunk)
-            if not path.is_file():
-                raise SweepError(f"{path}: is missing; {remedy}")
-            if bits and sha256(path.read_bytes()).hexdigest() != digest:
-                raise SweepError(f"{path}: was changed after it was written; {remedy}")
+            with reading(path, SweepError, remedy) as stream:
+                found = file_digest(stream, "sha256")  # pyright: ignore[reportArgumentType]
+                if found.hexdigest() != digest:
+                    raise SweepError(f"{path}: was changed after it was written; {remedy}")
+
+    @contextmanager
+    def _reading(self) -> Iterator[None]:
+        """What is wrong with the files that describe the arrays, as a SweepError; Zarr opens pipes and devices too."""
+        remedy = "take it from a copy of the folder, or run the sweep into a new one"
+        for name in ("zarr.json", *(f"{each}/zarr.json" for each in ("t", *self.names)), "t/c/0"):
+            with reading(self.path / name, SweepError, remedy):
+                pass
+        try:
+            yield
+        except SweepError:
+            raise
+        except Exception as error:  # Zarr and xarray promise no kinds
+            raise SweepError(f"{self.path}: are not the samples of the sweep ({why(error)}); {remedy}") from None
 
     def _shard(self, name: str, chunk: int) -> Path:
         return self.path / name / "c" / str(chunk) / "0" / "0"
 
     def open(self, joint_types: tuple[str | None, ...]) -> Any:
         """All as a lazy `xarray.Dataset` over run, t and joint, with units."""
-        xarray = needs("xarray", extra="data")
+        xarray = needs("xarray", extra="sweeps")
         needs("zarr", extra=_EXTRA)
-        found = xarray.open_zarr(self.path, consolidated=False, chunks=None)
-        for name in self.names:
-            found[name].attrs |= {"units": joint_units(name, joint_types), "long_name": QUANTITIES[name].title}
-        return found.assign_coords(run=np.arange(self.runs), joint=list(found.attrs.pop("joint")))
+        with self._reading():
+            found = xarray.open_zarr(self.path, consolidated=False, chunks=None)
+            for name in self.names:
+                found[name].attrs |= {"units": joint_units(name, joint_types), "long_name": QUANTITIES[name].title}
+            return found.assign_coords(run=np.arange(self.runs), joint=list(found.attrs.pop("joint")))
 
     def _array(self, zarr: Any, store: Any, name: str, t: np.ndarray, joints: tuple[str, ...]) -> Any:
         """An array of the store without numbers."""

@@ -10,15 +10,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, final
+from typing import Annotated, Any, Literal, final
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from robot_dyn import Setup
 from robot_dyn.codegen import processor_of_code, version_of
 from robot_dyn.foundations import SweepError, nearest, shorten, shown
 from robot_dyn.simulation import settings_of
 from robot_dyn.tools.sweeps import distributions
+from robot_dyn.tools.sweeps.designs import MOST_ROWS
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_named, digest_of
 from robot_dyn.tools.sweeps.plan import figures
 from robot_dyn.tools.sweeps.plan.figures import Figure, UserFigure
@@ -26,7 +28,8 @@ from robot_dyn.tools.sweeps.plan.samples import samples
 from robot_dyn.tools.sweeps.plan.stated import StatedScene, stated_scene
 from robot_dyn.tools.sweeps.plan.sweep import Sweep, is_scene
 
-FORMAT = 3
+FORMAT = 4
+_LONG = 2**26  # characters
 _PLACES = ("scene",)  # that may differ: where the scene lies
 
 
@@ -39,6 +42,57 @@ def processor() -> dict[str, str]:
     """Name and features of the processor."""
     name, features = processor_of_code()
     return {"processor": name, "features": ",".join(each[1:] for each in features.split(",") if each.startswith("+"))}
+
+
+class Stored(BaseModel):
+    """The form of `sweep.json`."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    format: int
+    scene: str
+    setup: dict[str, Any]
+    runs: Annotated[int, Field(gt=0, le=MOST_ROWS)]
+    design: str
+    seed: Annotated[int, Field(ge=0)]
+    vary: dict[str, dict[str, Any]]
+    order: list[str]
+    figures: dict[str, dict[str, Any]]
+    storage: Literal["npz", "parquet"]
+    samples: StoredSamples | None
+    versions: dict[str, str]
+    rows_sha256: str
+    chunk: Annotated[int, Field(gt=0)]
+
+
+class StoredSamples(BaseModel):
+    """Which samples are kept."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    names: list[str]
+    every: Annotated[int, Field(gt=0)]
+    failed: bool
+
+
+def parsed(text: str, where: str) -> Specification:
+    """The specification of a text; SweepError with the key and the value if it is not one, or of another version."""
+    try:
+        of = json.loads(text)["format"] if len(text) < _LONG else FORMAT
+        if of != FORMAT:
+            raise SweepError(f"{where}: has format {shown(of)}, this version reads {FORMAT}")
+        return Specification(Stored.model_validate_json(text).model_dump())
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        raise SweepError(
+            f"{where}: is not the specification of a sweep: {key}{': ' * bool(key)}{first['msg']}, got"
+            f" {shown(first['input'])}; take that of a copy, or give a new folder"
+        ) from None
+    except (ValueError, TypeError, KeyError, RecursionError):
+        raise SweepError(
+            f"{where}: is not the specification of a sweep; take that of a copy, or a new folder"
+        ) from None
 
 
 @final
@@ -72,10 +126,16 @@ class Specification:
         """The same in chunks of so many runs."""
         return Specification(self.data | {"chunk": runs})
 
-    def check_same(self, other: Specification, where: str) -> None:
-        """Raise SweepError unless another specification has all that this one states; names the first difference."""
+    def check_same(self, other: Specification, where: str, versions: bool = True) -> None:
+        """Raise SweepError unless another specification has all that this one states; names the first difference.
+
+        Args:
+            other: The specification.
+            where: The file of this one, for the message.
+            versions: Whether versions of packages are compared too: they matter where rows are computed.
+        """
         for name, here, there in _differences(self.data, other.data, ""):
-            if name not in _PLACES:
+            if name not in _PLACES and (versions or not name.startswith("versions.")):
                 raise SweepError(
                     f"{where}: holds another sweep: {name} is {shorten(here)} there, {shorten(there)} here; give"
                     " another folder, or the sweep that was begun"
@@ -84,15 +144,12 @@ class Specification:
 
 def specification(sweep: Sweep) -> Specification:
     """The specification of a sweep, without the size of its chunks."""
-    given = isinstance(sweep.design, str)
-    table = {} if given else {"table_sha256": sha256(np.ascontiguousarray(sweep.design, float).tobytes()).hexdigest()}
     data = {
         "format": FORMAT,
         "scene": sweep.source,
         "setup": _stated_setup(sweep),
         "runs": int(sweep.runs),
-        "design": sweep.design if given else "table",
-        **table,
+        "design": sweep.points.name,
         "seed": int(sweep.seed),
         "vary": {name: each.to_dict() for name, each in sweep.vary.items()},
         "order": list(sweep.vary),
@@ -100,12 +157,13 @@ def specification(sweep: Sweep) -> Specification:
         "storage": sweep.storage,
         "samples": None if sweep.samples is None else asdict(sweep.samples),
         "versions": versions(),
+        "rows_sha256": sha256(np.ascontiguousarray(sweep.points.rows).tobytes()).hexdigest(),
     }
     return Specification(json.loads(json.dumps(data)))  # as it is read again
 
 
 def sweep_of(
-    data: Mapping[str, Any], table: np.ndarray | None, where: str, named: Named = NOTHING, folder: Path | None = None
+    data: Mapping[str, Any], rows: np.ndarray, where: str, named: Named = NOTHING, folder: Path | None = None
 ) -> Sweep:
     """Return the sweep of a specification, with its scene as it is now.
 
@@ -113,7 +171,7 @@ def sweep_of(
 
     Args:
         data: The specification.
-        table: Rows of the design, if they are stored.
+        rows: Of the design.
         where: Its file, for messages.
         named: What the reader of the folder names.
         folder: The folder, from which nothing is imported.
@@ -122,17 +180,16 @@ def sweep_of(
         SweepError: If it is not one, or is one of another version; if the file of a named function has changed.
     """
     try:
-        if data["format"] != FORMAT:
-            raise SweepError(f"{where}: has format {data['format']}, this version reads {FORMAT}")
         scene = _scene_of(data, named, folder)
         vary = {name: distributions.from_dict(data["vary"][name]) for name in data["order"]}
         of = {name: _figure_of(name, stated, named, folder) for name, stated in data["figures"].items()}
         if unknown := named.figures.keys() - {name for name, figure in of.items() if isinstance(figure, UserFigure)}:
             raise SweepError(f"{where}: no function is the figure {shown(min(unknown))}; {nearest(min(unknown), of)}")
-        design = data["design"] if table is None else table
+        named_design = data["design"] != "table"
+        design, drawn = (data["design"], rows) if named_design else (rows, None)
         kept = data["samples"]
         kept = kept and samples(*kept["names"], every=kept["every"], failed=kept["failed"])
-        return Sweep(scene, data["runs"], vary, of, design, data["seed"], data["storage"], kept)
+        return Sweep(scene, data["runs"], vary, of, design, data["seed"], data["storage"], kept, drawn)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise SweepError(f"{where}: is not the specification of a sweep ({error!r})") from None
 

@@ -13,7 +13,7 @@ import numpy as np
 from robot_dyn import RobotDynError, Setup, sweepable
 from robot_dyn.foundations import Answer, Block, Caching, QueryError, SweepError, Table, Value, integer, shown
 from robot_dyn.queries import joint_types_of, unit
-from robot_dyn.tools.sweeps.designs import Design, design
+from robot_dyn.tools.sweeps.designs import Design, design, given
 from robot_dyn.tools.sweeps.distributions import Distribution, distribution
 from robot_dyn.tools.sweeps.folder.rows import TEXTS
 from robot_dyn.tools.sweeps.imported import imported, path_of
@@ -46,6 +46,7 @@ class Sweep(Answer, Value, Caching):
         seed: Of the design.
         storage: "parquet" or "npz"; None for Parquet where pyarrow is installed.
         samples: What to keep of the motion: "q", or `samples("q", "u", every=100)`; nothing by default.
+        drawn: The rows of the design, (N, d), as a folder keeps them; None to draw them by name and seed.
 
     Raises:
         SweepError: If an argument is not allowed; names it.
@@ -60,6 +61,7 @@ class Sweep(Answer, Value, Caching):
     seed: int = 0
     storage: str | None = None
     samples: Samples | None = None
+    drawn: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -78,7 +80,7 @@ class Sweep(Answer, Value, Caching):
             raise SweepError(f"storage must be one of {', '.join(FORMATS)}, got {shown(self.storage)}")
         set_(self, "storage", self.storage or _best_format())
         set_(self, "samples", samples_of(self.samples))
-        self.rows  # noqa: B018  that a design has so many rows
+        _ = self.points  # refused if the design does not have so many rows
         self._check_names()
 
     @cached_property
@@ -92,9 +94,12 @@ class Sweep(Answer, Value, Caching):
         return made
 
     @cached_property
-    def rows(self) -> Design:
-        """The design."""
-        return design(self.design, self.runs, sum(each.size for each in self.vary.values()), self.seed)
+    def points(self) -> Design:
+        """The design, drawn once."""
+        dimensions = sum(each.size for each in self.vary.values())
+        if self.drawn is not None and isinstance(self.design, str):
+            return given(self.drawn, self.runs, dimensions, self.design)
+        return design(self.design, self.runs, dimensions, self.seed)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -137,7 +142,7 @@ class Sweep(Answer, Value, Caching):
 
     def values(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """What varies in runs start, …, stop − 1, by name, (k, size)."""
-        u, first, found = self.rows.rows(start, stop), 0, {}
+        u, first, found = self.points.rows[start:stop], 0, {}
         for name, each in self.vary.items():
             found[name] = each.values(np.ascontiguousarray(u[:, first : first + each.size])).reshape(stop - start, -1)
             first += each.size

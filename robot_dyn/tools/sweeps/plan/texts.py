@@ -11,16 +11,12 @@ from inspect import signature
 from typing import Any
 
 from robot_dyn.foundations import SweepError, nearest, shorten
-from robot_dyn.tools.sweeps import distributions
-from robot_dyn.tools.sweeps.distributions import Distribution
+from robot_dyn.tools.sweeps.distributions import CONSTRUCTORS, Distribution
 from robot_dyn.tools.sweeps.plan import figures
 from robot_dyn.tools.sweeps.plan.figures import Figure, figure
 from robot_dyn.tools.sweeps.plan.samples import RECORDED, Samples, samples
 
 _MOST = 10_000  # characters
-_DISTRIBUTIONS: Mapping[str, Callable[..., Distribution]] = {
-    name: getattr(distributions, name) for name in ("uniform", "normal", "lognormal", "triangular", "choice")
-}
 _FIGURES: Mapping[str, Callable[..., Figure]] = {
     name: getattr(figures, name) for name in ("rms_error", "peak", "final")
 }
@@ -28,7 +24,7 @@ _FIGURES: Mapping[str, Callable[..., Figure]] = {
 
 def distribution_of(text: str) -> Distribution:
     """The distribution of a text; SweepError if it is not one."""
-    return _called("distribution", text, _DISTRIBUTIONS)
+    return _called("distribution", text, CONSTRUCTORS)
 
 
 def figure_of(name: str, text: str, imports: bool) -> Figure:
