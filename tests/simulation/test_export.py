@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation.export import netcdf
+from robot_dyn.simulation.export import tables
 from robot_dyn.simulation.export.export import export
 from robot_dyn.simulation.results.run_file import RunFileError
 from robot_dyn.simulation.run.outcome import Ending, Outcome
@@ -182,7 +182,7 @@ def test_a_run_that_ends_after_the_stamps_of_ros_is_refused(tame, tmp_path: Path
 
 def test_a_variable_that_netcdf_cannot_hold_is_refused(tame, tmp_path: Path, monkeypatch) -> None:
     pytest.importorskip("xarray")
-    monkeypatch.setattr(netcdf, "_LARGEST", tame.q.nbytes - 1)
+    monkeypatch.setattr(tables, "_LARGEST", tame.q.nbytes - 1)
     with pytest.raises(RunFileError, match="more than the 2 GiB of netCDF-3; write"):
         export(tame, tmp_path / "x.nc")
     assert list(tmp_path.iterdir()) == []

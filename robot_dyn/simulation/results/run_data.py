@@ -140,6 +140,13 @@ class RunData(Derived):
         return f"<{type(self).__name__}: {self.summary}>"
 
 
+def taken(values: Any, part: slice) -> Any:
+    """The part of an array along its first axis, or of all arrays of a dictionary; None of None."""
+    if isinstance(values, dict):
+        return {name: x[part] for name, x in values.items()}
+    return None if values is None else values[part]
+
+
 def attributes(run: RunData) -> dict[str, str]:
     """Attributes of a table: robot, settings, versions, and the summary without its times.
 
