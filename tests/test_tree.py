@@ -50,6 +50,30 @@ def test_imports_go_downward() -> None:
     assert done.returncode == 0, done.stdout[-2000:]
 
 
+FREE_OF_CIRCLES = ("accuracy", "report", "view", *(f"simulation.{x}" for x in ("columns", "comparison", "derived")))
+FREE_OF_CIRCLES += ("simulation.export", "simulation.results", "simulation.rollouts")
+
+
+def imports_of(path: Path, known: set[str]) -> set[str]:
+    """Modules that a file imports anywhere: at its top, in functions and for type checking."""
+    nodes = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.ImportFrom)]
+    names = {f"{node.module}.{each.name}" for node in nodes for each in node.names} | {str(x.module) for x in nodes}
+    return names & known
+
+
+def test_what_holds_and_shows_runs_has_no_import_circle() -> None:
+    """Modules without imports among the others are taken away, until none is left or only circles are."""
+    paths = {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in PACKAGE.rglob("*.py")}
+    places = tuple(f"robot_dyn.{place}" for place in FREE_OF_CIRCLES)
+    mine = {name for name in paths if name.startswith(places) and not name.endswith("__init__")}
+    left = {name: imports_of(paths[name], mine) for name in mine}
+    assert len(left) > 100
+    while free := [name for name, needs in left.items() if not needs & left.keys()]:
+        for name in free:
+            del left[name]
+    assert not left
+
+
 @pytest.mark.parametrize("code", ["rd.load('ur5').M([0.0] * 6)", "rd.load('ur5').C([0.1] * 6, [0.2] * 6)"])
 def test_a_query_loads_what_it_needs(code: str) -> None:
     """M and C of a robot load neither a compiler nor anything that draws, proves or simulates."""
