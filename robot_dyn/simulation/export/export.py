@@ -67,7 +67,7 @@ def export(run: RunData, path: str | Path) -> Path:
     form = _formats(run)[path.suffix.lower()]
     for package in form.packages:
         needs(package, extra=EXTRA)
-    columns = list(run.columns())
+    columns = list(run._columns())
     return save(path, lambda stream: form.write(run, columns, stream), RunFileError)
 
 

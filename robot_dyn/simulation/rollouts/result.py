@@ -129,8 +129,7 @@ class Rollouts(RolloutsData):
         """
         return self.overview.worst
 
-    def columns(self) -> Iterator[Column]:
-        """Return the columns of the table."""
+    def _columns(self) -> Iterator[Column]:
         return columns(self, self.overview)
 
     def _variables(self) -> Mapping[str, Variable]:
