@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.foundations.errors import RobotDynError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Result(Answer):
@@ -58,7 +61,7 @@ class Result(Answer):
             return ""
 
 
-def drawn(result: Result, theme: str = "light") -> Any:
+def drawn(result: Result, theme: str = "light") -> Figure:
     """Draw a result by the module that its class names.
 
     Raises:

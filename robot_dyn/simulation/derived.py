@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import attrgetter
 from typing import final
 
 import numpy as np
@@ -50,24 +51,20 @@ class Results:
     texts: dict[str, str]
     compiled: bool
     before: tuple[Remark, ...]
+    q = property(attrgetter("_columns.q"))
+    v = property(attrgetter("_columns.v"))
+    u = property(attrgetter("_columns.u"))
+    desired = property(attrgetter("_tracking.desired"))
+    desired_velocity = property(attrgetter("_tracking.desired_velocity"))
+    deviation = property(attrgetter("_tracking.deviation"))
 
     @cached_property
     def _columns(self) -> Columns:
         return columns(self.setup.equation, self.record.t, self.record.y, self.record.made)
 
-    @property
-    def q(self) -> np.ndarray:
-        """Positions there, (m, n)."""
-        return self._columns.q
-
-    @property
-    def v(self) -> np.ndarray:
-        """Velocities there, (m, n)."""
-        return self._columns.v
-
     @cached_property
     def a(self) -> np.ndarray:
-        """Accelerations there, (m, n)."""
+        """Accelerations at the samples, (m, n)."""
         if not self.setup.equation.impulses or not self._asks_plant:
             return self._columns.a
         return broken_away(self._plant, self.record.t, self._columns, self.effect_states)
@@ -81,11 +78,6 @@ class Results:
     @cached_property
     def _plant(self) -> Plant:
         return plant_of(self.setup.plant, self.compiled)
-
-    @property
-    def u(self) -> np.ndarray:
-        """Actuation there, (m, n)."""
-        return self._columns.u
 
     @property
     def power(self) -> dict[str, np.ndarray]:
@@ -104,21 +96,6 @@ class Results:
     @cached_property
     def _tracking(self) -> Tracking:
         return tracking_of(self.setup, self.record.t, self.q)
-
-    @property
-    def desired(self) -> np.ndarray | None:
-        """Positions of a joint reference, (m, n)."""
-        return self._tracking.desired
-
-    @property
-    def desired_velocity(self) -> np.ndarray | None:
-        """Velocities of a joint reference, (m, n)."""
-        return self._tracking.desired_velocity
-
-    @property
-    def deviation(self) -> np.ndarray | None:
-        """From the reference."""
-        return self._tracking.deviation
 
     @property
     def outcome(self) -> Outcome:

@@ -6,7 +6,7 @@ The first run is drawn opaque, the others as ghosts. Problems list what is drawn
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, final
 
@@ -21,7 +21,7 @@ from robot_dyn.queries.dynamics import Array
 from robot_dyn.simulation.comparison.differing_settings import run_names
 from robot_dyn.simulation.observation.remarks import remark_lines
 from robot_dyn.simulation.results.provenance import robot_of
-from robot_dyn.simulation.results.run_data import TrajectoryData
+from robot_dyn.simulation.results.run_data import QUANTITIES, TrajectoryData, taken
 from robot_dyn.view import commands
 from robot_dyn.view.causes import causes, resolution
 from robot_dyn.view.geometry.coarse import look_of
@@ -265,13 +265,9 @@ def _drawable(run: TrajectoryData) -> TrajectoryData:
     end = len(good) if good.all() else int(good.argmin())
     if not end:
         raise ReplayError("the run has no samples that can be shown; simulate it again, with a smaller step")
-    cut = {name: getattr(run, name)[:end] for name in ("t", "q", "v", "a", "u")}
-    if run.effect_torques is not None:
-        cut["effect_torques"] = {name: torque[:end] for name, torque in run.effect_torques.items()}
-    of_reference = {name: getattr(run, name) for name in ("desired", "desired_velocity", "deviation")}
-    cut |= {name: None if x is None else x[:end] for name, x in of_reference.items()}
+    cut = {x.name: taken(getattr(run, x.name), slice(end)) for x in fields(run) if x.name in QUANTITIES}
     wrenches = {link: F[F[:, 0] <= run.t[end - 1]] for link, F in run.wrenches.items()}
-    return replace(run, **cut, wrenches=wrenches, at_stop=None if run.at_stop is None else run.at_stop[:end])
+    return replace(run, **cut, wrenches=wrenches)
 
 
 def _seen(look: Drawing, inertia: bool) -> tuple[Piece, ...]:

@@ -15,7 +15,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn import export
 from robot_dyn.simulation import Ending, Outcome, RunFileError
-from robot_dyn.simulation.export import netcdf
+from robot_dyn.simulation.export import tables
 
 NAMES = ('a, "b"', "c\nd/ü [rad]")
 NUMBERS = [-0.0, np.nan, np.inf, -np.inf, 5e-324, 1 / 3, np.pi * 1e300, 0.1 + 0.2]
@@ -181,7 +181,7 @@ def test_a_run_that_ends_after_the_stamps_of_ros_is_refused(tame, tmp_path: Path
 
 def test_a_variable_that_netcdf_cannot_hold_is_refused(tame, tmp_path: Path, monkeypatch) -> None:
     pytest.importorskip("xarray")
-    monkeypatch.setattr(netcdf, "_LARGEST", tame.q.nbytes - 1)
+    monkeypatch.setattr(tables, "_LARGEST", tame.q.nbytes - 1)
     with pytest.raises(RunFileError, match="more than the 2 GiB of netCDF-3; write"):
         export(tame, tmp_path / "x.nc")
     assert list(tmp_path.iterdir()) == []

@@ -139,3 +139,12 @@ def test_no_column_hides_another(run, call: str) -> None:
         pytest.importorskip(call.removeprefix("to_"))
     with pytest.raises(QueryError, match=r"would be named 'controller[ _]state"):
         getattr(both, call)()
+
+
+def test_quantities_that_one_run_and_many_record_have_one_unit_and_title(run, batch) -> None:
+    """The Datasets of a run and of a batch name position, velocity and actuation alike."""
+    pytest.importorskip("xarray")
+    one, many = run.to_xarray(), batch.to_xarray()
+    for name in ("t", "q", "v", "u"):
+        assert one[name].attrs == many[name].attrs, name
+    assert many.q.dims == ("run", *one.q.dims) and many.kinetic.dims == ("run", "t")

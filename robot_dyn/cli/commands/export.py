@@ -12,8 +12,7 @@ from robot_dyn.cli.application import Force, app, bar
 from robot_dyn.cli.terminal import say, size_of
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.results.trajectory import Trajectory
-    from robot_dyn.simulation.rollouts.result import Rollouts
+    from robot_dyn.simulation.results.run_data import RunData
 
 
 @app.command()
@@ -36,7 +35,7 @@ def export(
     say(f"written: {file} ({size_of(file)})")
 
 
-def _loaded(path: str) -> Trajectory | Rollouts:
+def _loaded(path: str) -> RunData:
     """What a run file holds."""
     from robot_dyn.simulation.results.run_file import RunFileError
 

@@ -1,1 +1,1 @@
-"""Runs as files of other programs: CSV, Parquet, netCDF and MCAP, one format a file."""
+"""Runs as files of other programs: tables (CSV, Parquet, netCDF) and MCAP logs."""

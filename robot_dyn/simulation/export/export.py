@@ -11,7 +11,7 @@ from robot_dyn.foundations.errors import shown
 from robot_dyn.foundations.extras import needs
 from robot_dyn.foundations.files import FileKind, file_path, save, target
 from robot_dyn.simulation.columns import EXTRA, Column
-from robot_dyn.simulation.export import csv_table, mcap_log, netcdf, parquet
+from robot_dyn.simulation.export import mcap_log, tables
 from robot_dyn.simulation.results.run_data import RunData
 from robot_dyn.simulation.results.run_file import RunFileError
 from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
@@ -29,12 +29,12 @@ class Format:
 
 TABLE = FileKind("a table of a run", ".csv", b"t [s]")
 _OF_BOTH = (
-    Format(FileKind("a Parquet file", ".parquet", b"PAR1"), parquet.write, ("pyarrow",)),
-    Format(FileKind("a netCDF file", ".nc", b"CDF\x02"), netcdf.write, ("xarray",)),
+    Format(FileKind("a Parquet file", ".parquet", b"PAR1"), tables.write_parquet, ("pyarrow",)),
+    Format(FileKind("a netCDF file", ".nc", b"CDF\x02"), tables.write_netcdf, ("xarray",)),
 )
 _LOG = Format(FileKind("an MCAP log", ".mcap", b"\x89MCAP0\r\n"), mcap_log.write, ("mcap", "mcap_ros2.writer"))
-_OF_RUN = (Format(TABLE, csv_table.write), *_OF_BOTH, _LOG)
-_OF_RUNS = (Format(FileKind("a table of runs", ".csv", b"run,"), csv_table.write), *_OF_BOTH)
+_OF_RUN = (Format(TABLE, tables.write_csv), *_OF_BOTH, _LOG)
+_OF_RUNS = (Format(FileKind("a table of runs", ".csv", b"run,"), tables.write_csv), *_OF_BOTH)
 
 
 def kinds(run: RunData) -> tuple[FileKind, ...]:
@@ -67,7 +67,7 @@ def export(run: RunData, path: str | Path) -> Path:
     form = _formats(run)[path.suffix.lower()]
     for package in form.packages:
         needs(package, extra=EXTRA)
-    columns = list(run.columns())
+    columns = list(run._columns())
     return save(path, lambda stream: form.write(run, columns, stream), RunFileError)
 
 

@@ -51,11 +51,10 @@ _DEFINITIONS = {_STATE: _JOINT_STATE, _NUMBER: "float64 data\n"}
 Topic = tuple[str, str, Iterator[Any]]  # its name, its type, and its messages
 
 
-def write(run: TrajectoryData, columns: Iterable[Column], stream: BinaryIO) -> None:
+def write(run: TrajectoryData, columns: list[Column], stream: BinaryIO) -> None:
     """Write a message of each topic at each sample."""
     if not (run.t < _LONGEST_S).all():
         raise RunFileError(f"the run ends at t = {run.t[-1]:.3g} s; stamps of ROS 2 end at {_LONGEST_S:.3g} s")
-    columns = list(columns)
     stamps = [round(t * _NS) for t in run.t.tolist()]
     causes, missing = _causes(run)
     topics = [

@@ -108,8 +108,8 @@ class RunData(Derived):
         """A few lines: how it ended, its accuracy and its cost."""
         raise NotImplementedError
 
-    def columns(self) -> Iterable[Column]:
-        """Return the columns of the table, with quantity, joint and unit."""
+    def _columns(self) -> Iterable[Column]:
+        """The columns of the table, with quantity, joint and unit; exports read it too."""
         raise NotImplementedError
 
     def _variables(self) -> Mapping[str, Variable]:
@@ -123,21 +123,28 @@ class RunData(Derived):
         tracking error, the remarks; the rms of v and u over the samples up to the end, as far as they were recorded
         (`record=("q", "v", "u")` for u), and extremes of q, v and u over the steps, which need no record.
         """
-        return by_heading(self.columns())
+        return by_heading(self._columns())
 
     def to_pandas(self) -> Any:
         """Return `table` as a `pandas.DataFrame`; MissingExtraError without pandas."""
-        return data_frame(self.columns(), attributes(self))
+        return data_frame(self._columns(), attributes(self))
 
     def to_xarray(self) -> Any:
         """Return `table` as an `xarray.Dataset` over t or run, and joint, with units; MissingExtraError without xarray.
 
         That of rollouts has all samples too, over run, t and joint.
         """
-        return data_set(self.columns(), self.joint_names, attributes(self), self._variables())
+        return data_set(self._columns(), self.joint_names, attributes(self), self._variables())
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.summary}>"
+
+
+def taken(values: Any, part: slice) -> Any:
+    """The part of an array along its first axis, or of all arrays of a dictionary; None of None."""
+    if isinstance(values, dict):
+        return {name: x[part] for name, x in values.items()}
+    return None if values is None else values[part]
 
 
 def attributes(run: RunData) -> dict[str, str]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+
+import numpy as np
 
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.columns import Column
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.run_data import QUANTITIES, TrajectoryData
+
+Types = Mapping[str, str | None]  # of joints, by name
 
 
 def columns(run: TrajectoryData) -> Iterator[Column]:
@@ -24,9 +28,14 @@ def columns(run: TrajectoryData) -> Iterator[Column]:
             if x.ndim == 1:
                 yield Column(row.heading, x, row.unit, name, row.title, row.over)
             elif row.of_joints:
-                for (joint, kind), y in zip(types.items(), x.T, strict=True):
-                    yield Column(row.heading, y, unit(row.unit, kind), joint, row.title)
+                yield from of_joints(row.heading, x, row.unit, types, row.title)
             else:
                 numbers = "xyz" if row.over else map(str, range(1, 1 + x.shape[1]))
                 for of, y in zip(numbers, x.T, strict=True):
                     yield Column(f"{name} {row.heading}".lstrip(), y, row.unit, of, row.title, row.over)
+
+
+def of_joints(heading: str, values: np.ndarray, like: str, types: Types, title: str = "") -> Iterator[Column]:
+    """Columns of values (k, n) with the unit of another quantity."""
+    for (name, kind), x in zip(types.items(), values.T, strict=True):
+        yield Column(heading, x, unit(like, kind), name, title)

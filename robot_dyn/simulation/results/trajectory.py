@@ -103,8 +103,7 @@ class Trajectory(TrajectoryData):
         """A few lines: outcome, what acted, ledger, error, tracking, cost."""
         return summary(self)
 
-    def columns(self) -> Iterator[Column]:
-        """Return the columns of the table."""
+    def _columns(self) -> Iterator[Column]:
         return columns(self)
 
     def _repr_html_(self) -> str:

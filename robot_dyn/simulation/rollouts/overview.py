@@ -18,7 +18,7 @@ from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_square, tracking_of
-from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
+from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData, parts_of
 from robot_dyn.simulation.setup.setup import Setup
 
 OF_REFERENCES = RemarkKind.JUMPS, RemarkKind.HELD
@@ -139,7 +139,7 @@ def _of_references(runs: RolloutsData, setup: Setup) -> Iterator[Remark]:
         return
     extremes, of = runs.observed.extremes, dict[str, list[tuple[int, Remark]]]()
     for run in map(int, np.flatnonzero(at_rest(extremes).any(axis=1))):
-        plant, controller = runs.parts_of(setup, run)
+        plant, controller = parts_of(runs, setup, run)
         of_run = with_values(setup, {"plant": plant, "controller": controller, "q0": q0[run]})  # all was checked
         for remark in held(of_run, extremes[run], runs.t[runs.t <= runs.ended[run]], units(runs)):
             of.setdefault(remark.joint, []).append((run, remark))

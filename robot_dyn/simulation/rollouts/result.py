@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import fields, replace
 from functools import cached_property
 from operator import index
-from typing import Any, final, overload
+from typing import final, overload
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from robot_dyn.simulation.columns import Column, Variable
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.observation.remarks import remark_lines as lines_of
 from robot_dyn.simulation.results.provenance import about_the_robot
+from robot_dyn.simulation.results.run_data import taken
 from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.html import rollouts_html
@@ -82,13 +83,13 @@ class Rollouts(RolloutsData):
             IndexError: If no run has that number.
         """
         if isinstance(run, slice):
-            taken = range(len(self))[run]
-            if not taken:
+            chosen = range(len(self))[run]
+            if not chosen:
                 raise QueryError(f"there is no run in {run}: runs are numbered from 0 to {len(self) - 1}")
             numbers = np.arange(len(self)) if self.numbers is None else self.numbers
-            by_run = {name: _taken(x, run) for name, x in self._by_run().items()}
+            by_run = {x.name: taken(getattr(self, x.name), run) for x in fields(self) if x.name not in _SHARED}
             some = replace(self, **by_run, numbers=numbers[run], saved=None)
-            whole = None if self.saved is None else of_some(some, taken, self.saved)
+            whole = None if self.saved is None else of_some(some, chosen, self.saved)
             return replace(some, saved=whole)
         try:
             number = range(len(self))[index(None if isinstance(run, bool) else run)]  # type: ignore[arg-type]
@@ -128,8 +129,7 @@ class Rollouts(RolloutsData):
         """
         return self.overview.worst
 
-    def columns(self) -> Iterator[Column]:
-        """Return the columns of the table."""
+    def _columns(self) -> Iterator[Column]:
         return columns(self, self.overview)
 
     def _variables(self) -> Mapping[str, Variable]:
@@ -168,13 +168,3 @@ class Rollouts(RolloutsData):
         by_event = int((np.array([text != "" for text in self.advice]) & ~self.diverged).sum())
         early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped{at}"
         return early + (f", {by_event} ended by an event" if by_event else "")
-
-    def _by_run(self) -> dict[str, Any]:
-        return {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _SHARED}
-
-
-def _taken(values: Any, runs: slice) -> Any:
-    """Select the values that belong to a slice of the runs."""
-    if isinstance(values, dict):
-        return {name: x[runs] for name, x in values.items()}
-    return None if values is None else values[runs]

@@ -86,12 +86,13 @@ class RolloutsData(RunData):
         if setup is None:
             raise QueryError("runs that were read from a file have no setup; run rd.rollouts again, and use its result")
         run = integer("run", run, least=-len(self), most=len(self) - 1) % len(self)
-        plant, controller = self.parts_of(setup, run)
+        plant, controller = parts_of(self, setup, run)
         q0 = setup.q0 if self.q0 is None else self.q0[run]
         v0 = setup.v0 if self.v0 is None else self.v0[run]
         return replace(setup, plant=plant, controller=controller, q0=q0, v0=v0, estimate_error=True)
 
-    def parts_of(self, setup: Setup, run: int) -> tuple[Plant, Controller | None]:
-        """Plant and controller of a run, with its parameters and noise."""
-        number = run if self.numbers is None else int(self.numbers[run])
-        return parts_of_run(setup, {name: x[run] for name, x in self.params.items()}, number)
+
+def parts_of(runs: RolloutsData, setup: Setup, run: int) -> tuple[Plant, Controller | None]:
+    """Plant and controller of a run, with its parameters and noise."""
+    number = run if runs.numbers is None else int(runs.numbers[run])
+    return parts_of_run(setup, {name: x[run] for name, x in runs.params.items()}, number)

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from robot_dyn.codegen.parameters import parameters
-from robot_dyn.queries.units import joint_units, of_joint, unit
+from robot_dyn.queries.units import joint_units, of_joint
 from robot_dyn.simulation.columns import Column, Variable
-from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.run_data import QUANTITIES
 from robot_dyn.simulation.results.samples import root_mean_squares
+from robot_dyn.simulation.results.table import Types, of_joints
 from robot_dyn.simulation.rollouts.overview import texts_by_run
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 from robot_dyn.simulation.rollouts.sweepable import swept_parameter
-
-Types = Mapping[str, str | None]  # of joints, by name
 
 
 def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
@@ -27,20 +25,24 @@ def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
     yield from _of_parameters(runs, types)
     for key, start in (("q", runs.q0), ("v", runs.v0)):
         if start is not None:
-            yield from _of_joints(f"start {key}", start, key, types)
+            yield from of_joints(f"start {key}", start, key, types)
     yield Column("ended", runs.ended, "s")
     yield Column("outcome", np.array([runs.outcome(i).ending.value for i in range(len(runs))]))
     yield Column("steps", runs.steps)
     if of.tracking_error is not None:
-        yield Column("tracking error", of.tracking_error, _tracking_unit(runs, types))
-    yield from _of_remarks(of.remarks, len(runs))
+        yield Column(
+            "tracking error", of.tracking_error, "m" if "frame" in runs.about else joint_units("q", types.values())
+        )
+    texts = texts_by_run(of.remarks, len(runs))
+    yield Column("number of remarks", np.array([text.count(";") + 1 if text else 0 for text in texts]))
+    yield Column("remarks", np.array(texts))
     for key in ("v", "u"):
         if (x := getattr(runs, key)) is not None:
-            yield from _of_joints(f"rms {key}", root_mean_squares(x), key, types)
+            yield from of_joints(f"rms {key}", root_mean_squares(x), key, types)
     if runs.observed is not None:
         for row, key in enumerate(("q", "v", "u")):
             for side, which in enumerate(("least", "largest")):
-                yield from _of_joints(f"{which} {key}", runs.observed.extremes[:, row, side], key, types)
+                yield from of_joints(f"{which} {key}", runs.observed.extremes[:, row, side], key, types)
 
 
 def samples(runs: RolloutsData) -> dict[str, Variable]:
@@ -57,36 +59,20 @@ def samples(runs: RolloutsData) -> dict[str, Variable]:
     return found
 
 
-def _of_joints(quantity: str, values: np.ndarray, like: str, types: Types) -> Iterator[Column]:
-    for (name, kind), x in zip(types.items(), values.T, strict=True):
-        yield Column(quantity, x, unit(like, kind), name)
-
-
-def _tracking_unit(runs: RolloutsData, types: Types) -> str:
-    return "m" if "frame" in runs.about else joint_units("q", types.values())
-
-
-def _of_remarks(remarks: tuple[Remark, ...], count: int) -> Iterator[Column]:
-    """How many remarks are about a run, and what they are about."""
-    texts = texts_by_run(remarks, count)
-    yield Column("number of remarks", np.array([text.count(";") + 1 if text else 0 for text in texts]))
-    yield Column("remarks", np.array(texts))
-
-
 def _of_parameters(runs: RolloutsData, types: Types) -> Iterator[Column]:
     """What was swept: by joint, where its setup is known and says that it is of joints; else numbered if of several."""
     setup = runs.setup
     known = (
         () if setup is None else parameters(setup.plant.dynamics, setup.plant.effects, setup.controller, runs.params)
     )
-    of_joints = {each.name: each.declared for each in known if each.declared.of_joints}
+    declared = {each.name: each.declared for each in known if each.declared.of_joints}
     dynamics = None if setup is None else setup.plant.dynamics
     about = {each.name: swept_parameter(each, dynamics).unit for each in known}
     for name, values in runs.params.items():
         columns = values.T
-        if name in of_joints and len(columns) == len(types):
+        if name in declared and len(columns) == len(types):
             for (joint, kind), x in zip(types.items(), columns, strict=True):
-                yield Column(name, x, of_joint(of_joints[name].unit, kind), joint)
+                yield Column(name, x, of_joint(declared[name].unit, kind), joint)
         else:
             several = len(columns) > 1
             yield from (Column(name, x, about.get(name, ""), str(k + 1) * several) for k, x in enumerate(columns))
