@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.long import long
 from tests.test_readme_and_scripts import ROOT, check_prints, commands_of, run_commands, untimed, with_few_samples_here
 
 INDEX = ROOT / "docs" / "how_to" / "README.md"
@@ -19,7 +20,12 @@ EXTRAS = {
 }
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+IN_SHORT = {"query_an_arm", "mjcf", "follow_a_recorded_motion", "data_for_other_tools", "a_real_control_loop"}
+SHORT = [page for page in PAGES if page.stem in IN_SHORT]
+SOME = [*SHORT, *long(page for page in PAGES if page not in SHORT)]
+
+
+@pytest.mark.parametrize("page", SOME, ids=lambda page: page.stem)
 def test_blocks_run_and_print_what_the_page_says(page: Path, tmp_path: Path, monkeypatch, capsys) -> None:
     """The Python first, whose files the commands take."""
     for module in EXTRAS.get(page.name, ()):

@@ -9,6 +9,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError
+from tests.long import long
 
 BODY = rd.Payload("tool0", 5.0, (0.1, 0.0, 0.2))
 ROUNDING = 1e-12  # of the largest torque
@@ -39,7 +40,7 @@ def pull(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", plants())
-@pytest.mark.parametrize("engine", ["interpreted", "compiled"])
+@pytest.mark.parametrize("engine", [*long(["interpreted"]), "compiled"])
 def test_causes_add_up_to_the_actuation(name: str, engine: str) -> None:
     """To rounding, at all samples: those of joints that stick, strike and break away too."""
     plant = plants()[name]

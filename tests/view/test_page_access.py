@@ -46,7 +46,7 @@ def still(file: Path) -> None:
     rd.show(rd.load("cart_pole"), np.array([0.1, 0.2])).save(file)
 
 
-@pytest.fixture(scope="module", params=[one, *long([two]), still])
+@pytest.fixture(scope="module", params=[one, *long([two, still])])
 def page(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     make: Callable[[Path], None] = request.param
     file = tmp_path_factory.mktemp("page") / f"{make.__name__}.html"

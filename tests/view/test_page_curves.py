@@ -7,6 +7,7 @@ import pytest
 
 import robot_dyn as rd
 from tests.browser import opened, until
+from tests.long import long
 
 SPANS = "replay.plots.figures.map((each) => [each.scales.x.min, each.scales.x.max])"
 
@@ -45,7 +46,7 @@ CENTRES = """(() => {
 })()"""
 
 
-@pytest.mark.parametrize("scale", [1, 2])
+@pytest.mark.parametrize("scale", [1, *long([2])])
 def test_a_curve_is_as_fine_as_the_pixels(browser, file, run, scale: int) -> None:
     """The centre of the ink of each column of pixels is the curve's, within 1/4 of a pixel (root mean square 0.1).
 

@@ -7,6 +7,7 @@ import pytest
 
 import robot_dyn as rd
 from tests.browser import opened, until
+from tests.long import long
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +23,7 @@ def box(view, selector: str) -> tuple[float, float, float, float]:
     return tuple(view.ask(where))
 
 
-@pytest.mark.parametrize("width, height", [(1920, 1000), (1400, 900), (1200, 800), (1199, 800), (390, 844)])
+@pytest.mark.parametrize("width, height", [(1400, 900), (390, 844), *long([(1920, 1000), (1200, 800), (1199, 800)])])
 def test_the_arm_stays_in_view_while_the_plots_scroll(browser, file, width: int, height: int) -> None:
     """From 1200 px on it stands left of them, as high as the window; else it and the slider stick above them."""
     with opened(browser, file, size=(width, height)) as view:

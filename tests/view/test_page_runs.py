@@ -7,6 +7,7 @@ import pytest
 
 import robot_dyn as rd
 from tests.browser import opened
+from tests.long import long
 
 TITLES = "[...document.querySelectorAll('.plot h2')].map((each) => each.textContent)"
 
@@ -25,8 +26,8 @@ def runs():
     return followed(0.0), followed(0.5)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1400, 390])
+@pytest.mark.parametrize("scheme", ["light", *long(["dark"])])
+@pytest.mark.parametrize("width", [1400, *long([390])])
 def test_two_runs_show_desired_motion_difference_and_settings(browser, tmp_path, runs, width: int, scheme: str) -> None:
     """The difference that is drawn is that of the samples; the table names the payload alone."""
     a, b = runs

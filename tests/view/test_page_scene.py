@@ -7,6 +7,7 @@ import pytest
 
 import robot_dyn as rd
 from tests.browser import opened, until
+from tests.long import long
 
 Q = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4])
 
@@ -133,7 +134,7 @@ def test_frames_boxes_and_the_centre_of_mass_are_shown_and_hidden(view) -> None:
     assert view.complaints == []
 
 
-@pytest.mark.parametrize("frame", ["forearm_link", "tool0", ""])
+@pytest.mark.parametrize("frame", ["tool0", *long(["forearm_link", ""])])
 def test_the_path_is_that_of_the_chosen_frame(view, run, frame: str) -> None:
     """Pinocchio's positions, at every sample, lie on the one line that is shown."""
     if not view.page.locator("#layers").is_visible():

@@ -9,6 +9,7 @@ import pytest
 
 import robot_dyn as rd
 from tests.browser import opened, until
+from tests.long import long
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +23,7 @@ def file(swing, tmp_path_factory):
     return rd.save_replay(swing, tmp_path_factory.mktemp("page") / "swing.html")
 
 
-@pytest.mark.parametrize("focus", ["body", "#time", "#show", ".u-series th[tabindex]"])
+@pytest.mark.parametrize("focus", ["body", "#time", *long(["#show", ".u-series th[tabindex]"])])
 def test_arrows_step_a_sample_whatever_has_the_focus(browser, file, swing, focus: str) -> None:
     with opened(browser, file) as view:
         view.page.locator(focus).first.focus()

@@ -14,6 +14,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.view import Page
 from tests.browser import View, opened
+from tests.long import long
 
 STEPS = 2 * 32767  # the numbers of the page are whole steps, two of them half of one off
 TIMES = (0.0, 0.1234, 0.37, 0.4)
@@ -48,7 +49,7 @@ def values(view: View, count: int, n: int) -> np.ndarray:
     return np.array(view.ask(f"[...Array({count})].map((_, i) => [...Array({n})].map((_, j) => why.value(j, i)))"))
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (1400, "dark"), (390, "light"), (390, "dark")])
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), *long([(1400, "dark"), (390, "light")]), (390, "dark")])
 def test_numbers_and_bars_are_those_of_the_run(
     browser: Any, run: rd.Trajectory, page: Path, width: int, scheme: Any
 ) -> None:
