@@ -24,14 +24,14 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 588,
-    "as of": 169,
-    "what without noun": 666,
+    "opening": 573,
+    "as of": 146,
+    "what without noun": 657,
     "is told": 22,
-    "says that": 116,
+    "says that": 115,
     "tells that": 6,
     "goes on": 20,
-    "looks": 92,
+    "looks": 91,
     "believes": 28,
     "is no": 78,
     "of its own": 78,
@@ -40,14 +40,14 @@ CEILINGS = {
     "anew": 1,
     "likewise": 29,
     "in place of": 62,
-    "so many": 50,
+    "so many": 49,
     "but for": 19,
     "whatever": 37,
-    "of which": 58,
+    "of which": 56,
     "the same holds": 2,
-    "each": 878,
-    "arguments": 96,
-    "Any": 2699,
+    "each": 869,
+    "arguments": 93,
+    "Any": 2691,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.

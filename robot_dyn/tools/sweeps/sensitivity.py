@@ -32,9 +32,9 @@ class Sensitivity(Answer):
     Attributes:
         names: Of the parameters.
         first: First-order indices S, of design "saltelli"; else empty.
-        total: Total indices T, likewise.
+        total: Total indices T, in the same way.
         rank_correlation: Spearman's ρ, of other designs; it sees the monotone part only. Empty of "saltelli".
-        pawn: PAWN indices, likewise.
+        pawn: PAWN indices, in the same way.
         pawn_noise: The PAWN index of a parameter without influence, of as many runs.
         n: Runs.
         failed: Runs that failed.
@@ -44,14 +44,14 @@ class Sensitivity(Answer):
     """
 
     names: tuple[str, ...]
-    first: tuple[Estimate, ...]
-    total: tuple[Estimate, ...]
-    rank_correlation: tuple[float, ...]
-    pawn: tuple[float, ...]
-    pawn_noise: float
-    n: int
-    failed: int
-    method: str
+    first: tuple[Estimate, ...] = ()
+    total: tuple[Estimate, ...] = ()
+    rank_correlation: tuple[float, ...] = ()
+    pawn: tuple[float, ...] = ()
+    pawn_noise: float = 0.0
+    n: int = 0
+    failed: int = 0
+    method: str = ""
     figure: str = ""
     given: str | None = None
 
@@ -86,7 +86,7 @@ def saltelli(
 
     Args:
         y: The figure of each run, shape (N,).
-        known: Whether a run has a value, shape (N,); blocks with a run that has none are left out.
+        known: Whether a run has a value, shape (N,); blocks with a run that failed are left out.
         names: Of the d parameters.
         scrambling: The scrambling of each run, shape (N,).
         level: Of the intervals.
@@ -116,14 +116,24 @@ def saltelli(
     lost = int((~whole).sum())
     note = f"{lost} blocks of {block} runs with a failed one are left out" if lost else ""
     made = [
-        Estimate(f"{kind} index of {name}", float(x), float(x - h), float(x + h), level, len(y), failed, "SALib", note)
+        Estimate(
+            f"{kind} index of {name}",
+            float(x),
+            float(x - h),
+            float(x + h),
+            level=level,
+            n=len(y),
+            failed=failed,
+            method="SALib",
+            note=note,
+        )
         for kind, row, halves in zip(("first-order", "total"), theta, half, strict=True)
         for name, x, h in zip(names, row, halves, strict=True)
     ]
     method = f"Sobol' indices by SALib, jackknife over {len(left)} scramblings"
     method += f"; {note}" if note else ""
     d = len(names)
-    return Sensitivity(names, tuple(made[:d]), tuple(made[d:]), (), (), 0.0, len(y), failed, method)
+    return Sensitivity(names, tuple(made[:d]), tuple(made[d:]), n=len(y), failed=failed, method=method)
 
 
 def by_values(y: Any, x: Any, names: Sequence[str], *, failed: int = 0) -> Sensitivity:
@@ -154,7 +164,9 @@ def by_values(y: Any, x: Any, names: Sequence[str], *, failed: int = 0) -> Sensi
     noise = _pawn(y, bins(np.random.default_rng(0).random(len(y))))
     method = "Spearman's rank correlation; PAWN, median over values, or over up to 32 bins of them"
     pawn = tuple(_pawn(y, each) for each in binned)
-    return Sensitivity(names, (), (), correlation, pawn, noise, len(y), failed, method)
+    return Sensitivity(
+        names, rank_correlation=correlation, pawn=pawn, pawn_noise=noise, n=len(y), failed=failed, method=method
+    )
 
 
 def bins(x: np.ndarray) -> np.ndarray:

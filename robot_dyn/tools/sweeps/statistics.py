@@ -4,7 +4,7 @@
     16 scramblings          the statistic of each scrambling, and Student's t over them
     points not random       the statistic alone: there is no interval
 
-How often these intervals hold the true value is in docs/explanation/sweep_statistics.md.
+How often these intervals hold the true value: docs/data/sweep_coverage.csv, by scripts/benchmark.py sweeps.
 """
 
 from __future__ import annotations
@@ -56,7 +56,9 @@ def probability(events: Any, level: float = 0.95, scrambling: Any = None, *, fai
     if few < FEW and not isnan(low):
         which = "event" if few == k else "run without the event"
         note = f"{few} {which}{'s' * (few != 1)}, fewer than {FEW}: the interval is conservative"
-    return Estimate("probability", k / n, float(low), float(high), level, n, failed, method, note)
+    return Estimate(
+        "probability", k / n, float(low), float(high), level=level, n=n, failed=failed, method=method, note=note
+    )
 
 
 def quantiles(
@@ -97,7 +99,19 @@ def quantiles(
             half, method = _half_width_of_share(x <= estimate, scrambling, level)
             low, high = (_at_rank(ordered, len(x) * q + 0.5) for q in (p - half, p + half))
         note = _note_of_quantile(p, level, len(x), estimate, low, high)
-        made.append(Estimate(f"quantile {p:g}", estimate, float(low), float(high), level, len(x), failed, method, note))
+        made.append(
+            Estimate(
+                f"quantile {p:g}",
+                estimate,
+                float(low),
+                float(high),
+                level=level,
+                n=len(x),
+                failed=failed,
+                method=method,
+                note=note,
+            )
+        )
     return tuple(made)
 
 
@@ -124,7 +138,9 @@ def mean(x: Any, level: float = 0.95, scrambling: Any = None, *, failed: int = 0
     if len(two := np.unique(x)) <= 2:  # then it follows from the share of the larger one
         share = probability(x == two[-1], level, scrambling)
         low, high = (float(two[0] + (two[-1] - two[0]) * end) for end in (share.low, share.high))
-        return Estimate("mean", estimate, low, high, level, len(x), failed, share.method, share.note)
+        return Estimate(
+            "mean", estimate, low, high, level=level, n=len(x), failed=failed, method=share.method, note=share.note
+        )
     if scrambling is None:
         half, method = _student(x, level), "Student's t"
     else:
@@ -133,7 +149,17 @@ def mean(x: Any, level: float = 0.95, scrambling: Any = None, *, failed: int = 0
     skewness = float(skew(x))
     if len(x) < _COCHRAN * skewness**2 and not isnan(half):
         half, note = nan, f"no interval: skewness {skewness:.2g} is too large for {len(x)} runs (Cochran's rule)"
-    return Estimate("mean", estimate, estimate - half, estimate + half, level, len(x), failed, method, note)
+    return Estimate(
+        "mean",
+        estimate,
+        estimate - half,
+        estimate + half,
+        level=level,
+        n=len(x),
+        failed=failed,
+        method=method,
+        note=note,
+    )
 
 
 def _student(x: np.ndarray, level: float) -> float:

@@ -189,7 +189,7 @@ def sweep_of(
         design, drawn = (data["design"], rows) if named_design else (rows, None)
         kept = data["samples"]
         kept = kept and samples(*kept["names"], every=kept["every"], failed=kept["failed"])
-        return Sweep(scene, data["runs"], vary, of, design, data["seed"], data["storage"], kept, drawn)
+        return Sweep(scene, data["runs"], vary, of, design, data["seed"], data["storage"], samples=kept, drawn=drawn)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise SweepError(f"{where}: is not the specification of a sweep ({error!r})") from None
 
