@@ -83,7 +83,7 @@ def test_what_needs_asks_for_is_of_its_extra() -> None:
         (module, constants.get(extra, extra).strip('"'))
         for path in (ROOT / "robot_dyn").rglob("*.py")
         for text in [path.read_text(encoding="utf-8")]
-        for constants in [{"EXTRA": "data", "_EXTRA": "data"} if re.search(r"import EXTRA|EXTRA = ", text) else {}]
+        for constants in [{"EXTRA": "data", "_EXTRA": "sweeps"} if re.search(r"import EXTRA|EXTRA = ", text) else {}]
         for module, extra in re.findall(r'needs\("([\w.]+)", extra=([\w"]+)\)', text)
     ]
     assert len(calls) > 3

@@ -57,7 +57,7 @@ IN_CIRCLES = {
     "control.digital_loop": {"loop", "tick"},
     "effects": {"explanation", "plant"},
     "lagrange": {"digits"},
-    "model": {"evaluation", "from_pinocchio", "gravity", "info", "robot", "to_urdf"},
+    "model": {"calls", "evaluation", "from_pinocchio", "gravity", "info", "robot", "to_urdf"},
     "tools.motors.motor_budget": {"budget", "fastest", "result"},
     "tools.stress": {"result", "text"},
     "tools.sweeps": {"report", "result", "run_sweep"},

@@ -87,7 +87,6 @@ from robot_dyn.foundations.validate import integer as integer
 from robot_dyn.foundations.validate import number as number
 from robot_dyn.foundations.validate import numbers as numbers
 from robot_dyn.foundations.validate import one_state as one_state
-from robot_dyn.foundations.validate import real as real
 from robot_dyn.foundations.validate import truth as truth
 from robot_dyn.foundations.values import Caching as Caching
 from robot_dyn.foundations.values import Value as Value

@@ -15,7 +15,7 @@ from robot_dyn.accuracy import Certificate, DigitCount, Implementation, implemen
 from robot_dyn.accuracy.certificate.diagram import draw
 from robot_dyn.lagrange import articulated_body
 from robot_dyn.lagrange.digits import QUANTITIES
-from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
+from robot_dyn.queries import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from tests.long import long
 
 GIVEN = {"q": [0.3, -1.1], "v": [0.5, 0.4], "a": [0.2, 0.9], "tau": [1.0, -2.0]}

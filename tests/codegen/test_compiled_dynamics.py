@@ -16,7 +16,7 @@ import robot_dyn as rd
 from robot_dyn.codegen import CompiledDynamics, Kernel, SelfCheckError, SizeWarning, Trace
 from robot_dyn.foundations import OverflowedError, QueryError, SingularError
 from robot_dyn.lagrange import floored, magnitudes
-from robot_dyn.queries.dynamics import EQUATION
+from robot_dyn.queries import EQUATION
 from tests.codegen.arms import ARMS, compiled, states
 from tests.random_trees import RandomTree, trees
 

@@ -14,8 +14,7 @@ from robot_dyn.codegen import CompiledDynamics
 from robot_dyn.foundations import OverflowedError, QueryError
 from robot_dyn.lagrange.formulas import FORMULAS
 from robot_dyn.model.calls import PINOCCHIO
-from robot_dyn.queries import QUANTITIES, Dynamics
-from robot_dyn.queries.dynamics import EQUATION
+from robot_dyn.queries import EQUATION, QUANTITIES, Dynamics
 from tests.queries import arguments_of
 
 ENGINES = (rd.Robot, rd.Lagrangian, CompiledDynamics)

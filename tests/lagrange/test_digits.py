@@ -16,7 +16,7 @@ from robot_dyn.lagrange import articulated_body, digits_of, newton_euler
 from robot_dyn.lagrange import exact as exact_module
 from robot_dyn.lagrange.digits import QUANTITIES
 from robot_dyn.lagrange.exact import RESOLUTION, Exact
-from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
+from robot_dyn.queries import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from tests.campaigns.hard.chains import coincident, text
 
 FAR = """<robot name="far"><link name="base"/><link name="bar"><inertial><origin xyz="1e6 0 0"/><mass value="1.3"/>

@@ -12,7 +12,7 @@ import robot_dyn as rd
 from robot_dyn.description import check
 from robot_dyn.foundations import EditError, NotFiniteError, OverflowedError, QueryError, SingularError, UndecidedError
 from robot_dyn.lagrange import articulated_body
-from robot_dyn.queries.dynamics import EQUATION
+from robot_dyn.queries import EQUATION
 from tests.codegen.arms import compiled
 from tests.queries import ARGUMENTS, FRAMED
 

@@ -66,13 +66,9 @@ class Engine(Protocol):
         step       a step in which velocities may jump; see `RightSide`, also for `behind`
 
     Attributes:
-        equation: The state equation of the setup.
-        label: Its name in the summary of a run, with the reason for it.
         exact_right_angles: True if right angles of the robot's file are written out in full.
         doubtful: Σ |y| beyond which a step of fixed length is repeated by the interpreted equation.
-        most_steps: Steps after which the loop returns: 1 to report progress at each of them.
         most_threads: Threads that may run it side by side.
-        most_evaluations: Evaluations after which another engine is to be chosen.
     """
 
     exact_right_angles: ClassVar[bool]
@@ -80,13 +76,24 @@ class Engine(Protocol):
     most_threads: ClassVar[float]
 
     @property
-    def equation(self) -> StateEquation: ...
+    def equation(self) -> StateEquation:
+        """The state equation of the setup."""
+        ...
+
     @property
-    def label(self) -> str: ...
+    def label(self) -> str:
+        """Its name in the summary of a run, with the reason for it."""
+        ...
+
     @property
-    def most_steps(self) -> float: ...
+    def most_steps(self) -> float:
+        """Steps after which the loop returns: 1 to report progress at each of them."""
+        ...
+
     @property
-    def most_evaluations(self) -> float: ...
+    def most_evaluations(self) -> float:
+        """Evaluations after which another engine is to be chosen."""
+        ...
 
     def evaluated(self, equation: StateEquation, watch: Watched) -> Evaluated:
         """Return the functions of an equation that differs from its own in coefficients or payloads.

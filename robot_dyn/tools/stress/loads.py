@@ -15,7 +15,7 @@ from robot_dyn import Lagrangian, Payload, Plant, Robot, RobotDynError, Setup, s
 from robot_dyn.accuracy import Batch, evaluate
 from robot_dyn.control import PDGravity, hold
 from robot_dyn.effects import EffortLimit
-from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, N
+from robot_dyn.queries import CORIOLIS_TORQUE, N
 from robot_dyn.report import Budget
 from robot_dyn.simulation import RemarkKind
 from robot_dyn.tools.stress.confirm import BEYOND, WITHIN

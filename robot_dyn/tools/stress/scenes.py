@@ -14,7 +14,7 @@ from robot_dyn.accuracy import Batch, evaluate
 from robot_dyn.control import PD, gains_from, quintic
 from robot_dyn.effects import DryFriction, Effect, RegularisedCoulombFriction, RigidStops, ViscousFriction, joint_stops
 from robot_dyn.integrate import Adaptive, method
-from robot_dyn.queries.dynamics import M
+from robot_dyn.queries import M
 
 FAMILIES = ("swing", "friction", "dry friction", "stops", "rigid stops", "PD", "sampled PD")
 _METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8", "gauss_4", "rosenbrock_5")

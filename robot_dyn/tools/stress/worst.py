@@ -14,7 +14,7 @@ from robot_dyn.accuracy import Batch, Search, evaluate
 from robot_dyn.control import gains_from
 from robot_dyn.foundations import OverflowedError
 from robot_dyn.lagrange import unit_diagonal_conditions
-from robot_dyn.queries.dynamics import M, N
+from robot_dyn.queries import M, N
 from robot_dyn.report import Budget
 from robot_dyn.tools.stress.finding import WorstCase
 from robot_dyn.tools.stress.shrink import shrunk

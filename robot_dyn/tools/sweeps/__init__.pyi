@@ -21,6 +21,5 @@ from robot_dyn.tools.sweeps.sensitivity import Sensitivity as Sensitivity
 __all__: list[str]
 
 # Names that only tools and tests import.
-from robot_dyn.tools.sweeps.designs import Design as Design
 from robot_dyn.tools.sweeps.plan.work import Work as Work
 from robot_dyn.tools.sweeps.run_sweep import begun as begun

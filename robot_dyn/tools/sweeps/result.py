@@ -130,7 +130,9 @@ class SweepResult(Answer):
         First-order and total Sobol' indices of design "saltelli", else rank correlations and PAWN indices.
         """
         from robot_dyn.tools.sweeps import sensitivity
+        from robot_dyn.tools.sweeps.statistics import check_level
 
+        level = check_level(level)
         x, keep, failed = self._finite(figure, "sensitivity", given)
         if self.sweep.points.name == "saltelli":
             scrambling = self.sweep.points.scrambling

@@ -30,8 +30,7 @@ from robot_dyn.lagrange import (
     scaled,
     unit_diagonal_condition,
 )
-from robot_dyn.queries import Quantity
-from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
+from robot_dyn.queries import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
 from tests.campaigns.hard.case import Case, Row
 from tests.campaigns.hard.chains import CHAINS, FOLDER, LONG, file_of
 

@@ -19,7 +19,7 @@ import numpy as np
 import robot_dyn as rd
 from robot_dyn import RobotDynError
 from robot_dyn.accuracy import PeerError
-from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, INVERSE_DYNAMICS, M
+from robot_dyn.queries import FORWARD_DYNAMICS, INVERSE_DYNAMICS, M
 from tests.campaigns.hard.case import OURS, Case, Row
 from tests.campaigns.hard.chains import CHAINS, LONG
 from tests.campaigns.hard.conditioning import SOLVED, SUMS, errors, states

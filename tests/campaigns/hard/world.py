@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 import robot_dyn as rd
 from robot_dyn import RobotDynError
 from robot_dyn.codegen import completed
-from robot_dyn.queries.dynamics import FORWARD_DYNAMICS, M, N
+from robot_dyn.queries import FORWARD_DYNAMICS, M, N
 from tests.campaigns.estimates.truth import truth
 from tests.campaigns.hard import conditioning, far_out, sampled_control, tools
 from tests.campaigns.hard.case import Case, Row

@@ -63,7 +63,7 @@ def test_samples_that_are_missing_or_changed_are_found(tmp_path: Path) -> None:
     with pytest.raises(SweepError, match=r"v/c/2/0/0: was changed after it was written; remove the rows of chunk 2"):
         done.verify()
     shard.unlink()
-    with pytest.raises(SweepError, match=r"v/c/2/0/0: is missing"):
+    with pytest.raises(SweepError, match=r"v/c/2/0/0: there is no such file"):
         done.samples()
     done.folder.file(2).unlink()
     assert sw.run(done.sweep, tmp_path / "out").verify() == digest

@@ -17,7 +17,7 @@ import numpy as np
 
 from robot_dyn.foundations import SweepError, needs, reading, why
 from robot_dyn.queries import joint_units
-from robot_dyn.simulation.results.run_data import QUANTITIES
+from robot_dyn.simulation import QUANTITIES
 from robot_dyn.tools.sweeps.folder.files import Files, make_folder, write
 
 _INNER = 64  # runs that are read together, where all are kept

@@ -141,7 +141,9 @@ class Sweep(Answer, Value, Caching):
         return tuple(name if size == 1 else f"{name}[{k}]" for name, size in names for k in range(size))
 
     def values(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """What varies in runs start, …, stop − 1, by name, (k, size)."""
+        """What varies in runs start, …, stop − 1, by name, (k, size); SweepError if there are no such runs."""
+        stop = integer("stop", stop, most=self.runs, error=SweepError)
+        start = integer("start", start, most=stop, error=SweepError)
         u, first, found = self.points.rows[start:stop], 0, {}
         for name, each in self.vary.items():
             found[name] = each.values(np.ascontiguousarray(u[:, first : first + each.size])).reshape(stop - start, -1)

@@ -14,12 +14,11 @@ import numpy as np
 
 from robot_dyn import RobotDynError, Rollouts, Setup, Trajectory
 from robot_dyn.foundations import SweepError, because
-from robot_dyn.simulation import MOST_BYTES
+from robot_dyn.simulation import MOST_BYTES, parts_of_run
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.simulation.rollouts.overview import remarks_on_each, texts_by_run
 from robot_dyn.simulation.rollouts.rollouts import batch_of, manners, run_batch
-from robot_dyn.simulation.rollouts.sweepable import parts_of_run
 from robot_dyn.tools.sweeps.folder.rows import DIVERGED, FINISHED, RAISED, Rows
 from robot_dyn.tools.sweeps.folder.samples import check_times
 from robot_dyn.tools.sweeps.plan.runs import Runs, taken
