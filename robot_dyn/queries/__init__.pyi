@@ -3,8 +3,8 @@ from robot_dyn.queries.dynamics import CORIOLIS_TORQUE as CORIOLIS_TORQUE
 from robot_dyn.queries.dynamics import EQUATION as EQUATION
 from robot_dyn.queries.dynamics import FORWARD_DYNAMICS as FORWARD_DYNAMICS
 from robot_dyn.queries.dynamics import INVERSE_DYNAMICS as INVERSE_DYNAMICS
-from robot_dyn.queries.dynamics import C as C
 from robot_dyn.queries.dynamics import QUANTITIES as QUANTITIES
+from robot_dyn.queries.dynamics import C as C
 from robot_dyn.queries.dynamics import Dynamics as Dynamics
 from robot_dyn.queries.dynamics import M as M
 from robot_dyn.queries.dynamics import N as N

@@ -82,7 +82,7 @@ class Engine(Protocol):
 
     @property
     def label(self) -> str:
-        """Its name in the summary of a run, with the reason for it."""
+        """The name of the engine in the summary of a run, with the reason for it."""
         ...
 
     @property

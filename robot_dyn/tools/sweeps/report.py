@@ -61,7 +61,7 @@ def report(result: SweepResult) -> str:
 
 
 def strongest(failed: np.ndarray, x: np.ndarray) -> tuple[int, int]:
-    """The two columns of x (N, d) on which failure depends most: the least p-values of the chi-square test over values or bins."""
+    """The two columns of x (N, d) on which failure depends most: least p-values of the chi-square test over bins."""
     from scipy.stats import chi2_contingency
 
     found: list[tuple[Any, Any]] = []
