@@ -21,7 +21,7 @@ from robot_dyn.tools.sweeps.estimate import Estimate
 NOT_RANDOM = "points that are not random"
 FEW = 5
 """Events below which intervals of probabilities are said to be conservative."""
-_COCHRAN = 60  # of N/g²; with his 25, 10 % of the intervals of a log-normal figure of 512 runs are given and wrong
+_COCHRAN = 100  # with his 25, 10 % of the intervals of a log-normal figure of 512 runs are given and wrong
 _COUNTABLE = 1e15  # runs; a larger number is rounded, or infinite
 
 
@@ -116,7 +116,7 @@ def quantiles(
 
 
 def mean(x: Any, level: float = 0.95, scrambling: Any = None, *, failed: int = 0) -> Estimate:
-    """Mean of a figure; without an interval where N < 60 g² with the skewness g, since it would hold too seldom.
+    """Mean of a figure; without an interval where N < 100 g² with the skewness g, since it would hold too seldom.
 
     Args:
         x: The finite figure of each run, shape (N,).
