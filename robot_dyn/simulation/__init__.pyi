@@ -17,7 +17,7 @@ from robot_dyn.simulation.results.error_estimate import ErrorEstimate as ErrorEs
 from robot_dyn.simulation.results.error_estimate import Verdict as Verdict
 from robot_dyn.simulation.results.ledger import Ledger as Ledger
 from robot_dyn.simulation.results.provenance import robot_of as robot_of
-from robot_dyn.simulation.results.run_data import QUANTITIES as QUANTITIES
+from robot_dyn.simulation.results.run_data import SAMPLED as SAMPLED
 from robot_dyn.simulation.results.run_file import RunFileError as RunFileError
 from robot_dyn.simulation.results.samples import tracking_of as tracking_of
 from robot_dyn.simulation.rollouts.sweepable import parts_of_run as parts_of_run

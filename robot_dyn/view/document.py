@@ -21,7 +21,7 @@ from robot_dyn.queries.dynamics import Array
 from robot_dyn.simulation.comparison.differing_settings import run_names
 from robot_dyn.simulation.observation.remarks import remark_lines
 from robot_dyn.simulation.results.provenance import robot_of
-from robot_dyn.simulation.results.run_data import QUANTITIES, TrajectoryData, taken
+from robot_dyn.simulation.results.run_data import SAMPLED, TrajectoryData, taken
 from robot_dyn.view import commands
 from robot_dyn.view.causes import causes, resolution
 from robot_dyn.view.geometry.coarse import look_of
@@ -265,7 +265,7 @@ def _drawable(run: TrajectoryData) -> TrajectoryData:
     end = len(good) if good.all() else int(good.argmin())
     if not end:
         raise ReplayError("the run has no samples that can be shown; simulate it again, with a smaller step")
-    cut = {x.name: taken(getattr(run, x.name), slice(end)) for x in fields(run) if x.name in QUANTITIES}
+    cut = {x.name: taken(getattr(run, x.name), slice(end)) for x in fields(run) if x.name in SAMPLED}
     wrenches = {link: F[F[:, 0] <= run.t[end - 1]] for link, F in run.wrenches.items()}
     return replace(run, **cut, wrenches=wrenches)
 

@@ -1,6 +1,6 @@
 """The record of a run: one table of quantities, the fields that one run and many share, and those of one run.
 
-A quantity that is added stands in QUANTITIES and in the fields of `TrajectoryData`: files, tables, DataFrames, Datasets
+A quantity that is added stands in SAMPLED and in the fields of `TrajectoryData`: files, tables, DataFrames, Datasets
 and exports have it from there. `derived.py` computes it.
 """
 
@@ -26,7 +26,7 @@ from robot_dyn.simulation.run.outcome import Outcome
 
 @final
 @dataclass(frozen=True)
-class Quantity(Layout):
+class SampledQuantity(Layout):
     """A quantity at the samples of a run; its layout is that of one run.
 
     Attributes:
@@ -53,28 +53,28 @@ class Quantity(Layout):
 
 
 _M, _MN = ("m",), ("m", "n")
-QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
+SAMPLED: Mapping[str, SampledQuantity] = MappingProxyType(
     {
-        "t": Quantity(_M, unit="s", title="time", heading="t"),
-        "q": Quantity(_MN, unit="q", title="position", heading="q"),
-        "v": Quantity(_MN, unit="v", title="velocity", heading="v"),
-        "a": Quantity(_MN, absent=True, unit="a", title="acceleration", heading="a"),
-        "u": Quantity(_MN, absent=True, unit="u", title="actuation within its bounds", heading="u"),
-        "desired": Quantity(_MN, unit="q", title="desired position", heading="desired"),
-        "desired_velocity": Quantity(_MN, unit="v", title="desired velocity"),
-        "deviation": Quantity(
+        "t": SampledQuantity(_M, unit="s", title="time", heading="t"),
+        "q": SampledQuantity(_MN, unit="q", title="position", heading="q"),
+        "v": SampledQuantity(_MN, unit="v", title="velocity", heading="v"),
+        "a": SampledQuantity(_MN, absent=True, unit="a", title="acceleration", heading="a"),
+        "u": SampledQuantity(_MN, absent=True, unit="u", title="actuation within its bounds", heading="u"),
+        "desired": SampledQuantity(_MN, unit="q", title="desired position", heading="desired"),
+        "desired_velocity": SampledQuantity(_MN, unit="v", title="desired velocity"),
+        "deviation": SampledQuantity(
             ("m", ("n", 3)), unit="m", title="deviation from the desired motion", heading="deviation", over="axis"
         ),
-        "at_stop": Quantity(_MN, "bool", title="whether it is at or beyond a stop"),
-        "effect_torques": Quantity(_MN, absent=True, unit="u", title="torque of an effect"),
-        "power": Quantity(_M, absent=True, unit="W", heading="power", over="source"),
-        "kinetic": Quantity(_M, absent=True, unit="J", title="kinetic energy"),
-        "potential": Quantity(_M, absent=True, unit="J", title="potential energy"),
-        "work": Quantity(_M, absent=True, unit="J", title="work"),
-        "energy": Quantity(_M, unit="J", title="kinetic and potential energy", heading="energy"),
-        "residual": Quantity(_M, unit="J", title="energy that nothing accounts for", heading="residual"),
-        "controller_states": Quantity(("m", "z"), heading="controller state"),
-        "effect_states": Quantity(("m", None), heading="state"),
+        "at_stop": SampledQuantity(_MN, "bool", title="whether it is at or beyond a stop"),
+        "effect_torques": SampledQuantity(_MN, absent=True, unit="u", title="torque of an effect"),
+        "power": SampledQuantity(_M, absent=True, unit="W", heading="power", over="source"),
+        "kinetic": SampledQuantity(_M, absent=True, unit="J", title="kinetic energy"),
+        "potential": SampledQuantity(_M, absent=True, unit="J", title="potential energy"),
+        "work": SampledQuantity(_M, absent=True, unit="J", title="work"),
+        "energy": SampledQuantity(_M, unit="J", title="kinetic and potential energy", heading="energy"),
+        "residual": SampledQuantity(_M, unit="J", title="energy that nothing accounts for", heading="residual"),
+        "controller_states": SampledQuantity(("m", "z"), heading="controller state"),
+        "effect_states": SampledQuantity(("m", None), heading="state"),
     }
 )
 """By name, in the order of tables; those without a unit have that of their effect."""
@@ -93,7 +93,7 @@ class RunData(Derived):
     """
 
     joint_names: tuple[str, ...]
-    t: Annotated[np.ndarray, QUANTITIES["t"]]
+    t: Annotated[np.ndarray, SAMPLED["t"]]
     q: np.ndarray | None
     v: np.ndarray | None
     u: np.ndarray | None
@@ -161,29 +161,27 @@ def attributes(run: RunData) -> dict[str, str]:
 class TrajectoryData(RunData):
     """The fields of one run, as `Trajectory` describes them."""
 
-    q: Annotated[np.ndarray, QUANTITIES["q"]]
-    v: Annotated[np.ndarray, QUANTITIES["v"]]
-    a: Annotated[np.ndarray, QUANTITIES["a"]]
-    u: Annotated[np.ndarray, QUANTITIES["u"]]
-    power: dict[str, Annotated[np.ndarray, QUANTITIES["power"]]]
+    q: Annotated[np.ndarray, SAMPLED["q"]]
+    v: Annotated[np.ndarray, SAMPLED["v"]]
+    a: Annotated[np.ndarray, SAMPLED["a"]]
+    u: Annotated[np.ndarray, SAMPLED["u"]]
+    power: dict[str, Annotated[np.ndarray, SAMPLED["power"]]]
     ledger: Ledger
-    desired: Annotated[np.ndarray, QUANTITIES["desired"]] | None
-    deviation: Annotated[np.ndarray, QUANTITIES["deviation"]] | None
+    desired: Annotated[np.ndarray, SAMPLED["desired"]] | None
+    deviation: Annotated[np.ndarray, SAMPLED["deviation"]] | None
     outcome: Outcome
     error: ErrorEstimate | None = field(default_factory=NoneType)
     wrenches: dict[str, Annotated[np.ndarray, Layout((None, 7))]] = field(default_factory=dict)
-    at_stop: Annotated[np.ndarray, QUANTITIES["at_stop"]] | None = field(default_factory=NoneType)
+    at_stop: Annotated[np.ndarray, SAMPLED["at_stop"]] | None = field(default_factory=NoneType)
     remarks: tuple[Remark, ...] = field(default_factory=tuple)
     extremes: Annotated[np.ndarray, Layout((3, 2, "n"), finite=False)] | None = field(default_factory=NoneType)
     acting: tuple[str, ...] | None = field(default_factory=NoneType)
-    controller_states: Annotated[np.ndarray, QUANTITIES["controller_states"]] | None = field(default_factory=NoneType)
+    controller_states: Annotated[np.ndarray, SAMPLED["controller_states"]] | None = field(default_factory=NoneType)
     events: tuple[Occurrence, ...] = field(default_factory=tuple)
-    effect_states: dict[str, Annotated[np.ndarray, QUANTITIES["effect_states"]]] = field(default_factory=dict)
+    effect_states: dict[str, Annotated[np.ndarray, SAMPLED["effect_states"]]] = field(default_factory=dict)
     accuracy: Accuracy | None = field(default_factory=NoneType)
-    effect_torques: dict[str, Annotated[np.ndarray, QUANTITIES["effect_torques"]]] | None = field(
-        default_factory=NoneType
-    )
-    desired_velocity: Annotated[np.ndarray, QUANTITIES["desired_velocity"]] | None = field(default_factory=NoneType)
+    effect_torques: dict[str, Annotated[np.ndarray, SAMPLED["effect_torques"]]] | None = field(default_factory=NoneType)
+    desired_velocity: Annotated[np.ndarray, SAMPLED["desired_velocity"]] | None = field(default_factory=NoneType)
 
     @property
     def tracking_error(self) -> float | None:

@@ -9,7 +9,7 @@ import numpy as np
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.columns import Column
 from robot_dyn.simulation.results.provenance import joint_types
-from robot_dyn.simulation.results.run_data import QUANTITIES, TrajectoryData
+from robot_dyn.simulation.results.run_data import SAMPLED, TrajectoryData
 
 Types = Mapping[str, str | None]  # of joints, by name
 
@@ -20,7 +20,7 @@ def columns(run: TrajectoryData) -> Iterator[Column]:
     A deviation from a joint reference is left out: it is q − desired.
     """
     types = dict(zip(run.joint_names, joint_types(run), strict=True))
-    for key, row in QUANTITIES.items():
+    for key, row in SAMPLED.items():
         values = getattr(run.ledger if key in ("energy", "residual") else run, key) if row.heading else None
         if values is None or (key == "deviation" and run.desired is not None):
             continue

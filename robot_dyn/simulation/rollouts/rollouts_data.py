@@ -14,7 +14,7 @@ from robot_dyn.foundations.validate import integer
 from robot_dyn.foundations.values import NOT_STORED, Layout, Value, read_only
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
-from robot_dyn.simulation.results.run_data import QUANTITIES, RunData
+from robot_dyn.simulation.results.run_data import SAMPLED, RunData
 from robot_dyn.simulation.rollouts.sweepable import parts_of_run
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
@@ -41,12 +41,12 @@ class Overview(Value):
 class RolloutsData(RunData):
     """The fields of B runs, as `Rollouts` describes them."""
 
-    q: Annotated[np.ndarray, QUANTITIES["q"].of_runs] | None
-    v: Annotated[np.ndarray, QUANTITIES["v"].of_runs] | None
-    u: Annotated[np.ndarray, QUANTITIES["u"].of_runs] | None
-    kinetic: Annotated[np.ndarray, QUANTITIES["kinetic"].of_runs] | None
-    potential: Annotated[np.ndarray, QUANTITIES["potential"].of_runs] | None
-    work: dict[str, Annotated[np.ndarray, QUANTITIES["work"].of_runs]] | None
+    q: Annotated[np.ndarray, SAMPLED["q"].of_runs] | None
+    v: Annotated[np.ndarray, SAMPLED["v"].of_runs] | None
+    u: Annotated[np.ndarray, SAMPLED["u"].of_runs] | None
+    kinetic: Annotated[np.ndarray, SAMPLED["kinetic"].of_runs] | None
+    potential: Annotated[np.ndarray, SAMPLED["potential"].of_runs] | None
+    work: dict[str, Annotated[np.ndarray, SAMPLED["work"].of_runs]] | None
     ended: Annotated[np.ndarray, Layout(("B",))]
     diverged: Annotated[np.ndarray, Layout(("B",), "bool")]
     stopped: Annotated[np.ndarray, Layout(("B",), "bool")]

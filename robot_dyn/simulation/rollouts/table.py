@@ -10,7 +10,7 @@ from robot_dyn.codegen.parameters import parameters
 from robot_dyn.queries.units import joint_units, of_joint
 from robot_dyn.simulation.columns import Column, Variable
 from robot_dyn.simulation.results.provenance import joint_types
-from robot_dyn.simulation.results.run_data import QUANTITIES
+from robot_dyn.simulation.results.run_data import SAMPLED
 from robot_dyn.simulation.results.samples import root_mean_squares
 from robot_dyn.simulation.results.table import Types, of_joints
 from robot_dyn.simulation.rollouts.overview import texts_by_run
@@ -48,7 +48,7 @@ def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
 def samples(runs: RolloutsData) -> dict[str, Variable]:
     """What was recorded of the runs, over runs and sample times."""
     kinds, found = joint_types(runs), dict[str, Variable]()
-    for key, row in QUANTITIES.items():
+    for key, row in SAMPLED.items():
         values = getattr(runs, key, None)
         for name, x in values.items() if isinstance(values, dict) else (("", values),):
             if x is not None:

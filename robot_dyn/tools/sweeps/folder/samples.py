@@ -17,7 +17,7 @@ import numpy as np
 
 from robot_dyn.foundations import SweepError, needs, reading, why
 from robot_dyn.queries import joint_units
-from robot_dyn.simulation import QUANTITIES
+from robot_dyn.simulation import SAMPLED
 from robot_dyn.tools.sweeps.folder.files import Files, make_folder, write
 
 _INNER = 64  # runs that are read together, where all are kept
@@ -114,7 +114,7 @@ class SampleStore:
         with self._reading():
             found = xarray.open_zarr(self.path, consolidated=False, chunks=None)
             for name in self.names:
-                found[name].attrs |= {"units": joint_units(name, joint_types), "long_name": QUANTITIES[name].title}
+                found[name].attrs |= {"units": joint_units(name, joint_types), "long_name": SAMPLED[name].title}
             return found.assign_coords(run=np.arange(self.runs), joint=list(found.attrs.pop("joint")))
 
     def _array(self, zarr: Any, store: Any, name: str, t: np.ndarray, joints: tuple[str, ...]) -> Any:
