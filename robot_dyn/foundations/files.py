@@ -23,6 +23,7 @@ _NEW_S = 10.0  # a younger file may be open and not yet locked
 # Locks distinguish a file that is being written from an abandoned one; Windows cannot remove open files, so needs none.
 _locks: Any = import_module("fcntl") if os.name == "posix" else None
 # Opening a pipe would wait for its writer; Windows has no O_NONBLOCK, POSIX no O_BINARY.
+_PART = 2**24  # bytes of a read
 _READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 
@@ -240,8 +241,11 @@ def read_start(path: str | Path, count: int, error: type[RobotDynError], remedy:
     """The first bytes of a regular file, all if it has fewer; errors as in `reading`."""
     with reading(path, error, remedy) as stream:
         try:
-            size = os.fstat(stream.fileno()).st_size  # a read asks for all of its bound at once
-            return stream.read(min(count, size + 1))
+            parts, left = [], count
+            while left and (part := stream.read(min(left, _PART))):  # one read would ask for all of its bound at once
+                parts.append(part)
+                left -= len(part)
+            return b"".join(parts)
         except OSError as cause:
             raise error(f"{path}: cannot be read ({why(cause)}); {remedy}") from None
 
