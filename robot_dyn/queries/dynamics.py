@@ -56,8 +56,9 @@ def _solved_torque(size: Any, x: Mapping[str, Array]) -> Any:
 
 
 def _placement_terms(size: Any, x: Mapping[str, Array], frame: str) -> np.ndarray:
-    """Return 1 for the rotation and the distance from the base for the position."""
-    return np.vstack([np.hstack([np.ones((3, 3)), np.full((3, 1), size.reach[frame])]), [0.0, 0.0, 0.0, 1.0]])
+    """Return 1 for the rotation and the distance from the base for the position, which is exact where that is 0."""
+    distance = max(size.reach[frame], np.finfo(float).tiny)  # 0 would stand for an entry without terms
+    return np.vstack([np.hstack([np.ones((3, 3)), np.full((3, 1), distance)]), [0.0, 0.0, 0.0, 1.0]])
 
 
 def _jacobian_terms(size: Any, x: Mapping[str, Array], frame: str) -> np.ndarray:
