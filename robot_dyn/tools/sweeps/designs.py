@@ -42,6 +42,9 @@ class Design(Value):
     rows: np.ndarray = field(repr=False)
     block: int = 1
 
+    def __post_init__(self) -> None:
+        self.rows.setflags(write=False)
+
     @property
     def independent(self) -> bool:
         """Whether the rows are independent, so that formulas for independent runs hold."""
@@ -115,8 +118,7 @@ def _scrambled(engine: Callable[..., Any]) -> Callable[[int, int, int], np.ndarr
 def _sobol(runs: int, d: int, seed: int) -> np.ndarray:
     from scipy.stats import qmc  # late: it takes a second
 
-    if d > qmc.Sobol.MAXDIM:
-        raise SweepError(f"design 'sobol' takes at most {qmc.Sobol.MAXDIM} dimensions, got {d}")
+    _check_dimensions("sobol", d, qmc.Sobol.MAXDIM)
     _check_power("sobol", runs, SCRAMBLINGS, "16 scramblings of a balanced sequence")
     return _scrambled(lambda d, rng: qmc.Sobol(d, bits=_BITS, rng=rng))(runs, d, seed)
 
@@ -137,7 +139,10 @@ def _latin(runs: int, d: int, seed: int) -> np.ndarray:
 
 def _saltelli(runs: int, d: int, seed: int) -> np.ndarray:
     """Blocks A, A with column j of B for every j, B, as SALib draws and analyses them."""
+    from scipy.stats import qmc
+
     sample = needs("SALib.sample.sobol", extra="sweeps").sample
+    _check_dimensions("saltelli", d, qmc.Sobol.MAXDIM // 2)  # A and B are one point of Sobol'
     _check_power("saltelli", runs, SCRAMBLINGS * (d + 2), f"16 scramblings of blocks of {d + 2} rows")
     problem = {"num_vars": d, "names": [f"x{j}" for j in range(d)], "bounds": [[0.0, 1.0]] * d}
     blocks = runs // (d + 2)
@@ -161,6 +166,11 @@ def _grid(runs: int, d: int, seed: int) -> np.ndarray:
 _DRAWN: Mapping[str, Callable[[int, int, int], np.ndarray]] = {
     "random": _random, "sobol": _sobol, "halton": _halton, "latin": _latin, "grid": _grid,
 }  # fmt: skip
+
+
+def _check_dimensions(name: str, d: int, most: int) -> None:
+    if d > most:
+        raise SweepError(f"design {name!r} takes at most {most} dimensions, got {d}")
 
 
 def _check_count(name: str, runs: int, allowed: str, count: int, above: int) -> None:

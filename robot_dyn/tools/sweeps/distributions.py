@@ -102,7 +102,7 @@ class Distribution(Value, Caching):
         kind = getattr(stats, name, None)
         if not isinstance(kind, stats.rv_continuous | stats.rv_discrete):
             raise SweepError(f"scipy.stats has no distribution {shown(name)} of one variable")
-        args = [x for key, x in self.parameters.items() if key.isdigit()]
+        args = [self.parameters[key] for key in sorted(filter(str.isdigit, self.parameters), key=int)]
         try:
             return kind(*args, **{key: x for key, x in self.parameters.items() if not key.isdigit()}).ppf
         except TypeError as found:

@@ -69,7 +69,7 @@ class SweepResult(Answer):
     def quantiles(
         self, figure: str, probabilities: Any = (0.05, 0.5, 0.95), level: float = 0.95, given: str | None = None
     ) -> tuple[Estimate, ...]:
-        """Quantiles of a figure with their intervals; a run that failed counts as +∞.
+        """Quantiles of a figure with their intervals; a run that failed and has no value counts as +∞.
 
         Args:
             figure: Its name, or that of another column.
@@ -117,7 +117,7 @@ class SweepResult(Answer):
         return replace(found, statistic=f"probability of {event}{_among(given)}")
 
     def mean(self, figure: str, level: float = 0.95, given: str | None = None) -> Estimate:
-        """Mean of a figure with its interval; `given` as in `quantiles`, needed where runs failed."""
+        """Mean of a figure with its interval; `given` as in `quantiles`, needed where runs have no value."""
         from robot_dyn.tools.sweeps import statistics
 
         x, keep, failed = self._finite(figure, "mean", given)
@@ -161,8 +161,10 @@ class SweepResult(Answer):
     def samples(self) -> Any:
         """Samples of runs as a lazy `xarray.Dataset` over run, t and joint, nan where a run was not kept.
 
+        Each file is read once, to compare its digest.
+
         Raises:
-            SweepError: If the sweep keeps none, or a file of them is missing.
+            SweepError: If the sweep keeps none, or a file of them is missing or was changed.
         """
         if self.folder.samples is None:
             raise SweepError("no samples are kept: give the Sweep samples='q', or sw.samples('q', every=100)")

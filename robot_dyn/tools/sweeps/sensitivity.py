@@ -39,6 +39,7 @@ class Sensitivity(Answer):
         n: Runs.
         failed: Runs that failed.
         method: How the indices were computed.
+        left_out: Blocks of design "saltelli" with a run without a value, which are left out.
         figure: What is sensitive.
         given: As in `SweepResult.sensitivity`.
     """
@@ -52,6 +53,7 @@ class Sensitivity(Answer):
     n: int = 0
     failed: int = 0
     method: str = ""
+    left_out: int = 0
     figure: str = ""
     given: str | None = None
 
@@ -113,8 +115,7 @@ def saltelli(
 
     theta, without = indices(rows), np.array([indices(rows[of != r]) for r in left])
     half = _student_quantile(level, len(left) - 1) * np.sqrt((len(left) - 1) * without.var(axis=0))
-    lost = int((~whole).sum())
-    note = f"{lost} blocks of {block} runs with a failed one are left out" if lost else ""
+    left_out = int((~whole).sum())
     made = [
         Estimate(
             f"{kind} index of {name}",
@@ -125,15 +126,15 @@ def saltelli(
             n=len(y),
             failed=failed,
             method="SALib",
-            note=note,
         )
         for kind, row, halves in zip(("first-order", "total"), theta, half, strict=True)
         for name, x, h in zip(names, row, halves, strict=True)
     ]
     method = f"Sobol' indices by SALib, jackknife over {len(left)} scramblings"
-    method += f"; {note}" if note else ""
-    d = len(names)
-    return Sensitivity(names, tuple(made[:d]), tuple(made[d:]), n=len(y), failed=failed, method=method)
+    if left_out:
+        method += f", without {left_out} blocks of {block} runs in which one has no value"
+    first, total = tuple(made[: len(names)]), tuple(made[len(names) :])
+    return Sensitivity(names, first, total, n=len(y), failed=failed, method=method, left_out=left_out)
 
 
 def by_values(y: Any, x: Any, names: Sequence[str], *, failed: int = 0) -> Sensitivity:

@@ -227,8 +227,10 @@ def check_figure(x: Any) -> np.ndarray:
         x = float64(x)
     except ValueError as found:
         raise SweepError(f"a figure must be real numbers, one a run, got {found}") from None
-    if x.ndim != 1 or not len(x) or np.isnan(x).any():
+    if x.ndim != 1 or not len(x):
         raise SweepError(f"a figure must have shape (N,), one number a run, got {x.shape}")
+    if (unknown := np.isnan(x)).any():
+        raise SweepError(f"a figure must have a number for each run, got nan for run {int(unknown.argmax())}")
     return x
 
 

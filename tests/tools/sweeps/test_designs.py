@@ -134,6 +134,7 @@ def test_counts_that_a_design_cannot_take_are_refused_with_the_nearest_two(
         ({"name": [[0.5, 1.0]]}, r"numbers in \[0, 1\), got 1 in row 0, column 1"),
         ({"name": [[0.5, np.nan]]}, "the table of a design must be finite"),
         ({"name": "sobol", "dimensions": 21202, "runs": 64}, "at most 21201 dimensions"),
+        ({"name": "saltelli", "dimensions": 10601, "runs": 32 * 10603}, "at most 10600 dimensions"),
     ],
 )
 def test_what_is_not_a_design_is_refused(change: dict[str, Any], message: str) -> None:

@@ -29,7 +29,6 @@ from robot_dyn.tools.sweeps.plan.stated import StatedScene, stated_scene
 from robot_dyn.tools.sweeps.plan.sweep import Sweep, is_scene
 
 FORMAT = 4
-_LONG = 2**26  # characters
 _PLACES = ("scene",)  # that may differ: where the scene lies
 
 
@@ -78,10 +77,10 @@ class StoredSamples(BaseModel):
 def parsed(text: str, where: str) -> Specification:
     """The specification of a text; SweepError with the key and the value if it is not one, or of another version."""
     try:
-        of = json.loads(text)["format"] if len(text) < _LONG else FORMAT
-        if of != FORMAT:
-            raise SweepError(f"{where}: has format {shown(of)}, this version reads {FORMAT}")
-        return Specification(Stored.model_validate_json(text).model_dump())
+        given = json.loads(text)
+        if given["format"] != FORMAT:
+            raise SweepError(f"{where}: has format {shown(given['format'])}, this version reads {FORMAT}")
+        return Specification(Stored.model_validate(given).model_dump())
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
