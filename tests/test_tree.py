@@ -56,7 +56,6 @@ IN_CIRCLES = {
     "codegen.loops": {"arrays", "calls", "expressions", "function", "numbers", "program", "statements"},
     "control.digital_loop": {"loop", "tick"},
     "effects": {"explanation", "plant"},
-    "lagrange": {"digits"},
     "model": {"calls", "evaluation", "from_pinocchio", "gravity", "info", "robot", "to_urdf"},
     "tools.motors.motor_budget": {"budget", "fastest", "result"},
     "tools.stress": {"result", "text"},

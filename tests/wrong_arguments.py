@@ -234,8 +234,6 @@ def examples(folder: Path) -> dict[str, Example]:
         "Robot.from_text": (rd.Robot.from_text, {"urdf": robot.description.xml.decode(), "source": "arm"}),
         "Robot.to_urdf": (robot.to_urdf, {"path": folder / "written.urdf"}),
         "Robot.random_configuration": (getattr(robot, "random_configuration", None), {"rng": np.random.default_rng(0)}),
-        "Robot.digits": (lambda quantity, q: robot.digits(quantity, q), {"quantity": "N", "q": q}),
-        "Robot.warn_below": (robot.warn_below, {"digits": 12.0}),
         "Robot.with_": (
             robot.with_,
             {"gravity": (1.0, 0.0, -9.0), "lock": {"hinge": 0.1}, "payload": rd.Payload("pole", 1.0), "armature": 0.1,
@@ -265,6 +263,9 @@ def examples(folder: Path) -> dict[str, Example]:
             {"robot": robot, "q": q, "v": v, "a": u, "tau": u, "samples": 100, "seed": 3, "repeats": 1,
              "on_progress": lambda part, what: None},
         ),
+        "digits": (lambda robot, quantity, q: rd.accuracy.digits(robot, quantity, q),
+                   {"robot": robot, "quantity": "N", "q": q}),
+        "warn_below": (rd.accuracy.warn_below, {"robot": robot, "digits": 12.0}),
         "Certificate.of": (certified.of, {"quantity": "M", "implementation": "Pinocchio"}),
         "save_result": (rd.accuracy.save_result, {"result": certified, "path": folder / "digits.csv", "theme": "dark"}),
         "stress": (

@@ -2,6 +2,8 @@
 from robot_dyn.accuracy.advice import Advice as Advice
 from robot_dyn.accuracy.certificate.certificate import Certificate as Certificate
 from robot_dyn.accuracy.certificate.certify import certify as certify
+from robot_dyn.accuracy.correct_digits import digits as digits
+from robot_dyn.accuracy.correct_digits import warn_below as warn_below
 from robot_dyn.accuracy.costs.cost import Cost as Cost
 from robot_dyn.accuracy.costs.cost import cost as cost
 from robot_dyn.accuracy.run_difference import RunDifference as RunDifference
@@ -26,6 +28,7 @@ from robot_dyn.accuracy.certificate.implementation import implementations as imp
 from robot_dyn.accuracy.certificate.worst_case_search import Batch as Batch
 from robot_dyn.accuracy.certificate.worst_case_search import Search as Search
 from robot_dyn.accuracy.certificate.worst_case_search import random_states as random_states
+from robot_dyn.accuracy.correct_digits import digits_of as digits_of
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion as ArmMotion
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError as PeerError
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import bare_urdf as bare_urdf

@@ -149,7 +149,7 @@ class PlanWarning(RobotDynWarning):
 
 
 class PrecisionWarning(RobotDynWarning):
-    """An answer with fewer digits than requested by `Robot.warn_below`."""
+    """An answer with fewer digits than requested by `rd.accuracy.warn_below`, or of a nearly singular robot."""
 
 
 def announce(robot: str, findings: Sequence[str]) -> None:

@@ -4,7 +4,7 @@ tree, linkage: joints and links in literals, then in numbers · lagrangian: `Lag
 formulas: the closed form, by the names of the queries
 summand, christoffel, breakdown: what one body or link adds · recursions: the O(n) algorithms
 euler_lagrange, generalized_force, rigid_body: any energies, particles, one body
-magnitude, scale: sizes of terms, scales of comparison · exact, digits: true values in balls, correct digits
+magnitude, scale: sizes of terms, scales of comparison · exact: true values in balls
 """
 
 from robot_dyn.foundations.public import public_names

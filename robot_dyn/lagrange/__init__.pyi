@@ -1,5 +1,4 @@
 # Names that tools and tests import of this folder, and where they live; modules of the core import modules.
-from robot_dyn.lagrange.digits import digits_of as digits_of
 from robot_dyn.lagrange.euler_lagrange import EulerLagrange as EulerLagrange
 from robot_dyn.lagrange.generalized_force import lagrangian_of_particles as lagrangian_of_particles
 from robot_dyn.lagrange.linkage import Linkage as Linkage

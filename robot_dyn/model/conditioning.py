@@ -1,4 +1,4 @@
-"""Whether M can be solved for: M singular at every configuration, or so near to singular that digits are lost.
+"""Regularity of M: M is singular at every configuration, nearly singular so that digits are lost, or neither.
 
     κ = λ_max / λ_min  of  D⁻¹ M D⁻¹,  D = diag(√M_ii);    a solution of M a = τ errs by some u κ, by 8 n u κ at most
 
@@ -13,10 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.foundations.errors import QueryError, SingularError, UndecidedError
-from robot_dyn.foundations.validate import number
+from robot_dyn.foundations.errors import SingularError, UndecidedError
 from robot_dyn.queries.dynamics import acceleration
-from robot_dyn.queries.quantity import MOST_DIGITS
 
 LEAST_DIGITS = 8  # of forward dynamics; with fewer, M is called nearly singular
 
@@ -76,11 +74,21 @@ def _nearly_singular(M: np.ndarray, joint_names: tuple[str, ...]) -> NearlySingu
     return NearlySingular(condition, max(digits, 0.0), joint_names[int(np.argmax(np.abs(vectors[:, 0])))])
 
 
-def checked_digits(digits: float | None) -> float | None:
-    """A number of digits to warn below, above 0 and at most MOST_DIGITS, or None; raises QueryError for any other."""
-    if digits is None:
-        return None
-    digits = number("digits", digits, above=0)
-    if digits > MOST_DIGITS:
-        raise QueryError(f"digits must be at most {MOST_DIGITS}, got {digits:g}: no more are counted")
-    return digits
+def few_digits(robot: str, M: np.ndarray, a: np.ndarray) -> str:
+    """Return a warning if 8 n u κ of M (..., n, n) leaves finite accelerations (..., n) too few digits; "" if not."""
+    rows = np.isfinite(a).all(axis=-1)
+    M = np.broadcast_to(M, (*a.shape, a.shape[-1]))[rows]
+    if len(M) == 0:
+        return ""
+    d = np.sqrt(np.diagonal(M, axis1=-2, axis2=-1))
+    condition = np.linalg.cond(M / (d[:, :, None] * d[:, None, :]))
+    worst = int(np.argmax(condition))
+    digits = -np.log10(4 * len(d[0]) * np.finfo(float).eps * condition[worst])
+    if digits >= LEAST_DIGITS:
+        return ""
+    where = f" in row {np.flatnonzero(rows)[worst]} of the batch" if rows.ndim else ""
+    return (
+        f"forward_dynamics of {robot} may have only {max(digits, 0.0):.1f} correct digits{where}: M is nearly singular,"
+        f" κ = {condition[worst]:.1e}; rd.accuracy.digits(robot, 'forward_dynamics', q, v, tau) counts them, and"
+        " rd.Lagrangian(robot, np.longdouble) has more"
+    )

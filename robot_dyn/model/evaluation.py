@@ -7,7 +7,6 @@ Any input other than a single state of moderate float64 values is checked, conve
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +16,6 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
-from robot_dyn.foundations.errors import PrecisionWarning
 from robot_dyn.foundations.validate import is_moderate, shaped
 from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.model.calls import PINOCCHIO, Call, Scratch
@@ -128,12 +126,3 @@ class Evaluation:
         arrays = {key: shaped(key, x, names) for key, x in zip(quantity.arguments, state, strict=True)}
         answer = answered(equation, arrays, quantity.shape(self.robot.sizes), names, errors)
         return answer if answer.ndim else float(answer)
-
-
-def warn_of_digits(robot: Robot, quantity: str, answer: Any, *state: Any, stacklevel: int = 4) -> Any:
-    """Return the result, with a warning if it has fewer correct digits than `Robot.warn_below` requests."""
-    from robot_dyn.lagrange.digits import doubt  # late: it builds a Lagrangian
-
-    if message := doubt(robot, quantity, state, answer, robot.least_digits):
-        warnings.warn(message, PrecisionWarning, stacklevel=stacklevel)
-    return answer

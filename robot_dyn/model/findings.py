@@ -132,7 +132,7 @@ def hardly_any_inertia(near: NearlySingular | None) -> Iterator[str]:
         yield (
             f"joint {near.joint!r}: M is nearly singular, κ = {near.condition:.1e}, so that forward dynamics may keep"
             f" only {near.digits:.0f} digits; correct the inertia of what it moves, or give it armature (queries warn"
-            f" below {LEAST_DIGITS} digits; Robot.warn_below(None) for none of these warnings)"
+            f" below {LEAST_DIGITS} digits; rd.accuracy.warn_below(robot, None) does not warn)"
         )
 
 

@@ -6,8 +6,9 @@ straight to Pinocchio, after checks of a fraction of a microsecond; coupled join
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
 from types import MappingProxyType
@@ -23,13 +24,13 @@ from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Changes, Edits, takes_changes
 from robot_dyn.description.inertial_parameters import NAMES, Parametrised, ordered
 from robot_dyn.description.urdf import UNBOUNDED
-from robot_dyn.foundations.errors import DescriptionError, EditError, announce
-from robot_dyn.foundations.validate import instance, is_moderate, is_plain, is_state
+from robot_dyn.foundations.errors import DescriptionError, EditError, PrecisionWarning, announce
+from robot_dyn.foundations.validate import function, instance, is_moderate, is_plain, is_state
 from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.model.calls import Scratch
-from robot_dyn.model.conditioning import LEAST_DIGITS, checked_digits
+from robot_dyn.model.conditioning import few_digits
 from robot_dyn.model.coriolis import Coriolis
-from robot_dyn.model.evaluation import Evaluation, warn_of_digits
+from robot_dyn.model.evaluation import Evaluation
 from robot_dyn.model.findings import findings_of
 from robot_dyn.model.gravity import warn_without_torque
 from robot_dyn.model.info import info_html, robot_line
@@ -41,6 +42,7 @@ from robot_dyn.queries.quantity import DOUBTFUL
 
 _F8 = np.dtype(float)
 _RAISE = "raise"
+AnswerCheck = Callable[["Robot", str, tuple[ArrayLike, ...], ArrayLike], None]
 
 
 @final
@@ -51,12 +53,13 @@ class Robot(Dynamics[ndarray], Parametrised):
     Attributes:
         description: The checked file.
         edits: Gravity, locks, payloads, armature.
-        least_digits: Number of correct digits below which queries warn; None for no warnings. See `warn_below`.
+        answer_check: A function (robot, query, arguments, answer) called after each query, which may warn or raise;
+            None for none. `rd.accuracy.warn_below` sets it.
     """
 
     description: Description
     edits: Edits = field(default_factory=Edits)
-    least_digits: float | None = None
+    answer_check: AnswerCheck | None = None
     __repr__, _repr_html_ = robot_line, info_html
     to_urdf = to_urdf
 
@@ -73,8 +76,10 @@ class Robot(Dynamics[ndarray], Parametrised):
                     pass
                 else:
                     return call(scratch.data, *state)
-        answer = into(out, self._evaluation.answer(name, state, errors, *frame))
-        return answer if self.least_digits is None else warn_of_digits(self, name, answer, *state)
+        answer = self._evaluation.answer(name, state, errors, *frame)
+        if self.answer_check is not None:
+            self.answer_check(self, name, state, answer)
+        return into(out, answer)
 
     # --- queries of microseconds, answered at once
 
@@ -271,10 +276,10 @@ class Robot(Dynamics[ndarray], Parametrised):
         return robot_of(model).announced()
 
     def announced(self) -> Robot:
-        """The robot as it is loaded: warns of its findings; its queries warn below 8 digits if M is nearly singular."""
+        """Return the robot as it is loaded: warn of its findings, and let its queries warn if M is nearly singular."""
         announce(self.name, self.findings)
         regularity = self._evaluation.regularity
-        return self.warn_below(LEAST_DIGITS) if regularity.near and not regularity.singular else self
+        return replace(self, answer_check=_warn_of_condition) if regularity.near and not regularity.singular else self
 
     @takes_changes
     def with_(self, **changes: Unpack[Changes]) -> Robot:
@@ -294,46 +299,10 @@ class Robot(Dynamics[ndarray], Parametrised):
         robot = Robot(self.description, self.edits.with_(self.joint_names, **changes))
         if robot.edits.gravity != self.edits.gravity:
             warn_without_torque(robot)
-        return robot if self.least_digits is None else robot.warn_below(self.least_digits)
-
-    def digits(self, quantity: str, *state: ArrayLike) -> float:
-        """Number of correct decimal digits of the answer to a query, counted against true values in balls.
-
-            −log10(error),  from 0 to 20
-
-        Errors are relative to √(M_ii M_jj) for M; for C, N and inverse dynamics to the largest entry in the units
-        √M_ii of the joints; for forward dynamics to Σ ‖M⁻¹ τ_k‖ of τ, C v and N, in the norm of M. An answer that
-        cancels to nearly nothing has few digits. Numbers of the file count as the decimals written. Takes milliseconds.
-
-        Args:
-            quantity: "M", "C", "N", "inverse_dynamics" or "forward_dynamics".
-            *state: Its arguments at one state, shape (n,) each, as of the method of that name.
-
-        Raises:
-            QueryError: If there is no such quantity, or an argument is wrong.
-            SingularError: Of forward dynamics where M is singular; names the joint.
-        """
-        from robot_dyn.lagrange.digits import digits
-
-        return digits(self, quantity, state)
-
-    def warn_below(self, digits: float | None) -> Robot:
-        """A robot whose queries warn where their answers have fewer digits, as `digits` counts them.
-
-        Of M, C, N, inverse and forward dynamics. Digits are counted only where an estimate, 8 n u κ of the terms, is
-        below, for up to 64 joints, in milliseconds a state; machine code of the robot does not warn. A robot is loaded
-        with 8 digits if M is nearly singular at a configuration without symmetries.
-
-        Args:
-            digits: From above 0 to 20; None for no warnings, and no cost.
-
-        Raises:
-            QueryError: If it is not such a number.
-        """
-        return Robot(self.description, self.edits, digits)
+        return robot if self.answer_check is None else replace(robot, answer_check=self.answer_check)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "least_digits", checked_digits(self.least_digits))
+        function("answer_check", self.answer_check, "(robot, query, arguments, answer)")
         instance("edits", self.edits, Edits, "give those of another robot, or use with_", error=EditError)
         if not isinstance(self.description, Description):
             given = type(self.description).__name__
@@ -343,7 +312,7 @@ class Robot(Dynamics[ndarray], Parametrised):
         _ = self._built  # so that errors are raised now, not by the first query
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Robot, (self.description, self.edits, self.least_digits)
+        return Robot, (self.description, self.edits, self.answer_check)
 
     @cached_property
     def _built(self) -> tuple[Any, Couplings, tuple[str, ...]]:
@@ -355,8 +324,8 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     @cached_property
     def _shape(self) -> tuple[int] | None:
-        """Shape of one state that is answered at once; None if queries may warn."""
-        return (self.n,) if self.least_digits is None else None
+        """Shape of one state that is answered at once; None if answers are checked."""
+        return (self.n,) if self.answer_check is None else None
 
     @cached_property
     def _at_once(self) -> tuple[tuple[int] | None, Scratch, OnFirstUse]:
@@ -365,7 +334,7 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     @cached_property
     def _uncoupled_shape(self) -> tuple[int] | None:
-        """Shape of arguments that Pinocchio takes as they are; None if joints are coupled, or queries may warn."""
+        """Shape of arguments that Pinocchio takes as they are; None if joints are coupled, or answers are checked."""
         return self._shape if self.couplings.trivial else None
 
     @cached_property
@@ -389,6 +358,14 @@ class Robot(Dynamics[ndarray], Parametrised):
         values = full[[self.model.idx_vs[ids[name]] for name in self.joint_names]]
         values[np.abs(values) >= float(UNBOUNDED)] *= np.inf
         return _frozen(values)
+
+
+def _warn_of_condition(robot: Robot, quantity: str, state: tuple[ArrayLike, ...], answer: ArrayLike) -> None:
+    """Warn of forward dynamics that has few digits because M is nearly singular: the check of such a robot."""
+    if quantity == "forward_dynamics" and (
+        text := few_digits(robot.name, robot.M(state[0], errors="nan"), np.asarray(answer))
+    ):
+        warnings.warn(text, PrecisionWarning, stacklevel=4)  # at the query
 
 
 def _frozen(x: ndarray) -> ndarray:

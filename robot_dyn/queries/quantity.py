@@ -59,7 +59,7 @@ class Quantity:
         definite: True for a symmetric positive definite matrix, so that |x_ij| ≤ √(x_ii x_jj).
         solves: True if M a = τ is solved: no answer where M is singular, an error that grows as M's condition.
         doubtful: Size of a result above which M may be singular.
-        digits: True if `Robot.digits` and certificates count its digits.
+        digits: True if `rd.accuracy.digits` and certificates count its digits.
     """
 
     name: str

@@ -13,8 +13,8 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.accuracy import Certificate, DigitCount, Implementation, implementations, random_states
 from robot_dyn.accuracy.certificate.diagram import draw
+from robot_dyn.accuracy.correct_digits import QUANTITIES
 from robot_dyn.lagrange import articulated_body
-from robot_dyn.lagrange.digits import QUANTITIES
 from robot_dyn.queries import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from tests.long import long
 
@@ -51,10 +51,12 @@ def test_each_implementation_has_the_digits_of_its_numbers(made: Certificate) ->
 
 @pytest.mark.parametrize("quantity", [M, FORWARD_DYNAMICS], ids=lambda each: each.name)
 def test_digits_are_those_of_the_state_that_is_told(made: Certificate, quantity) -> None:
-    """Of M and forward dynamics the scale is that of `Robot.digits`."""
+    """Of M and forward dynamics the scale is that of `rd.accuracy.digits`."""
     robot, found = rd.load("planar_2r"), made.of(quantity.name, "Pinocchio")
-    assert robot.digits(quantity.name, *(found.state[name] for name in quantity.arguments)) == found.searched
-    assert robot.digits(quantity.name, *(GIVEN[name] for name in quantity.arguments)) == found.given
+    assert (
+        rd.accuracy.digits(robot, quantity.name, *(found.state[name] for name in quantity.arguments)) == found.searched
+    )
+    assert rd.accuracy.digits(robot, quantity.name, *(GIVEN[name] for name in quantity.arguments)) == found.given
 
 
 def test_digits_of_articulated_bodies_follow_from_400_bits(made: Certificate) -> None:

@@ -130,11 +130,11 @@ def test_body_axes_are_taken_where_the_bound_is_not_small() -> None:
 
 @pytest.mark.parametrize("name", ["ur5", "panda", "z1", "kinova", "mimic_chain", "skew_tree"])
 def test_c_of_one_state_has_13_digits(name: str) -> None:
-    """Of its largest entry, in the units of `Robot.digits`, at general states."""
+    """Of its largest entry, in the units of `rd.accuracy.digits`, at general states."""
     robot, rng = rd.load(name), np.random.default_rng(4)
     for _ in range(5):
         state = random_state(robot, rng)
-        assert robot.digits("C", state["q"], state["v"]) >= 13
+        assert rd.accuracy.digits(robot, "C", state["q"], state["v"]) >= 13
 
 
 def test_beyond_the_limits_of_a_prismatic_joint_c_keeps_its_digits() -> None:

@@ -278,7 +278,7 @@ def test_nothing_waits_of_a_run_with_parts_of_the_users_own() -> None:
 
 
 def test_a_robot_that_warns_warns_in_each_run_and_in_none_of_what_is_read() -> None:
-    arm = ARM.warn_below(15.9)  # of the 16 of a float: the start has fewer
+    arm = rd.accuracy.warn_below(ARM, 15.9)  # of the 16 of a float: the start has fewer
     control = rd.control.PD(PLAN, 10.0, 1.0, period_s=0.01)
     changes: dict[str, Any] = {"plant": rd.Plant(arm), "controller": control, "estimate_error": False}
     counts = []

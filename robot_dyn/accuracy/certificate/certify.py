@@ -20,10 +20,10 @@ from robot_dyn.accuracy.certificate.certificate import Certificate, Condition, H
 from robot_dyn.accuracy.certificate.digit_count import DigitCount
 from robot_dyn.accuracy.certificate.implementation import Implementation, evaluate, implementations
 from robot_dyn.accuracy.certificate.worst_case_search import Batch, Search, random_states, row
+from robot_dyn.accuracy.correct_digits import QUANTITIES, warn_below
 from robot_dyn.foundations.arithmetic import Ball
 from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.validate import function, instance, integer, joint_values
-from robot_dyn.lagrange.digits import QUANTITIES
+from robot_dyn.foundations.validate import function, integer, joint_values
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
@@ -70,7 +70,7 @@ def certify(
     Raises:
         QueryError: If an argument is wrong.
     """
-    robot = instance("robot", robot, Robot, "give one of rd.load").warn_below(None)
+    robot = warn_below(robot, None)
     samples = integer("samples", samples, least=_LEAST_SAMPLES, most=_MOST_SAMPLES)
     seed, repeats = integer("seed", seed, most=2**128 - 1), integer("repeats", repeats, least=1, most=_MOST_REPEATS)
     report = function("on_progress", on_progress, "(part, what)") or (lambda part, what: None)

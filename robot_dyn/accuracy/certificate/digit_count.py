@@ -10,8 +10,8 @@ import numpy as np
 from robot_dyn.accuracy.certificate.certificate import Held
 from robot_dyn.accuracy.certificate.implementation import Implementation, evaluate
 from robot_dyn.accuracy.certificate.worst_case_search import Batch, Search, row
+from robot_dyn.accuracy.correct_digits import digits_of
 from robot_dyn.foundations.errors import QueryError
-from robot_dyn.lagrange.digits import digits_of
 from robot_dyn.lagrange.exact import NOTHING, Exact, Scale, Truth, entry_units, in_joint_units
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm

@@ -9,10 +9,10 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.accuracy.correct_digits import QUANTITIES
 from robot_dyn.codegen.dynamics import CompiledDynamics
 from robot_dyn.foundations.arithmetic import FLOAT64, Array
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.lagrange.digits import QUANTITIES
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.model.robot import Robot

@@ -53,7 +53,7 @@ def is_frozen(part: Any) -> bool:
 def is_value(part: Any) -> bool:
     """Whether nothing can change what a part is: a value of this library, as is all that it holds.
 
-    A robot whose queries warn is none: they are to warn in each run.
+    A robot with a check of its answers is none: it is to warn in each run.
     """
     if isinstance(part, tuple):
         return all(map(is_value, part))
@@ -64,7 +64,7 @@ def is_value(part: Any) -> bool:
     if not type(part).__module__.startswith("robot_dyn.") or not is_frozen(part):
         return False
     if isinstance(part, Robot):
-        return part.least_digits is None
+        return part.answer_check is None
     caches = {each.name for each in fields(part) if not each.compare}
     return all(is_value(getattr(part, x)) for x in attributes(part) if x not in caches)
 

@@ -11,8 +11,7 @@ from math import log10
 import numpy as np
 
 from robot_dyn import Robot
-from robot_dyn.accuracy import Batch, DigitCount, Held, Implementation, implementations
-from robot_dyn.lagrange import digits_of
+from robot_dyn.accuracy import Batch, DigitCount, Held, Implementation, digits_of, implementations
 from robot_dyn.queries import FORWARD_DYNAMICS, INVERSE_DYNAMICS, Quantity
 from robot_dyn.report import Budget
 from robot_dyn.tools.stress.finding import WorstCase

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from robot_dyn import Robot
-from robot_dyn.accuracy import random_states
+from robot_dyn.accuracy import random_states, warn_below
 from robot_dyn.foundations import function, instance, integer, number
 from robot_dyn.report import Budget, processor_and_versions
 from robot_dyn.tools.stress.finding import JudgedRun, Limit, WorstCase
@@ -70,7 +70,7 @@ def stressed(
     seconds = number("budget_s", budget_s, above=0)
     budget = Budget(seconds, function("on_progress", on_progress, "(spent, what)"), clock)
     work = Work(budget, seconds / _PIECES)
-    robot, found, interrupted = robot.warn_below(None), list[Found](), False
+    robot, found, interrupted = warn_below(robot, None), list[Found](), False
     try:
         for each in _found(robot, samples, runs, seed, work):
             found.append(each)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import warnings
+from dataclasses import replace
 from fractions import Fraction
 from math import log10
 
@@ -12,9 +13,10 @@ import pytest
 from flint import arb, ctx
 
 import robot_dyn as rd
-from robot_dyn.lagrange import articulated_body, digits_of, newton_euler
+from robot_dyn.accuracy import digits_of
+from robot_dyn.accuracy.correct_digits import QUANTITIES
+from robot_dyn.lagrange import articulated_body, newton_euler
 from robot_dyn.lagrange import exact as exact_module
-from robot_dyn.lagrange.digits import QUANTITIES
 from robot_dyn.lagrange.exact import RESOLUTION, Exact
 from robot_dyn.queries import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from tests.campaigns.hard.chains import coincident, text
@@ -81,7 +83,11 @@ def test_an_entry_that_is_moved_loses_the_digits_beyond(name: str, quantity) -> 
     robot = rd.load(name)
     x = state(robot)
     truth, answer = Exact(robot).at(quantity, x), np.array(quantity.ask(robot, x))
-    assert 14 < robot.digits(quantity.name, *(x[each] for each in quantity.arguments)) == digits_of(truth.error(answer))
+    assert (
+        14
+        < rd.accuracy.digits(robot, quantity.name, *(x[each] for each in quantity.arguments))
+        == digits_of(truth.error(answer))
+    )
     entry = (1,) * answer.ndim
     for k in (3, 8, 12):
         moved = answer.copy()
@@ -100,7 +106,7 @@ def test_digits_of_a_pendulum_follow_from_its_decimals() -> None:
     robot = rd.load("pendulum")
     exact = Fraction("0.083333333333333333") + Fraction("0.25")
     error = abs(Fraction(float(robot.M([0.3])[0, 0])) - exact) / exact
-    assert robot.digits("M", [0.3]) == pytest.approx(-log10(error), abs=1e-6)
+    assert rd.accuracy.digits(robot, "M", [0.3]) == pytest.approx(-log10(error), abs=1e-6)
 
 
 def test_digits_that_a_lever_of_1000_km_costs_are_seen() -> None:
@@ -109,10 +115,10 @@ def test_digits_that_a_lever_of_1000_km_costs_are_seen() -> None:
         warnings.simplefilter("ignore", rd.ModelWarning)
         robot = rd.Robot.from_text(FAR)
     x = state(robot)
-    assert robot.digits("forward_dynamics", x["q"], x["v"], x["tau"]) < 11
-    assert robot.digits("M", x["q"]) > 14
+    assert rd.accuracy.digits(robot, "forward_dynamics", x["q"], x["v"], x["tau"]) < 11
+    assert rd.accuracy.digits(robot, "M", x["q"]) > 14
     with pytest.warns(rd.PrecisionWarning, match=r"^forward_dynamics of far has 10\.\d digits, fewer than 13; use rd"):
-        robot.warn_below(13).forward_dynamics(x["q"], x["v"], x["tau"])
+        rd.accuracy.warn_below(robot, 13).forward_dynamics(x["q"], x["v"], x["tau"])
 
 
 @pytest.mark.parametrize(("thin", "warns"), [(0.1, False), (1e-4, True)])
@@ -125,16 +131,54 @@ def test_a_nearly_singular_robot_says_so_and_its_answers_say_how_many_digits_the
         warnings.simplefilter("always")
         robot = rd.Robot.from_text(written)
     assert [("nearly singular" in str(each.message), each.filename) for each in said] == [(True, __file__)] * warns
-    assert robot.least_digits == (8 if warns else None)
     assert any("M is nearly singular, κ = 4.7e+12" in each for each in robot.findings) == warns
-    assert robot.warn_below(None).least_digits is None
     q = np.array([0.2, -0.9, 0.4, 0.7])
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         a = robot.forward_dynamics(q, 2 * q, 0.3 * q)
-    held = robot.digits("forward_dynamics", q, 2 * q, 0.3 * q)
-    assert [f"has {held:.1f} digits" in str(each.message) for each in said] == [True] * (held < 8)
+    held = rd.accuracy.digits(robot, "forward_dynamics", q, 2 * q, 0.3 * q)
+    assert [(each.category, each.filename) for each in said] == [(rd.PrecisionWarning, __file__)] * warns
     assert np.isfinite(a).all() and (held >= 8) != warns
+    assert pickle.loads(pickle.dumps(robot)) == robot
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        np.testing.assert_array_equal(
+            rd.accuracy.warn_below(robot, None).forward_dynamics(q, 2 * q, 0.3 * q), a, strict=True
+        )
+
+
+@pytest.mark.parametrize("angle", [1e-7, 1e-6, 1e-5])
+def test_no_answer_of_a_nearly_singular_robot_has_fewer_than_8_digits_without_a_warning(angle: float) -> None:
+    """8 n u κ bounds the error [Higham 2002, thm. 10.3]; κ at q, on which it depends by orders of magnitude."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rd.ModelWarning)
+        loaded = rd.Robot.from_text(text("axes", coincident(angle, 1e-4)))
+    robot = loaded.with_(mass_scale=1.1)  # keeps the check
+    q, v, tau = np.random.default_rng(3).uniform(-1.5, 1.5, (3, 12, robot.n))
+    few = [rd.accuracy.digits(robot, "forward_dynamics", *row) < 8 for row in zip(q, v, tau, strict=True)]
+    for k in range(len(q)):
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            robot.forward_dynamics(q[k], v[k], tau[k])
+            robot.M(q[k]), robot.N(q[k])  # which no condition spoils
+        assert len(said) == 1 if few[k] else len(said) <= 1
+    with pytest.warns(rd.PrecisionWarning, match=r"in row \d+ of the batch"):
+        robot.forward_dynamics(q, v, tau)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # states without an answer have no digits
+        assert robot.forward_dynamics(np.zeros((0, robot.n)), v[0], tau[0]).shape == (0, robot.n)
+        assert np.isnan(robot.forward_dynamics([q[0] * np.nan], v[0], tau[0], errors="nan")).all()
+
+
+def test_any_function_can_check_the_answers_of_a_robot() -> None:
+    seen = []
+    robot, x = rd.load("planar_2r"), state(rd.load("planar_2r"))
+    watched = replace(robot, answer_check=lambda robot, query, arguments, answer: seen.append((query, len(arguments))))
+    for each in QUANTITIES.values():
+        each.ask(watched.with_(mass_scale=1.1), x)
+    assert seen == [(each.name, len(each.arguments)) for each in QUANTITIES.values()]
+    with pytest.raises(rd.RobotDynError, match="answer_check must be a function"):
+        replace(robot, answer_check=8)  # pyright: ignore[reportArgumentType]
 
 
 def test_queries_warn_below_the_digits_that_are_set_and_answer_the_same() -> None:
@@ -143,10 +187,10 @@ def test_queries_warn_below_the_digits_that_are_set_and_answer_the_same() -> Non
     batch = np.array([x["q"], -x["q"]])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        wary = robot.warn_below(13)
+        wary = rd.accuracy.warn_below(robot, 13)
         for each in QUANTITIES.values():
             np.testing.assert_array_equal(each.ask(wary, x), each.ask(robot, x))
-    strict = robot.warn_below(18)
+    strict = rd.accuracy.warn_below(robot, 18)
     for each in QUANTITIES.values():
         with pytest.warns(
             rd.PrecisionWarning, match=rf"{each.name} of ur5 has 1[4-7]\.\d digits, fewer than 18"
@@ -155,8 +199,8 @@ def test_queries_warn_below_the_digits_that_are_set_and_answer_the_same() -> Non
         assert [warning.filename for warning in seen] == [QUANTITY_FILE]
     with pytest.warns(rd.PrecisionWarning, match="in row [01] of the batch"):
         strict.forward_dynamics(batch, x["v"], x["tau"])
-    assert robot.least_digits is None and strict.with_(mass_scale=1.1).least_digits == 18
-    assert pickle.loads(pickle.dumps(strict)) == strict != robot == strict.warn_below(None)
+    assert rd.accuracy.warn_below(strict.with_(mass_scale=1.1), 18) == strict.with_(mass_scale=1.1)
+    assert pickle.loads(pickle.dumps(strict)) == strict != robot == rd.accuracy.warn_below(strict, None)
 
 
 QUANTITY_FILE = rd.load.__code__.co_filename.replace(
@@ -165,7 +209,7 @@ QUANTITY_FILE = rd.load.__code__.co_filename.replace(
 
 
 def test_states_without_an_answer_are_not_warned_of() -> None:
-    robot = rd.load("planar_2r").warn_below(12)
+    robot = rd.accuracy.warn_below(rd.load("planar_2r"), 12)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         answers = robot.N([[0.3, np.nan], [0.3, 0.4]], errors="nan")
@@ -175,7 +219,7 @@ def test_states_without_an_answer_are_not_warned_of() -> None:
 
 def test_the_estimate_is_no_less_than_the_error() -> None:
     """8 n u κ of the terms, without which a warning would be left out in silence."""
-    from robot_dyn.lagrange.digits import _bound
+    from robot_dyn.accuracy.correct_digits import _bound
 
     for name in ("pendulum", "planar_2r", "cart_pole", "skew_tree", "ur5", "panda", "light_tip"):
         robot = rd.load(name)
@@ -189,14 +233,17 @@ def test_the_estimate_is_no_less_than_the_error() -> None:
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
-        (lambda robot, q: robot.digits("m", q), "no quantity 'm'; nearest: M.*"),
-        (lambda robot, q: robot.digits("M", q, q), "digits of M take q; got 2 of them"),
-        (lambda robot, q: robot.digits("C", q), "digits of C take q, v; got 1 of them"),
-        (lambda robot, q: robot.digits("N", [q, q]), r"digits are counted at one state: q must have .* got \(2, 2\)"),
-        (lambda robot, q: robot.digits("N", [0.1, np.inf]), "q .* finite.*|q: .*inf.*"),
-        (lambda robot, q: robot.warn_below(0), "digits must be positive, got 0.0"),
-        (lambda robot, q: robot.warn_below(21), "digits must be at most 20, got 21: no more are counted"),
-        (lambda robot, q: robot.warn_below("ten"), "digits must be a real number, got 'ten'"),
+        (lambda robot, q: rd.accuracy.digits(robot, "m", q), "no quantity 'm'; nearest: M.*"),
+        (lambda robot, q: rd.accuracy.digits(robot, "M", q, q), "digits of M take q; got 2 of them"),
+        (lambda robot, q: rd.accuracy.digits(robot, "C", q), "digits of C take q, v; got 1 of them"),
+        (
+            lambda robot, q: rd.accuracy.digits(robot, "N", [q, q]),
+            r"digits are counted at one state: q must have .* got \(2, 2\)",
+        ),
+        (lambda robot, q: rd.accuracy.digits(robot, "N", [0.1, np.inf]), "q .* finite.*|q: .*inf.*"),
+        (lambda robot, q: rd.accuracy.warn_below(robot, 0), "digits must be positive, got 0.0"),
+        (lambda robot, q: rd.accuracy.warn_below(robot, 21), "digits must be at most 20, got 21: no more are counted"),
+        (lambda robot, q: rd.accuracy.warn_below(robot, "ten"), "digits must be a real number, got 'ten'"),
     ],
 )
 def test_mistakes_are_told(ask, message: str) -> None:
@@ -208,8 +255,8 @@ def test_a_singular_arm_is_refused_by_its_joint() -> None:
     with pytest.warns(rd.ModelWarning):
         robot, q = rd.load("massless_tip"), np.array([0.3, -0.4])
     with pytest.raises(rd.RobotDynError, match="no forward dynamics: joint 'pointer_joint' carries no inertia"):
-        robot.digits("forward_dynamics", q, q, q)
-    assert robot.digits("M", q) > 15
+        rd.accuracy.digits(robot, "forward_dynamics", q, q, q)
+    assert rd.accuracy.digits(robot, "M", q) > 15
     truth = Exact(robot).at(N, {"q": q})  # the joint has no unit of its own, in which all errors would be small
     assert digits_of(truth.error(robot.N(q))) > 14
     assert digits_of(truth.error(robot.N(q) * (1 + 1e-5))) < 6

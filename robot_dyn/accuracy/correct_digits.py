@@ -1,4 +1,4 @@
-"""Correct digits of an answer: its distance from true values in balls, −log10(error).
+"""Correct digits of an answer, −log10(error), counted against true values in balls.
 
 An error is relative to the scale of the answer, in the units √M_ii of the joints (`lagrange.exact`). Before digits are
 counted it is estimated, as 8 n u κ times the ratio of the terms of the answer to the answer (`lagrange.magnitude`).
@@ -6,24 +6,25 @@ counted it is estimated, as 8 n u κ times the ratio of the terms of the answer 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log10
-from typing import TYPE_CHECKING, Any
+from typing import final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.validate import choice, shaped
+from robot_dyn.foundations.errors import PrecisionWarning, QueryError
+from robot_dyn.foundations.validate import choice, instance, number, shaped
 from robot_dyn.lagrange.exact import RESOLUTION, Exact, entry_units
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.magnitude import magnitudes
 from robot_dyn.lagrange.scale import acceleration_norm, solved_norm, solved_tolerance
+from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import QUANTITIES as QUERIES
 from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
-
-if TYPE_CHECKING:
-    from robot_dyn.model.robot import Robot
 
 QUANTITIES = {name: quantity for name, quantity in QUERIES.items() if quantity.digits}
 
@@ -34,9 +35,8 @@ _lagrangian = lru_cache(maxsize=8)(Lagrangian)
 
 
 @lru_cache(maxsize=8)
-def _quiet(robot: Robot) -> Robot:
-    """The robot without warnings."""
-    return robot.warn_below(None)
+def _unchecked(robot: Robot) -> Robot:
+    return replace(robot, answer_check=None)
 
 
 def digits_of(error: float) -> float:
@@ -44,8 +44,25 @@ def digits_of(error: float) -> float:
     return min(max(-log10(max(error, RESOLUTION)), 0.0), float(MOST_DIGITS)) if error == error else 0.0
 
 
-def digits(robot: Robot, quantity: str, state: tuple[Any, ...]) -> float:
-    """See `Robot.digits`."""
+def digits(robot: Robot, quantity: str, *state: ArrayLike) -> float:
+    """Count the correct decimal digits of the answer to a query.
+
+        −log10(error),  from 0 to 20
+
+    Errors are relative to √(M_ii M_jj) for M; for C, N and inverse dynamics to the largest entry in the units √M_ii of
+    the joints; for forward dynamics to Σ ‖M⁻¹ τ_k‖ of τ, C v and N, in the norm of M. An answer that cancels to nearly
+    nothing has few digits. Numbers of the file count as the decimals written. A count takes milliseconds.
+
+    Args:
+        robot: The robot.
+        quantity: "M", "C", "N", "inverse_dynamics" or "forward_dynamics".
+        *state: Arguments of that query at one state, shape (n,) each.
+
+    Raises:
+        QueryError: If there is no such quantity, or an argument is wrong.
+        SingularError: If M is singular and the quantity is forward dynamics; names the joint.
+    """
+    robot = warn_below(robot, None)
     requested = QUANTITIES[choice("quantity", quantity, QUANTITIES)]
     if len(state) != len(requested.arguments):
         raise QueryError(f"digits of {requested.name} take {', '.join(requested.arguments)}; got {len(state)} of them")
@@ -56,17 +73,60 @@ def digits(robot: Robot, quantity: str, state: tuple[Any, ...]) -> float:
     for name, x in arrays.items():
         if x.ndim != 1:
             raise QueryError(f"digits are counted at one state: {name} must have shape ({robot.n},), got {x.shape}")
-    return _counted(_quiet(robot), requested, arrays)
+    return _counted(robot, requested, arrays)
 
 
-def doubt(robot: Robot, quantity: str, state: Sequence[Any], answer: Any, least: float | None) -> str:
-    """The warning about answers (..., *shape) that have fewer digits than `least`; "" if they have them.
+def warn_below(robot: Robot, digits: float | None) -> Robot:
+    """Return a robot whose queries warn (`PrecisionWarning`) if their answers have fewer digits.
+
+    M, C, N, inverse and forward dynamics are checked. Digits are counted only where an estimate, 8 n u κ of the terms,
+    is below the limit, for up to 64 joints. A count takes milliseconds. Machine code of the robot does not warn.
+    `rd.load` checks the forward dynamics of a nearly singular robot by the condition of M alone.
+
+    Args:
+        robot: The robot.
+        digits: From above 0 to 20; None for a robot whose queries never warn.
+
+    Raises:
+        QueryError: If an argument is wrong.
+    """
+    robot = instance("robot", robot, Robot, "give one of rd.load")
+    if digits is None:
+        return _unchecked(robot)
+    return replace(robot, answer_check=DigitCheck(digits))
+
+
+@final
+@dataclass(frozen=True)
+class DigitCheck:
+    """A check of answers: it warns if they have too few digits.
+
+    Attributes:
+        digits: The number of digits below which it warns.
+    """
+
+    digits: float
+
+    def __post_init__(self) -> None:
+        digits = number("digits", self.digits, above=0)
+        if digits > MOST_DIGITS:
+            raise QueryError(f"digits must be at most {MOST_DIGITS}, got {digits:g}: no more are counted")
+        object.__setattr__(self, "digits", digits)
+
+    def __call__(self, robot: Robot, quantity: str, state: tuple[ArrayLike, ...], answer: ArrayLike) -> None:
+        """Check the answer (..., *shape) to a query."""
+        if message := doubt(_unchecked(robot), quantity, state, answer, self.digits):
+            warnings.warn(message, PrecisionWarning, stacklevel=4)  # at the query
+
+
+def doubt(robot: Robot, quantity: str, state: Sequence[ArrayLike], answer: ArrayLike, least: float) -> str:
+    """Return the warning about answers (..., *shape) with fewer digits than `least`; "" if they have enough.
 
     Digits are counted only where the estimate is below that, at the worst state; for more than 64 joints the estimate
     is reported.
     """
-    requested, quiet = QUANTITIES.get(quantity), _quiet(robot)
-    if requested is None or least is None:
+    requested = QUANTITIES.get(quantity)
+    if requested is None:
         return ""
     answers = np.asarray(answer)
     arrays = {name: shaped(name, x, robot.joint_names) for name, x in zip(requested.arguments, state, strict=True)}
@@ -75,12 +135,12 @@ def doubt(robot: Robot, quantity: str, state: Sequence[Any], answer: Any, least:
         ({name: np.broadcast_to(x, (*batch, robot.n))[k] for name, x in arrays.items()}, answers[k])
         for k in np.ndindex(batch)
     ]
-    bounds = [_bound(quiet, requested, state, answer) if np.isfinite(answer).all() else 0.0 for state, answer in rows]
+    bounds = [_bound(robot, requested, state, answer) if np.isfinite(answer).all() else 0.0 for state, answer in rows]
     if not bounds or digits_of(max(bounds)) >= least:
         return ""
     worst = int(np.argmax(bounds))
     counts = robot.n <= _COUNTED
-    held = _counted(quiet, requested, rows[worst][0]) if counts else digits_of(bounds[worst])
+    held = _counted(robot, requested, rows[worst][0]) if counts else digits_of(bounds[worst])
     if held >= least:
         return ""
     where = f" in row {worst} of the batch" if batch else ""
