@@ -31,8 +31,8 @@ WIDTH, HEIGHT = 1.5, 0.5  # of a box; rows are 1 apart
 BASE = "foundations"
 ACROSS = {  # middles of the boxes, such that no arrow passes behind another box
     "tools": 0.0, "cli": -1.2, "scene": -3.0, "accuracy": 3.3, "report": 1.4, "view": 0.6, "simulation": 0.0,
-    "codegen": -1.0, "effects": -3.2, "control": -1.2, "integrate": 1.3, "cross_check": 3.3, "model": 0.4,
-    "lagrange": 0.4, "shapes": 3.2, "queries": -0.6, "description": 2.4,
+    "codegen": -1.0, "effects": -3.2, "control": -1.2, "integrate": 1.3, "cross_check": 3.3, "model": -0.7,
+    "lagrange": 1.6, "shapes": 3.2, "queries": -0.6, "description": 2.4,
 }  # fmt: skip
 
 
