@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 from robot_dyn.description.catalog import abbreviated
+from robot_dyn.effects.effect import Effect, Force
 from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.model.findings import reservations
 from robot_dyn.queries.units import coefficient_texts, joint_types_of
-
-if TYPE_CHECKING:
-    from robot_dyn.effects.effect import Effect
-    from robot_dyn.effects.plant import Plant
 
 EDITED = {
     "gravity": "∂V/∂q in N, with V = −Σ m gᵀ p",
@@ -112,14 +109,13 @@ class Explanation(Answer):
             yield from (f"  {each}" for each in self.findings)
 
 
-def explanation(plant: Plant) -> Explanation:
-    """The equation of motion of a plant, with what acts."""
-    dynamics: Any = plant.dynamics
+def explanation(dynamics: Any, effects: tuple[Effect, ...]) -> Explanation:
+    """Return the equation of motion of dynamics with effects."""
     robot = getattr(dynamics, "robot", dynamics)
     edits = tuple(edit_terms(robot.edits)) if hasattr(robot, "edits") else ()
     weight = ["∂V/∂q"] if not hasattr(robot, "edits") or any(robot.edits.gravity) else []
-    forces = dict.fromkeys(force.name for force in plant.forces)
-    bounds = dict.fromkeys(part.name for part in plant.effects if hasattr(part, "actuation"))
+    forces = dict.fromkeys(force.name for force in effects if isinstance(force, Force))
+    bounds = dict.fromkeys(part.name for part in effects if hasattr(part, "actuation"))
     return Explanation(
         getattr(robot, "name", type(dynamics).__name__),
         dynamics.joint_names,
@@ -128,7 +124,7 @@ def explanation(plant: Plant) -> Explanation:
             f"N = {_sum([*weight, *(f'− τ_{name}' for name in forces)])}",
             " after ".join(["τ = u", *([", ".join(bounds)] if bounds else [])]),
         ),
-        (*edits, *(_term(parts, dynamics) for parts in _by_effect(plant.effects))),
+        (*edits, *(_term(parts, dynamics) for parts in _by_effect(effects))),
         source=robot.description.source if hasattr(robot, "description") else "",
         findings=reservations(robot.description) if hasattr(robot, "description") else (),
     )

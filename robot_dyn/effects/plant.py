@@ -64,10 +64,10 @@ class Plant:
         object.__setattr__(self, "effects", tuple(part.on(dynamics) for part in parts))
 
     def __repr__(self) -> str:
-        return f"<Plant: {explanation(self)}>"
+        return f"<Plant: {explanation(self.dynamics, self.effects)}>"
 
     def _repr_html_(self) -> str:
-        return explanation(self)._repr_html_()
+        return explanation(self.dynamics, self.effects)._repr_html_()
 
     @cached_property
     def equation_of_motion(self) -> EquationOfMotion:

@@ -1,4 +1,4 @@
-"""A robot of a `pinocchio.Model`: a URDF is written of it, and read as any other.
+"""Description and edits of a `pinocchio.Model`: a URDF is written of it, and read as any other.
 
 Literals are the shortest that give the same float64, so masses, inertias, axes and positions keep every bit; rotations
 pass through roll, pitch and yaw and keep all but the last.
@@ -13,10 +13,11 @@ import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.description.description import check
+from robot_dyn.description.description import Description, check
+from robot_dyn.description.edits import Edits
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.errors import DescriptionError, shorten
-from robot_dyn.model.robot import Robot
+from robot_dyn.model.pinocchio_model import build
 
 _KINDS = {
     f"JointModel{prefix}{axis}": kind
@@ -32,22 +33,21 @@ _UNBOUNDED = float(UNBOUNDED)
 _UNIT_SLACK = 1e-12  # of an axis: what normalising leaves
 
 
-def robot_of(model: Any) -> Robot:
-    """The robot of a `pinocchio.Model`; see `Robot.from_pinocchio`."""
+def described(model: Any) -> tuple[Description, Edits]:
+    """Return the description of a `pinocchio.Model`, and its gravity and armature; see `Robot.from_pinocchio`."""
     if not isinstance(model, pin.Model):
         raise DescriptionError(f"from_pinocchio takes a pinocchio.Model, got {type(model).__name__}")
     writer = _Writer(model)
-    robot = Robot(check(writer.urdf(), writer.source, writer.findings))
-    description, names = robot.description, tuple(model.names.tolist()[1:])
-    if robot.joint_names != names:
-        order = f"its joints stand in another order than in the model: {shorten(', '.join(robot.joint_names), 300)}"
+    description, names = check(writer.urdf(), writer.source, writer.findings), tuple(model.names.tolist()[1:])
+    joints = build(description, Edits())[2]
+    if joints != names:
+        order = f"its joints stand in another order than in the model: {shorten(', '.join(joints), 300)}"
         description = replace(
             description, findings=(*description.findings, f"{order}; arrange q, v and torques by these names")
         )
     drives = zip(names, model.idx_vs.tolist()[1:], strict=True)
     armature = {name: model.armature[v] for name, v in drives if model.armature[v]}
-    edits = robot.edits.with_(robot.joint_names, gravity=model.gravity.linear, armature=armature)
-    return Robot(description, edits)
+    return description, Edits().with_(joints, gravity=model.gravity.linear, armature=armature)
 
 
 class _Writer:

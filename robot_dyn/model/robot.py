@@ -32,6 +32,7 @@ from robot_dyn.model.conditioning import few_digits
 from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.evaluation import Evaluation
 from robot_dyn.model.findings import findings_of
+from robot_dyn.model.from_pinocchio import described
 from robot_dyn.model.gravity import warn_without_torque
 from robot_dyn.model.info import info_html, robot_line
 from robot_dyn.model.pinocchio_model import build, joint_ids, link_frames
@@ -271,9 +272,7 @@ class Robot(Dynamics[ndarray], Parametrised):
         Raises:
             DescriptionError: If it is not a `pinocchio.Model`, or has joints that are not revolute or prismatic.
         """
-        from robot_dyn.model.from_pinocchio import robot_of
-
-        return robot_of(model).announced()
+        return Robot(*described(model)).announced()
 
     def announced(self) -> Robot:
         """Return the robot as it is loaded: warn of its findings, and let its queries warn if M is nearly singular."""

@@ -48,7 +48,7 @@ def explain(what: Setup | Plant | Dynamics | str | Path) -> Explanation:
     if isinstance(what, Setup):
         return _complete(explanation_of(what), what.plant, what)
     plant = what if isinstance(what, Plant) else Plant(what)
-    return _complete(explanation(plant), plant, None)
+    return _complete(explanation(plant.dynamics, plant.effects), plant, None)
 
 
 def of_scene(scene: Scene, setup: Setup) -> Explanation:

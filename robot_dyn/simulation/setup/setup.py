@@ -305,7 +305,7 @@ def gibibytes(size: float) -> str:
 
 def explanation_of(setup: Setup) -> Explanation:
     """Explain a setup in words: the equation of motion, effects, control, method and start."""
-    plant, controller = explanation(setup.plant), setup.controller
+    plant, controller = explanation(setup.plant.dynamics, setup.plant.effects), setup.controller
     return replace(
         plant,
         equation=(*plant.equation, f"u = {'0' if controller is None else law(controller)}"),
