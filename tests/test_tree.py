@@ -51,13 +51,12 @@ def test_imports_go_downward() -> None:
     assert done.returncode == 0, done.stdout[-2000:]
 
 
-# Modules that still import in a circle, by folder; the set may only shrink. The translator's functions are recursive.
+# Modules that import in a circle, by folder; the set may only shrink. The translator's functions are recursive.
 IN_CIRCLES = {
     "codegen.loops": {"arrays", "calls", "expressions", "function", "numbers", "program", "statements"},
     "model": {"calls", "evaluation", "gravity", "info", "robot", "to_urdf"},
     "tools.motors.motor_budget": {"budget", "fastest", "result"},
-    "tools.sweeps": {"report", "result", "run_sweep"},
-    "tools.sweeps.engines": {"cluster"},
+    "tools.sweeps": {"report", "result"},
 }
 
 
@@ -67,7 +66,7 @@ def test_no_imports_in_a_circle() -> None:
     imported = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
     circles = {x for x, names in imported.items() if any(graph.chain_exists(importer=y, imported=x) for y in names)}
     known = {f"robot_dyn.{room}.{name}" for room, names in IN_CIRCLES.items() for name in names}
-    assert circles - known == set()
+    assert circles == known, "mend a new circle; take a mended one out of IN_CIRCLES"
 
 
 @pytest.mark.parametrize("code", ["rd.load('ur5').M([0.0] * 6)", "rd.load('ur5').C([0.1] * 6, [0.2] * 6)"])

@@ -32,8 +32,8 @@ from robot_dyn.scene.starters import starter
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps.engines.cluster import client_of
 from robot_dyn.tools.sweeps.folder.folder import Folder
+from robot_dyn.tools.sweeps.opening import begun, opened
 from robot_dyn.tools.sweeps.plan.work import Work
-from robot_dyn.tools.sweeps.run_sweep import begun, opened
 
 MIB = 2**20
 RESUME = """

@@ -21,5 +21,5 @@ from robot_dyn.tools.sweeps.sensitivity import Sensitivity as Sensitivity
 __all__: list[str]
 
 # Names that only tools and tests import.
+from robot_dyn.tools.sweeps.opening import begun as begun
 from robot_dyn.tools.sweeps.plan.work import Work as Work
-from robot_dyn.tools.sweeps.run_sweep import begun as begun

@@ -5,26 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from shutil import disk_usage
 from time import perf_counter
 from typing import Any
 
 from robot_dyn.codegen import thread_count
-from robot_dyn.foundations import SceneError, SweepError, check_folder, file_path, integer, shown
+from robot_dyn.foundations import SweepError, check_folder, file_path, shown
 from robot_dyn.tools.sweeps.engines.share import share as share_of
 from robot_dyn.tools.sweeps.engines.threads import Threads
-from robot_dyn.tools.sweeps.folder.chunk_file import Columns
-from robot_dyn.tools.sweeps.folder.folder import Folder, begin, folder_of, has_specification, read_specification
-from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places, named
-from robot_dyn.tools.sweeps.plan.pilot import pilot
+from robot_dyn.tools.sweeps.folder.folder import Folder
+from robot_dyn.tools.sweeps.imported import check_places, named
+from robot_dyn.tools.sweeps.opening import begun, opened
 from robot_dyn.tools.sweeps.plan.specification import (
-    Specification,
     names_of,
-    parsed,
-    processor,
-    specification,
-    sweep_of,
-    versions,
 )
 from robot_dyn.tools.sweeps.plan.sweep import Sweep
 from robot_dyn.tools.sweeps.plan.work import Work
@@ -119,51 +111,6 @@ def read(
     path = file_path(folder, SweepError)
     known, work = opened(path, named(scene, figures))
     return SweepResult(work.sweep, known)
-
-
-def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Work]:
-    """The folder of a sweep, and its work; arguments and errors as of `read`."""
-    check_places(path)
-    text, rows = read_specification(path)
-    where = str(path / "sweep.json")
-    stored = parsed(text, where)
-    try:
-        sweep = sweep_of(stored.data, rows, where, names, path)
-    except SceneError as error:
-        raise SweepError(f"{where}: {error}; sw.read(folder, scene=…), --scene, where it lies now") from None
-    stored.check_same(specification(sweep).with_chunk(stored.chunk), where, versions=False)
-    return _folder(path, sweep, stored), Work(sweep)
-
-
-def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
-    """The folder of a sweep, begun now unless it was; arguments and errors as of `run`."""
-    if chunk is not None:
-        chunk = integer("chunk", chunk, least=1, most=2**31, error=SweepError)
-    own, where = specification(sweep), str(path / "sweep.json")
-    if not has_specification(path):
-        _check_room(sweep, path)
-        stated = own.with_chunk(pilot(sweep, chunk))
-        if (store := _folder(path, sweep, stated).samples) is not None:
-            store.create(Work(sweep).times(), sweep.setup.plant.dynamics.joint_names)
-        if begin(path, stated.text, sweep.points.rows):
-            return _folder(path, sweep, stated)
-    stored = parsed(read_specification(path)[0], where)
-    stored.check_same(own.with_chunk(chunk or stored.chunk), where)
-    return _folder(path, sweep, stored)
-
-
-def _check_room(sweep: Sweep, path: Path) -> None:
-    """Raise SweepError if the disk has not as much room as the sweep will take."""
-    there = next(each for each in (path.absolute(), *path.absolute().parents) if each.exists())
-    free = disk_usage(there).free
-    if sweep.bytes_expected > free:
-        sizes = f"{sweep.bytes_expected / 2**30:.3g} GiB, and {there} has {free / 2**30:.3g} GiB"
-        raise SweepError(f"{path}: the sweep will take {sizes}; give another folder, fewer runs or fewer samples")
-
-
-def _folder(path: Path, sweep: Sweep, stated: Specification) -> Folder:
-    names = Columns(sweep.columns, tuple(sweep.figures))
-    return folder_of(path, stated.data, stated.digest, names, {"versions": versions()} | processor())
 
 
 class _Progress:

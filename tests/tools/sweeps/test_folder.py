@@ -16,7 +16,7 @@ import pytest
 
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps import Work, begun, run_sweep
+from robot_dyn.tools.sweeps import Work, begun, opening
 from robot_dyn.tools.sweeps.folder import files
 from robot_dyn.tools.sweeps.folder.files import Files, remove_abandoned, write
 from robot_dyn.tools.sweeps.folder.folder import MOST_FILES, Folder
@@ -207,7 +207,7 @@ def test_a_folder_is_moved_with_its_scene(tmp_path: Path) -> None:
 def test_a_disk_without_room_is_said_before_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sweep = swept(tmp_path, 1000, design="random")
     assert sweep.bytes_expected == 1000 * (8 * 9 + 9)  # 5 numbers that vary, 3 figures, the end; outcome, texts
-    monkeypatch.setattr(run_sweep, "disk_usage", lambda _: SimpleNamespace(free=80_000))
+    monkeypatch.setattr(opening, "disk_usage", lambda _: SimpleNamespace(free=80_000))
     with pytest.raises(SweepError, match=r"the sweep will take .* GiB, and .* has"):
         sw.run(sweep, tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -25,6 +25,7 @@ from robot_dyn.foundations import SweepError, needs, shown
 from robot_dyn.tools.sweeps.folder.files import temporary_name, write
 from robot_dyn.tools.sweeps.folder.folder import Folder
 from robot_dyn.tools.sweeps.imported import NOTHING, Named
+from robot_dyn.tools.sweeps.opening import opened
 from robot_dyn.tools.sweeps.plan.specification import versions
 
 _WINDOW = 3  # tasks a thread of a worker
@@ -246,8 +247,6 @@ def _answer(ticket: Ticket) -> str:
 @lru_cache(maxsize=1)
 def _work(ticket: Ticket) -> Any:
     """The folder, the work and the times of samples of a sweep, made once in a worker."""
-    from robot_dyn.tools.sweeps.run_sweep import opened
-
     _check(ticket)
     folder, work = opened(Path(ticket.folder), Named(ticket.scene, dict(ticket.figures)))
     if folder.digest != ticket.digest:
