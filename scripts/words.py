@@ -24,9 +24,9 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 572,
+    "opening": 571,
     "as of": 145,
-    "what without noun": 657,
+    "what without noun": 655,
     "is told": 22,
     "says that": 115,
     "tells that": 6,
@@ -47,7 +47,7 @@ CEILINGS = {
     "the same holds": 2,
     "each": 869,
     "arguments": 93,
-    "Any": 2685,
+    "Any": 2682,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.
