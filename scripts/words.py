@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 571,
+    "opening": 567,
     "as of": 145,
     "what without noun": 655,
     "is told": 22,
@@ -35,19 +35,19 @@ CEILINGS = {
     "believes": 28,
     "is no": 78,
     "of its own": 78,
-    "behind": 80,
+    "behind": 79,
     "beside": 113,
     "anew": 1,
     "likewise": 29,
     "in place of": 62,
-    "so many": 49,
+    "so many": 48,
     "but for": 19,
     "whatever": 37,
     "of which": 56,
     "the same holds": 2,
-    "each": 869,
+    "each": 859,
     "arguments": 93,
-    "Any": 2682,
+    "Any": 2675,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.

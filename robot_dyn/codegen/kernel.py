@@ -141,7 +141,7 @@ class Kernel:
         return self.program.inputs[: len(self.program.inputs) - self._parametrised]
 
     def _function(self, what: str, write: Callable[[Any, str], None]) -> Callable[..., int]:
-        return python_function(self._address("call", what, write), np.array(self.parameters, self.dtype))
+        return python_function(self._address("call", what, write), np.array(self.parameters, self.dtype).tobytes())
 
     def _address(self, function: str, what: str, write: Callable[[Any, str], None]) -> int:
         form = str(self.shape), self.dtype, str(self.times), repr(self.doubtful), str(self._parametrised)

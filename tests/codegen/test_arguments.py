@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -88,6 +90,45 @@ def test_arrays_of_other_kinds_are_taken_or_refused(count: int) -> None:
     for t in (10**400, None, "now"):
         with pytest.raises(QueryError, match="t must be a time"):
             PLANT.forward_dynamics(t, *rows)
+
+
+SAME: dict[str, Callable[[np.ndarray], Any]] = {
+    "contiguous": np.array,
+    "strided": lambda x: np.repeat(x, 2)[::2],
+    "backwards": lambda x: x[::-1].copy()[::-1],
+    "big-endian": lambda x: x.astype(">f8"),
+    "misaligned": lambda x: np.frombuffer(b"0" + x.tobytes(), offset=1),
+    "float32": lambda x: x.astype(np.float32),
+    "masked": np.ma.masked_array,
+    "records": lambda x: x.view(np.recarray),
+    "a list": list,
+}
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+@pytest.mark.parametrize("form", SAME)
+def test_numbers_of_any_form_give_the_same_answer(form: str, place: int) -> None:
+    """The numbers are exact in float32."""
+    for name in ("forward_dynamics", "inverse_dynamics"):
+        given: list[Any] = [np.array([0.25, -0.75]), np.array([0.5, 0.375]), np.array([1.0, -2.0])]
+        right = getattr(ARM, name)(*given)
+        timed = getattr(PUSHED, name)(0.25, *given)
+        given[place] = SAME[form](given[place])
+        np.testing.assert_allclose(getattr(FAST, name)(*given), right, rtol=1e-12)
+        np.testing.assert_allclose(getattr(PLANT, name)(0.25, *given), timed, rtol=1e-12)
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+@pytest.mark.parametrize(
+    "wrong", [np.ones(1), np.ones(3), np.array(1.0), np.ones(2, "M8[s]"), np.ones(2, complex), np.ones(2, object)]
+)
+def test_arrays_that_fit_no_joints_are_refused(wrong: np.ndarray, place: int) -> None:
+    given = state(False)
+    given[place] = wrong
+    with pytest.raises(QueryError):
+        FAST.forward_dynamics(*given)
+    with pytest.raises(QueryError):
+        PLANT.forward_dynamics(0.25, *given)
 
 
 def test_a_plant_that_was_used_can_be_pickled() -> None:

@@ -7,6 +7,7 @@ import gc
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -44,10 +45,17 @@ STRANGE: dict[str, Any] = {
     "too long": np.ones(4),
     "of two axes": np.ones((1, 3)),
     "of no axes": np.array(1.0),
+    "complex": np.ones(3, complex),
+    "extended": np.ones(3, np.longdouble),
+    "dates": np.ones(3, "M8[s]"),
+    "records": np.ones(3, [("x", float)]),
+    "objects": np.ones(3, object),
+    "masked": np.ma.masked_array(np.ones(3)),
     "misaligned": np.zeros(25, np.int8)[1:].view(float),
     "a list": [1.0, 1.0, 1.0],
     "None": None,
     "a number": 1.0,
+    "another buffer": memoryview(np.ones(3)),
     "a class": np.ndarray,
 }
 
@@ -59,6 +67,60 @@ def test_what_is_no_plain_array_is_reported(double: Kernel, what: str) -> None:
     assert double.call(STRANGE[what], y) == Status.SHAPE
     assert not y.any()
     assert double.call(np.ones(3), STRANGE[what]) == Status.SHAPE
+
+
+def used(*objects: Any) -> list[int]:
+    """References to each object."""
+    return [sys.getrefcount(x) for x in objects]
+
+
+@pytest.mark.parametrize("what", [*STRANGE, "read-only", "not finite", "right"])
+def test_a_call_releases_what_it_has_read(double: Kernel, what: str) -> None:
+    """In every place, of a state and of a batch, also the arrays before the one that is refused."""
+    x, y, locked = np.ones(3), np.zeros(3), np.ones(3)
+    locked.flags.writeable = False
+    other = {**STRANGE, "read-only": locked, "not finite": np.full(3, np.nan), "right": np.ones(3)}[what]
+    X, Y = np.ones((20, 3)), np.zeros((20, 3))
+    objects = x, y, other, X, Y, type(other), np.ndarray
+    before = used(*objects)
+    for _ in range(100):
+        double.call(other, y)
+        double.call(x, other)
+        double.call(x, y, other)
+        double.batch(other, Y, 0, 20)
+        double.batch(X, other, 0, 20)
+        double.batch(X, Y, 0, 20)
+        double.batch(X, X, 0, 20)
+    assert used(*objects) == before
+
+
+def test_arrays_can_be_resized_after_a_call(double: Kernel) -> None:
+    """NumPy refuses this while a view exists."""
+    x, y = np.ones(3), np.zeros(3)
+    assert double.call(x, y) == Status.FINE
+    assert double.call(x, y[::-1]) == Status.SHAPE
+    x.resize(6)
+    y.resize(6)
+    assert np.array_equal(y[:3], 2 * x[:3])
+
+
+def test_threads_share_arrays(double: Kernel) -> None:
+    """Each thread gets its own results, and no reference is lost or left over."""
+    x, X = np.arange(3.0), np.ones((200, 3))
+
+    def work(k: int) -> bool:
+        y, Y, right = np.empty(3), np.empty((200, 3)), True
+        for i in range(2000):
+            right &= double.call(x, y) == Status.FINE and np.array_equal(y, 2 * x)
+            right &= double.call(x, "no array" if (i + k) % 2 else x[::2]) == Status.SHAPE
+            right &= i % 20 != 0 or (double.batch(X, Y, 0, 200) == Status.FINE and bool(np.all(Y == 2)))
+        return right
+
+    assert work(0)
+    before = used(x, X)
+    with ThreadPoolExecutor(4) as pool:
+        assert all(pool.map(work, range(4)))
+    assert used(x, X) == before
 
 
 def test_read_only_arrays_are_read_and_not_written(double: Kernel) -> None:

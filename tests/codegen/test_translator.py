@@ -6,6 +6,8 @@ import ast
 import linecache
 import math
 import random
+import sys
+from contextlib import suppress
 from math import frexp
 from typing import Any, NamedTuple
 
@@ -16,7 +18,7 @@ from robot_dyn.codegen import INSTEAD, MachineFunction
 from robot_dyn.codegen.loops.expressions import EXPRESSIONS
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.loops.statements import STATEMENTS
-from robot_dyn.foundations import MachineCodeError
+from robot_dyn.foundations import MachineCodeError, TraceError
 from tests.long import long, stress
 
 
@@ -333,6 +335,59 @@ def test_arrays_that_are_read_only_are_not_written() -> None:
     frozen.setflags(write=False)
     with pytest.raises(SubsetError, match="read-only"):
         compiled(f)(frozen)
+
+
+def test_arrays_of_one_form_may_differ_in_what_may_be_done_with_them() -> None:
+    """Each call takes the type of its own arrays: contiguous, strided, read-only, of a subclass, empty."""
+
+    def f(x, y):
+        total = 0.0
+        for i in range(len(x)):
+            total += x[i] * (i + 1)
+        y[0] = total
+        return total
+
+    function, y, plain = compiled(f), np.zeros(1), np.arange(1.0, 4.0)
+    frozen = plain.copy()
+    frozen.setflags(write=False)
+    for x in (plain, np.repeat(plain, 2)[::2], frozen, plain[::-1].copy()[::-1], plain.view(np.recarray), plain[:0]):
+        assert function(x, y) == y[0] == (14.0 if len(x) else 0.0)
+    with pytest.raises(SubsetError, match="read-only"):
+        function(plain, frozen)
+    assert function(plain, y) == 14.0
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.ones(3, ">f8"), np.ones(3, np.float32), np.ones(3, "M8[s]"), np.ones(3, object), np.ones(3, "S0"),
+        np.ones(3, [("x", float)]), np.array(1.0), np.frombuffer(bytes(25), offset=1),
+        np.zeros(3, np.dtype([("a", "i1"), ("x", float)]))["x"],
+    ],
+    ids=str,
+)  # fmt: skip
+def test_arrays_that_machine_code_cannot_read_are_refused(wrong: np.ndarray) -> None:
+    """Each time, and an aligned array of the same form is read."""
+
+    def f(x):
+        return 0.0 if len(x) == 0 else x[0]
+
+    function = compiled(f)
+    for _ in range(2):
+        with pytest.raises(TraceError):
+            function(wrong)
+        assert function(np.ones(3)) == 1.0
+
+
+def test_no_array_is_kept_by_its_reading() -> None:
+    arrays = [np.ones(3), np.ones((3, 2))[:, :1], np.ones(3, "M8[s]"), np.ones(3).view(np.recarray)]
+    function = MachineFunction(lambda x: 0, INSTEAD, lambda: None, "")
+    before = [sys.getrefcount(x) for x in arrays]
+    for _ in range(20):
+        for i in range(len(arrays)):
+            with suppress(TraceError):
+                function.check(arrays[i])
+    assert [sys.getrefcount(x) for x in arrays] == before
 
 
 def test_no_sum_of_products_is_contracted() -> None:

@@ -1,4 +1,4 @@
-"""Machine code as a function of Python, of the form METH_FASTCALL, and Python's C API in machine code."""
+"""Machine code as a function of Python, of the form METH_FASTCALL, and Python's stable C API in machine code."""
 
 from __future__ import annotations
 
@@ -10,20 +10,30 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 
-from robot_dyn.codegen.llvm.numpy_array import check_structure
-from robot_dyn.codegen.llvm.vectors import F64, I64
+from robot_dyn.codegen.llvm.vectors import F64, I32, I64
 
 _FASTCALL = 0x80  # (self, pointer to the arguments, their number)
 OBJECT = ir.IntType(8).as_pointer()
+# A Py_buffer: data, owner, size, itemsize, readonly, axes, format, lengths, strides, suboffsets, internal
+VIEW = ir.LiteralStructType(
+    [OBJECT, OBJECT, I64, I64, I32, I32, OBJECT, I64.as_pointer(), I64.as_pointer(), I64.as_pointer(), OBJECT]
+)
+NDARRAY = "numpy.ndarray"  # symbol of the class
 # Functions of Python's C API that the code calls: result and arguments
 _API: dict[str, tuple[Any, ...]] = {
-    "PyFloat_AsDouble": (F64, OBJECT),
-    "PyErr_Occurred": (OBJECT,),
+    "PyBuffer_IsContiguous": (I32, VIEW.as_pointer(), ir.IntType(8)),
+    "PyBuffer_Release": (ir.VoidType(), VIEW.as_pointer()),
+    "PyBytes_AsString": (OBJECT, OBJECT),
     "PyErr_Clear": (ir.VoidType(),),
+    "PyErr_Occurred": (OBJECT,),
+    "PyEval_RestoreThread": (ir.VoidType(), OBJECT),
+    "PyEval_SaveThread": (OBJECT,),
+    "PyFloat_AsDouble": (F64, OBJECT),
     "PyLong_AsLongLong": (I64, OBJECT),
     "PyLong_FromLongLong": (OBJECT, I64),
-    "PyEval_SaveThread": (OBJECT,),
-    "PyEval_RestoreThread": (ir.VoidType(), OBJECT),
+    "PyObject_GetBuffer": (I32, OBJECT, VIEW.as_pointer(), I32),
+    "PyObject_Type": (OBJECT, OBJECT),
+    "Py_DecRef": (ir.VoidType(), OBJECT),
 }
 
 
@@ -39,20 +49,16 @@ class _Method(ctypes.Structure):
 
 
 def addresses() -> dict[str, int]:
-    """Addresses of the functions of Python's C API by name."""
-    return {name: ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value or 0 for name in _API}
+    """Return the addresses of the functions of Python's C API, and of the class of arrays, by symbol."""
+    functions = {name: ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value or 0 for name in _API}
+    return functions | {NDARRAY: id(np.ndarray)}
 
 
-def python_function(address: int, like: np.ndarray) -> Callable[..., int]:
-    """The Python function of machine code that reads arrays, whose `self` is this array.
-
-    Raises:
-        ArrayStructureError: If this NumPy has the fields of arrays at other offsets.
-    """
-    check_structure()
+def python_function(address: int, own: bytes = b"") -> Callable[..., int]:
+    """Return the Python function of machine code, whose `self` is `own`."""
     wrap = ctypes.pythonapi.PyCFunction_NewEx
     wrap.restype, wrap.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.py_object, ctypes.py_object]
-    return wrap(ctypes.addressof(_method(address)), like, None)
+    return wrap(ctypes.addressof(_method(address)), own, None)
 
 
 @cache  # the function holds no reference to it
@@ -61,7 +67,7 @@ def _method(address: int) -> _Method:
 
 
 def function_of(module: Any, name: str) -> Any:
-    """A function of this form in a module: arguments (self, pointer to the arguments, their number)."""
+    """Declare a function of this form in a module: arguments (self, pointer to the arguments, their number)."""
     return ir.Function(module, ir.FunctionType(OBJECT, [OBJECT, OBJECT.as_pointer(), I64]), name)
 
 

@@ -154,13 +154,13 @@ def kind_of(value: Any) -> Kind:
 
 
 def _kind_of_array(x: np.ndarray) -> ArrayKind:
-    if x.dtype not in _OF_DTYPE or not x.flags.aligned or not x.ndim:
+    if x.dtype not in _OF_DTYPE or not x.ndim or any(each % x.itemsize for each in (x.ctypes.data, *x.strides)):
         raise TraceError(
             f"machine code takes arrays of float64, int64, uint64 or bool with an axis at least, got {x.dtype} of shape"
             f" {x.shape}: convert it"
         )
-    single = x.ndim > 1 and x.shape[-1] == 1
-    return ArrayKind(_OF_DTYPE[x.dtype], x.ndim, x.flags.c_contiguous, single, not x.flags.writeable)
+    single, frozen = x.ndim > 1 and x.shape[-1] == 1, x.data.readonly
+    return ArrayKind(_OF_DTYPE[x.dtype], x.ndim, x.flags.c_contiguous, single, frozen)
 
 
 def unpacked(found: list[int], kind: Kind) -> Any:
