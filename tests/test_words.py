@@ -109,6 +109,12 @@ def test_a_count_above_its_ceiling_is_an_error_and_one_below_lowers_it(count: in
     assert len(words.complaints({"behind": count}, {"behind": 3})) == complaints
 
 
+def test_ceilings_are_lowered_to_the_counts_and_never_raised() -> None:
+    source = 'CEILINGS = {\n    "behind": 3,\n    "beside": 5,\n}\n'
+    lowered = words.lowered(source, {"behind": 2, "beside": 9}, {"behind": 3, "beside": 5})
+    assert lowered == 'CEILINGS = {\n    "behind": 2,\n    "beside": 5,\n}\n'
+
+
 def test_there_are_twenty_phrases_and_each_rule_has_a_ceiling() -> None:
     assert set(words.CEILINGS) == set(words.BY_SYNTAX) | set(words.PHRASES)
     assert len(words.PHRASES) == 20
