@@ -15,13 +15,13 @@ from robot_dyn.codegen.parameters import Parameter, Part, parameters
 from robot_dyn.codegen.program import Programs
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.store.keys import digest, sources_of_programs
-from robot_dyn.codegen.trace.right_angles import robot_of
 from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import TraceError
 from robot_dyn.foundations.values import LRUByIdentity
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.model.right_angles import robot_of
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.machine_code import CompiledFunctions, MachineCode

@@ -21,7 +21,6 @@ from robot_dyn.simulation.dynamics.moreau_jean import behind, stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.engine import Advance, Evaluated, Watched
 from robot_dyn.simulation.events.holding import Places
-from robot_dyn.simulation.events.modes import alone
 
 
 @final
@@ -48,7 +47,8 @@ class Interpreted:
     def places(self) -> Places:
         """Return the places of the mode: the run parameters are the mode and nothing else."""
         n = self.equation.plant.dynamics.n
-        return alone(n, n * self.equation.sampled)
+        first = n * self.equation.sampled
+        return Places(*(np.array([first + k * n], np.int64) for k in range(3)))  # held, direction and contact
 
     def loop(self, plain: Callable[[], Advance]) -> Advance:
         """Return the plain time loop."""

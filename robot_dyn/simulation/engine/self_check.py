@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.codegen.trace.right_angles import models_in_full
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import RobotDynError, because
 from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
+from robot_dyn.model.right_angles import models_in_full
 from robot_dyn.simulation.dynamics.bodies import bodies
 from robot_dyn.simulation.dynamics.moreau_jean import stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
