@@ -18,6 +18,7 @@ from robot_dyn.codegen.parameters import CONTROLLER, ROBOT, Parameter, Part, joi
 from robot_dyn.codegen.program import Programs
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.store.keys import digest, sources_of_the_writer
+from robot_dyn.codegen.waiting import COMPILING
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.set_valued import SetValued
 from robot_dyn.foundations.coefficients import value_at
@@ -156,6 +157,10 @@ class MachineCode:
     def loop(self, plain: Callable[[], Advance]) -> Advance:
         """Return the time loop, which stores the addresses of its arrays; the plain one if it is not compiled."""
         return plain() if self.machine_loop is None else self.machine_loop.calls()
+
+    def compiling_s(self) -> float:
+        """Return the time that this thread has spent on loading and compiling loops; see `Engine`."""
+        return COMPILING.seconds
 
     @cached_property
     def parameters(self) -> np.ndarray:
