@@ -18,9 +18,9 @@ from robot_dyn.foundations.errors import PrecisionWarning as PrecisionWarning
 from robot_dyn.foundations.errors import RobotDynError as RobotDynError
 from robot_dyn.lagrange.euler_lagrange import euler_lagrange as euler_lagrange
 from robot_dyn.lagrange.lagrangian import Lagrangian as Lagrangian
-from robot_dyn.model.info import info as info
 from robot_dyn.model.loading import load as load
 from robot_dyn.model.robot import Robot as Robot
+from robot_dyn.model.robot import info as info
 from robot_dyn.scene.explain import explain as explain
 from robot_dyn.scene.scene import read_scene as read_scene
 from robot_dyn.simulation.dynamics.linearise import linearise as linearise
