@@ -68,6 +68,15 @@ def test_no_imports_in_a_circle() -> None:
     assert circles == known, "mend a new circle; take a mended one out of IN_CIRCLES"
 
 
+def test_no_rooms_of_a_run_import_in_a_circle() -> None:
+    """Imports inside functions and type-checking blocks included."""
+    graph = grimp.build_graph("robot_dyn", cache_dir=None)
+    for room in (of_run := graph.find_children("robot_dyn.simulation")):
+        graph.squash_module(room)
+    imported = {room: graph.find_modules_directly_imported_by(room) for room in of_run}
+    assert not {x for x in of_run if any(graph.chain_exists(importer=y, imported=x) for y in imported[x])}
+
+
 @pytest.mark.parametrize("code", ["rd.load('ur5').M([0.0] * 6)", "rd.load('ur5').C([0.1] * 6, [0.2] * 6)"])
 def test_a_query_loads_what_it_needs(code: str) -> None:
     """M and C of a robot load neither a compiler nor anything that draws, proves or simulates."""

@@ -13,7 +13,7 @@ from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.engine.interpreted import interpreted_engine
 from robot_dyn.simulation.setup.setup import Setup
 
-ENGINES = {"compiled": "robot_dyn.simulation.engine.compiled:choose"}
+ENGINES = {"compiled": "robot_dyn.simulation.compiled.choice:choose"}
 
 
 def choose(setup: Setup, seen: float = 0) -> Engine:

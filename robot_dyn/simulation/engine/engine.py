@@ -1,4 +1,4 @@
-"""The protocol of the engines of a run: interpreted (`interpreted.py`) and machine code (`compiled.py`).
+"""The protocol of the engines of a run: interpreted (`interpreted.py`) and machine code (`compiled/machine_code.py`).
 
 engine = choose(setup);   run = make_run(setup, engine);   recording = run.record()
 """

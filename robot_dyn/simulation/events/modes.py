@@ -12,11 +12,11 @@ from robot_dyn.effects.rigid_backlash import RigidBacklash
 from robot_dyn.effects.rigid_stops import RigidStops, touching
 from robot_dyn.effects.set_valued import Mode
 from robot_dyn.effects.settling import settling
+from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.event_log import What, event_log
 from robot_dyn.simulation.events.holding import Holding, Laws, Places, Room
 from robot_dyn.simulation.events.mode_change import REACTIONS, at_once, start, width
-from robot_dyn.simulation.events.occurrence import Occurrence
 
 _IMPACTS = 64  # that are stored
 _STOP = {-1: "lower stop", 1: "upper stop"}

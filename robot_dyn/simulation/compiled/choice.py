@@ -13,17 +13,17 @@ from typing import Any
 from robot_dyn.codegen.waiting import announced
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.values import cached
-from robot_dyn.simulation.engine.cache import (
+from robot_dyn.simulation.compiled.cache import (
     existing,
     identify,
     interpreted_before,
     machine_code,
     with_numbers,
 )
+from robot_dyn.simulation.compiled.machine_code import MachineCode
+from robot_dyn.simulation.compiled.self_check import check
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.engine.interpreted import Interpreted, interpreted_engine
-from robot_dyn.simulation.engine.machine_code import MachineCode
-from robot_dyn.simulation.engine.self_check import check
 from robot_dyn.simulation.setup.setup import Setup, segments
 
 # Interpreted, an evaluation takes some 0.1 ms: these take about as long as imports, trace and LLVM, 1 to 2 s; half of
@@ -126,7 +126,7 @@ def _is_worthwhile(setup: Setup, before: list[float], seen: float) -> bool:
 
 def _has_loop(setup: Setup) -> bool:
     """Whether the time loop is in the store."""
-    from robot_dyn.simulation.engine.loop import loop_of
+    from robot_dyn.simulation.compiled.loop import loop_of
 
     method, holds = setup.integrator, bool(setup.plant.equation_of_motion.set_valued)
     return method.plain and loop_of(method, setup.finds_events, holds=holds).is_kept()
