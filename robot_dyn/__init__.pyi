@@ -18,11 +18,12 @@ from robot_dyn.foundations.errors import PrecisionWarning as PrecisionWarning
 from robot_dyn.foundations.errors import RobotDynError as RobotDynError
 from robot_dyn.lagrange.euler_lagrange import euler_lagrange as euler_lagrange
 from robot_dyn.lagrange.lagrangian import Lagrangian as Lagrangian
-from robot_dyn.model.info import info as info
 from robot_dyn.model.loading import load as load
 from robot_dyn.model.robot import Robot as Robot
+from robot_dyn.model.robot import info as info
 from robot_dyn.scene.explain import explain as explain
 from robot_dyn.scene.scene import read_scene as read_scene
+from robot_dyn.simulation.dynamics.event import Event as Event
 from robot_dyn.simulation.dynamics.linearise import linearise as linearise
 from robot_dyn.simulation.export.export import export as export
 from robot_dyn.simulation.results.run_file import load_run as load_run
@@ -33,7 +34,6 @@ from robot_dyn.simulation.rollouts.file import save_rollouts as save_rollouts
 from robot_dyn.simulation.rollouts.result import Rollouts as Rollouts
 from robot_dyn.simulation.rollouts.rollouts import rollouts as rollouts
 from robot_dyn.simulation.rollouts.sweepable import sweepable as sweepable
-from robot_dyn.simulation.setup.event import Event as Event
 from robot_dyn.simulation.setup.setup import Setup as Setup
 from robot_dyn.simulation.simulate import simulate as simulate
 from robot_dyn.view.plots.plots import plot as plot

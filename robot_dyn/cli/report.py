@@ -13,8 +13,7 @@ from robot_dyn.effects.plant_state import PlantState, plant_state
 from robot_dyn.foundations.answer import Table
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.validate import choice
-from robot_dyn.model.info import info
-from robot_dyn.model.robot import Robot
+from robot_dyn.model.robot import Robot, info
 from robot_dyn.queries.dynamics import QUANTITIES
 from robot_dyn.queries.units import numbers_row
 from robot_dyn.simulation.results.ledger import largest

@@ -10,8 +10,6 @@ from robot_dyn.codegen.store.cache import CacheWarning as CacheWarning
 from robot_dyn.codegen.store.cache import Store as Store
 from robot_dyn.codegen.store.keys import digest_of_texts as digest_of_texts
 from robot_dyn.codegen.store.keys import processor_of_code as processor_of_code
-from robot_dyn.codegen.store.keys import version_of as version_of
 from robot_dyn.codegen.threads import thread_count as thread_count
 from robot_dyn.codegen.trace.from_casadi import program_of as program_of
-from robot_dyn.codegen.trace.right_angles import completed as completed
 from robot_dyn.codegen.trace.trace import Trace as Trace

@@ -17,11 +17,11 @@ from robot_dyn.codegen.engine import Engine
 from robot_dyn.codegen.self_check import SelfCheck
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.threads import thread_count
-from robot_dyn.codegen.trace.right_angles import RightAngle, completed
 from robot_dyn.codegen.trace.trace import QUANTITIES, Trace
 from robot_dyn.description.inertial_parameters import Parametrised
 from robot_dyn.foundations.validate import choice, instance, truth
 from robot_dyn.foundations.values import OnFirstUse
+from robot_dyn.model.right_angles import RightAngle, completed
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import FORWARD_DYNAMICS_DERIVATIVES, Dynamics
 

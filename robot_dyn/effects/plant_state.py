@@ -16,7 +16,7 @@ from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.result import UNREPORTED
 from robot_dyn.foundations.validate import instance, number, one_state
 from robot_dyn.foundations.values import Value, read_only
-from robot_dyn.model.gravity import gravity_acts, no_torque
+from robot_dyn.model.info import no_torque
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import PLANT, C, M
 from robot_dyn.queries.units import joint_units, numbers_row, without_rounding
@@ -119,6 +119,6 @@ def plant_state(plant: Any, q: Any, v: Any, a: Any = None, tau: Any = None, t: f
     terms = {each.name: each.ask(plant, state | {"t": t}) for each in (M, C, PLANT["N"])}
     effects = dict(zip(numbered(*(force.name for force in plant.forces)), torques, strict=True))
     return PlantState(
-        robot.name, robot.edits.gravity, gravity_acts(robot), robot.joint_names, robot.joint_types, **state, **terms,
+        robot.name, robot.edits.gravity, robot.gravity_acts, robot.joint_names, robot.joint_types, **state, **terms,
         effects=effects, held=held, plant=plant, of_tau=of_tau,
     )  # fmt: skip

@@ -50,6 +50,7 @@ from robot_dyn.foundations.errors import nearest as nearest
 from robot_dyn.foundations.errors import shorten as shorten
 from robot_dyn.foundations.errors import shown as shown
 from robot_dyn.foundations.extras import needs as needs
+from robot_dyn.foundations.extras import version_of as version_of
 from robot_dyn.foundations.files import FileKind as FileKind
 from robot_dyn.foundations.files import check_folder as check_folder
 from robot_dyn.foundations.files import file_path as file_path

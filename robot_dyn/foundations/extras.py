@@ -1,7 +1,9 @@
-"""Packages that only some answers need: imported when asked for, named with the line that installs them."""
+"""Installed packages: their versions, and those that only some answers need, imported on use."""
 
 from __future__ import annotations
 
+import re
+from functools import cache
 from importlib import import_module
 from types import ModuleType
 
@@ -26,3 +28,16 @@ def needs(module: str, *, extra: str) -> ModuleType:
         raise MissingExtraError(
             f"{module.partition('.')[0]} is not installed: pip install 'robot-dyn[{extra}]'"
         ) from None
+
+
+@cache
+def version_of(name: str) -> str:
+    """The version of an installed distribution, or "unknown"."""
+    from importlib.metadata import PackageNotFoundError, distribution  # a query of a robot needs none of it
+
+    try:
+        found = distribution(name)
+    except PackageNotFoundError:  # run from its folder
+        return "unknown"
+    head = re.search("^Version: (.*)$", found.read_text("METADATA") or "", re.MULTILINE)
+    return head[1] if head else found.version  # which starts a mail parser

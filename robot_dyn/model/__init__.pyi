@@ -1,3 +1,3 @@
 # Names that tools and tests import of this folder, and where they live; modules of the core import modules.
 from robot_dyn.model import findings as findings
-from robot_dyn.model.gravity import gravity_acts as gravity_acts
+from robot_dyn.model.right_angles import completed as completed

@@ -1,6 +1,6 @@
 """Pinocchio's calls by the names of the queries.
 
-A call is built for a robot, and for a frame and its axes if it has them. It computes one state of all joints,
+A call is made for a built model, and for a frame and its axes if it has them. It computes one state of all joints,
 (data, q, …) → a new array or a number, where `data` is Pinocchio's working memory.
 """
 
@@ -9,18 +9,15 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 
 from robot_dyn.foundations.spatial import hat
 from robot_dyn.model.coriolis import jacobian_rate as rate_of
-from robot_dyn.model.pinocchio_model import link_frames
+from robot_dyn.model.pinocchio_model import Built, link_frames
 from robot_dyn.queries.dynamics import Axes, entry
-
-if TYPE_CHECKING:
-    from robot_dyn.model.robot import Robot
 
 Call = Callable[..., Any]
 
@@ -32,32 +29,32 @@ class Scratch(threading.local):
         self.data = model.createData()
 
 
-def _coriolis_torque(robot: Robot) -> Call:
-    weightless = robot.model.copy()  # of `robot.model` less N would keep the digits of N
+def _coriolis_torque(built: Built) -> Call:
+    weightless = built.model.copy()  # of `model` less N would keep the digits of N
     weightless.gravity = pin.Motion.Zero()
     return partial(pin.nonLinearEffects, weightless)
 
 
-def _coriolis_transpose(robot: Robot) -> Call:
-    matrix = robot.coriolis.matrix
+def _coriolis_transpose(built: Built) -> Call:
+    matrix = built.coriolis.matrix
     return lambda data, q, v: v.dot(matrix(data, q, v))
 
 
-def _momentum(robot: Robot) -> Call:
-    model, crba = robot.model, pin.crba
+def _momentum(built: Built) -> Call:
+    model, crba = built.model, pin.crba
     return lambda data, q, v: crba(model, data, q).dot(v)
 
 
-def _kinetic_energy(robot: Robot) -> Call:
+def _kinetic_energy(built: Built) -> Call:
     """pin.computeKineticEnergy leaves out the armature of joints whose axis is not x, y or z."""
-    model, crba = robot.model, pin.crba
+    model, crba = built.model, pin.crba
     return lambda data, q, v: float(v.dot(crba(model, data, q).dot(v))) / 2
 
 
-def _regressor(robot: Robot) -> Call:
+def _regressor(built: Built) -> Call:
     """Bodies in the order of their parameters; for one joint Pinocchio returns a flat array."""
-    model, names = robot.model, list(robot.model.names[1:])
-    N, order = model.nv, [names.index(name) for name in robot.body_names]
+    model, names = built.model, list(built.model.names[1:])
+    N, order = model.nv, [names.index(name) for name in built.body_names]
 
     def regressor(data: Any, q: ndarray, v: ndarray, a: ndarray) -> ndarray:
         Y = pin.computeJointTorqueRegressor(model, data, q, v, a)
@@ -67,14 +64,14 @@ def _regressor(robot: Robot) -> Call:
     return regressor
 
 
-def _frame(robot: Robot, name: str) -> int:
+def _frame(built: Built, name: str) -> int:
     """Return the index of the frame of a link or joint; QueryError if it is unknown."""
-    links = link_frames(robot.model)
-    return entry(links | {joint: links[child] for joint, child in robot.description.joint_frames.items()}, name)
+    links = link_frames(built.model)
+    return entry(links | {joint: links[child] for joint, child in built.description.joint_frames.items()}, name)
 
 
-def _placement(robot: Robot, frame: str) -> Call:
-    model, index = robot.model, _frame(robot, frame)
+def _placement(built: Built, frame: str) -> Call:
+    model, index = built.model, _frame(built, frame)
 
     def placement(data: Any, q: ndarray) -> ndarray:
         pin.forwardKinematics(model, data, q)
@@ -83,9 +80,9 @@ def _placement(robot: Robot, frame: str) -> Call:
     return placement
 
 
-def _jacobian(robot: Robot, frame: str, expressed_in: str) -> Call:
+def _jacobian(built: Built, frame: str, expressed_in: str) -> Call:
     """Computed in body axes and rotated here: the world-aligned one loses digits with distance from the base."""
-    model, index, axes = robot.model, _frame(robot, frame), Axes.of(expressed_in)
+    model, index, axes = built.model, _frame(built, frame), Axes.of(expressed_in)
     reference = pin.WORLD if axes is Axes.WORLD else pin.LOCAL
 
     def jacobian(data: Any, q: ndarray) -> ndarray:
@@ -98,8 +95,8 @@ def _jacobian(robot: Robot, frame: str, expressed_in: str) -> Call:
     return aligned if axes is Axes.WORLD_ALIGNED else jacobian
 
 
-def _jacobian_rate(robot: Robot, frame: str, expressed_in: str) -> Call:
-    model, index, axes = robot.model, _frame(robot, frame), Axes.of(expressed_in)
+def _jacobian_rate(built: Built, frame: str, expressed_in: str) -> Call:
+    model, index, axes = built.model, _frame(built, frame), Axes.of(expressed_in)
 
     def jacobian_rate(data: Any, q: ndarray, v: ndarray) -> ndarray:
         if axes is Axes.WORLD:
@@ -128,15 +125,15 @@ def _turned(R: ndarray, J: ndarray) -> ndarray:
 
 
 PINOCCHIO: dict[str, Callable[..., Call]] = {
-    "M": lambda robot: partial(pin.crba, robot.model),
-    "C": lambda robot: robot.coriolis.matrix,
-    "N": lambda robot: partial(pin.computeGeneralizedGravity, robot.model),
+    "M": lambda built: partial(pin.crba, built.model),
+    "C": lambda built: built.coriolis.matrix,
+    "N": lambda built: partial(pin.computeGeneralizedGravity, built.model),
     "coriolis_torque": _coriolis_torque,
     "coriolis_transpose": _coriolis_transpose,
-    "inverse_dynamics": lambda robot: partial(pin.rnea, robot.model),
-    "forward_dynamics": lambda robot: partial(pin.aba, robot.model),
+    "inverse_dynamics": lambda built: partial(pin.rnea, built.model),
+    "forward_dynamics": lambda built: partial(pin.aba, built.model),
     "kinetic_energy": _kinetic_energy,
-    "potential_energy": lambda robot: partial(pin.computePotentialEnergy, robot.model),
+    "potential_energy": lambda built: partial(pin.computePotentialEnergy, built.model),
     "momentum": _momentum,
     "regressor": _regressor,
     "placement": _placement,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
@@ -20,12 +20,10 @@ from robot_dyn.foundations.validate import is_moderate, shaped
 from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.model.calls import PINOCCHIO, Call, Scratch
 from robot_dyn.model.conditioning import Regularity, regularity
+from robot_dyn.model.pinocchio_model import Built
 from robot_dyn.queries.batch import answered
 from robot_dyn.queries.dynamics import QUANTITIES, acceleration
 from robot_dyn.queries.quantity import DOUBTFUL
-
-if TYPE_CHECKING:
-    from robot_dyn.model.robot import Robot
 
 
 @final
@@ -34,17 +32,18 @@ class Evaluation:
     """Evaluates Pinocchio's calls for one robot.
 
     Attributes:
-        robot: The robot.
+        built: The model of the robot.
         scratch: Memory that the algorithms of its model write to.
     """
 
-    robot: Robot
+    built: Built
     scratch: Scratch
 
     @cached_property
     def regularity(self) -> Regularity:
         """Whether M is invertible, judged at a configuration without symmetries."""
-        return regularity(self._batched("M")(np.linspace(0.3, 0.9, self.robot.n)), self.robot.joint_names)
+        names = self.built.joint_names
+        return regularity(self._batched("M")(np.linspace(0.3, 0.9, len(names))), names)
 
     @cached_property
     def one_state(self) -> OnFirstUse:
@@ -53,7 +52,7 @@ class Evaluation:
 
     def _one_state(self, query: str | tuple[str, ...]) -> Call:
         name, *frame = (query,) if isinstance(query, str) else query
-        couplings, quantity = self.robot.couplings, QUANTITIES[name]
+        couplings, quantity = self.built.couplings, QUANTITIES[name]
         if quantity.solves:
             return self._solved
         call = self._calls[name, *frame]
@@ -69,7 +68,7 @@ class Evaluation:
     @cached_property
     def _calls(self) -> OnFirstUse:
         """Calls of Pinocchio by (name, frame, axes)."""
-        return OnFirstUse(lambda query: PINOCCHIO[query[0]](self.robot, *query[1:]))
+        return OnFirstUse(lambda query: PINOCCHIO[query[0]](self.built, *query[1:]))
 
     def answer(self, name: str, state: tuple[Any, ...], errors: str, *frame: str) -> Any:
         """Return the answer to a query at one state or a batch; with errors="nan" NaN at states without one."""
@@ -79,11 +78,11 @@ class Evaluation:
 
     def _solved(self, data: Any, q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
         """Forward dynamics of one state, which is answered at once if joints are coupled and M is regular."""
-        robot, couplings = self.robot, self.robot.couplings
+        built, couplings = self.built, self.built.couplings
         if self.regularity.singular is None and not couplings.trivial:
             M = self.one_state["M"](data, q)
-            bias = pin.nonLinearEffects(robot.model, data, couplings.position(q), couplings.velocity(v))
-            a = acceleration(M, tau - couplings.torque(bias), robot.joint_names)
+            bias = pin.nonLinearEffects(built.model, data, couplings.position(q), couplings.velocity(v))
+            a = acceleration(M, tau - couplings.torque(bias), built.joint_names)
             if is_moderate(a, DOUBTFUL):
                 return a
         return self._forward_dynamics((q, v, tau), "raise")
@@ -92,7 +91,7 @@ class Evaluation:
         """M⁻¹ (τ − C v − N), by ABA, or by factorising M if joints are coupled; raises where M is singular."""
         if self.regularity.singular is not None:
             raise self.regularity.singular()
-        names, trivial = self.robot.joint_names, self.robot.couplings.trivial
+        names, trivial = self.built.joint_names, self.built.couplings.trivial
         M, inverse, solved = (self._batched(name) for name in ("M", "inverse_dynamics", "forward_dynamics"))
 
         def equation(q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
@@ -108,8 +107,8 @@ class Evaluation:
         try:
             call = self._calls[name, *frame]
         except TypeError:  # not hashable: refused
-            call = PINOCCHIO[name](self.robot, *frame)
-        couplings, data = self.robot.couplings, self.scratch.data
+            call = PINOCCHIO[name](self.built, *frame)
+        couplings, data = self.built.couplings, self.scratch.data
         axes = QUANTITIES[name].axes
 
         def equation(q: ndarray, *rates: ndarray) -> ndarray:
@@ -122,7 +121,7 @@ class Evaluation:
         return equation
 
     def _answered(self, name: str, state: tuple[Any, ...], errors: str, equation: Callable[..., ndarray]) -> Any:
-        names, quantity = self.robot.joint_names, QUANTITIES[name]
+        names, quantity = self.built.joint_names, QUANTITIES[name]
         arrays = {key: shaped(key, x, names) for key, x in zip(quantity.arguments, state, strict=True)}
-        answer = answered(equation, arrays, quantity.shape(self.robot.sizes), names, errors)
+        answer = answered(equation, arrays, quantity.shape(self.built.sizes), names, errors)
         return answer if answer.ndim else float(answer)

@@ -39,7 +39,7 @@ def described(model: Any) -> tuple[Description, Edits]:
         raise DescriptionError(f"from_pinocchio takes a pinocchio.Model, got {type(model).__name__}")
     writer = _Writer(model)
     description, names = check(writer.urdf(), writer.source, writer.findings), tuple(model.names.tolist()[1:])
-    joints = build(description, Edits())[2]
+    joints = build(description, Edits()).joint_names
     if joints != names:
         order = f"its joints stand in another order than in the model: {shorten(', '.join(joints), 300)}"
         description = replace(

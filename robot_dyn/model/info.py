@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, final
-
-import numpy as np
+from typing import Any, final
 
 from robot_dyn.description.catalog import abbreviated
+from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits, Payload
 from robot_dyn.foundations.answer import Answer, Block, Table
-from robot_dyn.model.gravity import gravity_acts, no_torque
-
-if TYPE_CHECKING:
-    from robot_dyn.model.robot import Robot
 
 _HEADINGS = "joint", "kind", "lower", "upper", "effort", "velocity", "damping", "dry friction", "armature"
 
@@ -95,39 +90,9 @@ class Info(Answer):
         yield from (f"finding: {finding}" for finding in self.findings)
 
 
-def info(robot: Robot) -> Info:
-    """What is known of a robot: joints with limits and stated friction, couplings, mass, edits and findings.
-
-    Its `repr` is the table that `robot-dyn info` prints, `to_json()` the document of `robot-dyn info --json`.
-
-    Args:
-        robot: Of `rd.load`, with its edits.
-
-    Raises:
-        QueryError: If it is no robot.
-    """
-    from robot_dyn.foundations.validate import instance
-    from robot_dyn.model.robot import Robot
-
-    instance("robot", robot, Robot, "give one, such as rd.load('ur5')")
-    columns = [getattr(robot, each) for each in list(Joint.__dataclass_fields__)[2:]]
-    rows = zip(robot.joint_names, robot.joint_types, *(np.asarray(x).tolist() for x in columns), strict=True)
-    return Info(
-        robot.name, robot.description.source, robot.n, robot.total_mass, robot.edits.gravity, gravity_acts(robot),
-        tuple(Joint(*row) for row in rows), tuple(_couplings(robot)), dict(robot.edits.lock), robot.edits.payloads,
-        dict(robot.estimated), robot.frame_names, robot.findings,
-    )  # fmt: skip
-
-
-def info_html(robot: Robot) -> str:
-    """The same as HTML, for a robot in a notebook."""
-    return info(robot)._repr_html_()
-
-
-def robot_line(self: Robot) -> str:
-    """`Robot.__repr__`: one line, as it stands within the `repr` of controllers and other values."""
-    edits = self.edits
-    heading = _heading(self.name, self.n, self.total_mass, edits.gravity)
+def robot_line(name: str, n: int, total_mass: float, edits: Edits) -> str:
+    """Return the `repr` of a robot: one line, as it stands within the `repr` of controllers and other values."""
+    heading = _heading(name, n, total_mass, edits.gravity)
     return f"<Robot: {'; '.join((heading, *_edits(dict(edits.lock), edits.payloads), *_other_edits(edits)))}>"
 
 
@@ -149,11 +114,17 @@ def _other_edits(edits: Edits) -> Iterator[str]:
             yield f"{name} changed: {', '.join(key for key, _ in changed)}"
 
 
-def _couplings(robot: Robot) -> Iterator[Coupling]:
-    """As the file states them."""
-    moving = robot.model.names[1:]
-    for joint in robot.description.element.iterfind("joint[mimic]"):
+def couplings_of(description: Description, moving: Collection[str]) -> Iterator[Coupling]:
+    """Yield the couplings of joints that move, as the file states them."""
+    for joint in description.element.iterfind("joint[mimic]"):
         mimic: Any = joint.find("mimic")
         if joint.get("name") in moving:
             name: Any = joint.get("name")
             yield Coupling(name, mimic.get("joint"), float(mimic.get("multiplier")), float(mimic.get("offset")))
+
+
+def no_torque(gravity: tuple[float, float, float]) -> str:
+    """Return the remark on a robot on which a gravity does not act."""
+    if not any(gravity):
+        return "gravity is zero, so N(q) = 0"
+    return f"gravity {gravity} m/s² has no torque on any joint at any position, so N(q) = 0"

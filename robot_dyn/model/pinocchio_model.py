@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations_with_replacement
-from typing import Any
+from types import MappingProxyType
+from typing import Any, final
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
@@ -12,16 +16,51 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 from robot_dyn.description.couplings import Couplings, Mimic, resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
+from robot_dyn.description.inertial_parameters import NAMES, ordered
 from robot_dyn.description.structure import stated_mimics
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import DescriptionError, EditError, nearest
+from robot_dyn.model.coriolis import Coriolis
 
 MAX_MOVING = 250  # Pinocchio's scratch memory for n joints is 63 n³ bytes: here 1 GB
 _MARK = "joint:"  # prefix while Pinocchio works by name: a joint may share a link's name or be called "universe"
 
 
-def build(description: Description, edits: Edits) -> tuple[Any, Couplings, tuple[str, ...]]:
-    """The Pinocchio model of all joints that move, the couplings between them, and the names of the independent ones.
+@final
+@dataclass(frozen=True, eq=False)
+class Built:
+    """A Pinocchio model with the values that calls of Pinocchio need besides.
+
+    Attributes:
+        model: The `pinocchio.Model` of all joints that move.
+        couplings: How its joints follow q.
+        joint_names: Names of the n independent joints, in the order of q.
+        description: The checked file, without the edits.
+    """
+
+    model: Any
+    couplings: Couplings
+    joint_names: tuple[str, ...]
+    description: Description
+
+    @cached_property
+    def coriolis(self) -> Coriolis:
+        """How C of `model` is computed, and the bound of its rounding."""
+        return Coriolis.of(self.model, self.couplings)
+
+    @cached_property
+    def sizes(self) -> Mapping[str, int]:
+        """The numbers that letters in the shapes of quantities stand for."""
+        return MappingProxyType({"n": len(self.joint_names), "p": len(NAMES) * self.model.nv})
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the joints that carry the bodies, in the order of their inertial parameters."""
+        return ordered(self.joint_names, self.model.names[1:])
+
+
+def build(description: Description, edits: Edits) -> Built:
+    """Return the Pinocchio model of a description with its edits.
 
     Raises:
         DescriptionError: If Pinocchio rejects it, or no joint moves.
@@ -51,7 +90,7 @@ def build(description: Description, edits: Edits) -> tuple[Any, Couplings, tuple
     _apply(edits, model)
     model = _locked(model, edits, mimics)
     _unmark(model)
-    return model, *_couplings(tuple(model.names[1:]), mimics)
+    return Built(model, *_couplings(tuple(model.names[1:]), mimics), description)
 
 
 def state_edits(robot: Any, edits: Edits) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Unpack, final
 
@@ -22,9 +23,16 @@ from numpy.typing import ArrayLike
 from robot_dyn.description.couplings import Couplings
 from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Changes, Edits, takes_changes
-from robot_dyn.description.inertial_parameters import NAMES, Parametrised, ordered
+from robot_dyn.description.inertial_parameters import Parametrised
 from robot_dyn.description.urdf import UNBOUNDED
-from robot_dyn.foundations.errors import DescriptionError, EditError, PrecisionWarning, announce
+from robot_dyn.foundations.errors import (
+    DescriptionError,
+    EditError,
+    ModelWarning,
+    PrecisionWarning,
+    RobotDynError,
+    announce,
+)
 from robot_dyn.foundations.validate import function, instance, is_moderate, is_plain, is_state
 from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.model.calls import Scratch
@@ -33,16 +41,17 @@ from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.evaluation import Evaluation
 from robot_dyn.model.findings import findings_of
 from robot_dyn.model.from_pinocchio import described
-from robot_dyn.model.gravity import warn_without_torque
-from robot_dyn.model.info import info_html, robot_line
-from robot_dyn.model.pinocchio_model import build, joint_ids, link_frames
-from robot_dyn.model.to_urdf import to_urdf
+from robot_dyn.model.info import Info, Joint, couplings_of, no_torque, robot_line
+from robot_dyn.model.pinocchio_model import Built, build, joint_ids, link_frames
+from robot_dyn.model.to_urdf import write_urdf
 from robot_dyn.queries.batch import into
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.quantity import DOUBTFUL
 
 _F8 = np.dtype(float)
 _RAISE = "raise"
+_STATES = 3  # N is analytic in q: zero at random states, it is zero at all
+_ROUNDING = 1e-12  # of the weight times the length of the robot
 AnswerCheck = Callable[["Robot", str, tuple[ArrayLike, ...], ArrayLike], None]
 
 
@@ -61,8 +70,6 @@ class Robot(Dynamics[ndarray], Parametrised):
     description: Description
     edits: Edits = field(default_factory=Edits)
     answer_check: AnswerCheck | None = None
-    __repr__, _repr_html_ = robot_line, info_html
-    to_urdf = to_urdf
 
     def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
         if out is None and errors is _RAISE:
@@ -129,7 +136,7 @@ class Robot(Dynamics[ndarray], Parametrised):
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the n joints, in the order of q."""
-        return self._built[2]
+        return self._built.joint_names
 
     @cached_property
     def joint_types(self) -> tuple[str, ...]:
@@ -194,26 +201,26 @@ class Robot(Dynamics[ndarray], Parametrised):
     @cached_property
     def model(self) -> Any:
         """The `pinocchio.Model` of all joints that move, coupled ones included. Read it, do not change it."""
-        return self._built[0]
+        return self._built.model
 
     @cached_property
     def couplings(self) -> Couplings:
         """How the joints of `model` follow q."""
-        return self._built[1]
+        return self._built.couplings
 
     @cached_property
     def coriolis(self) -> Coriolis:
         """How C of `model` is computed, and the bound of its rounding."""
-        return Coriolis.of(self.model, self.couplings)
+        return self._built.coriolis
 
-    @cached_property
+    @property
     def sizes(self) -> Mapping[str, int]:
         """The numbers that letters in the shapes of quantities stand for."""
-        return MappingProxyType({"n": self.n, "p": len(NAMES) * self.model.nv})
+        return self._built.sizes
 
     @property
     def body_names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        return ordered(self.joint_names, self.model.names[1:])
+        return self._built.body_names
 
     @property
     def inertial_parameters(self) -> ndarray:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -228,6 +235,18 @@ class Robot(Dynamics[ndarray], Parametrised):
     def findings(self) -> tuple[str, ...]:
         """Doubtful values of the description and its edits, each with its remedy; see docs/reference/findings.md."""
         return findings_of(self.description, self.edits, self._evaluation.regularity)
+
+    @cached_property
+    def gravity_acts(self) -> bool:
+        """True if gravity has a torque or force on a joint, at some position."""
+        g = float(np.linalg.norm(self.edits.gravity))
+        q = np.random.default_rng(0).uniform(-1.0, 1.0, (_STATES, self.n))
+        length = 1.0 + sum(float(np.linalg.norm(place.translation)) for place in self.model.jointPlacements)
+        length += max(float(np.linalg.norm(body.lever)) for body in self.model.inertias)
+        try:
+            return bool(np.abs(self.N(q)).max() > _ROUNDING * self.total_mass * g * length)
+        except RobotDynError:  # overflows: far from zero
+            return True
 
     def random_configuration(self, rng: np.random.Generator) -> ndarray:
         """Return a position within the joint limits, uniformly distributed.
@@ -296,9 +315,37 @@ class Robot(Dynamics[ndarray], Parametrised):
             ModelWarning: If the new gravity is not zero and has no torque on any joint.
         """
         robot = Robot(self.description, self.edits.with_(self.joint_names, **changes))
-        if robot.edits.gravity != self.edits.gravity:
-            warn_without_torque(robot)
+        gravity = robot.edits.gravity
+        if gravity != self.edits.gravity and any(gravity) and not robot.gravity_acts:
+            remedy = "give its direction in base axes, or (0, 0, 0)"
+            warnings.warn(f"{robot.name}: {no_torque(gravity)}; {remedy}", ModelWarning, stacklevel=2)
         return robot if self.answer_check is None else replace(robot, answer_check=self.answer_check)
+
+    def to_urdf(self, path: str | Path) -> Path:
+        """Write the robot with its edits as a URDF; an older one of that name is replaced.
+
+        Locks become fixed joints and payloads links; meshes keep their addresses, relative ones are those from the new
+        place.
+
+        Args:
+            path: Ends with .urdf, which is added if it has no suffix; not the file that the robot was read from.
+
+        Returns:
+            The path.
+
+        Raises:
+            DescriptionError: If the file cannot be written there.
+
+        Warns:
+            ModelWarning: If there is armature, or a gravity that is not the standard one: URDF has no place for them.
+        """
+        return write_urdf(self.description, self.edits, path)
+
+    def __repr__(self) -> str:
+        return robot_line(self.name, self.n, self.total_mass, self.edits)
+
+    def _repr_html_(self) -> str:
+        return info(self)._repr_html_()
 
     def __post_init__(self) -> None:
         function("answer_check", self.answer_check, "(robot, query, arguments, answer)")
@@ -314,12 +361,12 @@ class Robot(Dynamics[ndarray], Parametrised):
         return Robot, (self.description, self.edits, self.answer_check)
 
     @cached_property
-    def _built(self) -> tuple[Any, Couplings, tuple[str, ...]]:
+    def _built(self) -> Built:
         return build(self.description, self.edits)
 
     @cached_property
     def _evaluation(self) -> Evaluation:
-        return Evaluation(self, self._scratch)
+        return Evaluation(self._built, self._scratch)
 
     @cached_property
     def _shape(self) -> tuple[int] | None:
@@ -357,6 +404,27 @@ class Robot(Dynamics[ndarray], Parametrised):
         values = full[[self.model.idx_vs[ids[name]] for name in self.joint_names]]
         values[np.abs(values) >= float(UNBOUNDED)] *= np.inf
         return _frozen(values)
+
+
+def info(robot: Robot) -> Info:
+    """What is known of a robot: joints with limits and stated friction, couplings, mass, edits and findings.
+
+    Its `repr` is the table that `robot-dyn info` prints, `to_json()` the document of `robot-dyn info --json`.
+
+    Args:
+        robot: Of `rd.load`, with its edits.
+
+    Raises:
+        QueryError: If it is no robot.
+    """
+    instance("robot", robot, Robot, "give one, such as rd.load('ur5')")
+    columns = [getattr(robot, name) for name in list(Joint.__dataclass_fields__)[2:]]
+    rows = zip(robot.joint_names, robot.joint_types, *(np.asarray(x).tolist() for x in columns), strict=True)
+    return Info(
+        robot.name, robot.description.source, robot.n, robot.total_mass, robot.edits.gravity, robot.gravity_acts,
+        tuple(Joint(*row) for row in rows), tuple(couplings_of(robot.description, set(robot.model.names[1:]))),
+        dict(robot.edits.lock), robot.edits.payloads, dict(robot.estimated), robot.frame_names, robot.findings,
+    )  # fmt: skip
 
 
 def _warn_of_condition(robot: Robot, quantity: str, state: tuple[ArrayLike, ...], answer: ArrayLike) -> None:

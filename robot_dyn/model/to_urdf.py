@@ -11,13 +11,14 @@ import os
 import warnings
 from copy import deepcopy
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.description.couplings import resolve
-from robot_dyn.description.edits import STANDARD_GRAVITY, Payload
+from robot_dyn.description.description import Description
+from robot_dyn.description.edits import STANDARD_GRAVITY, Edits, Payload
 from robot_dyn.description.markup import parse
 from robot_dyn.description.structure import stated_mimics
 from robot_dyn.description.urdf import UNBOUNDED
@@ -27,45 +28,26 @@ from robot_dyn.foundations.files import FileKind, save, target
 from robot_dyn.foundations.spatial import rotation, rotation_rpy, rpy_of
 from robot_dyn.model.pinocchio_model import state_edits
 
-if TYPE_CHECKING:
-    from robot_dyn.model.robot import Robot
-
 _URDF = FileKind("a URDF", ".urdf", b"<?xml")
 _DRAWN = ("visual", "collision")
 _UNIT_SLACK = 1e-15  # of an axis: its rounding
 
 
-def to_urdf(self: Robot, path: str | Path) -> Path:
-    """Write the robot with its edits as a URDF; an older one of that name is replaced.
-
-    Locks become fixed joints and payloads links; meshes keep their addresses, relative ones are those from the new
-    place.
-
-    Args:
-        self: The robot.
-        path: Ends with .urdf, which is added if it has no suffix; not the file that the robot was read from.
-
-    Returns:
-        The path.
-
-    Raises:
-        DescriptionError: If the file cannot be written there.
-
-    Warns:
-        ModelWarning: If there is armature, or a gravity that is not the standard one: URDF has no place for them.
-    """
-    source = Path(self.description.source)
+def write_urdf(description: Description, edits: Edits, path: str | Path) -> Path:
+    """Write the file of `Robot.to_urdf`, which documents arguments, errors and warnings; return its path."""
+    source = Path(description.source)
     path = target(path, _URDF, DescriptionError, [source] if source.is_file() else [])
-    text = urdf_text(self, path.parent)
+    lacking = _not_stated(edits)
+    text = _urdf_text(description, edits, lacking, path.parent)
     save(path, lambda stream: stream.write(text), DescriptionError)
-    if lacking := _not_stated(self):
-        warnings.warn(f"{self.name}: {'; '.join(lacking)}", ModelWarning, stacklevel=2)
+    if lacking:
+        warnings.warn(f"{description.name}: {'; '.join(lacking)}", ModelWarning, stacklevel=3)
     return path
 
 
-def urdf_text(robot: Robot, folder: Path) -> bytes:
-    """The bytes of that file, with relative addresses of meshes as from `folder`."""
-    out, edits = robot.description.element, robot.edits
+def _urdf_text(description: Description, edits: Edits, lacking: list[str], folder: Path) -> bytes:
+    """Return the bytes of that file, with addresses of meshes relative to `folder`."""
+    out = description.element
     state_edits(out, edits)
     for inertial in out.iterfind("link/inertial") if edits.mass_scale != 1.0 else ():
         for element in (inertial.find("mass"), inertial.find("inertia")):
@@ -74,21 +56,21 @@ def urdf_text(robot: Robot, folder: Path) -> bytes:
     _fix_locked(out, dict(edits.lock))
     for joint in out.iterfind("joint"):
         _restate(joint)
-    _draw(out, robot, folder)
+    _draw(out, description, folder)
     for payload in edits.payloads:
         _add_payload(out, payload)
-    for each in _not_stated(robot):
-        out.insert(0, etree.Comment(f" {each.replace('--', '- -')} "))
+    for text in lacking:
+        out.insert(0, etree.Comment(f" {text.replace('--', '- -')} "))
     etree.indent(out)
     return etree.tostring(out, xml_declaration=True, encoding="UTF-8") + b"\n"
 
 
-def _not_stated(robot: Robot) -> list[str]:
+def _not_stated(edits: Edits) -> list[str]:
     """What a URDF cannot state of the edits."""
-    armature = {name: value for name, value in robot.edits.armature if value}
+    armature = {name: value for name, value in edits.armature if value}
     told = [f"armature is not in the URDF, which has no place for it: {armature}"] if armature else []
-    if robot.edits.gravity != STANDARD_GRAVITY:
-        told.append(f"gravity is not in the URDF, which has no place for it: {robot.edits.gravity} m/s²")
+    if edits.gravity != STANDARD_GRAVITY:
+        told.append(f"gravity is not in the URDF, which has no place for it: {edits.gravity} m/s²")
     return told
 
 
@@ -131,16 +113,16 @@ def _restate(joint: Any) -> None:
         joint.remove(limit)
 
 
-def _draw(out: Any, robot: Robot, folder: Path) -> None:
+def _draw(out: Any, description: Description, folder: Path) -> None:
     """Add the shapes of links, and materials, of the text that was read."""
-    read, _ = parse(robot.description.text, robot.description.source)
+    read, _ = parse(description.text, description.source)
     shapes = {(link.get("name") or "").strip(): link for link in read.iterfind("link")}
     for link in out.iterfind("link"):
         if (drawn := shapes.get(link.get("name"))) is not None:
             link.extend(deepcopy(each) for each in drawn if each.tag in _DRAWN)
     for material in reversed(read.findall("material")):
         out.insert(0, deepcopy(material))
-    source = Path(robot.description.source)
+    source = Path(description.source)
     for element in out.iter("mesh", "texture") if source.is_file() else ():
         address = element.get("filename") or ""
         if address and "://" not in address and not Path(address).is_absolute():

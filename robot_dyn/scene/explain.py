@@ -133,7 +133,7 @@ def _machine_code(plant: Plant, setup: Setup | None) -> Iterator[str]:
 
 def _of_tick(setup: Setup, kind: str | None) -> Iterator[str]:
     """Instructions of a tick, and those of the first controller alone."""
-    from robot_dyn.simulation.engine.cache import machine_code
+    from robot_dyn.simulation.compiled.cache import machine_code
 
     inside: Any = setup.controller
     if inside is None or not inside.period_s:

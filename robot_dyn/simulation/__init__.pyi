@@ -1,11 +1,11 @@
 # Names that tools and tests import of this folder, and where they live; modules of the core import modules.
+from robot_dyn.simulation.compiled.cache import machine_code as machine_code
+from robot_dyn.simulation.compiled.self_check import MachineError as MachineError
 from robot_dyn.simulation.dynamics.fastest_motion import jacobian as jacobian
 from robot_dyn.simulation.dynamics.sampled_loop import linearised as linearised
 from robot_dyn.simulation.dynamics.stability import Stability as Stability
 from robot_dyn.simulation.dynamics.stability import step_map as step_map
 from robot_dyn.simulation.dynamics.state_equation import StateEquation as StateEquation
-from robot_dyn.simulation.engine.cache import machine_code as machine_code
-from robot_dyn.simulation.engine.self_check import MachineError as MachineError
 from robot_dyn.simulation.estimate.requested_accuracy import AccuracyError as AccuracyError
 from robot_dyn.simulation.observation.observation import observation_of as observation_of
 from robot_dyn.simulation.observation.remarks import Remark as Remark

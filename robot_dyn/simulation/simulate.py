@@ -11,7 +11,6 @@ from dataclasses import fields, replace
 from time import perf_counter
 from typing import Any, NamedTuple, Unpack
 
-from robot_dyn.codegen.waiting import COMPILING
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.validate import function
 from robot_dyn.foundations.values import cached, derived
@@ -116,7 +115,7 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
     seen, said, chooses = 0, (), setup.integrator.name == AUTO
     while True:
         engine = choose(setup, seen)
-        ready, before, observer = perf_counter(), COMPILING.seconds, observer_of(setup)
+        ready, before, observer = perf_counter(), engine.compiling_s(), observer_of(setup)
         run = make_run(
             setup, engine, on_progress=on_progress, observer=observer, most=engine.most_evaluations, chooses=chooses
         )
@@ -129,7 +128,7 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
                 setup, chooses, said = cached(setup, _nonsmooth), False, (*said, remark)
             case record:
                 observer.end()
-                return _Ran(setup, engine, observer, record, ready + COMPILING.seconds - before, said)
+                return _Ran(setup, engine, observer, record, ready + engine.compiling_s() - before, said)
 
 
 def _stiff(setup: Setup) -> Setup:

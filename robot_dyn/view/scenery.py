@@ -12,7 +12,6 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.foundations.spatial import hat, homogeneous
-from robot_dyn.model.gravity import gravity_acts
 from robot_dyn.model.robot import Robot
 from robot_dyn.view import commands
 from robot_dyn.view.commands import Command
@@ -123,7 +122,7 @@ def gravity_label(robot: Robot) -> str:
     gravity = robot.edits.gravity
     if not any(gravity):
         return "no gravity"
-    acts = "" if gravity_acts(robot) else ", without torque on any joint"
+    acts = "" if robot.gravity_acts else ", without torque on any joint"
     return f"↓ gravity {np.linalg.norm(gravity):.4g} m/s²{acts}"
 
 

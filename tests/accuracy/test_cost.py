@@ -24,7 +24,7 @@ from robot_dyn.foundations import QueryError, json_text
 from robot_dyn.report import Budget
 from robot_dyn.scene import starter
 from robot_dyn.simulation import StateEquation, machine_code
-from robot_dyn.simulation.engine.cache import machine_code_of_constants
+from robot_dyn.simulation.compiled.cache import machine_code_of_constants
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])

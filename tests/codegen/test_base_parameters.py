@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn.codegen import Trace, completed
+from robot_dyn.codegen import Trace
 from robot_dyn.codegen.trace.base_parameters import regrouped
 from robot_dyn.codegen.trace.origins import slid
 from robot_dyn.lagrange import Linkage, articulated_body, composite_body, magnitudes, newton_euler
 from robot_dyn.lagrange.recursions.kinetic_energy import kinetic_energy
+from robot_dyn.model import completed
 from tests.long import long
 from tests.random_trees import RandomTree, trees
 

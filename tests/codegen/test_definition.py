@@ -16,8 +16,8 @@ import robot_dyn as rd
 from robot_dyn.codegen.store.definition import definition
 from robot_dyn.foundations.values import LRUByIdentity
 from robot_dyn.simulation import StateEquation, machine_code
-from robot_dyn.simulation.engine import cache
-from robot_dyn.simulation.engine.structure import structure
+from robot_dyn.simulation.compiled import cache
+from robot_dyn.simulation.compiled.structure import structure
 from tests.codegen.test_kernel import Memory
 
 ARM = rd.load("planar_2r")

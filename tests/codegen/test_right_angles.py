@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen import completed
+from robot_dyn.model import completed
 from robot_dyn.scene import of_scene, parse_scene
 
 ARM = """<robot name="arm"><link name="base"/>

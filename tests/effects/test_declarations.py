@@ -16,8 +16,8 @@ from robot_dyn.control import Block, Controller
 from robot_dyn.effects import Effect
 from robot_dyn.foundations import EffectError, TraceError, tanh
 from robot_dyn.simulation import MachineError, Verdict
+from robot_dyn.simulation.diagnostics.smoothness import LOOKS
 from robot_dyn.simulation.dynamics.declarations import undeclared
-from robot_dyn.simulation.dynamics.smoothness import LOOKS
 from robot_dyn.simulation.engine.choice import choose
 
 ARM = rd.load("planar_2r")

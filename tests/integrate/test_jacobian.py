@@ -11,7 +11,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.integrate import System
 from robot_dyn.simulation import MachineError, StateEquation, machine_code, segment_table
-from robot_dyn.simulation.engine.self_check import check, jacobian_error
+from robot_dyn.simulation.compiled.self_check import check, jacobian_error
 
 HAS_LONGDOUBLE = np.finfo(np.longdouble).nmant > 52
 ARM = rd.load("planar_2r")

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.model import gravity_acts
 from tests.command import document, said
 
 G = -rd.STANDARD_GRAVITY[2]
@@ -37,23 +36,23 @@ def test_its_tip_goes_where_the_lecture_says() -> None:
 @pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")  # of the massless tip
 @pytest.mark.parametrize("name", OWN)
 def test_gravity_acts_on_every_robot_of_the_library(name: str) -> None:
-    assert gravity_acts(rd.load(name))
+    assert rd.load(name).gravity_acts
 
 
 def test_gravity_along_all_axes_of_an_arm_has_no_torque_and_that_is_said() -> None:
     arm = rd.load("planar_2r")
     with pytest.warns(rd.ModelWarning, match=r"planar_2r: gravity \(0.0, -9.8, 0.0\) .* no torque .* N\(q\) = 0"):
         level = arm.with_(gravity=(0.0, -9.8, 0.0))
-    assert not gravity_acts(level)
-    assert gravity_acts(level.with_(gravity=(1e-6, -9.8, 0.0)))  # the least of a slope
+    assert not level.gravity_acts
+    assert level.with_(gravity=(1e-6, -9.8, 0.0)).gravity_acts  # the least of a slope
 
 
 def test_no_gravity_and_unchanged_gravity_are_silent() -> None:
     """The arm twodofs moves in a horizontal plane: as it is loaded nothing is wrong with it."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert not gravity_acts(rd.load("planar_2r").with_(gravity=(0.0, 0.0, 0.0)))
-        assert not gravity_acts(rd.load("twodofs").with_(armature=0.1, gravity=rd.STANDARD_GRAVITY))
+        assert not rd.load("planar_2r").with_(gravity=(0.0, 0.0, 0.0)).gravity_acts
+        assert not rd.load("twodofs").with_(armature=0.1, gravity=rd.STANDARD_GRAVITY).gravity_acts
 
 
 def test_the_commands_say_why_N_is_zero() -> None:

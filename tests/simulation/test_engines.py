@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen import completed
 from robot_dyn.control import Stateless
 from robot_dyn.effects import Active
 from robot_dyn.foundations import QueryError, TraceError
 from robot_dyn.integrate import FIXED_STEP
+from robot_dyn.model import completed
 from robot_dyn.simulation import MachineError, StateEquation
+from robot_dyn.simulation.compiled.self_check import check
 from robot_dyn.simulation.engine.choice import choose
-from robot_dyn.simulation.engine.self_check import check
 from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.watch import Watch
 from tests.long import long

@@ -231,11 +231,11 @@ def test_a_long_run_that_cannot_be_compiled_is_made_in_python(monkeypatch: pytes
         tried.append(1.0)
         raise rd.RobotDynError("not here")
 
-    monkeypatch.setattr("robot_dyn.simulation.engine.choice.existing", lambda *_: None)
-    monkeypatch.setattr("robot_dyn.simulation.engine.choice.machine_code", refuse)
-    monkeypatch.setattr("robot_dyn.simulation.engine.choice._COMPILED", 500)
+    monkeypatch.setattr("robot_dyn.simulation.compiled.choice.existing", lambda *_: None)
+    monkeypatch.setattr("robot_dyn.simulation.compiled.choice.machine_code", refuse)
+    monkeypatch.setattr("robot_dyn.simulation.compiled.choice._COMPILED", 500)
     count = [0.0]  # evaluations of runs before, which other tests may have made
-    monkeypatch.setattr("robot_dyn.simulation.engine.choice.interpreted_before", lambda *_: count)
+    monkeypatch.setattr("robot_dyn.simulation.compiled.choice.interpreted_before", lambda *_: count)
     tight = rd.integrate.Adaptive(rtol=3e-14, atol=1e-15)
     run = rd.simulate(ARM, [0.3, 0.4], duration_s=0.4, estimate_error=False, integrator=tight)
     assert run.statistics.evaluations > 500

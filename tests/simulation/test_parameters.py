@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen import completed
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.foundations import EffectError, QueryError, TraceError, eigh, tanh
-from robot_dyn.simulation.engine import cache
+from robot_dyn.model import completed
+from robot_dyn.simulation.compiled import cache
 from tests.long import long
 
 ARM = rd.load("planar_2r")

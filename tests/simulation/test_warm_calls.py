@@ -23,7 +23,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn import Trajectory
 from robot_dyn.simulation import Ending, RemarkKind, StateEquation
-from robot_dyn.simulation.engine.machine_code import MachineCode
+from robot_dyn.simulation.compiled.machine_code import MachineCode
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.3, -0.4]), np.array([0.5, -0.2])

@@ -21,9 +21,9 @@ from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.program import Program
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.trace.from_casadi import program_of
-from robot_dyn.codegen.trace.right_angles import completed
 from robot_dyn.codegen.trace.trace import Trace
 from robot_dyn.foundations.errors import QueryError, RobotDynError
+from robot_dyn.model.right_angles import completed
 from robot_dyn.model.robot import Robot
 from robot_dyn.report.timing import seconds
 

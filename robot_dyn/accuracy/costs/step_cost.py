@@ -23,9 +23,9 @@ from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.methods import method
 from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.compiled.cache import machine_code, machine_code_of_constants
+from robot_dyn.simulation.compiled.machine_code import MachineCode
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.cache import machine_code, machine_code_of_constants
-from robot_dyn.simulation.engine.machine_code import MachineCode
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles

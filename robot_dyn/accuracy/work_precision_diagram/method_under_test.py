@@ -14,9 +14,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.codegen.trace.right_angles import completed, models_in_full
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.model.right_angles import completed, models_in_full
 from robot_dyn.model.robot import Robot
 from robot_dyn.report.time_budget import Limit
 from robot_dyn.simulation.engine.choice import choose

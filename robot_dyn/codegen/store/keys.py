@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import re
 from collections.abc import Iterable
 from functools import cache
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
+
+from robot_dyn.foundations.extras import version_of
 
 _ROOT = Path(__file__).parents[2]
 _CODEGEN = _ROOT / "codegen"
@@ -79,14 +79,3 @@ def digest_of_files(folder: Path, paths: Iterable[Path]) -> str:
             data = file.read()
         result.update(f"{name[prefix:]} {len(data)}\n".encode() + data)
     return result.hexdigest()
-
-
-@cache
-def version_of(name: str) -> str:
-    """The version of an installed distribution, or "unknown"."""
-    try:
-        found = distribution(name)
-    except PackageNotFoundError:  # run from its folder
-        return "unknown"
-    head = re.search("^Version: (.*)$", found.read_text("METADATA") or "", re.MULTILINE)
-    return head[1] if head else found.version  # which starts a mail parser

@@ -1,6 +1,6 @@
 """From the lines of the library to a program: the formulations run on symbols.
 
-right_angles, origins, base_parameters    the same motion with fewer numbers: π/2 in full, frames, inertias
+origins, base_parameters    the same motion with fewer numbers: frames, inertias
 symbol, condition, symbolic    numbers of a trace, their comparisons, and both ways of a branch
 trace             each quantity by its formulations, and the shortest
 symbolic_dynamics, symbolic_plant    robots, plants and controllers of symbols

@@ -4,4 +4,5 @@
 - reference_remarks: a reference that jumps at its start, or moves a joint that friction holds.
 - creep, damped_task, stiffness, unstable_loop: regularised friction, singular tasks, stiff runs, sampled loops.
 - imbalance: why the energy ledger does not close; missed_events: what acted between the ends of two steps.
+- smoothness: where the right-hand side of a run is smooth, and where it may not be.
 """

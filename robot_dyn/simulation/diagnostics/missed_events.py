@@ -15,8 +15,8 @@ import numpy as np
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.effect import Force
 from robot_dyn.foundations.errors import RobotDynError, call
+from robot_dyn.simulation.diagnostics.smoothness import LOOKS, cubics, extremes
 from robot_dyn.simulation.dynamics.declarations import named
-from robot_dyn.simulation.dynamics.smoothness import LOOKS, cubics, extremes
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.run.recording import Path, Recording
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS

@@ -4,5 +4,5 @@
 - `loop_state`: the arrays on which loops work
 - `linearise`, `fastest_motion`, `stability`, `sampled_loop`: linear models, eigenvalues, stable steps and periods
 - `smooth_differences`: derivatives at the step that errs least
-- `smoothness`, `declarations`: where the right-hand side is smooth, and what parts declare about it
+- `declarations`: what parts declare about where they switch; `event`: events of users, and what happened in a run
 """

@@ -26,7 +26,7 @@ from robot_dyn.foundations.values import Caching
 from robot_dyn.queries.dynamics import acceleration
 
 if TYPE_CHECKING:
-    from robot_dyn.simulation.setup.event import Event
+    from robot_dyn.simulation.dynamics.event import Event
 
 CONTROL = "control"
 PICK_UP = "pick_up"  # the work of impacts where payloads at rest are picked up

@@ -1,7 +1,5 @@
-"""The engines of a run: its state equation in Python, or as machine code.
+"""What evaluates the state equation of a run.
 
-- engine: the protocol `Engine`, with the functions that a time loop calls; interpreted, machine_code: both engines.
-- choice: one of them for a setup, by a count of evaluations; self_check: machine code compared with Python before use.
-- cache: machine code in this process and in the store; structure: the key; trace: the equation in symbols.
-- loop: the time loops as machine code, one for each method.
+- engine: the protocol `Engine`, with the functions that a time loop calls; interpreted: the engine in Python.
+- choice: the engine of a setup; machine code (`compiled/`) is a plug-in, which a run does not import.
 """

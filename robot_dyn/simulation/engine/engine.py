@@ -1,4 +1,4 @@
-"""The protocol of the engines of a run: interpreted (`interpreted.py`) and machine code (`machine_code.py`).
+"""The protocol of the engines of a run: interpreted (`interpreted.py`) and machine code (`compiled/machine_code.py`).
 
 engine = choose(setup);   run = make_run(setup, engine);   recording = run.record()
 """
@@ -110,4 +110,8 @@ class Engine(Protocol):
 
     def loop(self, plain: Callable[[], Advance]) -> Advance:
         """Return the time loop for one run: machine code, or the plain function that `plain` returns."""
+        ...
+
+    def compiling_s(self) -> float:
+        """Return the time that this thread has spent on loading and compiling loops until now, in [s]."""
         ...

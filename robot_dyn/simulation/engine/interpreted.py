@@ -21,7 +21,7 @@ from robot_dyn.simulation.dynamics.moreau_jean import behind, stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.engine import Advance, Evaluated, Watched
 from robot_dyn.simulation.events.holding import Places
-from robot_dyn.simulation.events.modes import alone
+from robot_dyn.simulation.setup.setup import Setup
 
 
 @final
@@ -48,11 +48,29 @@ class Interpreted:
     def places(self) -> Places:
         """Return the places of the mode: the run parameters are the mode and nothing else."""
         n = self.equation.plant.dynamics.n
-        return alone(n, n * self.equation.sampled)
+        first = n * self.equation.sampled
+        return Places(*(np.array([first + k * n], np.int64) for k in range(3)))  # held, direction and contact
 
     def loop(self, plain: Callable[[], Advance]) -> Advance:
         """Return the plain time loop."""
         return plain()
+
+    def compiling_s(self) -> float:
+        """Return 0: nothing is compiled."""
+        return 0.0
+
+
+def interpreted_engine(setup: Setup, why: str = "", most: float = inf) -> Interpreted:
+    """Return the engine that runs a setup in Python.
+
+    Args:
+        setup: What to run.
+        why: The reason for this engine, in its label.
+        most: Evaluations after which another engine is to be chosen.
+    """
+    reasons = [why] * bool(why) + ["Jacobian by differences"] * setup.integrator.needs_jacobian
+    label = f"interpreted ({'; '.join(reasons)})" if reasons else "interpreted"
+    return Interpreted(setup.equation, label, most)
 
 
 def interpreted(equation: StateEquation, watch: Watched) -> Functions:

@@ -17,8 +17,8 @@ from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.diagnostics.missed_events import cut_alike, stepped_over
+from robot_dyn.simulation.diagnostics.smoothness import first_crossing, first_kink
 from robot_dyn.simulation.diagnostics.stiffness import damped_oscillation
-from robot_dyn.simulation.dynamics.smoothness import first_crossing, first_kink
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.estimate.verdicts import (
     COARSE,

@@ -5,5 +5,5 @@
 - `modes`, `holding`: what holds joints (dry friction, rigid stops, backlash), in Python and in the loop
 - `mode_change`, `impacts`: the end of a mode, and impacts
 - `payload_events`: payloads picked up and dropped
-- `event_log`, `occurrence`: what happened, in the loop and for users
+- `event_log`: what happened, in the loop
 """

@@ -7,17 +7,16 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.codegen.parameters import Parameter
-from robot_dyn.effects.effect import Conservative, Effect
+from robot_dyn.effects.effect import Conservative
 from robot_dyn.effects.rigid_backlash import RigidBacklash
 from robot_dyn.effects.rigid_stops import RigidStops, touching
-from robot_dyn.effects.set_valued import Mode, SetValued
+from robot_dyn.effects.set_valued import Mode
 from robot_dyn.effects.settling import settling
+from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.event_log import What, event_log
 from robot_dyn.simulation.events.holding import Holding, Laws, Places, Room
 from robot_dyn.simulation.events.mode_change import REACTIONS, at_once, start, width
-from robot_dyn.simulation.events.occurrence import Occurrence
 
 _IMPACTS = 64  # that are stored
 _STOP = {-1: "lower stop", 1: "upper stop"}
@@ -26,7 +25,6 @@ _PHRASES = {
     What.STRIKES: "strikes {}", What.RESTS_AT_LAST: "comes to rest at {}", What.STICKS: "sticks",
     What.RESTS: "rests at {}", What.SLIDES: "slides", What.LEAVES: "leaves {}", What.REVERSES: "reverses",
 }  # fmt: skip
-_MODE = "held", "_direction", "_contact"  # coefficients of set-valued effects
 
 
 @final
@@ -159,21 +157,6 @@ def _room(equation: StateEquation, N: int, n: int) -> Room:
         np.zeros((N, max(N, 2))), np.zeros(N), side, v, first, after, ended, least, most, forced, a, held, direction,
         was_held, was_direction, np.zeros(n), settling(N),
     )  # fmt: skip
-
-
-def places(known: Sequence[Parameter], effects: Sequence[Effect], first: int) -> Places:
-    """Where the parameters of effects have the mode, behind so many other run parameters."""
-    at: dict[str, list[int]] = {name: [] for name in _MODE}
-    for each in known:
-        if each.part[0] == "effect" and isinstance(effects[each.part[1]], SetValued) and each.key in at:
-            at[each.key].append(first)
-        first += each.size
-    return Places(*(np.array(each, np.int64) for each in at.values()))
-
-
-def alone(n: int, first: int) -> Places:
-    """Where run parameters are the mode and nothing else, behind so many others: held, direction and contact, (3n,)."""
-    return Places(*(np.array([first + k * n], np.int64) for k in range(3)))
 
 
 _NONE, _ROWS, _TABLE = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))

@@ -14,8 +14,8 @@ import numpy as np
 
 from robot_dyn.effects.plant import carrying
 from robot_dyn.queries.dynamics import acceleration
+from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.state_equation import PICK_UP, StateEquation
-from robot_dyn.simulation.events.occurrence import Occurrence
 
 Carried = tuple[bool, ...]
 

@@ -13,11 +13,11 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.integrate.bernstein import room
+from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.state_equation import CONTROLLER, StateEquation
 from robot_dyn.simulation.events.crossings import LOOKS, ROUNDING, Switches
 from robot_dyn.simulation.events.mode_change import guards
 from robot_dyn.simulation.events.modes import Modes
-from robot_dyn.simulation.events.occurrence import Occurrence
 
 _MOST = 256  # equations that are cached, each of the sides of all thresholds
 Quantity = tuple[int, bool]  # a joint, and whether it is its actuation that passes a level

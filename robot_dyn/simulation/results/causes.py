@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from robot_dyn.codegen.trace import right_angles
 from robot_dyn.effects.causes import Causes, by_cause, exerted_torques
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import QueryError
+from robot_dyn.model import right_angles
 from robot_dyn.simulation.results.provenance import robot_of
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.simulation.results.samples import Columns

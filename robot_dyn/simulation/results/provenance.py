@@ -16,13 +16,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from robot_dyn.codegen.store.keys import version_of
-from robot_dyn.codegen.trace.right_angles import written_out
 from robot_dyn.description import catalog
 from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Payload
 from robot_dyn.foundations.errors import DescriptionError, QueryError, shorten
+from robot_dyn.foundations.extras import version_of
 from robot_dyn.model.findings import reservations
+from robot_dyn.model.right_angles import written_out
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.results.run_data import RunData
 from robot_dyn.simulation.setup.settings import settings_of

@@ -15,7 +15,7 @@ import numpy as np
 
 from robot_dyn.foundations.values import Derived, Layout, read_only
 from robot_dyn.simulation.columns import Column, Variable, by_heading, data_frame, data_set
-from robot_dyn.simulation.events.occurrence import Occurrence
+from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.ledger import Ledger, leak

@@ -6,7 +6,7 @@ import numpy as np
 
 from robot_dyn.foundations.errors import escaped
 from robot_dyn.queries.units import joint_units
-from robot_dyn.simulation.events.occurrence import Occurrence
+from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.observation.remarks import remark_lines as lines_of
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.provenance import about_the_robot, joint_types

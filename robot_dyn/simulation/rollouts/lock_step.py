@@ -14,14 +14,14 @@ from typing import cast, final
 
 import numpy as np
 
-from robot_dyn.codegen.trace.right_angles import robot_of
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.integrate.integrator import PlainMethod
+from robot_dyn.model.right_angles import robot_of
+from robot_dyn.simulation.compiled.machine_code import MachineCode
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why, rules_of, runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.machine_code import MachineCode
 from robot_dyn.simulation.events.detection import Detecting
 from robot_dyn.simulation.observation.observation import observations_of, observed
 from robot_dyn.simulation.results.statistics import Statistics

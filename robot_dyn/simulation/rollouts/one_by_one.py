@@ -9,9 +9,9 @@ from typing import NamedTuple, final
 import numpy as np
 
 from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.simulation.compiled.choice import choose_for_batch, for_run
 from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.choice import choose_for_batch, for_run
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.observation.guard_levels import GuardLevels
 from robot_dyn.simulation.observation.observation import Observation, Observed, observation_of, observed

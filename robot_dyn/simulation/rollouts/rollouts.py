@@ -27,8 +27,8 @@ from robot_dyn.foundations.validate import choice, integer, joint_values, number
 from robot_dyn.foundations.values import several
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.engine.cache import machine_code
-from robot_dyn.simulation.engine.choice import checked
+from robot_dyn.simulation.compiled.cache import machine_code
+from robot_dyn.simulation.compiled.choice import checked
 from robot_dyn.simulation.results.acting import frame_of, rotors_of
 from robot_dyn.simulation.results.provenance import edits_of_machine_code
 from robot_dyn.simulation.rollouts.batch import Batch

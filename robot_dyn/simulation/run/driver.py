@@ -15,9 +15,9 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.values import cached
+from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Rules, rules_of, runs_of
 from robot_dyn.simulation.engine.engine import Engine
-from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.observation.observation import NOTHING
 from robot_dyn.simulation.observation.observer import Observer

@@ -12,8 +12,8 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy, evaluate
+from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.loop_state import Functions, Now, Rules, Runs, erase_ended
-from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.observation.observation import Observation, observe
 from robot_dyn.simulation.run.outcome import Outcome
 

@@ -13,13 +13,13 @@ from robot_dyn.foundations.convex import not_found
 from robot_dyn.foundations.errors import NotFiniteError, OverflowedError, RobotDynError
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.integrate.step_control import At
+from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now
 from robot_dyn.simulation.events.crossings import Switches
 from robot_dyn.simulation.events.event_log import CHATTER, EventLog, What, remember_time
 from robot_dyn.simulation.events.holding import Holding, part, write_mode
 from robot_dyn.simulation.events.mode_change import change
 from robot_dyn.simulation.events.modes import Modes
-from robot_dyn.simulation.events.occurrence import Occurrence
 from robot_dyn.simulation.events.sides import Sides, keep_numbers, sides_of
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind

@@ -15,7 +15,7 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import ControlError, EffectError, OverflowedError, QueryError, call, shown
 from robot_dyn.foundations.validate import Kind, float64, number
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.setup.event import Event
+from robot_dyn.simulation.dynamics.event import Event
 from robot_dyn.simulation.setup.schedule import MOST_CUT
 
 _UNITS = ("rad", "m")

@@ -23,9 +23,9 @@ from robot_dyn.integrate.adaptive import AUTO, Adaptive
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.dynamics.declarations import is_value, undeclared
+from robot_dyn.simulation.dynamics.event import Event
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.setup.checks import check_method, check_model, check_start, least_accuracy
-from robot_dyn.simulation.setup.event import Event
 from robot_dyn.simulation.setup.explanation import control_lines, law
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS, MOST_CUT, ON_STEP, Segment, cuts, near, nodes, steps_on
 

@@ -16,9 +16,9 @@ import numpy as np
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError
-from robot_dyn.codegen import completed
 from robot_dyn.foundations import NotFiniteError, midpoint
 from robot_dyn.lagrange import diagonal_scale, floored, magnitudes, scaled
+from robot_dyn.model import completed
 from robot_dyn.queries import INVERSE_DYNAMICS, M, N, Quantity
 from tests.campaigns.hard.case import Case, Row
 from tests.campaigns.hard.conditioning import SUMS, U

@@ -21,7 +21,6 @@ from functools import partial
 import numpy as np
 
 import robot_dyn as rd
-from robot_dyn.codegen import completed
 from robot_dyn.lagrange import (
     acceleration_norm,
     diagonal_scale,
@@ -31,6 +30,7 @@ from robot_dyn.lagrange import (
     scaled,
     unit_diagonal_condition,
 )
+from robot_dyn.model import completed
 from robot_dyn.queries import CORIOLIS_TORQUE, FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N, Quantity
 from tests.campaigns.hard.case import Case, Row
 from tests.campaigns.hard.conditioning import U

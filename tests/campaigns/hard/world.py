@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError
-from robot_dyn.codegen import completed
+from robot_dyn.model import completed
 from robot_dyn.queries import FORWARD_DYNAMICS, M, N
 from tests.campaigns.estimates.truth import truth
 from tests.campaigns.hard import conditioning, far_out, sampled_control, tools

@@ -15,10 +15,11 @@ import pytest
 from flint import arb, arb_series, ctx
 
 import robot_dyn as rd
-from robot_dyn.codegen import completed, program_of
+from robot_dyn.codegen import program_of
 from robot_dyn.control import polynomial
 from robot_dyn.foundations import ProofError, QueryError, with_values
 from robot_dyn.lagrange.exact import RoundedLiterals
+from robot_dyn.model import completed
 from robot_dyn.tools.proof.enclosure import step as steps
 from robot_dyn.tools.proof.enclosure import tube as tubes
 from robot_dyn.tools.proof.enclosure.balls import Inverse, NotProvenError, between, exact, largest, matrix, upper

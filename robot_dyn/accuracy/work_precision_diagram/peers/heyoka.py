@@ -14,7 +14,7 @@ from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion
 from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import COMPILED
 from robot_dyn.codegen.program import Kind, Program
 from robot_dyn.report.time_budget import Limit
-from robot_dyn.simulation.engine.cache import machine_code
+from robot_dyn.simulation.compiled.cache import machine_code
 
 _TOLERANCES = (1e-6, 1e-10, 1e-14)  # each is compiled by itself, which takes many seconds
 

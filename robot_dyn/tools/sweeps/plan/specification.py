@@ -16,8 +16,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from robot_dyn import Setup
-from robot_dyn.codegen import processor_of_code, version_of
-from robot_dyn.foundations import SweepError, nearest, shorten, shown
+from robot_dyn.codegen import processor_of_code
+from robot_dyn.foundations import SweepError, nearest, shorten, shown, version_of
 from robot_dyn.simulation import settings_of
 from robot_dyn.tools.sweeps import distributions
 from robot_dyn.tools.sweeps.designs import MOST_ROWS

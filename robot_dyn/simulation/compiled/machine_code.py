@@ -6,7 +6,7 @@ LLVM is imported where something is compiled or loaded.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -18,18 +18,21 @@ from robot_dyn.codegen.parameters import CONTROLLER, ROBOT, Parameter, Part, joi
 from robot_dyn.codegen.program import Programs
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.store.keys import digest, sources_of_the_writer
+from robot_dyn.codegen.waiting import COMPILING
+from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.set_valued import SetValued
 from robot_dyn.foundations.coefficients import value_at
 from robot_dyn.foundations.convex import PASSES
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.engine import Advance, Evaluated, Watched
 from robot_dyn.simulation.events.holding import Places
-from robot_dyn.simulation.events.modes import places
 
 if TYPE_CHECKING:
     from robot_dyn.codegen.loops.call import MachineFunction
 
 _FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
+_MODE = "held", "_direction", "_contact"  # coefficients of set-valued effects
 STEP = "problem", "newton", "behind"  # programs of one function; the last is one by itself, too
 
 
@@ -149,11 +152,15 @@ class MachineCode:
     def places(self) -> Places:
         """Return the places of the mode among the parameters of effects; see `Engine`."""
         plant = self.equation.plant
-        return places(self.known, plant.effects, plant.dynamics.n * self.equation.sampled)
+        return _places(self.known, plant.effects, plant.dynamics.n * self.equation.sampled)
 
     def loop(self, plain: Callable[[], Advance]) -> Advance:
         """Return the time loop, which stores the addresses of its arrays; the plain one if it is not compiled."""
         return plain() if self.machine_loop is None else self.machine_loop.calls()
+
+    def compiling_s(self) -> float:
+        """Return the time that this thread has spent on loading and compiling loops; see `Engine`."""
+        return COMPILING.seconds
 
     @cached_property
     def parameters(self) -> np.ndarray:
@@ -211,3 +218,13 @@ def _callable(address: int) -> Callable[..., None]:
         function(t, y.ctypes.data, p.ctypes.data, run_parameters.ctypes.data, out.ctypes.data)
 
     return call
+
+
+def _places(known: Sequence[Parameter], effects: Sequence[Effect], first: int) -> Places:
+    """Return where the parameters of effects have the mode; the first parameter is at place `first`."""
+    at: dict[str, list[int]] = {name: [] for name in _MODE}
+    for each in known:
+        if each.part[0] == "effect" and isinstance(effects[each.part[1]], SetValued) and each.key in at:
+            at[each.key].append(first)
+        first += each.size
+    return Places(*(np.array(each, np.int64) for each in at.values()))

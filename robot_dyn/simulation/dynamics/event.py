@@ -1,4 +1,4 @@
-"""Events: where a run passes a threshold of an effect, or a user-defined function vanishes."""
+"""Events: a function of the user that a run watches, and what happened in a run."""
 
 from __future__ import annotations
 
@@ -51,3 +51,25 @@ class Event:
             pass
         if not self.name:
             object.__setattr__(self, "name", getattr(self.function, "__name__", type(self.function).__name__))
+
+
+@final
+@dataclass(frozen=True)
+class Occurrence:
+    """An event of a run.
+
+    Attributes:
+        t: When, in [s].
+        name: What happened, as "upper stop of panda_joint2 touched" or the name of the user's event.
+        direction: 1 where the switching function grows, −1 where it falls.
+        q: Position then, n numbers, in [rad] or [m].
+        v: Velocity then, in [rad/s] or [m/s].
+        joint: The joint that it is of; empty for a user-defined event.
+    """
+
+    t: float
+    name: str
+    direction: int
+    q: tuple[float, ...]
+    v: tuple[float, ...]
+    joint: str = ""

@@ -25,9 +25,9 @@ from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import call
 from robot_dyn.simulation.dynamics.bodies import bodies as bodies_of
+from robot_dyn.simulation.dynamics.event import Event
 from robot_dyn.simulation.dynamics.moreau_jean import behind, problem, solution
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.setup.event import Event
 from robot_dyn.simulation.setup.segment_table import BOUNDS, lengths, polynomials
 
 Bodies = Callable[[Any, Part], SymbolicDynamics]

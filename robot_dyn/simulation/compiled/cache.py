@@ -15,17 +15,17 @@ from robot_dyn.codegen.parameters import Parameter, Part, parameters
 from robot_dyn.codegen.program import Programs
 from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.codegen.store.keys import digest, sources_of_programs
-from robot_dyn.codegen.trace.right_angles import robot_of
 from robot_dyn.codegen.waiting import interrupts_later
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import TraceError
 from robot_dyn.foundations.values import LRUByIdentity
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.model.right_angles import robot_of
 from robot_dyn.model.robot import Robot
+from robot_dyn.simulation.compiled.machine_code import CompiledFunctions, MachineCode
+from robot_dyn.simulation.compiled.structure import changeable, of_library, structure
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.machine_code import CompiledFunctions, MachineCode
-from robot_dyn.simulation.engine.structure import changeable, of_library, structure
 
 Method = Integrator | Adaptive
 _MOST_INSTRUCTIONS = 100_000  # some ten seconds of compiling
@@ -140,7 +140,7 @@ def _with_loop(
     """These functions with the loop of a method; without one where its step cannot be machine code."""
     loop, refused = None, ""
     if method is not None and method.plain:
-        from robot_dyn.simulation.engine.loop import loop_for
+        from robot_dyn.simulation.compiled.loop import loop_for
 
         loop = loop_for(method, identified.compiled_form, cuts, lanes, detects)
         if isinstance(loop, SubsetError):
@@ -278,7 +278,7 @@ def _traced(equation: StateEquation, known: tuple[Parameter, ...], what: Traces,
     """The programs of a state equation by a trace; arguments as of `Identified`, and whether numbers are constants."""
     from robot_dyn.codegen.trace.from_casadi import program_of
     from robot_dyn.codegen.trace.symbolic_dynamics import SymbolicDynamics
-    from robot_dyn.simulation.engine.trace import trace
+    from robot_dyn.simulation.compiled.trace import trace
 
     def bodies(dynamics: Any, part: Part) -> SymbolicDynamics:
         """Its equations in symbols, traced once for a file and its edits."""

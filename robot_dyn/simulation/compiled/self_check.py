@@ -14,16 +14,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot_dyn.codegen.trace.right_angles import models_in_full
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import RobotDynError, because
 from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
+from robot_dyn.model.right_angles import models_in_full
+from robot_dyn.simulation.compiled.cache import robot_to_compile
+from robot_dyn.simulation.compiled.machine_code import STEP, MachineCode, States
 from robot_dyn.simulation.dynamics.bodies import bodies
 from robot_dyn.simulation.dynamics.moreau_jean import stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.cache import robot_to_compile
 from robot_dyn.simulation.engine.interpreted import Interpreted, sample
-from robot_dyn.simulation.engine.machine_code import STEP, MachineCode, States
 from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.recording import Path, Recording
