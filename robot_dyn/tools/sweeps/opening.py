@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from shutil import disk_usage
 
-from robot_dyn.foundations import SceneError, SweepError, integer
-from robot_dyn.tools.sweeps.folder.chunk_file import Columns
+from robot_dyn.foundations import SceneError, SweepError, integer, needs
 from robot_dyn.tools.sweeps.folder.folder import Folder, begin, folder_of, has_specification, read_specification
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
 from robot_dyn.tools.sweeps.plan.pilot import pilot
@@ -40,6 +39,7 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
     """The folder of a sweep, begun now unless it was; arguments and errors as of `run`."""
     if chunk is not None:
         chunk = integer("chunk", chunk, least=1, most=2**31, error=SweepError)
+    needs("pyarrow", extra="sweeps")
     own, where = specification(sweep), str(path / "sweep.json")
     if not has_specification(path):
         _check_room(sweep, path)
@@ -63,5 +63,5 @@ def _check_room(sweep: Sweep, path: Path) -> None:
 
 
 def _folder(path: Path, sweep: Sweep, stated: Specification) -> Folder:
-    names = Columns(sweep.columns, tuple(sweep.figures))
+    names = (*sweep.columns, *sweep.figures)
     return folder_of(path, stated.data, stated.digest, names, {"versions": versions()} | processor())

@@ -12,7 +12,8 @@ import numpy as np
 from robot_dyn.foundations import FileKind, SweepError, html_of, page, save, side_by_side, table, target, text
 from robot_dyn.report import PAGE, ink, inline, styled
 from robot_dyn.tools.sweeps.export import inputs_of
-from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading, is_scene
+from robot_dyn.tools.sweeps.folder.rows import FINISHED
+from robot_dyn.tools.sweeps.plan.sweep import heading, is_scene
 from robot_dyn.tools.sweeps.sensitivity import bins
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def save_report(result: SweepResult, path: str | Path, force: bool) -> Path:
 def report(result: SweepResult) -> str:
     """The page."""
     x, columns = result.table("outcome", "reason", *result.sweep.columns, *result.sweep.figures), result.sweep.columns
-    failed = x["outcome"] != OUTCOMES[0]
+    failed = x["outcome"] != FINISHED
     parts = [*html_of(result.blocks())]
     parts += ["<h2>Failures</h2>", text(repr(result.probability("failed")))]
     if failed.any():

@@ -14,9 +14,9 @@ from robot_dyn.foundations import UNREPORTED, Answer, Block, SweepError, choice,
 from robot_dyn.tools.sweeps import counts
 from robot_dyn.tools.sweeps.event import happened
 from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
-from robot_dyn.tools.sweeps.folder.rows import FINISHED, TEXTS, digest_of
+from robot_dyn.tools.sweeps.folder.rows import FINISHED, FIXED, NUMBERS, OUTCOMES, digest_of
 from robot_dyn.tools.sweeps.plan.specification import specification
-from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, Sweep, heading
+from robot_dyn.tools.sweeps.plan.sweep import Sweep, heading
 from robot_dyn.tools.sweeps.plan.work import Work
 
 if TYPE_CHECKING:
@@ -50,21 +50,26 @@ class SweepResult(Answer):
         """Numbers of the chunks that are left to do."""
         return self.folder.missing()
 
+    @property
+    def columns(self) -> dict[str, str]:
+        """Meaning of each column of the table, by name; units are in `units`."""
+        varied = dict.fromkeys(self.sweep.columns, "value of what varies")
+        figures = dict.fromkeys(self.sweep.figures, "figure of the run; nan if it failed")
+        fixed = {column.name: column.meaning for column in FIXED}
+        return {"run": "number of the run"} | varied | figures | fixed
+
     def table(self, *names: str) -> dict[str, np.ndarray]:
-        """Columns of all runs, (N,) by name: "run", what varies, figures, "outcome", "ended", "reason", "remarks".
+        """Columns of all runs, (N,), by their names in `columns`; all of them unless names are given.
 
         Their units are in `units`, and in the headings of `export`.
         """
         self._check_complete()
-        known = ("run", *self.sweep.columns, *self.sweep.figures, "outcome", "ended", *TEXTS)
-        names = names or known
+        names = names or tuple(self.columns)
         for name in names:
-            choice("column", name, known, error=SweepError)
-        found = self.folder.columns(name for name in names if name != "run")
-        found["run"] = np.arange(self.sweep.runs)
-        if "outcome" in names:
-            found["outcome"] = np.array(OUTCOMES)[found["outcome"]]
-        return {name: found[name] for name in names}
+            choice("column", name, tuple(self.columns), error=SweepError)
+        table = self.folder.columns(name for name in names if name != "run")
+        table["run"] = np.arange(self.sweep.runs)
+        return {name: table[name] for name in names}
 
     def quantiles(
         self, figure: str, probabilities: Any = (0.05, 0.5, 0.95), level: float = 0.95, given: str | None = None
@@ -243,7 +248,7 @@ class SweepResult(Answer):
         if len(self.missing):
             return None
         outcome = self._outcome()
-        return {name: int((outcome == k).sum()) for k, name in enumerate(OUTCOMES)}
+        return {name: int((outcome == name).sum()) for name in OUTCOMES}
 
     @reported
     def remarks(self) -> dict[str, int] | None:
@@ -285,7 +290,7 @@ class SweepResult(Answer):
 
     def _figure(self, name: str) -> np.ndarray:
         self._check_complete()
-        known = (*self.sweep.figures, *self.sweep.columns, "ended")
+        known = (*self.sweep.figures, *self.sweep.columns, *NUMBERS)
         return self.folder.columns((choice("figure", name, known, error=SweepError),))[name]
 
     @property

@@ -16,14 +16,14 @@ import pytest
 
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps import Work, begun
+from robot_dyn.tools.sweeps import begun
 from robot_dyn.tools.sweeps.engines import cluster
 from robot_dyn.tools.sweeps.engines.cluster import Cluster, client_of
 from robot_dyn.tools.sweeps.engines.share import share
 from robot_dyn.tools.sweeps.engines.threads import Threads
 from robot_dyn.tools.sweeps.plan.work import Stopped
 from tests.tools.sweeps.children import outcome_of
-from tests.tools.sweeps.swept import swept
+from tests.tools.sweeps.swept import digest, swept
 
 
 class Future:
@@ -74,7 +74,7 @@ def filled(tmp_path: Path) -> Iterator[Any]:
     sweep = swept(tmp_path, 100)
     folder = begun(sweep, tmp_path / "out", chunk=10)
     folder.prepare()
-    yield folder, Work(sweep).rows(0, 100).digest()
+    yield folder, digest(sweep)
     cluster._work.cache_clear()
 
 
@@ -223,7 +223,7 @@ def test_ctrl_c_drops_the_chunks_under_way_and_keeps_the_rest(tmp_path: Path) ->
     assert 0 < len(done.missing) <= 400 and f"{len(done.missing)} of 400 chunks are left to do" in repr(done)
     assert not list((tmp_path / "out" / "rows").glob(".*"))
     again = sw.run(sweep, tmp_path / "out")
-    assert again.verify() == Work(sweep).rows(0, 2_000).digest()
+    assert again.verify() == digest(sweep)
 
 
 def test_an_error_of_a_chunk_ends_the_others_and_is_raised() -> None:
@@ -266,7 +266,7 @@ def test_workers_in_processes_make_the_same_bits_and_one_that_is_killed_is_repla
                 os.kill(pids[0], signal.SIGKILL)
 
         done = sw.run(sweep, tmp_path / "out", chunk=5, cluster=client, on_progress=progress)
-    assert killed and done.verify() == Work(sweep).rows(0, 400).digest()
+    assert killed and done.verify() == digest(sweep)
 
 
 DYING = """
