@@ -27,7 +27,7 @@ def fill(
     look: Callable[[], object],
     lost: tuple[type[BaseException], ...] = (),
 ) -> None:
-    """Submit chunks until none is missing.
+    """Submit chunks until the folder has all of them.
 
     Args:
         submit: Begins to make a chunk.
@@ -83,7 +83,7 @@ def fill_by_threads(
     count: int,
     look: Callable[[], object],
 ) -> None:
-    """Fill a folder by threads of this process; errors as of `fill`.
+    """Fill a folder by threads of this process; errors as in `fill`.
 
     Args:
         make: Makes a chunk and writes it, called with its number and a function to be called meanwhile, which raises
@@ -111,7 +111,7 @@ def fill_by_threads(
 
 
 def share_of(text: Any) -> tuple[int, int]:
-    """Return job and number of jobs of a share such as "3/16"; None is all of the work.
+    """Return job and number of jobs of a share such as "3/16"; None means all chunks.
 
     Raises:
         SweepError: If it is not a share.

@@ -147,7 +147,7 @@ def fill_by_cluster(
         look: As in `fill`.
 
     Raises:
-        SweepError: If a worker sees another folder or has other versions; others as of `fill`.
+        SweepError: If a worker sees another folder or has other versions; others as in `fill`.
     """
     distributed = needs("distributed", extra="cluster")
     lost = distributed.KilledWorker, distributed.comm.CommClosedError, OSError

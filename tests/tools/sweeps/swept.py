@@ -66,6 +66,11 @@ def digest(sweep: sw.Sweep) -> str:
     return digest_of([Work(sweep).rows(0, sweep.runs)])
 
 
+def names_in(folder: Path) -> list[str]:
+    """Return the names of what a folder of a sweep holds, that of its design without its digest."""
+    return sorted("design" if path.name.startswith("design-") else path.name for path in folder.iterdir())
+
+
 def of_figure(folder: Path, name: str, kp: Any, runs: int = 512, **changes: Any) -> sw.SweepResult:
     """A sweep of two steps a run, whose one figure, "f", of own_figures.py depends on kp, and kd in 0 … 1, alone."""
     scene(folder, SCENE.replace("duration_s = 0.05", "duration_s = 0.002"))

@@ -20,7 +20,7 @@ from robot_dyn.tools.sweeps import Work, begun, opening
 from robot_dyn.tools.sweeps.folder import files
 from robot_dyn.tools.sweeps.folder.files import Files, remove_abandoned, write
 from robot_dyn.tools.sweeps.folder.folder import MOST_FILES, Folder
-from tests.tools.sweeps.swept import digest, swept
+from tests.tools.sweeps.swept import digest, names_in, swept
 
 CALLS = ("open", "write", "sync", "close", "rename", "sync_folder")
 
@@ -184,7 +184,25 @@ def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
     with pytest.raises(FileExistsError):
         write(tmp_path / "out" / "sweep.json", b"{}", files.Exclusive())
     assert (tmp_path / "out" / "sweep.json").read_text() == text
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["design.npy", "sweep.json"]
+    assert names_in(tmp_path / "out") == ["design", "sweep.json"]
+
+
+def test_another_sweep_that_begins_at_the_same_time_changes_nothing(tmp_path: Path, monkeypatch) -> None:
+    """The first begins while the second makes its pilot, which is refused and leaves the folder as it was."""
+    first, second, out = swept(tmp_path, 50, samples="q"), swept(tmp_path, 50, seed=4, samples="v"), tmp_path / "out"
+    pilot = opening.pilot
+
+    def pilot_of_the_second(sweep: sw.Sweep, chunk: int | None) -> int:
+        monkeypatch.setattr(opening, "pilot", pilot)
+        sw.run(first, out, chunk=20, share="1/3")
+        return pilot(sweep, chunk)
+
+    monkeypatch.setattr(opening, "pilot", pilot_of_the_second)
+    with pytest.raises(SweepError, match="holds another sweep: seed"):
+        sw.run(second, out, chunk=20)
+    assert len(sw.read(out).missing) == 2
+    done = sw.run(first, out)
+    assert done.verify() == digest(first) and set(done.samples().data_vars) == {"q"}
 
 
 def test_a_folder_is_moved_with_its_scene(tmp_path: Path) -> None:

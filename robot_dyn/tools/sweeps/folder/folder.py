@@ -1,7 +1,7 @@
 """The folder of a sweep: its specification, and a file for each chunk that is done. What has no file is left to do.
 
 sweep.json                   the specification
-design.npy                   rows of the design
+design-0123456789abcdef.npy  rows of the design, with the start of their SHA-256
 rows/000123.parquet          a chunk; of more than 20 000 chunks rows/0004/080123.parquet
 samples/                     samples of runs, where they are kept
 """
@@ -12,7 +12,7 @@ import io
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -27,9 +27,10 @@ from robot_dyn.tools.sweeps.folder.samples import SampleStore
 
 MOST_FILES = 20_000  # of a folder
 _MOST_TEXT, _MOST_TABLE = 2**26, 2**34
-_SPECIFICATION, _DESIGN, _SAMPLES = "sweep.json", "design.npy", "samples"
+_SPECIFICATION, _SAMPLES = "sweep.json", "samples"
 _SUFFIX, _FOOTER = ".parquet", b"footer"
 _REMEDY = "run the sweep again, after removing this file"
+_NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
 
 
 @final
@@ -203,42 +204,46 @@ def has_specification(path: Path) -> bool:
     return (path / _SPECIFICATION).is_file()
 
 
-def read_specification(path: Path) -> tuple[str, np.ndarray]:
-    """The text of the specification of a folder, and the rows of its design.
+def read_specification(path: Path) -> str:
+    """The text of the specification of a folder; SweepError if it holds no sweep, or it cannot be read."""
+    return read(path / _SPECIFICATION, _MOST_TEXT, SweepError, _NONE).decode("utf-8", "replace")
 
-    Raises:
-        SweepError: If the folder holds no sweep, or it cannot be read.
-    """
-    remedy = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
-    text = read(path / _SPECIFICATION, _MOST_TEXT, SweepError, remedy).decode("utf-8", "replace")
-    data = read(path / _DESIGN, _MOST_TABLE, SweepError, remedy)
+
+def read_design(path: Path, digest: str) -> np.ndarray:
+    """The rows of the design of a folder, whose SHA-256 its specification states; errors as in `read_specification`."""
+    file = _design(path, digest)
+    data = read(file, _MOST_TABLE, SweepError, _NONE)
     try:
-        return text, np.load(io.BytesIO(data), allow_pickle=False)
+        return np.load(io.BytesIO(data), allow_pickle=False)
     except (ValueError, EOFError) as error:
-        raise SweepError(f"{path / _DESIGN}: is not a table of numbers ({error})") from None
+        raise SweepError(f"{file}: is not a table of numbers ({error})") from None
 
 
-def begin(path: Path, text: str, rows: np.ndarray, files: Files | None = None) -> bool:
-    """Write the specification of a new sweep; False if another process was first.
+def begin(path: Path, text: str, rows: np.ndarray, digest: str, files: Files | None = None) -> None:
+    """Write the specification of a new sweep, unless another process was first.
+
+    The file of a design is named after its rows, so that two sweeps that begin at one time do not mix.
 
     Raises:
         SweepError: If the folder holds other files, or cannot be written.
     """
     make_folder(path)
-    own = (_DESIGN, _SAMPLES)
-    strange = [each for each in sorted(os.listdir(path)) if each not in own and not each.endswith(".unfinished")]
-    if strange and _SPECIFICATION not in strange:
+    names = {each.name for each in path.iterdir() if not each.name.endswith(".unfinished")}
+    strange = sorted(name for name in names if not name.startswith("design-"))
+    if strange and _SPECIFICATION not in names:
         raise SweepError(f"{path}: holds other files, such as {strange[0]}; give a new folder")
     try:
         stream = io.BytesIO()
         np.save(stream, rows, allow_pickle=False)
-        write(path / _DESIGN, stream.getvalue(), files)
-        write(path / _SPECIFICATION, text.encode(), files or Exclusive())
-    except FileExistsError:
-        return False
+        write(_design(path, digest), stream.getvalue(), files)
+        with suppress(FileExistsError):
+            write(path / _SPECIFICATION, text.encode(), files or Exclusive())
     except OSError as error:
         raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
-    return True
+
+
+def _design(path: Path, digest: str) -> Path:
+    return path / f"design-{digest[:16]}.npy"
 
 
 def read_all(folder: Folder) -> Iterator[Rows]:

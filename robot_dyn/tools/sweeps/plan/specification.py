@@ -34,7 +34,7 @@ _PLACES = ("scene",)  # that may differ: where the scene lies
 
 def versions() -> dict[str, str]:
     """Versions of what the bits of rows depend on."""
-    return {name: version_of(name) for name in ("robot-dyn", "numpy", "scipy", "pin")}
+    return {name: version_of(name) for name in ("robot-dyn", "numpy", "scipy", "pin", "salib")}
 
 
 def processor() -> dict[str, str]:
@@ -59,7 +59,7 @@ class Stored(BaseModel):
     figures: dict[str, dict[str, Any]]
     samples: StoredSamples | None
     versions: dict[str, str]
-    rows_sha256: str
+    rows_sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     chunk: Annotated[int, Field(gt=0)]
 
 
@@ -114,6 +114,11 @@ class Specification:
         """SHA-256 of all but where the scene lies."""
         data = {key: value for key, value in self.data.items() if key not in _PLACES}
         return sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+    @property
+    def rows_digest(self) -> str:
+        """SHA-256 of the rows of the design."""
+        return self.data["rows_sha256"]
 
     @property
     def chunk(self) -> int:
