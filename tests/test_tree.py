@@ -56,7 +56,6 @@ IN_CIRCLES = {
     "codegen.loops": {"arrays", "calls", "expressions", "function", "numbers", "program", "statements"},
     "model": {"calls", "evaluation", "gravity", "info", "robot", "to_urdf"},
     "tools.motors.motor_budget": {"budget", "fastest", "result"},
-    "tools.sweeps": {"report", "result"},
 }
 
 

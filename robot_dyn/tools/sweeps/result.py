@@ -10,17 +10,31 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from robot_dyn import Setup, Trajectory
-from robot_dyn.foundations import UNREPORTED, Answer, Block, SweepError, choice, integer, reported, shown, truth
+from robot_dyn.foundations import (
+    UNREPORTED,
+    Answer,
+    Block,
+    SweepError,
+    choice,
+    integer,
+    reported,
+    save,
+    shown,
+    target,
+    truth,
+)
 from robot_dyn.tools.sweeps import counts
 from robot_dyn.tools.sweeps.event import happened
+from robot_dyn.tools.sweeps.export import export, inputs_of
 from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
 from robot_dyn.tools.sweeps.folder.rows import FINISHED, FIXED, NUMBERS, OUTCOMES, digest_of
 from robot_dyn.tools.sweeps.plan.specification import specification
-from robot_dyn.tools.sweeps.plan.sweep import Sweep, heading
+from robot_dyn.tools.sweeps.plan.sweep import Sweep, heading, is_scene
 from robot_dyn.tools.sweeps.plan.work import Work
 
 if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.estimate import Estimate
+    from robot_dyn.tools.sweeps.report import FigureReport
     from robot_dyn.tools.sweeps.sensitivity import Sensitivity
 
 _SHOWN = 5  # reasons, and worst runs
@@ -186,8 +200,6 @@ class SweepResult(Answer):
         Raises:
             SweepError: If it cannot be written, or would replace a file.
         """
-        from robot_dyn.tools.sweeps.export import export
-
         self._check_complete()
         return export(self.sweep, self.folder, path, truth("force", force, error=SweepError))
 
@@ -196,9 +208,30 @@ class SweepResult(Answer):
 
         `path` and `force` as in `export`; SweepError if it cannot be written.
         """
-        from robot_dyn.tools.sweeps.report import save_report
+        from robot_dyn.tools.sweeps.report import KIND, report
 
-        return save_report(self, path, truth("force", force, error=SweepError))
+        inputs = inputs_of(self.folder, path)
+        path = target(path, KIND, SweepError, inputs, truth("force", force, error=SweepError))
+        varied = {name: heading(self.sweep, name) for name in self.sweep.columns}
+        source = "" if is_scene(self.sweep.source) else f", scene={self.sweep.source!r}"
+        repeat = f"sw.read({str(self.path)!r}{source}).run"
+        figures = map(self._reported, self.sweep.figures)
+        data = report(self, self.probability("failed"), self.table(), varied, figures, repeat).encode()
+        return save(path, lambda stream: stream.write(data), SweepError)
+
+    def _reported(self, name: str) -> FigureReport:
+        """What the report shows of a figure."""
+        from robot_dyn.tools.sweeps.report import PROBABILITIES, WORST, FigureReport
+
+        x = self._figure(name)
+        given = "known" if (np.isnan(x) & ~self._failed).any() else None
+        try:
+            sensitivity = self.sensitivity(name, given="known")
+        except SweepError as error:  # of a figure that is the same in all runs
+            sensitivity = str(error)
+        quantiles = self.quantiles(name, PROBABILITIES, given=given)
+        worst = self.worst(name, min(WORST, len(x)), given="known")
+        return FigureReport(heading(self.sweep, name), x, quantiles, worst, sensitivity)
 
     def run(self, i: int) -> Trajectory:
         """Repeat run i alone, with all that rollouts record: the same bits.
