@@ -388,7 +388,7 @@ def examples(folder: Path) -> dict[str, Example]:
         "Sweep": (
             rd.tools.sweeps.Sweep,
             {"scene": scene, "runs": 8, "vary": {"q0": rd.tools.sweeps.uniform(low=[0.1, 0.2], high=0.3)},
-             "figures": {"peak": rd.tools.sweeps.peak("v")}, "design": "random", "seed": 1, "storage": "npz"},
+             "figures": {"peak": rd.tools.sweeps.peak("v")}, "design": "random", "seed": 1},
         ),
         "Sweep.values": (swept.sweep.values, {"start": 0, "stop": 3}),
         "SweepResult.export": (swept.export, {"path": folder / "rows.csv", "force": True}),

@@ -30,7 +30,7 @@ import robot_dyn as rd
 from benchmarks.planar_scene import planar_scene
 from robot_dyn.scene.starters import starter
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps.engines.cluster import client_of
+from robot_dyn.tools.sweeps.cluster import client_of
 from robot_dyn.tools.sweeps.folder.folder import Folder
 from robot_dyn.tools.sweeps.opening import begun, opened
 from robot_dyn.tools.sweeps.plan.work import Work

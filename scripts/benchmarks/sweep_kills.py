@@ -40,7 +40,7 @@ def sweep(folder: str) -> sw.Sweep:
         "mass_scale": sw.normal(mean=1.0, sd=0.4),
     }
     figures = {"peak": sw.peak("v"), "end": sw.final("q", "joint_2")}
-    return sw.Sweep(f"{folder}/scene.toml", RUNS, vary, figures, seed=5, storage="npz")
+    return sw.Sweep(f"{folder}/scene.toml", RUNS, vary, figures, seed=5)
 
 
 def fill(plan: sw.Sweep, out: str, calls: int, options: dict[str, Any]) -> None:
@@ -94,7 +94,7 @@ def check(plan: sw.Sweep, out: str, expected: str) -> str:
     """What is wrong with a complete folder; "complete, same bits" if nothing is."""
     result = sw.run(plan, out, threads=1)  # removes what was left, makes nothing
     names = sorted(path.name for path in (Path(out) / "rows").iterdir())
-    if names != [f"{k:06d}.npz" for k in range(result.folder.count)]:
+    if names != [f"{k:06d}.parquet" for k in range(result.folder.count)]:
         return f"WRONG: {len(names)} files, {result.folder.count} chunks"
     if len(result.table("run")["run"]) != RUNS:
         return "WRONG: rows are lost or doubled"

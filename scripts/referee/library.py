@@ -316,7 +316,7 @@ def width(distribution: Any) -> int:
 def sweep(setup: str, vary: Mapping[str, Any], figures: Mapping[str, Any], design: np.ndarray) -> Any:
     """Return a sweep on given rows; `setup` is the import path of a function that returns a setup."""
     names = {parameter(name): x for name, x in vary.items()}
-    return _sw.Sweep(setup, len(design), names, dict(figures), design=design, storage="npz")
+    return _sw.Sweep(setup, len(design), names, dict(figures), design=design)
 
 
 def sweep_values(of: Any, folder: Path) -> tuple[Values, Texts]:

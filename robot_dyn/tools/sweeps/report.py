@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from html import escape
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import FileKind, SweepError, html_of, page, save, side_by_side, table, target, text
+from robot_dyn.foundations import Answer, FileKind, html_of, page, side_by_side, text
+from robot_dyn.foundations import table as html_table
 from robot_dyn.report import PAGE, ink, inline, styled
-from robot_dyn.tools.sweeps.export import inputs_of
-from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading, is_scene
-from robot_dyn.tools.sweeps.sensitivity import bins
+from robot_dyn.tools.sweeps.estimate import Estimate
+from robot_dyn.tools.sweeps.folder.rows import FINISHED
+from robot_dyn.tools.sweeps.sensitivity import Sensitivity, bins
 
-if TYPE_CHECKING:
-    from robot_dyn.tools.sweeps.result import SweepResult
-
-_KIND = FileKind("a page", ".html", b"<!doctype html>")
+KIND = FileKind("a page", ".html", b"<!doctype html>")
 _BINS, _CELLS, _MOST_CROSSES = 60, 24, 500
-_WORST = 10
-_PROBABILITIES = (0.05, 0.5, 0.95, 0.99)
+WORST = 10
+PROBABILITIES = (0.05, 0.5, 0.95, 0.99)
 _HEAD = (
     '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="color-scheme" content="light dark">'
     "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
@@ -30,34 +28,55 @@ _HEAD = (
 )
 
 
-def save_report(result: SweepResult, path: str | Path, force: bool) -> Path:
-    """Write the page; SweepError if the sweep is not complete, or the page cannot be written."""
-    path = target(path, _KIND, SweepError, inputs_of(result.folder, path), force)
-    data = report(result).encode()
-    return save(path, lambda stream: stream.write(data), SweepError)
+@final
+@dataclass(frozen=True)
+class FigureReport:
+    """What a report shows of a figure.
+
+    Attributes:
+        heading: Its name with its unit.
+        values: Of all runs, (N,).
+        quantiles: Of `PROBABILITIES`.
+        worst: Numbers of runs with the largest values.
+        sensitivity: To what varies; a text if there is none.
+    """
+
+    heading: str
+    values: np.ndarray
+    quantiles: tuple[Estimate, ...]
+    worst: tuple[int, ...]
+    sensitivity: Sensitivity | str
 
 
-def report(result: SweepResult) -> str:
-    """The page."""
-    x, columns = result.table("outcome", "reason", *result.sweep.columns, *result.sweep.figures), result.sweep.columns
-    failed = x["outcome"] != OUTCOMES[0]
-    parts = [*html_of(result.blocks())]
-    parts += ["<h2>Failures</h2>", text(repr(result.probability("failed")))]
+def report(
+    result: Answer, failure: Estimate, table: Mapping[str, np.ndarray], varied: Mapping[str, str],
+    figures: Iterable[FigureReport], repeat: str,
+) -> str:  # fmt: skip
+    """The page.
+
+    Args:
+        result: Whose title and blocks are shown.
+        failure: Probability of a failure.
+        table: Columns of all runs.
+        varied: Headings of what varies, by column.
+        figures: What is shown of each figure.
+        repeat: Python that repeats a run, without its number.
+    """
+    failed = table["outcome"] != FINISHED
+    parts = [*html_of(result.blocks()), "<h2>Failures</h2>", text(repr(failure))]
     if failed.any():
-        some = np.flatnonzero(failed)[:_WORST].tolist()
-        rows = [(i, str(x["outcome"][i]), str(x["reason"][i]), _repeat(result, i)) for i in some]
-        parts.append(table(("first runs that failed", "outcome", "reason", "repeat it by"), rows))
-    if failed.any() and len(columns) > 1:
-        pair = strongest(failed, np.column_stack([x[name] for name in columns]))
-        names = tuple(columns[k] for k in pair)
-        headings = tuple(heading(result.sweep, each) for each in names)
-        shown = f"Share of runs that failed over {names[0]} and {names[1]}, the two that it depends on most"
+        some = np.flatnonzero(failed)[:WORST].tolist()
+        rows = [(i, str(table["outcome"][i]), str(table["reason"][i]), f"{repeat}({i})") for i in some]
+        parts.append(html_table(("first runs that failed", "outcome", "reason", "repeat it by"), rows))
+    if failed.any() and len(varied) > 1:
+        names = tuple(varied)
+        first, second = (names[k] for k in strongest(failed, np.column_stack([table[name] for name in names])))
+        shown = f"Share of runs that failed over {first} and {second}, the two that it depends on most"
         parts.append(f"<p>{escape(shown)}; cells without runs are empty, each cross is a run that failed.</p>")
-        parts.append(_failure_map(headings, [x[name] for name in names], failed))
-    for name in result.sweep.figures:
-        parts += _of_figure(result, name, x[name], failed)
-    body = page(result.title, *parts)
-    return _HEAD.format(title=escape(result.title), body=body)
+        parts.append(_failure_map((varied[first], varied[second]), [table[first], table[second]], failed))
+    for figure in figures:
+        parts += _of_figure(figure, repeat)
+    return _HEAD.format(title=escape(result.title), body=page(result.title, *parts))
 
 
 def strongest(failed: np.ndarray, x: np.ndarray) -> tuple[int, int]:
@@ -76,29 +95,20 @@ def strongest(failed: np.ndarray, x: np.ndarray) -> tuple[int, int]:
     return first, second
 
 
-def _of_figure(result: SweepResult, name: str, x: np.ndarray, failed: np.ndarray) -> Iterator[str]:
+def _of_figure(figure: FigureReport, repeat: str) -> Iterator[str]:
     """Distribution, quantiles and worst runs of a figure."""
-    title = heading(result.sweep, name)
-    yield f"<h2>{escape(title)}</h2>"
-    finite = x[np.isfinite(x)]
-    quantiles = result.quantiles(name, _PROBABILITIES, given="known" if (np.isnan(x) & ~failed).any() else None)
-    rows = [(each.statistic, each.estimate, each.low, each.high) for each in quantiles]
-    level = f"{100 * quantiles[0].level:g} % interval from"
-    parts = [table(("", "estimate", level, "to"), rows), text(f"{quantiles[0].n} runs, {quantiles[0].failed} failed")]
-    worst = [(i, float(x[i]), _repeat(result, i)) for i in result.worst(name, min(_WORST, len(x)), given="known")]
-    yield side_by_side([*([_histogram(title, finite)] if len(finite) else []), f"<div>{''.join(parts)}</div>"])
-    yield table(("worst runs that finished", title, "repeat it by"), worst)
-    try:
-        yield from html_of(result.sensitivity(name, given="known").blocks())
-    except SweepError as none:  # of a grid, or of a figure that is the same in all runs
-        yield text(f"no sensitivity: {none}")
-
-
-def _repeat(result: SweepResult, run: int) -> str:
-    """The line that repeats a run."""
-    scene = result.sweep.source
-    named = "" if is_scene(scene) else f", scene={scene!r}"  # a function is called only if it is named
-    return f"sw.read({str(result.path)!r}{named}).run({run})"
+    yield f"<h2>{escape(figure.heading)}</h2>"
+    first, finite = figure.quantiles[0], figure.values[np.isfinite(figure.values)]
+    rows = [(each.statistic, each.estimate, each.low, each.high) for each in figure.quantiles]
+    level = f"{100 * first.level:g} % interval from"
+    parts = [html_table(("", "estimate", level, "to"), rows), text(f"{first.n} runs, {first.failed} failed")]
+    worst = [(i, float(figure.values[i]), f"{repeat}({i})") for i in figure.worst]
+    yield side_by_side([*([_histogram(figure.heading, finite)] if len(finite) else []), f"<div>{''.join(parts)}</div>"])
+    yield html_table(("worst runs that finished", figure.heading, "repeat it by"), worst)
+    if isinstance(figure.sensitivity, str):
+        yield text(f"no sensitivity: {figure.sensitivity}")
+    else:
+        yield from html_of(figure.sensitivity.blocks())
 
 
 def _histogram(name: str, x: np.ndarray) -> str:

@@ -10,17 +10,31 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from robot_dyn import Setup, Trajectory
-from robot_dyn.foundations import UNREPORTED, Answer, Block, SweepError, choice, integer, reported, shown, truth
+from robot_dyn.foundations import (
+    UNREPORTED,
+    Answer,
+    Block,
+    SweepError,
+    choice,
+    integer,
+    reported,
+    save,
+    shown,
+    target,
+    truth,
+)
 from robot_dyn.tools.sweeps import counts
 from robot_dyn.tools.sweeps.event import happened
+from robot_dyn.tools.sweeps.export import export, inputs_of
 from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
-from robot_dyn.tools.sweeps.folder.rows import FINISHED, TEXTS, digest_of
+from robot_dyn.tools.sweeps.folder.rows import FINISHED, FIXED, NUMBERS, OUTCOMES, digest_of
 from robot_dyn.tools.sweeps.plan.specification import specification
-from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, Sweep, heading
+from robot_dyn.tools.sweeps.plan.sweep import Sweep, heading, is_scene
 from robot_dyn.tools.sweeps.plan.work import Work
 
 if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.estimate import Estimate
+    from robot_dyn.tools.sweeps.report import FigureReport
     from robot_dyn.tools.sweeps.sensitivity import Sensitivity
 
 _SHOWN = 5  # reasons, and worst runs
@@ -50,21 +64,26 @@ class SweepResult(Answer):
         """Numbers of the chunks that are left to do."""
         return self.folder.missing()
 
+    @property
+    def columns(self) -> dict[str, str]:
+        """Meaning of each column of the table, by name; units are in `units`."""
+        varied = dict.fromkeys(self.sweep.columns, "value of what varies")
+        figures = dict.fromkeys(self.sweep.figures, "figure of the run; nan if it failed")
+        fixed = {column.name: column.meaning for column in FIXED}
+        return {"run": "number of the run"} | varied | figures | fixed
+
     def table(self, *names: str) -> dict[str, np.ndarray]:
-        """Columns of all runs, (N,) by name: "run", what varies, figures, "outcome", "ended", "reason", "remarks".
+        """Columns of all runs, (N,), by their names in `columns`; all of them unless names are given.
 
         Their units are in `units`, and in the headings of `export`.
         """
         self._check_complete()
-        known = ("run", *self.sweep.columns, *self.sweep.figures, "outcome", "ended", *TEXTS)
-        names = names or known
+        names = names or tuple(self.columns)
         for name in names:
-            choice("column", name, known, error=SweepError)
-        found = self.folder.columns(name for name in names if name != "run")
-        found["run"] = np.arange(self.sweep.runs)
-        if "outcome" in names:
-            found["outcome"] = np.array(OUTCOMES)[found["outcome"]]
-        return {name: found[name] for name in names}
+            choice("column", name, tuple(self.columns), error=SweepError)
+        table = self.folder.columns(name for name in names if name != "run")
+        table["run"] = np.arange(self.sweep.runs)
+        return {name: table[name] for name in names}
 
     def quantiles(
         self, figure: str, probabilities: Any = (0.05, 0.5, 0.95), level: float = 0.95, given: str | None = None
@@ -181,8 +200,6 @@ class SweepResult(Answer):
         Raises:
             SweepError: If it cannot be written, or would replace a file.
         """
-        from robot_dyn.tools.sweeps.export import export
-
         self._check_complete()
         return export(self.sweep, self.folder, path, truth("force", force, error=SweepError))
 
@@ -191,9 +208,30 @@ class SweepResult(Answer):
 
         `path` and `force` as in `export`; SweepError if it cannot be written.
         """
-        from robot_dyn.tools.sweeps.report import save_report
+        from robot_dyn.tools.sweeps.report import KIND, report
 
-        return save_report(self, path, truth("force", force, error=SweepError))
+        inputs = inputs_of(self.folder, path)
+        path = target(path, KIND, SweepError, inputs, truth("force", force, error=SweepError))
+        varied = {name: heading(self.sweep, name) for name in self.sweep.columns}
+        source = "" if is_scene(self.sweep.source) else f", scene={self.sweep.source!r}"
+        repeat = f"sw.read({str(self.path)!r}{source}).run"
+        figures = map(self._reported, self.sweep.figures)
+        data = report(self, self.probability("failed"), self.table(), varied, figures, repeat).encode()
+        return save(path, lambda stream: stream.write(data), SweepError)
+
+    def _reported(self, name: str) -> FigureReport:
+        """What the report shows of a figure."""
+        from robot_dyn.tools.sweeps.report import PROBABILITIES, WORST, FigureReport
+
+        x = self._figure(name)
+        given = "known" if (np.isnan(x) & ~self._failed).any() else None
+        try:
+            sensitivity = self.sensitivity(name, given="known")
+        except SweepError as error:  # of a figure that is the same in all runs
+            sensitivity = str(error)
+        quantiles = self.quantiles(name, PROBABILITIES, given=given)
+        worst = self.worst(name, min(WORST, len(x)), given="known")
+        return FigureReport(heading(self.sweep, name), x, quantiles, worst, sensitivity)
 
     def run(self, i: int) -> Trajectory:
         """Repeat run i alone, with all that rollouts record: the same bits.
@@ -243,7 +281,7 @@ class SweepResult(Answer):
         if len(self.missing):
             return None
         outcome = self._outcome()
-        return {name: int((outcome == k).sum()) for k, name in enumerate(OUTCOMES)}
+        return {name: int((outcome == name).sum()) for name in OUTCOMES}
 
     @reported
     def remarks(self) -> dict[str, int] | None:
@@ -285,7 +323,7 @@ class SweepResult(Answer):
 
     def _figure(self, name: str) -> np.ndarray:
         self._check_complete()
-        known = (*self.sweep.figures, *self.sweep.columns, "ended")
+        known = (*self.sweep.figures, *self.sweep.columns, *NUMBERS)
         return self.folder.columns((choice("figure", name, known, error=SweepError),))[name]
 
     @property

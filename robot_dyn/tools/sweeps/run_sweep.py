@@ -10,14 +10,11 @@ from typing import Any
 
 from robot_dyn.codegen import thread_count
 from robot_dyn.foundations import SweepError, check_folder, file_path, shown
-from robot_dyn.tools.sweeps.engines.share import share as share_of
-from robot_dyn.tools.sweeps.engines.threads import Threads
+from robot_dyn.tools.sweeps.chunks import fill_by_threads, share_of
 from robot_dyn.tools.sweeps.folder.folder import Folder
 from robot_dyn.tools.sweeps.imported import check_places, named
 from robot_dyn.tools.sweeps.opening import begun, opened
-from robot_dyn.tools.sweeps.plan.specification import (
-    names_of,
-)
+from robot_dyn.tools.sweeps.plan.specification import names_of
 from robot_dyn.tools.sweeps.plan.sweep import Sweep
 from robot_dyn.tools.sweeps.plan.work import Work
 from robot_dyn.tools.sweeps.result import SweepResult
@@ -55,7 +52,7 @@ def run(
     """
     if not isinstance(sweep, Sweep):
         raise SweepError(f"run takes a Sweep, got {shown(sweep)}; sw.read(folder).sweep is that of a folder")
-    path, mine, work = file_path(folder, SweepError), share_of(share), Work(sweep)
+    path, (job, jobs), work = file_path(folder, SweepError), share_of(share), Work(sweep)
     count = thread_count(threads)
     if on_progress is not None and not callable(on_progress):
         raise SweepError(
@@ -71,21 +68,21 @@ def run(
     tell, t = _Progress(known, on_progress), None if known.samples is None else known.samples.times()
 
     def missing() -> list[int]:
-        return mine.of(known.missing()).tolist()
+        chunks = known.missing()
+        return chunks[chunks % jobs == job - 1].tolist()
+
+    def make(number: int, look: Callable[[float], object]) -> None:
+        if not known.file(number).exists():  # another driver was first
+            known.write(number, *work.made(*known.of(number), t, look))
 
     with suppress(KeyboardInterrupt):
-        if cluster is not None:
-            from robot_dyn.tools.sweeps.engines.cluster import Cluster, client_of
+        if cluster is None:
+            fill_by_threads(make, missing, count, tell)
+        else:
+            from robot_dyn.tools.sweeps.cluster import client_of, fill_by_cluster
 
             with client_of(cluster) as client:
-                Cluster(client, known, names_of(sweep)).run(missing, tell)
-        else:
-
-            def make(number: int, look: Callable[[float], object]) -> None:
-                if not known.file(number).exists():  # another driver was first
-                    known.write(number, *work.made(*known.of(number), t, look))
-
-            Threads(make, count).run(missing(), tell)
+                fill_by_cluster(client, known, names_of(sweep), missing, tell)
     tell(True)
     return SweepResult(sweep, known)
 

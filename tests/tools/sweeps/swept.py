@@ -5,7 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from robot_dyn.tools import sweeps as sw
+from robot_dyn.tools.sweeps import Work
+from robot_dyn.tools.sweeps.folder.rows import digest_of
+
+pytest.importorskip("pyarrow")
 
 SCENE = """
 robot = "planar_2r"
@@ -51,8 +57,18 @@ def scene(folder: Path, text: str = SCENE) -> Path:
 def swept(folder: Path, runs: int = 200, **changes: Any) -> sw.Sweep:
     """The sweep of a scene in a folder."""
     path = folder / "scene.toml"
-    given = {"runs": runs, "seed": 3, "vary": VARY, "figures": FIGURES, "storage": "npz"} | changes
+    given = {"runs": runs, "seed": 3, "vary": VARY, "figures": FIGURES} | changes
     return sw.Sweep(str(path if path.exists() else scene(folder)), **given)
+
+
+def digest(sweep: sw.Sweep) -> str:
+    """Return the digest of all rows of a sweep, made in one piece."""
+    return digest_of([Work(sweep).rows(0, sweep.runs)])
+
+
+def names_in(folder: Path) -> list[str]:
+    """Return the names of what a folder of a sweep holds, that of its design without its digest."""
+    return sorted("design" if path.name.startswith("design-") else path.name for path in folder.iterdir())
 
 
 def of_figure(folder: Path, name: str, kp: Any, runs: int = 512, **changes: Any) -> sw.SweepResult:

@@ -27,7 +27,7 @@ Damage = Callable[[Path], object]
 def whole(tmp_path_factory: pytest.TempPathFactory) -> sw.SweepResult:
     """A sweep of 60 runs in 3 chunks, with samples."""
     folder = tmp_path_factory.mktemp("whole")
-    return sw.run(swept(folder, 60, samples="q", storage="parquet"), folder / "out", chunk=20)
+    return sw.run(swept(folder, 60, samples="q"), folder / "out", chunk=20)
 
 
 @pytest.fixture
@@ -70,6 +70,11 @@ def a_folder(name: str) -> Damage:
 
 def gone(name: str) -> Damage:
     return lambda folder: removed(folder, name)
+
+
+def design_of_zeros(folder: Path) -> None:
+    (design,) = folder.glob("design-*.npy")
+    zeros(design.name)(folder)
 
 
 ROWS, SHARD = "rows/000001.parquet", "samples/q/c/1/0/0"
@@ -150,7 +155,7 @@ def test_damaged_samples_are_refused(copy: Path, damage: Damage) -> None:
         pytest.param(zeros(SHARD), "samples().q.values", id="shard, zeros"),
         *long(
             [
-                pytest.param(zeros("design.npy"), "table()", id="design, zeros"),
+                pytest.param(design_of_zeros, "table()", id="design, zeros"),
                 pytest.param(zeros(ROWS), "table()", id="rows, zeros"),
                 pytest.param(pipe("samples/q/zarr.json"), "samples().q.values", id="array, pipe"),
                 pytest.param(zeros("samples/t/zarr.json"), "samples().q.values", id="times, zeros"),
@@ -184,7 +189,7 @@ def test_one_flipped_bit_of_a_chunk_is_refused_or_changes_nothing(copy: Path) ->
             read = sw.read(copy).table()
         except RobotDynError:
             continue
-        others += [at for name, x in table.items() if x.tobytes() != read[name].tobytes() and x.dtype.kind in "fi"]
+        others += [at for name, x in table.items() if not np.array_equal(x, read[name], equal_nan=x.dtype.kind == "f")]
     assert not others
 
 

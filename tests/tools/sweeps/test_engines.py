@@ -7,6 +7,7 @@ import signal
 import socket
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -16,25 +17,13 @@ import pytest
 
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps import Work, begun
-from robot_dyn.tools.sweeps.engines import cluster
-from robot_dyn.tools.sweeps.engines.cluster import Cluster, client_of
-from robot_dyn.tools.sweeps.engines.share import share
-from robot_dyn.tools.sweeps.engines.threads import Threads
+from robot_dyn.tools.sweeps import begun, chunks, cluster
+from robot_dyn.tools.sweeps.chunks import fill_by_threads
+from robot_dyn.tools.sweeps.cluster import client_of, fill_by_cluster
+from robot_dyn.tools.sweeps.imported import NOTHING
 from robot_dyn.tools.sweeps.plan.work import Stopped
 from tests.tools.sweeps.children import outcome_of
-from tests.tools.sweeps.swept import swept
-
-
-class Future:
-    def __init__(self, error: BaseException | None = None) -> None:
-        self.status, self._error = "error" if error else "finished", error
-
-    def exception(self) -> BaseException | None:
-        return self._error
-
-    def add_done_callback(self, call: Callable[[Any], object]) -> None:
-        call(self)
+from tests.tools.sweeps.swept import digest, names_in, swept
 
 
 class Client:
@@ -54,17 +43,17 @@ class Client:
         except SweepError as error:
             return {"tcp://127.0.0.1:1": error}
 
-    def submit(self, function: Callable[..., Any], ticket: Any, chunk: int, **_: Any) -> Future:
-        self.submitted.append(chunk)
-        if self.forgets(chunk):
-            return Future()
-        try:
-            function(ticket, chunk)
-        except Exception as error:
-            return Future(error)
-        return Future()
+    def get_executor(self, **_: Any) -> Client:
+        return self
 
-    def cancel(self, futures: list[Future], force: bool) -> None: ...
+    def submit(self, function: Callable[..., Any], ticket: Any, chunk: int) -> Future[Any]:
+        self.submitted.append(chunk)
+        future = Future[Any]()
+        try:
+            future.set_result(None if self.forgets(chunk) else function(ticket, chunk))
+        except Exception as error:
+            future.set_exception(error)
+        return future
 
 
 @pytest.fixture
@@ -74,12 +63,12 @@ def filled(tmp_path: Path) -> Iterator[Any]:
     sweep = swept(tmp_path, 100)
     folder = begun(sweep, tmp_path / "out", chunk=10)
     folder.prepare()
-    yield folder, Work(sweep).rows(0, 100).digest()
+    yield folder, digest(sweep)
     cluster._work.cache_clear()
 
 
-def missing(folder: Any) -> Callable[[], list[int]]:
-    return lambda: folder.missing().tolist()
+def fill(client: Any, folder: Any, look: Callable[[], object] = lambda: None) -> None:
+    fill_by_cluster(client, folder, NOTHING, lambda: folder.missing().tolist(), look)
 
 
 def test_completeness_is_asked_of_the_folder(filled: Any) -> None:
@@ -87,22 +76,18 @@ def test_completeness_is_asked_of_the_folder(filled: Any) -> None:
     folder, expected = filled
     client = Client()
     client.forgets = lambda chunk: chunk in (3, 7) and client.submitted.count(chunk) < 3
-    Cluster(client, folder).run(missing(folder), lambda: None)
+    fill(client, folder)
     assert sorted(client.submitted) == sorted([*range(10), 3, 3, 7, 7])
     assert sw.read(folder.path).verify() == expected
-    assert sorted(path.name for path in folder.path.iterdir()) == [
-        "design.npy",
-        "rows",
-        "sweep.json",
-    ]  # tokens are gone
+    assert names_in(folder.path) == ["design", "rows", "sweep.json"]  # tokens are gone
 
 
 def test_a_chunk_that_always_ends_its_worker_is_named(filled: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, _ = filled
-    monkeypatch.setattr(cluster, "_ATTEMPTS", 4)
+    monkeypatch.setattr(chunks, "_ATTEMPTS", 4)
     client = Client(lambda chunk: chunk == 5)
     with pytest.raises(SweepError, match="chunk 5 ended its worker 4 times"):
-        Cluster(client, folder).run(missing(folder), lambda: None)
+        fill(client, folder)
     assert folder.missing().tolist() == [5]
 
 
@@ -114,34 +99,37 @@ def test_an_error_of_a_task_is_raised(filled: Any, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(cluster.Folder, "write", full)
     with pytest.raises(SweepError, match="No space left"):
-        Cluster(Client(), folder).run(missing(folder), lambda: None)
+        fill(Client(), folder)
 
 
-def test_workers_with_other_versions_are_refused_by_name(filled: Any) -> None:
+def with_another(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> None:
+    """Give workers a ticket of the driver with other entries."""
+    ticket_of = cluster.ticket_of
+    monkeypatch.setattr(cluster, "ticket_of", lambda *given: replace(ticket_of(*given), **changes))
+
+
+def test_workers_with_other_versions_are_refused_by_name(filled: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, _ = filled
-    of = Cluster(Client(), folder)
-    other = tuple((name, "0.1" if name == "scipy" else version) for name, version in of._ticket.versions)
-    of._ticket = replace(of._ticket, versions=other)
+    with_another(monkeypatch, versions=(("scipy", "0.1"),))
     with pytest.raises(SweepError, match=r"worker tcp://127.0.0.1:1: scipy is .* on .*, 0\.1 at the driver"):
-        of.run(missing(folder), lambda: None)
+        fill(Client(), folder)
     assert len(folder.missing()) == 10
 
 
-def test_workers_that_see_another_folder_are_refused(filled: Any, tmp_path: Path) -> None:
+def test_workers_that_see_another_folder_are_refused(filled: Any, tmp_path: Path, monkeypatch) -> None:
     folder, _ = filled
     other = tmp_path / "same path on another disk"
     other.mkdir()
-    of = Cluster(Client(), folder)
-    of._ticket = replace(of._ticket, folder=str(other))
-    with pytest.raises(SweepError, match="is not the folder of the driver"):
-        of.run(missing(folder), lambda: None)
+    with monkeypatch.context() as patch, pytest.raises(SweepError, match="is not the folder of the driver"):
+        with_another(patch, folder=str(other))
+        fill(Client(), folder)
 
     class Elsewhere(Client):  # reads the folder, as of a cache, and writes to another one
         def run(self, function: Any, ticket: Any, on_error: str) -> dict[str, Any]:
             return {"tcp://10.0.0.1:1": f"{ticket.token}.host.1"}
 
     with pytest.raises(SweepError, match=r"worker tcp://10.0.0.1:1 writes to another folder"):
-        Cluster(Elsewhere(), folder).run(missing(folder), lambda: None)
+        fill(Elsewhere(), folder)
 
 
 def test_few_tasks_wait_at_a_scheduler(filled: Any) -> None:
@@ -149,18 +137,13 @@ def test_few_tasks_wait_at_a_scheduler(filled: Any) -> None:
     waiting, most = list[Callable[[], object]](), [0]
 
     class Slow(Client):
-        def submit(self, function: Any, ticket: Any, chunk: int, **_: Any) -> Future:
-            future = Future()
-            future.add_done_callback = lambda call: waiting.append(lambda: (function(ticket, chunk), call(future)))  # type: ignore[method-assign]
-            self.submitted.append(chunk)
-            most[0] = max(most[0], len(waiting) + 1)
+        def submit(self, function: Any, ticket: Any, chunk: int) -> Future[Any]:
+            future = Future[Any]()
+            waiting.append(lambda: future.set_result(function(ticket, chunk)))
+            most[0] = max(most[0], len(waiting))
             return future
 
-    def look() -> None:
-        if waiting:
-            waiting.pop(0)()
-
-    Cluster(Slow(), folder).run(missing(folder), look)
+    fill(Slow(), folder, lambda: waiting.pop(0)())
     assert 2 <= most[0] <= 4 and not len(folder.missing())
 
 
@@ -203,9 +186,9 @@ def test_addresses_of_this_machine_and_encrypted_ones_are_allowed() -> None:
 
 
 @pytest.mark.parametrize("given", ["0/4", "5/4", "1/0", "1", "a/b", "1/4/2", 3, "-1/4"])
-def test_shares_that_cannot_be_are_refused(given: Any) -> None:
+def test_shares_that_cannot_be_are_refused(tmp_path: Path, given: Any) -> None:
     with pytest.raises(SweepError, match="share: give job and number of jobs"):
-        share(given)
+        sw.run(swept(tmp_path), tmp_path / "out", share=given)
 
 
 # --- threads
@@ -223,7 +206,7 @@ def test_ctrl_c_drops_the_chunks_under_way_and_keeps_the_rest(tmp_path: Path) ->
     assert 0 < len(done.missing) <= 400 and f"{len(done.missing)} of 400 chunks are left to do" in repr(done)
     assert not list((tmp_path / "out" / "rows").glob(".*"))
     again = sw.run(sweep, tmp_path / "out")
-    assert again.verify() == Work(sweep).rows(0, 2_000).digest()
+    assert again.verify() == digest(sweep)
 
 
 def test_an_error_of_a_chunk_ends_the_others_and_is_raised() -> None:
@@ -242,7 +225,7 @@ def test_an_error_of_a_chunk_ends_the_others_and_is_raised() -> None:
         made.append(chunk)
 
     with pytest.raises(SweepError, match="chunk 2"):
-        Threads(make, 2).run(range(100), lambda: None)
+        fill_by_threads(make, lambda: list(range(100)), 2, lambda: None)
     assert set(made) <= {0, 1}
 
 
@@ -266,7 +249,7 @@ def test_workers_in_processes_make_the_same_bits_and_one_that_is_killed_is_repla
                 os.kill(pids[0], signal.SIGKILL)
 
         done = sw.run(sweep, tmp_path / "out", chunk=5, cluster=client, on_progress=progress)
-    assert killed and done.verify() == Work(sweep).rows(0, 400).digest()
+    assert killed and done.verify() == digest(sweep)
 
 
 DYING = """
@@ -285,7 +268,7 @@ def test_what_a_killed_driver_left_is_removed_by_the_next_one(tmp_path: Path) ->
     assert outcome_of(DYING, tmp_path, gib=64) == "killed"
     done = sw.run(swept(tmp_path, 40), tmp_path / "out")
     assert not len(done.missing)
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["design.npy", "rows", "sweep.json"]
+    assert names_in(tmp_path / "out") == ["design", "rows", "sweep.json"]
 
 
 WITHOUT_SEMAPHORES = """

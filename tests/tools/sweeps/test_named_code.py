@@ -46,7 +46,7 @@ def received(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     monkeypatch.delitem(sys.modules, "code_of_a_test", raising=False)
     figures = {"mine": FIGURE, "peak": sw.peak("v")}
-    plan = sw.Sweep(SCENE, 48, {"q0": VARY["q0"]}, figures, storage="npz", samples=sw.samples("q"))
+    plan = sw.Sweep(SCENE, 48, {"q0": VARY["q0"]}, figures, samples=sw.samples("q"))
     sw.run(plan, "out", threads=1, chunk=16)
     forget(monkeypatch)
     return tmp_path / "out"
@@ -82,7 +82,7 @@ def test_results_are_read_without_importing_what_the_folder_names(received: Path
 
 def test_what_needs_code_that_was_not_named_is_refused(received: Path) -> None:
     done = sw.read(received)
-    (received / "rows" / "000001.npz").unlink()
+    (received / "rows" / "000001.parquet").unlink()
     for ask in (lambda: done.run(3), lambda: done.setup_of(3), lambda: sw.run(done.sweep, received)):
         with pytest.raises(SweepError):
             ask()
@@ -93,7 +93,7 @@ def test_what_needs_code_that_was_not_named_is_refused(received: Path) -> None:
 
 def test_named_code_repeats_and_resumes_runs(received: Path) -> None:
     kept = sw.read(received).table()
-    (received / "rows" / "000001.npz").unlink()
+    (received / "rows" / "000001.parquet").unlink()
     named = sw.read(received, scene=SCENE, figures={"mine": FIGURE})
     done = sw.run(named.sweep, received, threads=1)
     for name, x in done.table().items():
@@ -134,7 +134,7 @@ def test_the_command_runs_no_code_that_a_folder_names(received: Path) -> None:
     for action in (("status",), ("verify",), ("report", "-o", "r.html"), ("export", "-o", "r.csv")):
         said = command.run("sweep", action[0], str(received), *action[1:])
         assert said.returncode == 0, said.stderr
-    (received / "rows" / "000001.npz").unlink()
+    (received / "rows" / "000001.parquet").unlink()
     assert command.run("sweep", "run", str(received)).returncode == 2
     assert no_code_ran()
     named = "--scene", SCENE, "--figure", f"mine={FIGURE}"

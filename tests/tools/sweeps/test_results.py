@@ -308,7 +308,6 @@ def test_figures_that_cannot_be_are_refused(tmp_path: Path, module: Path, figure
         ({"vary": {"kp": 3.0}}, "vary: kp: a distribution must be"),
         ({"design": "sobol"}, "nearest"),
         ({"runs": 0}, "runs"),
-        ({"storage": "xlsx"}, "storage must be one of npz, parquet"),
         ({"seed": -1}, "seed"),
     ],
 )
@@ -338,13 +337,13 @@ def test_runs_that_end_by_an_event_keep_their_figures_whatever_is_beside_them(tm
     sys.path.insert(0, str(tmp_path))
     try:
         sweep = sw.Sweep("setup_with_an_event:setup", 24, {"q0": sw.normal(mean=[0.4, 0.9], sd=0.1)},
-                         {"error": sw.rms_error()}, storage="npz", seed=2)  # fmt: skip
+                         {"error": sw.rms_error()}, seed=2)  # fmt: skip
         rows = Work(sweep).rows(0, 24)
-        assert len(set(rows.ended.tolist())) > 2
+        assert len(set(rows["ended"].tolist())) > 2
         alone = [Work(sweep).rows(i, i + 1) for i in range(0, 24, 5)]
     finally:
         sys.path.remove(str(tmp_path))
-    assert [each.figures["error"][0] for each in alone] == rows.figures["error"][::5].tolist()
+    assert [each["error"][0] for each in alone] == rows["error"][::5].tolist()
 
 
 def test_a_scene_states_a_sweep_as_data(tmp_path: Path) -> None:

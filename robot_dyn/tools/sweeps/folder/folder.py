@@ -1,7 +1,7 @@
 """The folder of a sweep: its specification, and a file for each chunk that is done. What has no file is left to do.
 
 sweep.json                   the specification
-design.npy                   rows of the design
+design-0123456789abcdef.npy  rows of the design, with the start of their SHA-256
 rows/000123.parquet          a chunk; of more than 20 000 chunks rows/0004/080123.parquet
 samples/                     samples of runs, where they are kept
 """
@@ -9,8 +9,10 @@ samples/                     samples of runs, where they are kept
 from __future__ import annotations
 
 import io
+import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -18,15 +20,17 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import SweepError, read, why
-from robot_dyn.tools.sweeps.folder.chunk_file import FORMAT, Columns, Format
+from robot_dyn.foundations import SweepError, needs, read, reading, why
 from robot_dyn.tools.sweeps.folder.files import Exclusive, Files, make_folder, remove_abandoned, write
-from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows
+from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows, digest_of, schema, type_of
 from robot_dyn.tools.sweeps.folder.samples import SampleStore
 
 MOST_FILES = 20_000  # of a folder
 _MOST_TEXT, _MOST_TABLE = 2**26, 2**34
-_SPECIFICATION, _DESIGN, _SAMPLES = "sweep.json", "design.npy", "samples"
+_SPECIFICATION, _SAMPLES = "sweep.json", "samples"
+_SUFFIX, _FOOTER = ".parquet", b"footer"
+_REMEDY = "run the sweep again, after removing this file"
+_NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
 
 
 @final
@@ -39,8 +43,7 @@ class Folder:
         runs: N.
         chunk: Runs of a chunk; the last one may have fewer.
         digest: Of the specification.
-        format: Of the files.
-        names: Of the columns.
+        names: Of what varies and of figures.
         about: What footers state beside the digest: versions and processor.
         samples: Where samples of runs are; None where none are kept.
         files: The calls that a write consists of.
@@ -50,8 +53,7 @@ class Folder:
     runs: int
     chunk: int
     digest: str
-    format: Format
-    names: Columns
+    names: tuple[str, ...]
     about: dict[str, Any] = field(default_factory=dict)
     samples: SampleStore | None = None
     files: Files = field(default_factory=Files, compare=False)
@@ -67,8 +69,7 @@ class Folder:
 
     def file(self, chunk: int) -> Path:
         """The file of a chunk."""
-        name = f"{chunk:06d}{self.format.suffix}"
-        return self._subfolder(chunk) / name
+        return self._subfolder(chunk) / f"{chunk:06d}{_SUFFIX}"
 
     @property
     def subfolders(self) -> list[Path]:
@@ -82,7 +83,6 @@ class Folder:
     def present(self) -> np.ndarray:
         """Whether each chunk has a file, (count,)."""
         found = np.zeros(self.count, bool)
-        suffix = self.format.suffix
         for folder in self.subfolders:
             try:
                 names = os.listdir(folder)
@@ -93,7 +93,7 @@ class Folder:
                     f"{folder}: is not a folder of rows ({why(error)}); remove it, and run again"
                 ) from None
             for name in names:
-                stem = name.removesuffix(suffix)
+                stem = name.removesuffix(_SUFFIX)
                 if stem.isdigit() and stem != name and int(stem) < self.count:
                     found[int(stem)] = True
         return found
@@ -111,16 +111,24 @@ class Folder:
     def write(self, chunk: int, rows: Rows, samples: Mapping[str, np.ndarray] = MappingProxyType({})) -> None:
         """Write a chunk, its samples first; SweepError if it cannot be written, with what is there unchanged."""
         start, stop = self.of(chunk)
-        footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": rows.digest()}
+        footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": digest_of([rows])}
         try:
-            if self.samples is not None:
-                footer["samples"] = self.samples.write(chunk, samples, self.files)
-            write(self.file(chunk), self.format.packed(rows, footer | self.about), self.files)
+            kept = {} if self.samples is None else self.samples.write(chunk, samples, self.files)
+            write(self.file(chunk), self._packed(rows, footer | {"samples": kept} | self.about), self.files)
         except OSError as error:
             raise SweepError(
                 f"chunk {chunk} (runs {start} to {stop - 1}) cannot be written to {self.file(chunk)} ({why(error)});"
                 " the chunks that are there are kept: make room, and run the sweep again"
             ) from None
+
+    def _packed(self, rows: Rows, footer: dict[str, Any]) -> bytes:
+        """Return rows and a footer as the bytes of a Parquet file with checksums of its pages."""
+        pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="sweeps")
+        stated = schema(self.names).with_metadata({_FOOTER: json.dumps(footer)})
+        table = pa.table(rows | {"run": np.arange(footer["start"], footer["stop"])}, stated)
+        stream = io.BytesIO()
+        parquet.write_table(table, stream, compression="zstd", use_dictionary=list(TEXTS), write_page_checksum=True)
+        return stream.getvalue()
 
     def read(self, chunk: int) -> Rows:
         """The rows of a chunk.
@@ -128,18 +136,14 @@ class Folder:
         Raises:
             SweepError: If its file is missing, damaged, or of another sweep.
         """
-        path = self.file(chunk)
-        rows, footer = self.format.rows(path, self.names)
-        self._check(path, chunk, footer)
-        if rows.digest() != footer.get("rows"):
-            raise SweepError(f"{path}: was changed after it was written; run the sweep again, after removing this file")
+        rows, footer = self._read(chunk, [name for name in schema(self.names).names if name != "run"])
+        if digest_of([rows]) != footer["rows"]:
+            raise SweepError(f"{self.file(chunk)}: was changed after it was written; {_REMEDY}")
         return rows
 
     def footer(self, chunk: int) -> dict[str, Any]:
         """The footer of a chunk; errors as of `read`."""
-        footer = self.format.footer(self.file(chunk))
-        self._check(self.file(chunk), chunk, footer)
-        return footer
+        return self._read(chunk, [])[1]
 
     def check_samples(self) -> None:
         """Raise SweepError where samples that were written are missing or have changed."""
@@ -147,35 +151,52 @@ class Folder:
             for chunk in range(self.count):
                 self.samples.check(chunk, self.footer(chunk)["samples"])
 
-    def columns(self, names: Iterable[str]) -> dict[str, np.ndarray]:
+    def columns(self, names: Iterable[str]) -> Rows:
         """Columns of all rows, (N,); errors as of `read`."""
         names = list(dict.fromkeys(names))
-        found = {name: np.empty(self.runs, _type(name)) for name in names}
+        columns = {name: np.empty(self.runs, type_of(name)) for name in names}
         for chunk in range(self.count):
             start, stop = self.of(chunk)
-            table, footer = self.format.table(self.file(chunk), names)
-            self._check(self.file(chunk), chunk, footer)
-            for name, x in table.items():
-                found[name][start:stop] = x
-        return found
+            for name, x in self._read(chunk, names)[0].items():
+                columns[name][start:stop] = x
+        return columns
 
-    def _check(self, path: Path, chunk: int, footer: dict[str, Any]) -> None:
-        if footer.get("sweep") != self.digest:
-            raise SweepError(f"{path}: is of another sweep; remove it, and run the sweep again")
-        if (footer.get("chunk"), footer.get("start"), footer.get("stop")) != (chunk, *self.of(chunk)):
-            raise SweepError(f"{path}: is of other runs than its name says; remove it, and run the sweep again")
+    def _read(self, chunk: int, names: list[str]) -> tuple[Rows, dict[str, Any]]:
+        """Return columns of a chunk, and its footer."""
+        parquet, path, expected = needs("pyarrow.parquet", extra="sweeps"), self.file(chunk), self.of(chunk)
+        with reading(path, SweepError, _REMEDY) as stream, _errors_of(path):
+            file = parquet.ParquetFile(stream, page_checksum_verification=True)
+            footer = json.loads(file.schema_arrow.metadata[_FOOTER])
+            if footer["sweep"] != self.digest:
+                raise SweepError(f"{path}: is of another sweep; {_REMEDY}")
+            if (footer["chunk"], footer["start"], footer["stop"]) != (chunk, *expected):
+                raise SweepError(f"{path}: is of other runs than its name says; {_REMEDY}")
+            if not file.schema_arrow.equals(schema(self.names)):
+                raise SweepError(f"{path}: its columns are not those of the sweep; {_REMEDY}")
+            table = file.read(columns=names, use_threads=False)
+            rows = {name: table[name].to_numpy().astype(type_of(name)) for name in names}
+            if any(x.shape != (expected[1] - expected[0],) for x in rows.values()):
+                raise SweepError(f"{path}: has {len(table)} rows, not {expected[1] - expected[0]}; {_REMEDY}")
+            return rows, footer
 
 
-def _type(name: str) -> Any:
-    return np.int8 if name == "outcome" else object if name in TEXTS else float
+@contextmanager
+def _errors_of(path: Path) -> Iterator[None]:
+    """Raise what is wrong with a file as a SweepError with its path."""
+    try:
+        yield
+    except SweepError:
+        raise
+    except Exception as error:  # pyarrow promises no kinds
+        raise SweepError(f"{path}: is not a complete chunk ({type(error).__name__}); {_REMEDY}") from None
 
 
-def folder_of(path: Path, data: dict[str, Any], digest: str, names: Columns, about: dict[str, Any]) -> Folder:
+def folder_of(path: Path, data: dict[str, Any], digest: str, names: tuple[str, ...], about: dict[str, Any]) -> Folder:
     """The folder of a specification with the size of its chunks."""
     kept = data["samples"]
     dense = kept is not None and kept["every"] == 1 and not kept["failed"]
     store = kept and SampleStore(path / _SAMPLES, data["runs"], data["chunk"], tuple(kept["names"]), dense)
-    return Folder(path, data["runs"], data["chunk"], digest, FORMAT[data["storage"]], names, about, store)
+    return Folder(path, data["runs"], data["chunk"], digest, names, about, store)
 
 
 def has_specification(path: Path) -> bool:
@@ -183,42 +204,46 @@ def has_specification(path: Path) -> bool:
     return (path / _SPECIFICATION).is_file()
 
 
-def read_specification(path: Path) -> tuple[str, np.ndarray]:
-    """The text of the specification of a folder, and the rows of its design.
+def read_specification(path: Path) -> str:
+    """The text of the specification of a folder; SweepError if it holds no sweep, or it cannot be read."""
+    return read(path / _SPECIFICATION, _MOST_TEXT, SweepError, _NONE).decode("utf-8", "replace")
 
-    Raises:
-        SweepError: If the folder holds no sweep, or it cannot be read.
-    """
-    remedy = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
-    text = read(path / _SPECIFICATION, _MOST_TEXT, SweepError, remedy).decode("utf-8", "replace")
-    data = read(path / _DESIGN, _MOST_TABLE, SweepError, remedy)
+
+def read_design(path: Path, digest: str) -> np.ndarray:
+    """The rows of the design of a folder, whose SHA-256 its specification states; errors as in `read_specification`."""
+    file = _design(path, digest)
+    data = read(file, _MOST_TABLE, SweepError, _NONE)
     try:
-        return text, np.load(io.BytesIO(data), allow_pickle=False)
+        return np.load(io.BytesIO(data), allow_pickle=False)
     except (ValueError, EOFError) as error:
-        raise SweepError(f"{path / _DESIGN}: is not a table of numbers ({error})") from None
+        raise SweepError(f"{file}: is not a table of numbers ({error})") from None
 
 
-def begin(path: Path, text: str, rows: np.ndarray, files: Files | None = None) -> bool:
-    """Write the specification of a new sweep; False if another process was first.
+def begin(path: Path, text: str, rows: np.ndarray, digest: str, files: Files | None = None) -> None:
+    """Write the specification of a new sweep, unless another process was first.
+
+    The file of a design is named after its rows, so that two sweeps that begin at one time do not mix.
 
     Raises:
         SweepError: If the folder holds other files, or cannot be written.
     """
     make_folder(path)
-    own = (_DESIGN, _SAMPLES)
-    strange = [each for each in sorted(os.listdir(path)) if each not in own and not each.endswith(".unfinished")]
-    if strange and _SPECIFICATION not in strange:
+    names = {each.name for each in path.iterdir() if not each.name.endswith(".unfinished")}
+    strange = sorted(name for name in names if not name.startswith("design-"))
+    if strange and _SPECIFICATION not in names:
         raise SweepError(f"{path}: holds other files, such as {strange[0]}; give a new folder")
     try:
         stream = io.BytesIO()
         np.save(stream, rows, allow_pickle=False)
-        write(path / _DESIGN, stream.getvalue(), files)
-        write(path / _SPECIFICATION, text.encode(), files or Exclusive())
-    except FileExistsError:
-        return False
+        write(_design(path, digest), stream.getvalue(), files)
+        with suppress(FileExistsError):
+            write(path / _SPECIFICATION, text.encode(), files or Exclusive())
     except OSError as error:
         raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
-    return True
+
+
+def _design(path: Path, digest: str) -> Path:
+    return path / f"design-{digest[:16]}.npy"
 
 
 def read_all(folder: Folder) -> Iterator[Rows]:

@@ -1,87 +1,99 @@
-"""Rows: what a sweep keeps of runs start, …, stop − 1, as columns."""
+"""Rows of a sweep's table as columns by name, and the columns that every sweep has.
+
+A column more is an entry of `FIXED`: files, `table()`, exports, reports, events, units and `columns` follow from it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import Value
+from robot_dyn import Rollouts
+from robot_dyn.foundations import needs
+from robot_dyn.simulation.rollouts.overview import remarks_on_each, texts_by_run
 
-FINISHED, DIVERGED, RAISED = range(3)
-TEXTS = ("reason", "remarks")  # columns of them
+FINISHED, DIVERGED, RAISED = OUTCOMES = ("finished", "diverged", "raised")
+Rows = dict[str, np.ndarray]
+"""Columns by name, each of shape (k,): numbers are float64, texts have the type of their column."""
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Rows(Value):
-    """Rows of runs, in their order.
+@dataclass(frozen=True)
+class Column:
+    """A column that every sweep has.
 
     Attributes:
-        start: Number of the first run.
-        outcome: FINISHED, DIVERGED or RAISED, (k,).
-        ended: Time at which each ended, in [s], (k,); nan of one that raised.
-        reason: Why it failed, or which event ended it, (k,), texts; empty otherwise.
-        remarks: What is noteworthy in it, by kind, quantity and joint, (k,), texts; empty where nothing is.
-        varied: What varies, by column, (k,).
-        figures: By name, (k,); nan of a run that failed.
+        name: In files, tables and events.
+        type: Of its values in memory: float, or a type of texts.
+        unit: Of its numbers, or empty.
+        meaning: For readers of tables.
+        missing: Its value in a run that raised.
+        values: Its values in runs that were made, (B,).
     """
 
-    start: int
-    outcome: np.ndarray
-    ended: np.ndarray
-    reason: np.ndarray
-    remarks: np.ndarray
-    varied: dict[str, np.ndarray]
-    figures: dict[str, np.ndarray]
+    name: str
+    type: Any
+    unit: str
+    meaning: str
+    missing: Any
+    values: Callable[[Rollouts], Any]
 
-    def __len__(self) -> int:
-        return len(self.outcome)
 
-    @classmethod
-    def empty(cls, start: int, stop: int, varied: Mapping[str, np.ndarray], figures: Iterable[str]) -> Rows:
-        """Rows to be filled; as they are, those of runs that raised without a reason."""
-        k = stop - start
-        reason, remarks = np.full(k, "", object), np.full(k, "", object)
-        outcome, ended = np.full(k, RAISED, np.int8), np.full(k, np.nan)
-        of_each = {name: np.full(k, np.nan) for name in figures}
-        return cls(start, outcome, ended, reason, remarks, dict(varied), of_each)
+FIXED = (
+    Column(
+        "outcome", "U8", "", f"outcome of the run: {', '.join(OUTCOMES)}", RAISED,
+        lambda made: np.where(made.diverged, DIVERGED, FINISHED),
+    ),
+    Column("ended", float, "s", "time at which the run ended; nan if it raised", np.nan, lambda made: made.ended),
+    Column(
+        "reason", object, "", "why the run failed, or which event ended it", "",
+        lambda made: np.array(made.advice, object),
+    ),
+    Column(
+        "remarks", object, "", "what is noteworthy in the run, by kind, quantity and joint", "",
+        lambda made: texts_by_run(remarks_on_each(made), len(made)),
+    ),
+)  # fmt: skip
+TYPES = {column.name: column.type for column in FIXED}
+TEXTS = tuple(column.name for column in FIXED if column.type is not float)
+NUMBERS = tuple(column.name for column in FIXED if column.type is float)
 
-    @classmethod
-    def joined(cls, parts: Sequence[Rows]) -> Rows:
-        """Rows that follow each other, as one."""
-        first = parts[0]
-        if len(parts) == 1:
-            return first
 
-        def of(name: str) -> dict[str, np.ndarray]:
-            return {key: np.concatenate([getattr(each, name)[key] for each in parts]) for key in getattr(first, name)}
+def type_of(name: str) -> Any:
+    """Return the type of a column in memory; what varies and figures are float64."""
+    return TYPES.get(name, float)
 
-        outcome, ended, reason, remarks = (
-            np.concatenate([getattr(each, name) for each in parts]) for name in ("outcome", "ended", *TEXTS)
-        )
-        return cls(first.start, outcome, ended, reason, remarks, of("varied"), of("figures"))
 
-    @property
-    def columns(self) -> dict[str, np.ndarray]:
-        """All but the texts, in the order of files."""
-        return {"outcome": self.outcome, "ended": self.ended} | self.varied | self.figures
+def schema(names: Iterable[str]) -> Any:
+    """Return the schema of the files of rows; `names` are those of what varies and of figures."""
+    pa = needs("pyarrow", extra="sweeps")
+    types = {name: pa.string() if name in TEXTS else pa.float64() for name in (*names, *TYPES)}
+    return pa.schema({"run": pa.int64()} | types)
 
-    def digest(self) -> str:
-        """SHA-256 of all that rows hold, to the bit."""
-        return digest_of([self])
+
+def empty(count: int, varied: Mapping[str, np.ndarray], figures: Iterable[str]) -> Rows:
+    """Return rows to be filled; as they are, those of runs that raised without a reason."""
+    missing = dict.fromkeys(figures, np.nan) | {column.name: column.missing for column in FIXED}
+    return {**varied} | {name: np.full(count, value, type_of(name)) for name, value in missing.items()}
+
+
+def joined(parts: Sequence[Rows]) -> Rows:
+    """Return rows that follow each other, as one."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def digest_of(parts: Iterable[Rows]) -> str:
     """SHA-256 of rows that follow each other, to the bit; it does not depend on how they are parted."""
-    of_numbers, of_texts = sha256(), {name: sha256() for name in TEXTS}
-    for each in parts:
-        numbers = np.column_stack([np.asarray(x, float) for x in each.columns.values()])
-        numbers[np.isnan(numbers)] = np.nan  # whose bits are many
-        of_numbers.update(numbers.tobytes())
-        for name, digest in of_texts.items():
-            digest.update(b"".join(text.encode() + b"\0" for text in getattr(each, name).tolist()))
-    return sha256(b"".join(each.digest() for each in (of_numbers, *of_texts.values()))).hexdigest()
+    digests: dict[str, Any] = {}
+    for rows in parts:
+        for name, x in rows.items():
+            digest = digests.setdefault(name, sha256(name.encode()))
+            if name in TEXTS:
+                digest.update(b"".join(text.encode() + b"\0" for text in x.tolist()))
+            else:
+                digest.update(np.where(np.isnan(x), np.nan, x).tobytes())  # the bits of nan are many
+    return sha256(b"".join(digest.digest() for digest in digests.values())).hexdigest()

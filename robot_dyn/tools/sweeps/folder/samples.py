@@ -21,7 +21,7 @@ from robot_dyn.simulation import SAMPLED
 from robot_dyn.tools.sweeps.folder.files import Files, make_folder, write
 
 _INNER = 64  # runs that are read together, where all are kept
-_EXTRA = "sweeps"
+_EXTRA, _TIMES = "sweeps", "t/c/0"
 
 
 @final
@@ -44,14 +44,19 @@ class SampleStore:
     dense: bool
 
     def create(self, t: np.ndarray, joint_names: tuple[str, ...]) -> None:
-        """Write what describes the arrays, and the times of samples, (m,)."""
-        make_folder(self.path)
+        """Write what describes the arrays, and the times of samples, (m,), unless they are there."""
+        if (self.path / _TIMES).is_file():
+            return
         zarr = needs("zarr", extra=_EXTRA)
-        group = zarr.create_group(self.path, overwrite=True, zarr_format=3, attributes={"joint": list(joint_names)})
+        memory = zarr.storage.MemoryStore()
+        group = zarr.create_group(memory, zarr_format=3, attributes={"joint": list(joint_names)})
+        for name in self.names:
+            self._array(zarr, memory, name, t, joint_names)
         times = group.create_array("t", data=t, dimension_names=("t",), compressors=None)
         times.attrs["units"] = "s"
-        for name in self.names:
-            self._array(zarr, group.store, name, t, joint_names)
+        for name in sorted(memory._store_dict, key=_TIMES.__eq__):  # the times are last: then all is there
+            make_folder((self.path / name).parent)
+            write(self.path / name, memory._store_dict[name].to_bytes())
 
     def times(self) -> np.ndarray:
         """Of the samples, (m,), in [s]."""
@@ -94,7 +99,7 @@ class SampleStore:
     def _reading(self) -> Iterator[None]:
         """What is wrong with the files that describe the arrays, as a SweepError; Zarr opens pipes and devices too."""
         remedy = "take it from a copy of the folder, or run the sweep into a new one"
-        for name in ("zarr.json", *(f"{each}/zarr.json" for each in ("t", *self.names)), "t/c/0"):
+        for name in ("zarr.json", *(f"{each}/zarr.json" for each in ("t", *self.names)), _TIMES):
             with reading(self.path / name, SweepError, remedy):
                 pass
         try:

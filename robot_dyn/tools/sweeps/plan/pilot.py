@@ -28,8 +28,8 @@ def pilot(sweep: Sweep, chunk: int | None = None) -> int:
     """
     work, count = Work(sweep), min(_RUNS, sweep.runs)
     rows = work.rows(0, count)  # with what is compiled first
-    if (rows.outcome == RAISED).all():
-        raise SweepError(f"all {count} runs of the pilot raise; the first: {rows.reason[0]}")
+    if (rows["outcome"] == RAISED).all():
+        raise SweepError(f"all {count} runs of the pilot raise; the first: {rows['reason'][0]}")
     work.check_figures(0, count)
     if chunk is not None:
         return chunk

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Any, Literal, final
+from typing import Annotated, Any, final
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -28,13 +28,13 @@ from robot_dyn.tools.sweeps.plan.samples import samples
 from robot_dyn.tools.sweeps.plan.stated import StatedScene, stated_scene
 from robot_dyn.tools.sweeps.plan.sweep import Sweep, is_scene
 
-FORMAT = 4
+FORMAT = 5
 _PLACES = ("scene",)  # that may differ: where the scene lies
 
 
 def versions() -> dict[str, str]:
     """Versions of what the bits of rows depend on."""
-    return {name: version_of(name) for name in ("robot-dyn", "numpy", "scipy", "pin")}
+    return {name: version_of(name) for name in ("robot-dyn", "numpy", "scipy", "pin", "salib")}
 
 
 def processor() -> dict[str, str]:
@@ -57,10 +57,9 @@ class Stored(BaseModel):
     vary: dict[str, dict[str, Any]]
     order: list[str]
     figures: dict[str, dict[str, Any]]
-    storage: Literal["npz", "parquet"]
     samples: StoredSamples | None
     versions: dict[str, str]
-    rows_sha256: str
+    rows_sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     chunk: Annotated[int, Field(gt=0)]
 
 
@@ -117,6 +116,11 @@ class Specification:
         return sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()
 
     @property
+    def rows_digest(self) -> str:
+        """SHA-256 of the rows of the design."""
+        return self.data["rows_sha256"]
+
+    @property
     def chunk(self) -> int:
         """Number of runs in a chunk."""
         return self.data["chunk"]
@@ -153,7 +157,6 @@ def specification(sweep: Sweep) -> Specification:
         "vary": {name: each.to_dict() for name, each in sweep.vary.items()},
         "order": list(sweep.vary),
         "figures": {name: each.to_dict() for name, each in sweep.figures.items()},
-        "storage": sweep.storage,
         "samples": None if sweep.samples is None else asdict(sweep.samples),
         "versions": versions(),
         "rows_sha256": sha256(np.ascontiguousarray(sweep.points.rows).tobytes()).hexdigest(),
@@ -188,7 +191,7 @@ def sweep_of(
         design, drawn = (data["design"], rows) if named_design else (rows, None)
         kept = data["samples"]
         kept = kept and samples(*kept["names"], every=kept["every"], failed=kept["failed"])
-        return Sweep(scene, data["runs"], vary, of, design, data["seed"], data["storage"], samples=kept, drawn=drawn)
+        return Sweep(scene, data["runs"], vary, of, design, data["seed"], samples=kept, drawn=drawn)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise SweepError(f"{where}: is not the specification of a sweep ({error!r})") from None
 

@@ -15,7 +15,7 @@ from robot_dyn.foundations import Answer, Block, Caching, QueryError, SweepError
 from robot_dyn.queries import joint_types_of, unit
 from robot_dyn.tools.sweeps.designs import Design, design, given
 from robot_dyn.tools.sweeps.distributions import Distribution, distribution
-from robot_dyn.tools.sweeps.folder.rows import TEXTS
+from robot_dyn.tools.sweeps.folder.rows import FIXED, NUMBERS, OUTCOMES, TEXTS
 from robot_dyn.tools.sweeps.imported import imported, path_of
 from robot_dyn.tools.sweeps.plan.figures import Figure, figure
 from robot_dyn.tools.sweeps.plan.samples import Samples, samples_of
@@ -23,9 +23,7 @@ from robot_dyn.tools.sweeps.plan.stated import StatedScene
 
 READER = "robot_dyn.scene.scene:read_scene"  # of scenes, a room above: it is named as users' functions are
 STARTS = ("q0", "v0")
-OUTCOMES = ("finished", "diverged", "raised")
-RESERVED = ("run", "outcome", "ended", *TEXTS, "failed", *OUTCOMES)
-FORMATS = ("npz", "parquet")
+RESERVED = ("run", *NUMBERS, *TEXTS, "failed", *OUTCOMES)
 
 
 @final
@@ -44,7 +42,6 @@ class Sweep(Answer, Value, Caching):
         design: "random", "sobol", "halton", "latin", "saltelli", "grid"; or rows in [0, 1), (N, d), a column for each
             number that varies.
         seed: Of the design.
-        storage: "parquet" or "npz"; None for Parquet where pyarrow is installed.
         samples: What to keep of the motion: "q", or `samples("q", "u", every=100)`; nothing by default.
         drawn: The rows of the design, (N, d), as a folder keeps them; None to draw them by name and seed.
 
@@ -59,7 +56,6 @@ class Sweep(Answer, Value, Caching):
     figures: dict[str, Figure] = field(default_factory=dict)
     design: Any = "random"
     seed: int = 0
-    storage: str | None = None
     samples: Samples | None = None
     drawn: np.ndarray | None = None
 
@@ -76,9 +72,6 @@ class Sweep(Answer, Value, Caching):
             raise SweepError(f"figures: {taken[0]!r} is the name of another column of a sweep; take another one")
         set_(self, "figures", {name: figure(name, given) for name, given in figures.items()})
         set_(self, "seed", integer("seed", self.seed, most=2**63 - 1, error=SweepError))
-        if self.storage is not None and not (isinstance(self.storage, str) and self.storage in FORMATS):
-            raise SweepError(f"storage must be one of {', '.join(FORMATS)}, got {shown(self.storage)}")
-        set_(self, "storage", self.storage or _best_format())
         set_(self, "samples", samples_of(self.samples))
         _ = self.points  # refused if the design does not have so many rows
         self._check_names()
@@ -112,7 +105,7 @@ class Sweep(Answer, Value, Caching):
 
     @cached_property
     def units(self) -> dict[str, str]:
-        """Of each column that has one: of what varies, of figures, and of "ended"."""
+        """Units of the columns that have one, by name."""
         if isinstance(self.scene, StatedScene):
             return dict(self.scene.units)
         types = self.joint_types
@@ -120,7 +113,8 @@ class Sweep(Answer, Value, Caching):
         of |= {f"{name}[{k}]": unit(name[0], kind) for name in STARTS for k, kind in enumerate(types)}
         varied = {name: of.get(name, of.get(name.rpartition("[")[0], "")) for name in self.columns}
         figures = {name: each.unit(self.setup) for name, each in self.figures.items()}
-        return {name: each for name, each in (varied | figures | {"ended": "s"}).items() if each}
+        fixed = {column.name: column.unit for column in FIXED}
+        return {name: text for name, text in (varied | figures | fixed).items() if text}
 
     @property
     def source(self) -> str:
@@ -174,7 +168,7 @@ class Sweep(Answer, Value, Caching):
         """What its rows and samples take on disk, at most but for footers and texts."""
         if isinstance(self.scene, StatedScene):
             return self.scene.bytes_expected
-        rows = 8 * (len(self.columns) + len(self.figures) + 1) + 1 + 4 * len(TEXTS)
+        rows = 8 * (len(self.columns) + len(self.figures) + len(NUMBERS)) + 4 * len(TEXTS)
         if self.samples is None or self.samples.failed:
             return self.runs * rows
         numbers = samples_of_run(self.setup) * self.setup.plant.dynamics.n * len(self.samples.names)
@@ -257,11 +251,3 @@ def _varied(name: str, given: Any) -> Distribution:
         return distribution(given)
     except RobotDynError as error:
         raise SweepError(f"vary: {name}: {error}") from None
-
-
-def _best_format() -> str:
-    try:
-        import pyarrow  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    except ImportError:
-        return "npz"
-    return "parquet"

@@ -17,9 +17,8 @@ from robot_dyn.foundations import SweepError, because
 from robot_dyn.simulation import MOST_BYTES, parts_of_run
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES
-from robot_dyn.simulation.rollouts.overview import remarks_on_each, texts_by_run
 from robot_dyn.simulation.rollouts.rollouts import batch_of, manners, run_batch
-from robot_dyn.tools.sweeps.folder.rows import DIVERGED, FINISHED, RAISED, Rows
+from robot_dyn.tools.sweeps.folder.rows import FIXED, RAISED, Rows, empty, joined
 from robot_dyn.tools.sweeps.folder.samples import check_times
 from robot_dyn.tools.sweeps.plan.runs import Runs, taken
 from robot_dyn.tools.sweeps.plan.sweep import STARTS, Sweep, samples_of_run
@@ -72,7 +71,7 @@ class Work:
         for a in range(start, stop, self.part):
             b = min(a + self.part, stop)
             parts.append(self._part(a, b, look, t, {name: x[a - start : b - start] for name, x in samples.items()}))
-        return Rows.joined(parts), samples
+        return joined(parts), samples
 
     def times(self) -> np.ndarray:
         """Of the samples of the first run that finishes among 64, (m,), in [s]."""
@@ -114,11 +113,11 @@ class Work:
     ) -> Rows:  # fmt: skip
         """The rows of some runs, and their samples, which are written into arrays."""
         values = self.sweep.values(start, stop)
-        rows = Rows.empty(start, stop, self._columns(values), self.sweep.figures)
+        rows = empty(stop - start, self._columns(values), self.sweep.figures)
         for runs, result in self._results(np.arange(start, stop), values, look):
             at = runs - start
             if isinstance(result, str):
-                rows.outcome[at], rows.reason[at] = RAISED, result
+                rows["outcome"][at], rows["reason"][at] = RAISED, result
             else:
                 self._write(rows, at, result)
                 if samples and t is not None:
@@ -142,16 +141,15 @@ class Work:
 
     def _write(self, rows: Rows, at: np.ndarray, result: Rollouts) -> None:
         """Rows of runs that were made; figures of those that finished."""
-        rows.outcome[at] = np.where(result.diverged, DIVERGED, FINISHED)
-        rows.ended[at], rows.reason[at] = result.ended, np.array(result.advice, object)
-        rows.remarks[at] = texts_by_run(remarks_on_each(result), len(result))
+        for column in FIXED:
+            rows[column.name][at] = column.values(result)
         whole = np.flatnonzero(~result.diverged)
         if not len(whole):
             return
         runs = Runs(result if len(whole) == len(result) else taken(result, whole))
         for name, figure in self.sweep.figures.items():
             try:
-                rows.figures[name][at[whole]] = figure.of(runs)
+                rows[name][at[whole]] = figure.of(runs)
             except Exception:  # of a user's function: which runs it is of
                 self._write_one_by_one(rows, name, at[whole], runs)
 
@@ -159,9 +157,9 @@ class Work:
         """A figure of each run by itself; a run of which it raises is one that raised, with that as its reason."""
         for i, place in enumerate(at.tolist()):
             try:
-                rows.figures[name][place] = self.sweep.figures[name].of(runs.only(i))[0]
+                rows[name][place] = self.sweep.figures[name].of(runs.only(i))[0]
             except Exception as error:
-                rows.outcome[place], rows.reason[place] = RAISED, f"figure {name}: {because(error)}"
+                rows["outcome"][place], rows["reason"][place] = RAISED, f"figure {name}: {because(error)}"
 
     def _results(
         self, runs: np.ndarray, values: dict[str, np.ndarray], look: Look | None

@@ -14,24 +14,21 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from ipaddress import ip_address
-from itertools import islice
 from pathlib import Path
-from queue import Empty, Queue
 from typing import Any, final
 from urllib.parse import urlsplit
 
 from robot_dyn import RobotDynError
 from robot_dyn.foundations import SweepError, needs, shown
+from robot_dyn.tools.sweeps.chunks import fill
 from robot_dyn.tools.sweeps.folder.files import temporary_name, write
 from robot_dyn.tools.sweeps.folder.folder import Folder
-from robot_dyn.tools.sweeps.imported import NOTHING, Named
+from robot_dyn.tools.sweeps.imported import Named
 from robot_dyn.tools.sweeps.opening import opened
 from robot_dyn.tools.sweeps.plan.specification import versions
 
 _WINDOW = 3  # tasks a thread of a worker
-_ATTEMPTS = 20  # rounds without a new file, after which a chunk is held to end its worker
 _WAIT_S = 60.0  # for the first worker
-_LOOK_S = 0.5
 # what a process of Dask does beside its tasks, a profile and a look at itself each 20 ms, is 4 % of two processors
 _LOCAL = {
     "distributed.worker.profile.enabled": False,
@@ -137,93 +134,56 @@ def _check_address(address: str) -> None:
         )
 
 
-@final
-class Cluster:
-    """Workers of Dask.
+def fill_by_cluster(
+    client: Any, folder: Folder, names: Named, missing: Callable[[], list[int]], look: Callable[[], object]
+) -> None:
+    """Fill a folder by the workers of a cluster.
 
     Args:
         client: Of the cluster.
         folder: That is filled.
         names: Scene and functions that workers may import.
+        missing: Numbers of the chunks that are left to do.
+        look: As in `fill`.
+
+    Raises:
+        SweepError: If a worker sees another folder or has other versions; others as in `fill`.
     """
-
-    def __init__(self, client: Any, folder: Folder, names: Named = NOTHING) -> None:
-        self._client, self._folder = client, folder
-        path = folder.path.absolute()
-        self._key = f"token-{os.urandom(8).hex()}"
-        token = temporary_name(self._key)
-        figures = tuple(names.figures.items())
-        self._ticket = Ticket(str(path), folder.digest, token, tuple(versions().items()), names.scene, figures)
-
-    def run(self, chunks: Callable[[], list[int]], look: Callable[[], object]) -> None:
-        """Make the chunks that the folder lacks; `look` is called meanwhile.
-
-        Args:
-            chunks: Those that are left to do, asked of the folder.
-            look: An error of it, or Ctrl-C, ends the work.
-
-        Raises:
-            SweepError: If a worker sees another folder or has other versions, or a chunk always ends its worker.
-        """
-        token = self._folder.path / self._ticket.token
-        write(token, self._ticket.token.encode())
-        try:
-            self._handshake()
-            left, attempts = chunks(), 0
-            while left:
-                self._round(left, look)
-                before, left = len(left), chunks()
-                attempts = attempts + 1 if len(left) == before else 0
-                if attempts == _ATTEMPTS:
-                    raise SweepError(
-                        f"chunk {left[0]} ended its worker {_ATTEMPTS} times; make it in this process to see why, with"
-                        " the same folder and cluster=None"
-                    )
-        finally:
-            for each in self._folder.path.glob(f".{self._key}.*"):
-                each.unlink(missing_ok=True)
-
-    def _handshake(self) -> None:
-        """Every worker reads the token and writes one back, which is read here."""
-        self._client.wait_for_workers(1, timeout=_WAIT_S)
-        for worker, answer in self._client.run(_answer, self._ticket, on_error="return").items():
-            if isinstance(answer, BaseException):
-                why = str(answer) if isinstance(answer, RobotDynError) else f"{type(answer).__name__}: {answer}"
-                raise SweepError(f"worker {worker}: {why}")
-            if not (self._folder.path / answer).is_file():
-                raise SweepError(
-                    f"worker {worker} writes to another folder than {self._folder.path}: give one that all hosts share"
-                )
-
-    def _round(self, chunks: list[int], look: Callable[[], object]) -> None:
-        """Submit chunks, a few for each worker at a time, until each has ended in some way."""
-        left, pending, ended = iter(chunks), set[Any](), Queue[Any]()
-        try:
-            while True:
-                most = _WINDOW * max(1, sum(self._client.nthreads().values()))
-                for chunk in islice(left, max(0, most - len(pending))):
-                    future = self._client.submit(make_chunk, self._ticket, chunk, pure=False, retries=0)
-                    pending.add(future)
-                    future.add_done_callback(ended.put)
-                if not pending:
-                    return
-                look()
-                with suppress(Empty):
-                    future = ended.get(timeout=_LOOK_S)
-                    pending.discard(future)
-                    _raise_error_of(future)
-        finally:
-            self._client.cancel(list(pending), force=True)
-
-
-def _raise_error_of(future: Any) -> None:
-    """Raise what a task raised; a worker that died is no error, since the folder lacks its chunk."""
     distributed = needs("distributed", extra="cluster")
-    if future.status != "error":
-        return
-    error = future.exception()
-    if not isinstance(error, distributed.KilledWorker | distributed.comm.CommClosedError | OSError):
-        raise error
+    lost = distributed.KilledWorker, distributed.comm.CommClosedError, OSError
+    key = f"token-{os.urandom(8).hex()}"
+    ticket = ticket_of(folder, temporary_name(key), names)
+    write(folder.path / ticket.token, ticket.token.encode())
+    try:
+        _check_workers(client, folder, ticket)
+        executor = client.get_executor(pure=False, retries=0)
+
+        def capacity() -> int:
+            return _WINDOW * max(1, sum(client.nthreads().values()))
+
+        fill(lambda chunk: executor.submit(make_chunk, ticket, chunk), missing, capacity, look, lost)
+    finally:
+        for path in folder.path.glob(f".{key}.*"):
+            path.unlink(missing_ok=True)
+
+
+def ticket_of(folder: Folder, token: str, names: Named) -> Ticket:
+    """Return the ticket of a folder and of what workers may import."""
+    of_driver, figures = tuple(versions().items()), tuple(names.figures.items())
+    return Ticket(str(folder.path.absolute()), folder.digest, token, of_driver, names.scene, figures)
+
+
+def _check_workers(client: Any, folder: Folder, ticket: Ticket) -> None:
+    """Let each worker read the token and write one back, which is read here."""
+    client.wait_for_workers(1, timeout=_WAIT_S)
+    for worker, answer in client.run(_answer, ticket, on_error="return").items():
+        if isinstance(answer, BaseException):
+            why = str(answer) if isinstance(answer, RobotDynError) else f"{type(answer).__name__}: {answer}"
+            raise SweepError(f"worker {worker}: {why}")
+        if not (folder.path / answer).is_file():
+            raise SweepError(
+                f"worker {worker} writes to another folder than {folder.path}: give one that all hosts share"
+            )
 
 
 # --- in a worker
