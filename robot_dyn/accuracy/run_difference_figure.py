@@ -8,13 +8,14 @@ import numpy as np
 
 from robot_dyn.accuracy.run_difference import RunDifference
 from robot_dyn.queries.units import unit
-from robot_dyn.report.figure import Colours, ResultError, heading_room, key, legend, lines, sheet, styled
+from robot_dyn.report.figure import Colours, ResultError, key, legend, sheet, styled
 from robot_dyn.simulation.results.provenance import joint_types
+from robot_dyn.view.plots.figure import drawable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_WIDE, _PAIR, _HEAD, _FOOT, _GAP = 13.0, 3.6, 1.15, 0.75, 0.55  # [inch]: the sheet, a row of joints, above, below
+_WIDE, _PAIR, _AROUND = 13.0, 3.6, 1.5  # [inch]: the sheet, a row of joints, heading and legend
 _ACROSS, _MOST = 4, 64  # joints beside each other; that one figure shows
 
 
@@ -31,28 +32,24 @@ def draw(result: RunDifference, theme: str = "light") -> Figure:
         )
     across = 3 if len(names) in (5, 6, 9) else min(_ACROSS, len(names))
     rows = -(-len(names) // across)
-    head = _HEAD + heading_room(_WIDE, result.sentence, theme)
-    height = head + _PAIR * rows + _FOOT
-    figure, colours = sheet(_WIDE, height, result.sentence, _caption(result), theme)
-    grid = figure.add_gridspec(
-        rows, across, left=0.06, right=0.985, top=1 - head / height, bottom=_FOOT / height, wspace=0.32, hspace=0.35
-    )
+    figure, colours = sheet(_WIDE, _PAIR * rows + _AROUND, result.sentence, _caption(result), theme)
+    grid = figure.add_gridspec(rows, across)
     types = joint_types(result.runs[0])
     for i, name in enumerate(names):
-        cell = grid[divmod(i, across)].subgridspec(2, 1, hspace=0.12, height_ratios=(1.3, 1))
+        cell = grid[divmod(i, across)].subgridspec(2, 1, height_ratios=(1.3, 1))
         above = figure.add_subplot(cell[0])
         _over_each_other(above, result.runs, i, unit("q", types[i]), colours, name)
         below = figure.add_subplot(cell[1], sharex=above)
         _difference(below, result, i, unit("q", types[i]), colours)
     a, b, _, grey = (colours["lines"][k] for k in (0, 1, 2, 3))
     handles = [
-        key(lines(result.names[0]), a),
-        key(lines(result.names[1]), b, linestyle="--"),
+        key(drawable(result.names[0]), a),
+        key(drawable(result.names[1]), b, linestyle="--"),
         key("b − a", colours["ink"]),
         key("± what they part beyond", grey, linestyle=":"),
     ]
     legend(figure, handles, colours)
-    return figure
+    return figure.figure
 
 
 def _caption(result: RunDifference) -> str:
@@ -62,7 +59,7 @@ def _caption(result: RunDifference) -> str:
 
 
 def _over_each_other(axes: Any, runs: Any, i: int, of_q: str, colours: Colours, name: str) -> None:
-    styled(axes, colours, "", lines(name), f"q [{of_q}]")
+    styled(axes, colours, "", drawable(name), f"q [{of_q}]")
     for run, colour, dashes in zip(runs, colours["lines"], ("-", "--"), strict=False):
         axes.plot(run.t, _finite(run.q[:, i]), dashes, color=colour, linewidth=1.3)
     axes.tick_params(labelbottom=False)

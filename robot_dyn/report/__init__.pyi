@@ -3,12 +3,10 @@ from robot_dyn.report.environment import processor_and_versions as processor_and
 from robot_dyn.report.figure import PAGE as PAGE
 from robot_dyn.report.figure import Colours as Colours
 from robot_dyn.report.figure import ResultError as ResultError
-from robot_dyn.report.figure import heading_room as heading_room
 from robot_dyn.report.figure import ink as ink
 from robot_dyn.report.figure import inline as inline
 from robot_dyn.report.figure import key as key
 from robot_dyn.report.figure import legend as legend
-from robot_dyn.report.figure import lines as lines
 from robot_dyn.report.figure import sheet as sheet
 from robot_dyn.report.figure import styled as styled
 from robot_dyn.report.result import Result as Result

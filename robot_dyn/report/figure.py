@@ -5,18 +5,17 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping, Sequence
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.view.plots.figure import THEMES, drawable, framed
+from robot_dyn.view.plots.figure import THEMES, framed
+from robot_dyn.view.plots.sheet import headed
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
-_LETTERS = 9.5  # of a heading, in an inch
 _PART = 0.75  # of the width, on a page, which is narrower than paper
-_TOP, _LEFT, _LINE, _CAPTION = 0.15, 0.16, 0.22, 0.43  # [inch]: above and beside the heading, of its lines, below
+_PAD = 0.08  # [inch] around axes and texts
 
 Colours = Mapping[str, Any]
 
@@ -31,31 +30,23 @@ class ResultError(RobotDynError):
     """A result that cannot be written."""
 
 
-def sheet(width: float, height: float, sentence: str, caption: str, theme: str) -> tuple[Figure, Colours]:
-    """Return a figure of a size in [inch], headed by a sentence and a caption, and its colours.
+def sheet(width: float, height: float, sentence: str, caption: str, theme: str) -> tuple[SubFigure, Colours]:
+    """Return a figure of a size in [inch], headed by a sentence and a caption, without these, and its colours.
 
     For the page of a notebook, which has the sentence beside it, there is no heading.
     """
     from robot_dyn.view.plots.shown import Figure
 
-    if theme == "page":
-        return Figure(figsize=(_PART * width, height), facecolor=PAGE["paper"]), PAGE
-    colours = THEMES[theme]
-    figure = Figure(figsize=(width, height), facecolor=colours["paper"])
-    heading, left = _heading(sentence, width), _LEFT / width
-    below = _CAPTION + _LINE * heading.count("\n")
-    figure.text(left, 1 - _TOP / height, lines(heading), fontsize=12, weight="bold", va="top", **ink(colours))
-    figure.text(left, 1 - below / height, lines(caption), fontsize=8.5, va="top", linespacing=1.4, **ink(colours))
-    return figure, colours
-
-
-def heading_room(width: float, sentence: str, theme: str) -> float:
-    """Return the height in [inch] of the lines of a heading after its first one; 0 on a page, which has none."""
-    return 0.0 if theme == "page" else _LINE * _heading(sentence, width).count("\n")
-
-
-def _heading(sentence: str, width: float) -> str:
-    return fill(sentence, int(_LETTERS * width))
+    on_page = theme == "page"
+    colours = PAGE if on_page else THEMES[theme]
+    size = (_PART if on_page else 1.0) * width, height
+    figure = Figure(size, facecolor=colours["paper"], layout="constrained")
+    figure.get_layout_engine().set(w_pad=_PAD, h_pad=_PAD)
+    body = figure.subfigures()
+    if not on_page:
+        headed(figure, sentence, colours, fontsize=12, weight="bold")
+        headed(body, caption, colours, fontsize=8.5)
+    return body, colours
 
 
 def inline(figure: Figure) -> str:
@@ -89,22 +80,16 @@ def styled(axes: Any, colours: Colours, x: str, title: str, y: str = "") -> None
     axes.set_ylabel(y, fontsize=8.5, **ink(colours))
 
 
-def legend(figure: Figure, handles: Sequence[Any], colours: Colours, title: str = "") -> None:
-    """Explain the marks of a figure at its lower left."""
+def legend(figure: SubFigure, handles: Sequence[Any], colours: Colours, title: str = "") -> None:
+    """Explain the marks of a figure below it."""
     drawn = figure.legend(
-        handles=handles, title=title, ncols=4, frameon=False, fontsize=8.5, loc="lower left",
-        bbox_to_anchor=(0.03, 0.0), alignment="left",
-    )  # fmt: skip
+        handles=handles, title=title, ncols=4, frameon=False, fontsize=8.5, loc="outside lower left", alignment="left"
+    )
     drawn.get_title().set(color=colours["ink"], fontsize=8.5)
     for label in drawn.get_texts():
-        label.set(color=colours["ink"], parse_math=False)
+        label.set(**ink(colours))
 
 
 def ink(colours: Colours) -> dict[str, Any]:
     """Return how text is written."""
     return {"color": colours["ink"], "parse_math": False}
-
-
-def lines(text: str) -> str:
-    """Return lines with what the fonts of a figure lack spelled out."""
-    return "\n".join(map(drawable, text.split("\n")))

@@ -36,6 +36,11 @@ def cells(figure, symbol: str) -> list:
     return [axes for axes in figure.axes if axes.get_ylabel().startswith(f"{symbol} [")]
 
 
+def headings(figure) -> str:
+    """Texts of a figure and of its parts that are not of axes."""
+    return " ".join([*(text.get_text() for text in figure.texts), *map(headings, figure.subfigs)])
+
+
 def lines(axes, label: str) -> list:
     return [line for line in axes.lines if line.get_label() == label]
 

@@ -12,7 +12,7 @@ from robot_dyn import plot, save_plot
 from robot_dyn.foundations import QueryError
 from robot_dyn.view import PlotError
 from robot_dyn.view.plots.batch import BATCH_PLOTS, LEVELS
-from tests.view.plotted import cart_pole, lines
+from tests.view.plotted import cart_pole, headings, lines
 
 COUNT, LOST = 40, [5, 9, 30]
 ARM, Q = rd.load("planar_2r"), np.array([0.4, -0.7])
@@ -76,7 +76,7 @@ def test_runs_that_diverged_are_drawn_and_counted_in_each_part(some_lost) -> Non
         for line, run in zip(drawn, LOST, strict=True):
             np.testing.assert_array_equal(line.get_ydata(), some_lost.q[run, :, i])
         assert len(lines(axes, "_end")) == 3 and np.abs(axes.get_ylim()).max() < 10
-    assert any("3 of 40 diverged" in text.get_text() for text in figure.texts)
+    assert "3 of 40 diverged" in headings(figure)
     (axes,) = plot(some_lost, "outcomes").axes
     assert {
         label.get_text(): bar.get_height() for label, bar in zip(axes.get_xticklabels(), axes.patches, strict=True)
@@ -120,8 +120,7 @@ def test_columns_are_those_of_the_table_with_their_units(runs) -> None:
 def test_all_parts_fit_a_page_and_are_named(some_lost, tmp_path) -> None:
     whole = plot(some_lost)
     assert whole.get_size_inches()[1] * 25.4 <= 297
-    words = " ".join(text.get_text() for text in whole.texts)
-    assert all(each in words for each in ("Positions", "Tracking error", "Outcomes", "Histogram", " over "))
+    assert all(each in headings(whole) for each in ("Positions", "Tracking error", "Outcomes", "Histogram", " over "))
     for name in BATCH_PLOTS:
         for suffix in (".png", ".svg", ".pdf"):
             assert (
@@ -153,5 +152,5 @@ def test_what_was_not_recorded_is_refused_by_name_and_left_out_of_the_whole(runs
     for name in ("fan", "tracking"):
         with pytest.raises(PlotError, match="positions"):
             plot(bare, name)
-    words = " ".join(text.get_text() for text in plot(bare).texts)
+    words = headings(plot(bare))
     assert "Outcomes" in words and "Positions" not in words

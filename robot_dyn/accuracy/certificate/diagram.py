@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.accuracy.certificate.certificate import DECIMALS, Certificate, Held
-from robot_dyn.report.figure import Colours, ResultError, key, legend, lines, sheet, styled
+from robot_dyn.report.figure import Colours, ResultError, key, legend, sheet, styled
+from robot_dyn.view.plots.figure import drawable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,20 +25,19 @@ def draw(result: Certificate, theme: str = "light") -> Figure:
         raise ResultError("no digits were counted, so there is nothing to draw; look at left_out")
     figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), theme)
     hues = {name: colours["lines"][k % len(colours["lines"])] for k, name in enumerate(result.implementations)}
-    grid = figure.add_gridspec(1, len(result.quantities), left=0.04, right=0.99, top=0.76, bottom=0.2, wspace=0.16)
-    for k, quantity in enumerate(result.quantities):
-        axes = figure.add_subplot(grid[0, k])
+    every = figure.subplots(1, len(result.quantities), squeeze=False)[0]
+    for k, (quantity, axes) in enumerate(zip(result.quantities, every, strict=True)):
         axes.set(xscale="log", ylim=(0, _TOP), yticks=range(0, 21, 5))
         styled(axes, colours, "time of a query [µs]", quantity.replace("_", " "), "" if k else "digits")
         for each in result.digits:
             if each.quantity == quantity:
                 _mark(axes, each, hues[each.implementation], colours)
         axes.axhline(result.decimals[quantity], color=colours["ink"], linewidth=0.9, linestyle=(0, (6, 3)))
-    handles = [key(lines(name), hue, marker="o", linewidth=3) for name, hue in hues.items()]
+    handles = [key(drawable(name), hue, marker="o", linewidth=3) for name, hue in hues.items()]
     handles.append(key(DECIMALS, colours["ink"], linestyle="--"))
     hollow = not all(each.repeatable for each in result.digits)
     legend(figure, handles, colours, "hollow: a time that did not repeat to 5 %" if hollow else "")
-    return figure
+    return figure.figure
 
 
 def _caption(result: Certificate) -> str:

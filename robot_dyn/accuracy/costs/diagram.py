@@ -8,7 +8,8 @@ from robot_dyn.accuracy.costs.ab_comparison import ABComparison
 from robot_dyn.accuracy.costs.cost import Cost
 from robot_dyn.accuracy.costs.step_cost import EVERYTHING
 from robot_dyn.queries.units import format_duration
-from robot_dyn.report.figure import Colours, ResultError, ink, lines, programs, sheet, styled
+from robot_dyn.report.figure import Colours, ResultError, ink, programs, sheet, styled
+from robot_dyn.view.plots.figure import drawable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,14 +31,12 @@ def draw(result: Cost, theme: str = "light") -> Figure:
     others = [each for each in result.alternatives if each.group != "parts"]
     height = _HEIGHT + _ROW * max(len(parts), len(others))
     figure, colours = sheet(_WIDTH, height, result.sentence, _caption(result), theme)
-    grid = figure.add_gridspec(
-        1, 2, left=0.125, right=0.975, top=1 - 1.3 / height, bottom=0.55 / height, wspace=0.72, width_ratios=(1, 1.1)
-    )
+    grid = figure.add_gridspec(1, 2)
     if parts:
         _draw_parts(figure.add_subplot(grid[0]), parts, colours)
     if others:
         _draw_ratios(figure.add_subplot(grid[1]), others, colours)
-    return figure
+    return figure.figure
 
 
 def _caption(result: Cost) -> str:
@@ -103,7 +102,7 @@ def _draw_ratios(axes: Any, others: list[ABComparison], colours: Colours) -> Non
 
 def _named(axes: Any, names: list[str], colours: Colours) -> None:
     """Rows from above, by name."""
-    axes.set_yticks(range(len(names)), [lines(name) for name in names])
+    axes.set_yticks(range(len(names)), [drawable(name) for name in names])
     axes.tick_params(axis="y", length=0)
     for label in axes.get_yticklabels():
         label.set(color=colours["ink"], fontsize=8, parse_math=False)

@@ -38,9 +38,7 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     if not any(np.isfinite(p.error) for each in result.ladders for p in each.points):
         raise ResultError("no run ended, so there is nothing to draw; look at left_out")
     figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), theme)
-    grid = figure.add_gridspec(
-        3, 2, width_ratios=(2.1, 1), left=0.065, right=0.985, top=0.845, bottom=0.195, hspace=0.62, wspace=0.17
-    )
+    grid = figure.add_gridspec(3, 2, width_ratios=(2.1, 1))
     first = [each for each in result.ladders if each.peer or (each.events and each.engine != INTERPRETED)]
     first = first if any(not each.peer for each in first) else list(result.ladders)
     first = most_precise(first)
@@ -73,7 +71,7 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     for axes in (small[0], small[2]):
         axes.set_ylim(result.reference.error / 10, _MOST_ERROR)
         _believed(axes, result, colours)
-    return figure
+    return figure.figure
 
 
 def most_precise(ladders: list[ToleranceLadder]) -> list[ToleranceLadder]:

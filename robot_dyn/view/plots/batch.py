@@ -58,11 +58,6 @@ class Fan:
     x: str = "t [s]"
     note: str = ""
 
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Of the median, the bands, and what diverged."""
-        return ("median", "25 to 75 %", "5 to 95 %") + (f"diverged ({len(self.lost)})",) * bool(len(self.lost))
-
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """Draw them; what diverged leaves the scale of the others."""
         colours = style.colours["lines"]
@@ -76,7 +71,7 @@ class Fan:
         low, high = axes.get_ylim()
         for k, line in enumerate(self.lost[:_MOST_LINES]):
             style_of = {"color": colours[_LOST], "linewidth": 0.6 * style.line, "linestyle": (0, (4, 2))}
-            axes.plot(self.t, line, label="_diverged" if k else self.labels[-1], **style_of)
+            axes.plot(self.t, line, label="_diverged" if k else f"diverged ({len(self.lost)})", **style_of)
             if len(last := np.flatnonzero(np.isfinite(line))):
                 end = self.t[last[-1]], np.clip(line[last[-1]], low, high)
                 axes.plot(*end, "x", color=colours[_LOST], markersize=4, clip_on=False, label="_end")
@@ -97,7 +92,6 @@ class Bars:
     lost: int = 0
     y: str = "runs [1]"
     note: str = ""
-    labels: tuple[str, ...] = ()
 
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """Draw bars, with the count where they have names, and of what diverged."""
@@ -140,11 +134,6 @@ class Points:
     lost: np.ndarray
     note: str = ""
 
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Two, where runs diverged."""
-        return ("run", f"diverged ({self.lost.sum()})") if self.lost.any() else ("run",)
-
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """Draw them."""
         colours, held = style.colours["lines"], ~self.lost
@@ -155,8 +144,9 @@ class Points:
         scale(axes, "x", self.at, np.inf, False, False)
         if self.lost.any():
             edge = {"transform": axes.get_xaxis_transform(), "clip_on": False} | dots | {"markersize": 4}
-            top = np.ones(int(self.lost.sum()))
-            axes.plot(self.at[self.lost], top, marker="x", color=colours[_LOST], label=self.labels[1], **edge)
+            many = int(self.lost.sum())
+            mark = {"marker": "x", "color": colours[_LOST], "label": f"diverged ({many})"}
+            axes.plot(self.at[self.lost], np.ones(many), **mark, **edge)
 
 
 def fan(view: BatchView) -> list[Panel]:

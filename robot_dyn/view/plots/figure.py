@@ -96,11 +96,6 @@ class Axes(Protocol):
         """Name of the vertical axis, with its unit."""
         ...
 
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Labels of the legend."""
-        ...
-
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """Draw on axes of Matplotlib; `diverged` says that values may have grown without bound."""
 
@@ -125,11 +120,6 @@ class Cell:
     note: str = ""
     marks: tuple[float, ...] = ()
     rests: tuple[Rest, ...] = ()
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Of the curves."""
-        return tuple(curve.label for curve in self.curves)
 
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """The curves, limits and scales."""
@@ -264,11 +254,11 @@ def shortened(name: str, most: int) -> str:
 
 
 def drawable(name: str) -> str:
-    """The text with what the font lacks spelled by its code point.
+    """The text, of one or several lines, with what the font lacks spelled by its code point.
 
     Otherwise all of it would be the same empty box.
     """
     from matplotlib.font_manager import FontProperties, findfont, get_font
 
     font = get_font(findfont(FontProperties()))
-    return "".join(c if font.get_char_index(ord(c)) else f"\\u{ord(c):04x}" for c in name)
+    return "".join(c if c == "\n" or font.get_char_index(ord(c)) else f"\\u{ord(c):04x}" for c in name)

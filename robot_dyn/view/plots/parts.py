@@ -111,7 +111,6 @@ def torques(view: View) -> list[Panel]:
     if np.isnan(view.run.u).all():
         raise PlotError("the torques of the run were not recorded; add u to record of rollouts")
     cells = [replace(_torque(view, i, "t [s]"), title=view.run.joint_names[i]) for i in view.joints]
-    cells = [replace(each, note=f", {each.note}" if each.note else "") for each in cells]
     return [Panel(f"Actuation{_limits(view, u=view.efforts)}", _grid(view, cells), _HIGH_MM)]
 
 
@@ -208,8 +207,9 @@ def _torque(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
 
 def _off(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
     off = np.zeros_like(view.run.t) if view.run.deviation is None else view.run.deviation[:, i]
-    curves = (Curve("error", view.run.t, off),)
-    return Cell("", x, f"q − q_d [{view.unit('q', i)}]", curves, note=f"rms {_rms(off):.2e} {view.unit('q', i)}")
+    curves, of_q = (Curve("error", view.run.t, off),), view.unit("q", i)
+    y = f"q − q_d\n[{of_q}]" if " or " in of_q else f"q − q_d [{of_q}]"  # a row is not as high as both units are long
+    return Cell("", x, y, curves, note=f"rms {_rms(off):.2e} {of_q}")
 
 
 def _ledger(view: View) -> list[Cell]:

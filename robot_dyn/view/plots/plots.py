@@ -95,7 +95,10 @@ def plot(
     view = _view(run, shown, limits, width)
     with np.errstate(all="ignore"):  # the last samples of a run that diverged may overflow
         panels = [panel for name in parts or ("overview",) for panel in PLOTS[name](view)]
-        return draw(panels, _opening(run, look), look, width, run.outcome.ending is Ending.DIVERGED)
+        end = run.outcome
+        title = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
+        remarks = [text for text in (end.advice, *remark_lines(run.remarks)) if text]
+        return draw(panels, title, remarks, look, width, end.ending is Ending.DIVERGED)
 
 
 def save_plot(
@@ -138,10 +141,9 @@ def _of_batch(view: BatchView, parts: list[str], style: Style) -> Figure:
             except PlotError:
                 if parts:
                     raise
-    ink, orange = style.colours["ink"], style.colours["lines"][1]
     first, *more = view.runs.summary.splitlines()
-    opening = [(f"{view.runs.about.get('robot', 'runs')}: {first}", ink), *((text, orange) for text in more[:-1])]
-    return draw(panels, opening, style, view.width, bool(view.runs.diverged.any()))
+    title = f"{view.runs.about.get('robot', 'runs')}: {first}"
+    return draw(panels, title, more[:-1], style, view.width, bool(view.runs.diverged.any()))
 
 
 def _names(option: str, given: Any, of: str) -> tuple[str, ...]:
@@ -167,16 +169,6 @@ def _width(width_mm: float) -> float:
     if width > MOST_MM:
         raise QueryError(f"width_mm must be at most {MOST_MM:g}, got {width:g}; it is in millimetres")
     return width
-
-
-def _opening(run: TrajectoryData, style: Style) -> list[tuple[str, str]]:
-    """Lines above the panels: what it is and how it ended, and the remarks in colour."""
-    end = run.outcome
-    title = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
-    ink, orange = style.colours["ink"], style.colours["lines"][1]
-    return [(text, ink) for text in (title, end.advice) if text] + [
-        (text, orange) for text in remark_lines(run.remarks)
-    ]
 
 
 def _columns(run: TrajectoryData | RolloutsData, shown: Collection[str]) -> tuple[int, ...]:

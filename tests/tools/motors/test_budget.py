@@ -555,5 +555,6 @@ def test_a_verdict_of_many_lines_stands_above_the_axes_of_its_figure() -> None:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     renderer = canvas.get_renderer()
-    bottom = min(text.get_window_extent(renderer).y0 for text in figure.texts)
+    headings = [*figure.texts, *figure.subfigs[0].texts]
+    bottom = min(text.get_window_extent(renderer).y0 for text in headings)
     assert max(axes.get_tightbbox(renderer).y1 for axes in figure.axes) < bottom

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_dyn.queries import of_joint
-from robot_dyn.report import Colours, ResultError, heading_room, ink, key, legend, lines, sheet, styled
+from robot_dyn.report import Colours, ResultError, ink, key, legend, sheet, styled
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget
-from robot_dyn.view import NEAR, shortened
+from robot_dyn.view import NEAR, drawable, shortened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_WIDE, _ROW, _CELL, _HEAD, _GAP, _FOOT = 13.0, 0.42, 2.3, 1.35, 0.75, 1.15  # [inch]
+_WIDE, _ROW, _CELL, _AROUND = 13.0, 0.42, 2.3, 1.9  # [inch]
 _ACROSS, _MOST = 3, 64  # joints beside each other; that one figure shows
 _LETTERS = 24  # of the name of a joint beside bars
 _BAR = 0.27
@@ -31,26 +31,21 @@ def draw(result: MotorBudget, theme: str = "light") -> Figure:
     """
     if not 0 < len(result.joints) <= _MOST:
         raise ResultError(f"a budget of {len(result.joints)} joints cannot be drawn, up to {_MOST} can")
-    head = _HEAD + heading_room(_WIDE, result.sentence, theme)
     rows, above = -(-len(result.joints) // _ACROSS), _ROW * len(result.joints) + 0.5
-    height = head + above + _GAP + _CELL * rows + _FOOT
+    height = above + _CELL * rows + _AROUND
     figure, colours = sheet(_WIDE, height, result.sentence, f"Limits: {result.limits}; {result.resolution}.", theme)
-    top = 1 - head / height
-    bars = figure.add_gridspec(1, 2, left=0.14, right=0.985, top=top, bottom=top - above / height, wspace=0.05)
+    whole = figure.add_gridspec(2, 1, height_ratios=(above, _CELL * rows))
+    bars, grid = whole[0].subgridspec(1, 2), whole[1].subgridspec(rows, _ACROSS)
     _used(figure.add_subplot(bars[0]), result, colours)
     _by_cause(figure.add_subplot(bars[1]), result, colours)
-    below = top - (above + _GAP) / height
-    grid = figure.add_gridspec(
-        rows, _ACROSS, left=0.055, right=0.985, top=below, bottom=_FOOT / height, wspace=0.26, hspace=0.6
-    )
     for i, joint in enumerate(result.joints):
         _over_time(figure.add_subplot(grid[divmod(i, _ACROSS)]), result, i, joint, colours)
     legend(figure, _handles(result, colours), colours)
-    return figure
+    return figure.figure
 
 
 def _names(result: MotorBudget) -> list[str]:
-    return [lines(shortened(each.joint, _LETTERS)) for each in result.joints]
+    return [drawable(shortened(each.joint, _LETTERS)) for each in result.joints]
 
 
 def _used(axes: Any, result: MotorBudget, colours: Colours) -> None:
@@ -99,7 +94,7 @@ def _over_time(axes: Any, result: MotorBudget, i: int, joint: JointBudget, colou
     rows = np.arange(len(split.t)) if result.demand.cells is None else np.flatnonzero(result.demand.weights == 0)
     limit = f" of {joint.peak_limit:.4g}" if joint.peak_limit < inf else ""
     title = f"{shortened(joint.joint, _LETTERS)}: {joint.peak:.4g}{limit} {unit}"
-    styled(axes, colours, "t [s]", lines(title), f"τ [{unit}]")
+    styled(axes, colours, "t [s]", drawable(title), f"τ [{unit}]")
     for k, torque in enumerate(split.torques.values()):
         axes.plot(split.t[rows], torque[rows, i], color=_colour(colours, k), linewidth=0.9)
     axes.plot(split.t[rows], split.tau[rows, i], color=colours["ink"], linewidth=1.5)
@@ -121,7 +116,7 @@ def _handles(result: MotorBudget, colours: Colours) -> list[Any]:
     causes = result.joints[0].of_rms
     return [
         key("τ, and its peak", colours["ink"], marker="o", markersize=4),
-        *(key(lines(name), _colour(colours, k)) for k, name in enumerate(causes)),
+        *(key(drawable(name), _colour(colours, k)) for k, name in enumerate(causes)),
         key("± peak torque, where it is near", colours["ink"], linestyle="--", linewidth=0.9),
         *(key(f"used of {KINDS[kind]}", colours["ink"], linewidth=5, alpha=x) for kind, x in _SHADES.items()),
     ]
