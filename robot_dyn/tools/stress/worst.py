@@ -1,8 +1,8 @@
 """The configurations at which an arm is hardest: κ of M, the fastest motion, gravity torque over effort limit.
 
-Each is searched for from the worst of random states on. A greedy search then finds a
-state with fewer entries that are not zero and fewer digits, which is nearly as bad. [Zeller and Hildebrandt, Simplifying
-and isolating failure-inducing input, IEEE TSE 28, 2002]
+Each is searched for from the worst of random states on. A greedy search then finds a state with fewer entries that are
+not zero and fewer digits, which is nearly as bad. [Zeller and Hildebrandt, Simplifying and isolating failure-inducing
+input, IEEE TSE 28, 2002]
 """
 
 from __future__ import annotations
