@@ -33,4 +33,4 @@ from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError as PeerError
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import bare_urdf as bare_urdf
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import desired_motion as desired_motion
-from robot_dyn.accuracy.work_precision_diagram.peers.mujoco_model import mujoco_model as mujoco_model
+from robot_dyn.accuracy.work_precision_diagram.peers.mujoco import mujoco_model as mujoco_model

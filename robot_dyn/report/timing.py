@@ -1,13 +1,40 @@
-"""Times of calls that take turns, so that changes of the machine's speed affect all of them."""
+"""Runs timed in turns, so that changes of the machine's speed affect all of them."""
 
 from __future__ import annotations
 
 import timeit
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from time import perf_counter
+from typing import final
+
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.report.time_budget import Budget, OvertimeError
 
 TURNS = 5
 _AGREE = 1.05  # ratio of the two least times
+_BRIEF_S, _OFTEN = 1e-3, 20  # shorter runs settle after so many turns: after five, some are 10 % off
+
+
+@final
+@dataclass(eq=False)
+class Timed:
+    """A run and its times.
+
+    Attributes:
+        name: Name in reports.
+        run: Runs it once and returns the time it took, in [s].
+        times: Times of its turns, in [s].
+    """
+
+    name: str
+    run: Callable[[], float]
+    times: list[float] = field(default_factory=list)
+
+    @property
+    def settled(self) -> bool:
+        """Whether more turns would not change its least time."""
+        return repeatable(self.times) and (len(self.times) >= _OFTEN or self.times[0] >= _BRIEF_S)
 
 
 def repeatable(times: Sequence[float]) -> bool:
@@ -27,12 +54,48 @@ def seconds(call: Callable[[], object], at_least: float, clock: Callable[[], flo
     return taken / number
 
 
+def take_turns(
+    runs: Iterable[Timed], turns: int, budget: Budget, kept_s: float = 0.0, until_settled: bool = False
+) -> dict[str, RobotDynError]:
+    """Time runs one after the other, `turns` times at most; return the errors of those that fail, by name.
+
+    The first run of each, which compiles and loads, is not counted, and is apart from the budget.
+
+    Args:
+        runs: The runs.
+        turns: Number of turns.
+        budget: Of the time.
+        kept_s: Time of the budget that is left over, in [s].
+        until_settled: Whether a run whose time is settled is not run again.
+    """
+    left, failed = list(runs), dict[str, RobotDynError]()
+    for turn in range(turns):
+        for timed in tuple(left):
+            if budget.left <= kept_s:
+                return failed
+            if until_settled and timed.settled:
+                continue
+            budget.report(f"round {turn + 1}: {timed.name}")
+            try:
+                if not timed.times:
+                    with budget.apart():
+                        timed.run()
+                timed.times.append(timed.run())
+            except OvertimeError:
+                continue
+            except RobotDynError as error:
+                failed[timed.name] = error
+                left.remove(timed)
+    return failed
+
+
 def in_turns(calls: Mapping[str, Callable[[], object]], repeats: int, at_least: float) -> dict[str, list[float]]:
-    """Times of each call in [s], over so many turns; the first call of each is not counted."""
-    times: dict[str, list[float]] = {name: [] for name in calls}
-    for call in calls.values():
-        call()
-    for _ in range(repeats):
-        for name, call in calls.items():
-            times[name].append(seconds(call, at_least))
-    return times
+    """Times of each call in [s], over loops of about `at_least` seconds in so many turns.
+
+    Raises:
+        RobotDynError: If a call does.
+    """
+    runs = [Timed(name, lambda call=call: seconds(call, at_least)) for name, call in calls.items()]
+    for error in take_turns(runs, repeats, Budget()).values():
+        raise error
+    return {timed.name: timed.times for timed in runs}

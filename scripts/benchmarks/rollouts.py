@@ -13,7 +13,7 @@ import numpy as np
 
 import robot_dyn as rd
 from benchmarks.measure import BATCH, READY, Effort, arms, row, seconds, stick_and_stop, table
-from robot_dyn.accuracy.work_precision_diagram.peers.mujoco_model import STEP_S, mujoco_model
+from robot_dyn.accuracy.work_precision_diagram.peers.mujoco import STEP_S, mujoco_model
 
 mujoco: Any = import_module("mujoco")
 mujoco_rollout: Any = import_module("mujoco.rollout")

@@ -16,7 +16,7 @@ import numpy as np
 
 import robot_dyn as rd
 from benchmarks.measure import Effort, arms, row, stick_and_stop, table
-from robot_dyn.accuracy.work_precision_diagram.peers.mujoco_model import mujoco_model
+from robot_dyn.accuracy.work_precision_diagram.peers.mujoco import mujoco_model
 
 LEVELS, DAMPING, DURATION_S, SAMPLE_S = np.array([3, 6, 2, 4, 1, 0.8, 0.3]), 0.1, 2.0, 8e-3
 LOWER, UPPER = np.array([-1, -1.2, -1, -2.5, -1, 0.6, -1]), np.array([1, 0.4, 1, -1, 1, 2.2, 1])

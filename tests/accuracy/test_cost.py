@@ -15,7 +15,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn import RobotDynError
 from robot_dyn.accuracy.costs import step_cost
-from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Pair, Version, Way, in_turns
+from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Pair, Version, Way, take_turns
 from robot_dyn.accuracy.costs.cost import _cells
 from robot_dyn.accuracy.costs.query_cost import QueryCost
 from robot_dyn.codegen import program_of
@@ -198,7 +198,7 @@ def test_times_are_the_least_of_turns_and_what_fails_is_left_out() -> None:
 
     pair = Pair("algorithms", "sum", "state", runs("a", 5.0, 1.0, 3.0), runs("b", 1.0, 1.0, 1.0).named("b", 2))
     bad = Pair("algorithms", "bad", "state", Way("x", 1, broken), Way("y", 1, broken))
-    assert in_turns([pair, bad], Budget(1e3), 3) == ["time of bad, x: no such code", "time of bad, y: no such code"]
+    assert take_turns([pair, bad], Budget(1e3), 3) == ["time of bad, x: no such code", "time of bad, y: no such code"]
     found = pair.alternative()
     assert found.first == Version("a", 10, 1.0, 3, False)
     assert found.second == Version("b", 20, 2.0, 3, False)

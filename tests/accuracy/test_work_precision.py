@@ -31,10 +31,9 @@ from robot_dyn.integrate import ButcherTableau, ExplicitRungeKutta
 from robot_dyn.queries import format_duration
 from robot_dyn.report import Budget
 from robot_dyn.report.time_budget import Limit
+from robot_dyn.report.timing import Timed
 from robot_dyn.scene import parse_scene, starter
 from tests.long import long
-
-UNTIL_DONE = Limit(math.inf)
 
 
 def swing(duration_s: float = 0.3) -> rd.Setup:
@@ -52,8 +51,7 @@ def ladder(candidate: MethodUnderTest, truth: Reference, first: int, last: int) 
     """The rungs from `first` to `last`, whatever time they take."""
     walk = Walk(candidate)
     for setting in islice(candidate.settings(), first, last):
-        run = candidate.run(setting, UNTIL_DONE)
-        walk.rungs.append(Rung(setting, run, truth.distance(run), [run.time_s]))
+        walk.add(setting, truth, math.inf)
     return walk.ladder(truth.error)
 
 
@@ -191,7 +189,8 @@ def test_a_time_is_repeatable_if_the_two_least_of_five_turns_agree_to_five_perce
 ) -> None:
     setup, exact = smooth
     method = own(setup, rd.integrate.method("rk4"), "interpreted", True)
-    (point,) = Walk(method, [Rung(0.1, method.run(0.1, UNTIL_DONE), 1e-6, times)]).ladder(exact.error).points
+    run = method.run(0.1, Limit(math.inf))
+    (point,) = Walk(method, [Rung(0.1, run, 1e-6, Timed("rk4", float, times))]).ladder(exact.error).points
     assert (point.time_s, point.repeats, point.repeatable) == (min(times), len(times), repeatable)
 
 

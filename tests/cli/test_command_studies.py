@@ -98,8 +98,8 @@ study._walk = lambda *given: (work(*given), tell())[0]
 """,
     "cost": """
 from robot_dyn.accuracy.costs import cost as study
-work = study.in_turns
-study.in_turns = lambda *given: (tell(), work(*given))[1]
+work = study.take_turns
+study.take_turns = lambda *given: (tell(), work(*given))[1]
 """,
 }
 

@@ -12,10 +12,10 @@ from typing import final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.result import reported
+from robot_dyn.report import timing
 from robot_dyn.report.time_budget import Budget
-from robot_dyn.report.timing import repeatable
+from robot_dyn.report.timing import Timed, repeatable
 
 _QUARTILES = (25, 75)
 
@@ -137,28 +137,13 @@ class Pair:
         )  # fmt: skip
 
 
-def in_turns(pairs: Iterable[Pair], budget: Budget, repeats: int) -> list[str]:
-    """Time all ways so often at most, one after the other, and say which were not.
-
-    What the first run of each compiles or loads is apart from the budget.
-    """
-    ways: dict[int, tuple[str, Way]] = {}  # by what they share
+def take_turns(pairs: Iterable[Pair], budget: Budget, repeats: int) -> list[str]:
+    """Time all ways so often at most, one after the other, and return which were not timed, with the reason."""
+    runs: dict[int, Timed] = {}  # by the times that ways share
     for pair in pairs:
         for way in (pair.first, pair.second):
-            ways.setdefault(id(way.times), (f"{pair.what}, {way.name}", way))
-    left_out: list[str] = []
-    for k in range(repeats):
-        for key, (name, way) in list(ways.items()):
-            if budget.left <= 0:
-                untimed = [name for name, way in ways.values() if not way.times]
-                return left_out + [f"time of {each}: the budget of {budget.seconds:g} s ended" for each in untimed]
-            budget.report(f"round {k + 1}: {name}")
-            try:
-                if not k:
-                    with budget.apart():
-                        way.run()
-                way.times.append(way.run())
-            except RobotDynError as error:
-                left_out.append(f"time of {name}: {error}")
-                del ways[key]
-    return left_out
+            runs.setdefault(id(way.times), Timed(f"{pair.what}, {way.name}", way.run, way.times))
+    failed = timing.take_turns(runs.values(), repeats, budget)
+    ended = f"the budget of {budget.seconds:g} s ended"
+    untimed = {each.name: ended for each in runs.values() if not each.times and budget.left <= 0}
+    return [f"time of {name}: {why}" for name, why in {**untimed, **failed}.items()]

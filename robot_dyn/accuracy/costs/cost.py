@@ -8,7 +8,7 @@ from math import isfinite
 from typing import Any, ClassVar, final
 
 from robot_dyn.accuracy.costs import step_cost
-from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Pair, Version, in_turns
+from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Pair, Version, take_turns
 from robot_dyn.accuracy.costs.query_cost import QueryCost
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.answer import Block, Table
@@ -155,7 +155,7 @@ def cost(
                     pairs += make()
                 except (ImportError, RobotDynError) as error:
                     left_out.append(f"{name}: {error}")
-        left_out += in_turns(pairs, budget, repeats)
+        left_out += take_turns(pairs, budget, repeats)
     except KeyboardInterrupt:
         interrupted = True
         left_out.append("what was to come when it was interrupted")

@@ -35,42 +35,37 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     Raises:
         ResultError: If no run finished.
     """
-    if not any(np.isfinite(p.error) for each in result.ladders for p in each.points):
+    if not any(np.isfinite(p.error) for ladder in result.ladders for p in ladder.points):
         raise ResultError("no run ended, so there is nothing to draw; look at left_out")
     figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), theme)
     grid = figure.add_gridspec(3, 2, width_ratios=(2.1, 1))
-    first = [each for each in result.ladders if each.peer or (each.events and each.engine != INTERPRETED)]
-    first = first if any(not each.peer for each in first) else list(result.ladders)
-    first = most_precise(first)
-    own = [each for each in first if not each.peer]
-    slow = [each for each in result.ladders if each.engine == INTERPRETED and each not in first]
-    names = {each.method for each in first}
+    first = [ladder for ladder in result.ladders if ladder.peer or (ladder.events and ladder.engine != INTERPRETED)]
+    first = most_precise(first if any(not ladder.peer for ladder in first) else list(result.ladders))
+    ours = [ladder for ladder in first if not ladder.peer]
+    slow = [ladder for ladder in result.ladders if ladder.engine == INTERPRETED and ladder not in first]
+    names = {ladder.method for ladder in first}
     without = [each for each in result.ladders if not each.events and not each.peer and each.method in names]
-    main = figure.add_subplot(grid[:, 0])
-    _axes(main, result, colours, "time of the run [ms]", "Error over time: lower left is better")
+    both = first + without
+    main = _panel(figure, grid[:, 0], result, colours, "time of the run [ms]", "Error over time: lower left is better")
     _front(main, result, colours)
-    for each in first + without:
-        _curve(main, each, colours, _ms, _error, 1.0 if each.events else 0.9, dashed=not each.events)
-    times = [_ms(p) for each in first + without for p in _shown(each)]
-    main.set(xlim=(min(times) / 1.5, max(times) * 1.5), ylim=(result.reference.error / 10, _MOST_ERROR))
-    _believed(main, result, colours)
-    _legend(figure, first, without, colours)
-    small = [figure.add_subplot(grid[k, 1]) for k in range(3)]
-    _axes(small[0], result, colours, "evaluations of the equation of motion", "Error over evaluations")
-    for each in [each for each in first + without if any(p.evaluations for p in each.points)]:
-        _curve(small[0], each, colours, lambda p: p.evaluations, _error, 0.6, dashed=not each.events)
-    _axes(small[1], result, colours, "error of q", "Energy residual, as a part of what was exchanged")
-    for each in own:
-        _curve(small[1], each, colours, _error, lambda p: p.energy, 0.6)
-    small[1].set_ylabel("residual")
-    small[1].set_xlim(_MOST_ERROR, result.reference.error / 3)
-    words = "Error over time, interpreted [ms]" if slow else "Error over steps"
-    _axes(small[2], result, colours, "time [ms]" if slow else "steps", words)
-    for each in slow or own:
-        _curve(small[2], each, colours, _ms if slow else _steps, _error, 0.6)
-    for axes in (small[0], small[2]):
+    _curves(main, both, colours, _ms, _error, 1.0)
+    times = [_ms(p) for ladder in both for p in _shown(ladder)]
+    main.set_xlim(min(times) / 1.5, max(times) * 1.5)
+    x, title = "evaluations of the equation of motion", "Error over evaluations"
+    evaluations = _panel(figure, grid[0, 1], result, colours, x, title)
+    counted = [ladder for ladder in both if any(p.evaluations for p in ladder.points)]
+    _curves(evaluations, counted, colours, lambda p: p.evaluations, _error)
+    title = "Energy residual, as a part of what was exchanged"
+    energy = _panel(figure, grid[1, 1], result, colours, "error of q", title)
+    _curves(energy, ours, colours, _error, lambda p: p.energy)
+    energy.set(ylabel="residual", xlim=(_MOST_ERROR, result.reference.error / 3))
+    x, title = ("time [ms]", "Error over time, interpreted [ms]") if slow else ("steps", "Error over steps")
+    other = _panel(figure, grid[2, 1], result, colours, x, title)
+    _curves(other, slow or ours, colours, _ms if slow else _steps, _error)
+    for axes in (main, evaluations, other):
         axes.set_ylim(result.reference.error / 10, _MOST_ERROR)
         _believed(axes, result, colours)
+    _legend(figure, first, without, colours)
     return figure.figure
 
 
@@ -82,9 +77,9 @@ def most_precise(ladders: list[ToleranceLadder]) -> list[ToleranceLadder]:
         return np.inf if price is None else price.value
 
     by_time = sorted(ladders, key=soon)
-    first = {program_of(each): each for each in reversed(by_time)}.values()
-    chosen = [*first, *(each for each in by_time if not any(each is one for one in first))][:_MOST_METHODS]
-    return [each for each in ladders if any(each is one for one in chosen)]
+    soonest = {program_of(ladder): ladder for ladder in reversed(by_time)}.values()
+    chosen = sorted(by_time, key=lambda ladder: ladder not in soonest)[:_MOST_METHODS]
+    return [ladder for ladder in ladders if ladder in chosen]
 
 
 def _ms(p: Point) -> float:
@@ -115,31 +110,34 @@ def _shown(ladder: ToleranceLadder) -> list[Point]:
     return [p for p in ladder.points if p.error < _MOST_ERROR]
 
 
-def _axes(axes: Any, result: WorkPrecision, colours: Colours, x: str, title: str) -> None:
+def _panel(figure: Any, cell: Any, result: WorkPrecision, colours: Colours, x: str, title: str) -> Any:
+    """Axes with logarithmic scales."""
     from matplotlib.ticker import NullFormatter
 
+    axes: Any = figure.add_subplot(cell)
     axes.set(xscale="log", yscale="log")
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.yaxis.set_minor_formatter(NullFormatter())
     styled(axes, colours, x, title, f"error of q [{result.unit}]")
+    return axes
 
 
-def _curve(
-    axes: Any, ladder: ToleranceLadder, colours: Colours, x: Callable[[Point], Any], y: Callable[[Point], float],
-    size: float, dashed: bool = False,
+def _curves(
+    axes: Any, ladders: list[ToleranceLadder], colours: Colours, x: Callable[[Point], Any],
+    y: Callable[[Point], float], size: float = 0.6,
 ) -> None:  # fmt: skip
-    """Draw the runs of a ladder, with hollow markers for those without a believed error or a repeatable time."""
-    colour, marker = _look(ladder, colours)
-    points = [p for p in _shown(ladder) if y(p) > 0]
-    style = "--" if ladder.peer else ":" if dashed else "-"
-    bold = 1.9 if ladder.method in ("DOP853", "Rosenbrock") else 1.1
-    xs, ys = [x(p) for p in points], [y(p) for p in points]
-    axes.plot(xs, ys, style, color=colour, linewidth=size * bold)
-    for measured, face in ((True, colour), (False, colours["paper"])):
-        at = [k for k, p in enumerate(points) if (p.believed and p.repeatable) is measured]
-        shape = {"marker": marker, "s": 30 * size**2, "color": colour, "zorder": 3, "linewidths": 0.9}
-        faced = {} if marker in "x+1" else {"facecolors": face}
-        axes.scatter([xs[k] for k in at], [ys[k] for k in at], **shape, **faced)
+    """Draw the runs of ladders, with hollow markers for those without a believed error or a repeatable time."""
+    for ladder in ladders:
+        colour, marker = _look(ladder, colours)
+        points = [p for p in _shown(ladder) if y(p) > 0]
+        style = "--" if ladder.peer else "-" if ladder.events else ":"
+        bold = 1.9 if ladder.method in ("DOP853", "Rosenbrock") else 1.1
+        axes.plot([x(p) for p in points], [y(p) for p in points], style, color=colour, linewidth=size * bold)
+        for measured, face in ((True, colour), (False, colours["paper"])):
+            marked = [p for p in points if (p.believed and p.repeatable) is measured]
+            shape = {"marker": marker, "s": 30 * size**2, "color": colour, "zorder": 3, "linewidths": 0.9}
+            faced = {} if marker in "x+1" else {"facecolors": face}
+            axes.scatter([x(p) for p in marked], [y(p) for p in marked], **shape, **faced)
 
 
 def _look(ladder: ToleranceLadder, colours: Colours) -> tuple[str, str]:

@@ -5,15 +5,17 @@ Preparation is not timed: the time of a run is that of its loop, and of what it 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from math import ceil, gcd, inf
 from time import perf_counter
 from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import Method
 from robot_dyn.effects.plant import Plant
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.right_angles import completed, models_in_full
@@ -59,22 +61,16 @@ class Run:
 
 @final
 @dataclass(frozen=True, eq=False)
-class MethodUnderTest:
+class MethodUnderTest(Method):
     """A method with a ladder of settings.
 
     Attributes:
-        method, engine, events, order, by: As in `ToleranceLadder`.
         settings: Yields the settings, from coarse to fine.
         run: Runs one setting within a time limit.
         warm: Loads the machine code that the runs need.
     """
 
-    method: str
-    engine: str
-    events: bool
-    order: int | None
-    by: str
-    settings: Callable[[], Iterator[float]]
+    settings: Callable[[], Iterable[float]]
     run: Callable[[float, Limit], Run]
     warm: Callable[[], object] = tuple
 
@@ -140,41 +136,41 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnde
         engine: "compiled" or "interpreted".
         events: Whether steps end at the thresholds of the effects.
     """
+    setup = replace(setup, engine=engine)
 
-    def warm() -> None:
-        warmed(replace(setup, integrator=made, engine=engine))
+    def run(setting: float, limit: Limit) -> Run:
+        return timed(at_setting(setup, made, setting), limit, events)
 
+    order, by, settings = ORDERS.get(made.name), "tolerance", tolerances
+    if not made.controls_error:
+        order, by, settings = made.order, "step", partial(_steps, setup, made, events)
+    return MethodUnderTest(
+        made.name, engine, events, order, by, settings, run, lambda: warmed(replace(setup, integrator=made))
+    )
+
+
+def at_setting(setup: Setup, made: Any, setting: float) -> Setup:
+    """The setup with a method at a step, in [s], or a relative tolerance."""
     if made.controls_error:
-        order = ORDERS.get(made.name)
-
-        def tight(rtol: float, limit: Limit) -> Run:
-            changed = replace(setup, integrator=replace(made, rtol=rtol, atol=ATOL * rtol), engine=engine)
-            return timed(changed, limit, events)
-
-        return MethodUnderTest(made.name, engine, events, order, "tolerance", tolerances, tight, warm)
-
-    cut = events and switches(setup)
-
-    def steps() -> Iterator[float]:
-        before = 0
-        for step in step_ladder(setup.record_period_s, made.order):
-            changed = replace(setup, integrator=made, step_s=step)
-            count = changed.steps
-            if count > (MOST_CUT if cut else _MOST_STEPS):  # of more steps none ends at an event
-                return
-            if count > before:  # a step longer than a tick or segment is cut to its length
-                yield step
-            before = count
-
-    def short(step: float, limit: Limit) -> Run:
-        return timed(replace(setup, integrator=made, step_s=step, engine=engine), limit, events)
-
-    return MethodUnderTest(made.name, engine, events, made.order, "step", steps, short, warm)
+        return replace(setup, integrator=replace(made, rtol=setting, atol=ATOL * setting))
+    return replace(setup, integrator=made, step_s=setting)
 
 
-def tolerances() -> Iterator[float]:
+def _steps(setup: Setup, made: Any, events: bool) -> Iterator[float]:
+    """Steps from the record period on, up to the number that a run may take."""
+    before, most = 0, MOST_CUT if events and switches(setup) else _MOST_STEPS  # of more steps none ends at an event
+    for step in step_ladder(setup.record_period_s, made.order):
+        count = at_setting(setup, made, step).steps
+        if count > most:
+            return
+        if count > before:  # a step longer than a tick or segment is cut to its length
+            yield step
+        before = count
+
+
+def tolerances() -> list[float]:
     """Relative tolerances, each a tenth of the one before."""
-    yield from (10.0**-k for k in range(_LOOSEST, _TIGHTEST + 1))
+    return [10.0**-k for k in range(_LOOSEST, _TIGHTEST + 1)]
 
 
 def step_ladder(period_s: float, order: int) -> Iterator[float]:

@@ -17,8 +17,8 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import ATOL, recorded
-from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import at_setting, recorded
+from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import ToleranceLadder
 from robot_dyn.effects.effect import Conservative
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.report.time_budget import Budget, Limit, OvertimeError
@@ -62,33 +62,26 @@ def past_horizon(
         budget: Of which a run may take a fiftieth.
     """
     found: dict[str, PastHorizon] = {}
-    longest = _PART * budget.seconds
+    longest, setup = _PART * budget.seconds, recorded(setup, setup.duration_s)
     for ladder in ladders:
         in_time = [p for p in ladder.points if isfinite(p.error) and p.time_s * setup.duration_s / horizon_s < longest]
         if ladder.peer or not ladder.events or ladder.method in found or not in_time:
             continue
         budget.report(f"beyond the horizon: {ladder.name}")
         with suppress(OvertimeError, RobotDynError):
-            found[ladder.method] = _of(
-                _with(setup, integrators[ladder.method], ladder, in_time[-1]), ladder, in_time[-1], longest
-            )
+            setting = in_time[-1].setting
+            finest = at_setting(replace(setup, engine=ladder.engine), integrators[ladder.method], setting)
+            found[ladder.method] = PastHorizon(ladder.method, setting, *_there_and_back(finest, longest))
     return tuple(found.values())
 
 
-def _with(setup: Setup, method: Any, ladder: ToleranceLadder, point: Point) -> Setup:
-    setup = replace(recorded(setup, setup.duration_s), engine=ladder.engine)
-    if ladder.by == "tolerance":
-        return replace(setup, integrator=replace(method, rtol=point.setting, atol=ATOL * point.setting))
-    return replace(setup, integrator=method, step_s=point.setting)
-
-
-def _of(setup: Setup, ladder: ToleranceLadder, point: Point, longest: float) -> PastHorizon:
-    there = _run(setup, longest)
-    returned = None
-    if setup.controller is None and all(isinstance(each, Conservative) for each in setup.plant.effects):
+def _there_and_back(setup: Setup, longest: float) -> tuple[float, float | None]:
+    """Energy and distance of return."""
+    there, returned = _run(setup, longest), None
+    if setup.controller is None and all(isinstance(effect, Conservative) for effect in setup.plant.effects):
         back = _run(replace(setup, q0=there.q[-1], v0=-there.v[-1]), longest)
         returned = float(np.abs(back.q[-1] - setup.q0).max())
-    return PastHorizon(ladder.method, point.setting, there.ledger.closure, returned)
+    return there.ledger.closure, returned
 
 
 def _run(setup: Setup, longest: float) -> Trajectory:

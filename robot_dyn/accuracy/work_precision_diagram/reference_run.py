@@ -100,16 +100,16 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
             if parted is not None:
                 setup = replace(setup, duration_s=parted, record_period_s=0.0)
                 continue
-        second, t, distance, refined = _second(setup, run, q, budget)
+        other = _second(setup, run, q, budget)
         size = max(1.0, float(np.abs(q).max()))
-        end = _passes(t, distance, size * (_PARTED if refined else _COARSE))
+        end = _passes(other.t, other.distance, size * (_PARTED if other.refined else _COARSE))
         if end is None:
-            error = max(float(distance.max()), _ULPS * np.finfo(float).eps * size)
-            return setup, Reference(run, q, error, (first, second), setup.duration_s, parted, lost)
+            error = max(float(other.distance.max()), _ULPS * np.finfo(float).eps * size)
+            return setup, Reference(run, q, error, (first, other.words), setup.duration_s, parted, lost)
         parted = end = float(f"{end:.2g}") if float(f"{end:.2g}") < setup.duration_s else end
         if end < _LEAST * requested:
             raise HorizonError(
-                f"{first} and {second} part within {_LEAST:g} of the duration, at t = {end:.2g} s: no error can be"
+                f"{first} and {other.words} part within {_LEAST:g} of the duration, at t = {end:.2g} s: no error can be"
                 " measured; take a shorter run, or a start that is less sensitive"
             )
         setup = replace(setup, duration_s=end, record_period_s=0.0)
@@ -151,36 +151,41 @@ def _longest(budget: Budget) -> float:
     return max(_SHARE * budget.seconds, _LEAST_S)
 
 
-def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> tuple[str, np.ndarray, np.ndarray, bool]:
-    """Words for the other run, times, its distance from q there, and whether shorter steps win nothing more."""
-    best: tuple[str, np.ndarray, np.ndarray, bool] | None = None
+@final
+@dataclass(frozen=True, eq=False)
+class _Other:
+    """A run by another method: its distance from the first one at times, and whether shorter steps win nothing."""
+
+    words: str
+    t: np.ndarray
+    distance: np.ndarray
+    refined: bool
+
+
+def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> _Other:
+    """The finest run by another method."""
     for name in _SECOND:
         try:
-            replace(setup, integrator=method(name))
+            setup_of_other = replace(setup, integrator=method(name))
         except QueryError:  # it cannot end its steps where joints are held, say
             continue
-        for best in _refined(setup, name, t, q, budget):
-            if best[-1]:
-                return best
-        if best is not None:
-            return best
+        if runs := list(_refined(setup_of_other, t, q, budget)):
+            return runs[-1]
     raise HorizonError(
         f"no run by {' or '.join(_SECOND)} ends within {_longest(budget):.2g} s: take a larger budget, or a shorter run"
     )
 
 
-def _refined(
-    setup: Setup, name: str, t: np.ndarray, q: np.ndarray, budget: Budget
-) -> Iterator[tuple[str, np.ndarray, np.ndarray, bool]]:
+def _refined(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> Iterator[_Other]:
     """Runs with ever shorter steps, until these win nothing or take too long."""
-    integrator, before, limit, late = method(name), np.inf, _longest(budget), 0
+    before, limit, late = np.inf, _longest(budget), 0
     with budget.apart():
-        warmed(replace(setup, integrator=integrator))
+        warmed(setup)
     for step in step_ladder(setup.record_period_s, 1):
-        description = f"{name}, step {step:.3g} s"
-        budget.report(f"reference: {description}")
+        words = f"{setup.integrator.name}, step {step:.3g} s"
+        budget.report(f"reference: {words}")
         try:
-            run = timed(replace(setup, integrator=integrator, step_s=step), Limit(limit))
+            run = timed(replace(setup, step_s=step), Limit(limit))
         except OvertimeError:
             late += 1
             if late == _LATE:
@@ -189,12 +194,12 @@ def _refined(
         if run.q is not None:
             times, distance = _distance(t, q, run)
             size = float(np.log10(np.maximum(distance[1:], 1e-17)).mean())
-            refined = bool(distance[1] < _ORDERLY and size > before - _STAGNANT)
-            refined |= bool(distance.max() < _ENOUGH[setup.engine])
-            yield description, times, distance, refined
-            before = size if distance[1] < _ORDERLY else np.inf
-            if 2 * run.time_s > limit:
+            orderly = distance[1] < _ORDERLY
+            refined = bool((orderly and size > before - _STAGNANT) or distance.max() < _ENOUGH[setup.engine])
+            yield _Other(words, times, distance, refined)
+            if refined or 2 * run.time_s > limit:
                 return
+            before = size if orderly else np.inf
 
 
 def _distance(t: np.ndarray, q: np.ndarray, run: Run) -> tuple[np.ndarray, np.ndarray]:

@@ -60,10 +60,9 @@ class Price:
     extrapolated: bool
 
 
-@final
 @dataclass(frozen=True)
-class ToleranceLadder:
-    """Runs of one method.
+class Method:
+    """A method of this library or of another program.
 
     Attributes:
         method: Name of the method.
@@ -71,9 +70,6 @@ class ToleranceLadder:
         events: Whether steps end at the thresholds of the effects.
         order: Order stated by the source of the method; None if there is none.
         by: What varies from run to run: "step" or "tolerance".
-        points: The runs, from coarse to fine.
-        ended: Why there is no finer run.
-        floor: Error of the reference, in [rad] or [m].
     """
 
     method: str
@@ -81,19 +77,35 @@ class ToleranceLadder:
     events: bool
     order: int | None
     by: str
-    points: tuple[Point, ...] = field(metadata=UNREPORTED)
-    ended: str
-    floor: float = field(metadata=UNREPORTED)
 
     @reported
     def name(self) -> str:
-        """Name of the method, with any marks that distinguish this ladder."""
-        return ladder_name(self.method, self.engine, self.events)
+        """Name of the method, with any marks that distinguish its engine and events."""
+        apart = [INTERPRETED] * (self.engine == INTERPRETED) + ["without events"] * (not self.events)
+        return f"{self.method} ({', '.join(apart)})" if apart else self.method
 
     @property
     def peer(self) -> bool:
         """Whether the method is from another program."""
         return not self.engine
+
+
+@final
+@dataclass(frozen=True)
+class ToleranceLadder(Method):
+    """Runs of one method.
+
+    Attributes:
+        points: The runs, from coarse to fine.
+        ended: Why there is no finer run.
+        floor: Error of the reference, in [rad] or [m].
+    """
+
+    points: tuple[Point, ...] = field(metadata=UNREPORTED)
+    ended: str
+    floor: float = field(metadata=UNREPORTED)
+
+    name = Method.name  # plain data hold properties of the class itself
 
     @reported
     def measured_order(self) -> float | None:
@@ -133,9 +145,3 @@ class ToleranceLadder:
         if errors[-1] > _RESOLVED or not orders:
             return None
         return Price(float(costs[-1] * (errors[-1] / error) ** (1 / min(orders))), True)
-
-
-def ladder_name(method: str, engine: str, events: bool) -> str:
-    """Name of a method, with any marks that distinguish its ladder."""
-    apart = [INTERPRETED] * (engine == INTERPRETED) + ["without events"] * (not events)
-    return f"{method} ({', '.join(apart)})" if apart else method

@@ -5,7 +5,7 @@ error = max over joints and records of |q − q_ref|
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor, isfinite, log10
 from typing import Any, ClassVar, final
@@ -219,7 +219,11 @@ def work_precision(
     """
     given = {"duration_s": duration_s, "controller": controller}
     setup = setup_of("work_precision", what, starts(q0, v0) | {k: x for k, x in given.items() if x is not None})
-    integrators = [as_method(each) for each in (_ordered(METHODS) if methods is None else _several(methods))]
+    if methods is None:
+        methods = sorted(METHODS, key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
+        methods.remove(AUTO)
+    instance("methods", methods, tuple | list, "give a list of names or methods, such as ['DOP853', 'rk4']")
+    integrators = [as_method(each) for k, each in enumerate(methods) if each not in methods[:k]]
     if any(each.name == AUTO for each in integrators):
         raise QueryError(f"methods: {AUTO!r} is one of {EXPLICIT!r} and {STIFF!r}; name these")
     truth("peers", peers)
@@ -270,17 +274,6 @@ def _able(setup: Setup, integrators: list[Any]) -> tuple[list[Any], list[str]]:
         except QueryError as error:
             why.append(f"{each.name}: {error}")
     return able, why
-
-
-def _several(methods: Any) -> tuple[Any, ...]:
-    """Methods that are given as a list, each once."""
-    methods = instance("methods", methods, tuple | list, "give a list of names or methods, such as ['DOP853', 'rk4']")
-    return tuple(each for k, each in enumerate(methods) if each not in methods[:k])
-
-
-def _ordered(names: Iterable[str]) -> tuple[str, ...]:
-    names = tuple(name for name in names if name != AUTO)
-    return (*(name for name in _FIRST if name in names), *(name for name in names if name not in _FIRST))
 
 
 def _ladder_rows(result: WorkPrecision, columns: list[int]) -> Iterator[list[str]]:

@@ -2,14 +2,15 @@
 
     stress   the first limits that an arm reaches (Stress)
 
-search, result, finding  the search, its result, and its findings
-work, shrink             pieces of work within a time; states of few digits
-worst, lost_digits       worst configurations; digits lost at the worst states
-steps, gains, loads      limits of step, gain, speed and payload
-confirm                  runs on both sides of a limit
-scenes, runs             random scenes, and their runs judged
-text                     its text
-command                  the command `stress`
+search       the parts of a stress test, one after the other
+work         pieces of work within a time
+worst        worst configurations, and states of few digits
+lost_digits  digits lost at the worst states
+stability    limits of step and gain, confirmed by runs
+loads        limits of speed and payload
+runs         random scenes, and their runs judged
+result       the result, and its text
+command      the command `stress`
 """
 
 from robot_dyn.foundations import public_names

@@ -9,6 +9,9 @@ implementation, and by runs under a PD.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
 
 from robot_dyn import Lagrangian, Payload, Plant, Robot, RobotDynError, Setup, simulate
@@ -18,14 +21,16 @@ from robot_dyn.effects import EffortLimit
 from robot_dyn.queries import CORIOLIS_TORQUE, N
 from robot_dyn.report import Budget
 from robot_dyn.simulation import RemarkKind
-from robot_dyn.tools.stress.confirm import BEYOND, WITHIN
-from robot_dyn.tools.stress.finding import Limit
+from robot_dyn.tools.stress.result import Limit
+from robot_dyn.tools.stress.stability import BEYOND, WITHIN
 from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import Gains, State, listed, worst
 
 _LOOKS = 50  # states at which the tip is looked for
 _HOLD_S = 0.05  # of a run that holds a payload
 _SPEED = 1.0  # [rad/s] or [m/s], of joints without a velocity limit
+_NOTHING = 1e-12  # of an effort limit
+_NO_TORQUE = "it has no torque on any joint with a limit"
 
 
 def efforts(robot: Robot) -> np.ndarray:
@@ -33,16 +38,13 @@ def efforts(robot: Robot) -> np.ndarray:
     return np.where(robot.effort_limit > 0, robot.effort_limit, np.inf)
 
 
-def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, work: Work) -> Limit | None:
+def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, work: Work) -> Iterator[Limit]:
     """The least multiple of the velocity limits at which Coriolis torque alone passes an effort limit.
 
-    None for lack of time.
+    Nothing for lack of time.
     """
-    effort, most = efforts(robot), robot.velocity_limit
-    most = np.where((most > 0) & np.isfinite(most), most, _SPEED)
-    what = "Coriolis torque passes an effort limit, at a multiple of the velocity limits"
-    of_joints = np.abs(states["v"]).max()
-    states = states | {"v": states["v"] / of_joints * most}
+    most = np.where((robot.velocity_limit > 0) & np.isfinite(robot.velocity_limit), robot.velocity_limit, _SPEED)
+    states = states | {"v": states["v"] / np.abs(states["v"]).max() * most}
 
     def direction(v: np.ndarray) -> np.ndarray:
         largest = np.abs(v / most).max(axis=-1, keepdims=True)
@@ -50,34 +52,36 @@ def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, work: Wor
 
     def measure(batch: Batch) -> np.ndarray:
         at = {"q": batch["q"], "v": direction(batch["v"])}
-        return (np.abs(evaluate(robot, CORIOLIS_TORQUE, at)) / effort).max(axis=1)
+        return (np.abs(evaluate(robot, CORIOLIS_TORQUE, at)) / efforts(robot)).max(axis=1)
 
     found = worst(states, rng, ("q", "v"), measure, work, "speed")
     if found is None:
-        return None
-    (sizes, state), none = found, "it has no torque on any joint with a limit"
-    if not sizes["minimal"] > 1e-12:
-        return Limit("speed", what, "", np.inf, "times", none, "", None)
-    q, v, limit = state["q"], direction(state["v"]), float(sizes["minimal"]) ** -0.5
-    return work.do("speed, judged", lambda _: _judged_speed(robot, q, v, limit, what))
+        return
+    what = "Coriolis torque passes an effort limit, at a multiple of the velocity limits"
+    limit, largest = Limit("speed", what, "", np.inf, "times", _NO_TORQUE), found[0]["minimal"]
+    if largest > _NOTHING:
+        state = {"q": found[1]["q"], "v": direction(found[1]["v"])}
+        limit = work.do("speed, judged", lambda _: _judged_speed(robot, state, replace(limit, value=largest**-0.5)))
+    if limit is not None:
+        yield limit
 
 
-def _judged_speed(robot: Robot, q: np.ndarray, v: np.ndarray, limit: float, what: str) -> Limit:
+def _judged_speed(robot: Robot, state: State, limit: Limit) -> Limit:
     """The torques at both sides of the limit by the library's own implementation."""
-    own, effort = Lagrangian(robot), efforts(robot)
+    q, v, own, effort = state["q"], state["v"], Lagrangian(robot), efforts(robot)
     joint = int(np.argmax(np.abs(robot.coriolis_torque(q, v)) / effort))
-    parts = [float((np.abs(own.coriolis_torque(q, part * limit * v)) / effort).max()) for part in (WITHIN, BEYOND)]
-    within, beyond = (f"{part:.3f} of the effort limit" for part in parts)
-    confirmed = bool(parts[0] < 1 < parts[1])
-    return Limit(
-        "speed", what, robot.joint_names[joint], limit, "times", within, beyond, confirmed, listed({"q": q, "v": v})
-    )
+    parts = (float((np.abs(own.coriolis_torque(q, x * limit.value * v)) / effort).max()) for x in (WITHIN, BEYOND))
+    within, beyond = parts
+    return replace(
+        limit, joint=robot.joint_names[joint], within=f"{within:.3f} of the effort limit",
+        beyond=f"{beyond:.3f} of the effort limit", confirmed=within < 1 < beyond, state=listed(state),
+    )  # fmt: skip
 
 
 def payload_limit(
     robot: Robot, states: Batch, rng: np.random.Generator, gains: Gains | None, work: Work
-) -> Limit | None:
-    """The least mass at the tip at which gravity torque passes an effort limit; None for lack of time.
+) -> Iterator[Limit]:
+    """The least mass at the tip at which gravity torque passes an effort limit; nothing for lack of time.
 
     Args:
         robot: The robot.
@@ -89,51 +93,44 @@ def payload_limit(
     effort = efforts(robot)
     frame = work.do("tip, where a payload is heaviest", lambda _: _tip(robot, states), ("payload",))
     if frame is None:
-        return None
-    what, loaded = f"gravity torque of a payload at {frame}", robot.with_(payload=Payload(frame, 1.0))
+        return
+    loaded = robot.with_(payload=Payload(frame, 1.0))
 
     def inverse_masses(batch: Batch) -> np.ndarray:
         """1/m of each joint, (S, n)."""
         own = evaluate(robot, N, batch)
         per_kg = evaluate(loaded, N, batch) - own
         spare = effort - np.sign(per_kg) * own
-        made = np.abs(per_kg) / np.where(spare > 0, spare, 1e-300)
-        return np.where(np.isfinite(effort), made, 0.0)
+        return np.where(np.isfinite(effort), np.abs(per_kg) / np.where(spare > 0, spare, 1e-300), 0.0)
 
     found = worst(states, rng, ("q",), lambda batch: inverse_masses(batch).max(axis=1), work, "payload")
     if found is None:
-        return None
-    sizes, state = found
-    q, largest = state["q"], float(sizes["minimal"])
-    if not largest > 1e-12:
-        return Limit("payload", what, "", np.inf, "kg", "it has no torque on any joint with a limit", "", None)
-    joint = robot.joint_names[int(np.argmax(inverse_masses({"q": q[None]})[0]))]
-    if largest > 1e250:
-        alone = "gravity alone passes its effort limit"
-        return Limit("payload", what, joint, 0.0, "kg", alone, "", None, listed(state))
-    return work.do(
-        "payload, judged", lambda until: _judged_payload(robot, state, Payload(frame, 1 / largest), joint, gains, until)
-    )
+        return
+    largest, state = found[0]["minimal"], found[1]
+    limit = Limit("payload", f"gravity torque of a payload at {frame}", "", np.inf, "kg", _NO_TORQUE)
+    if largest > _NOTHING:
+        joint = robot.joint_names[int(np.argmax(inverse_masses({"q": state["q"][None]})[0]))]
+        limit = replace(limit, joint=joint, value=1 / largest, state=listed(state))
+        if largest > 1e250:
+            limit = replace(limit, value=0.0, within="gravity alone passes its effort limit")
+        else:
+            limit = work.do("payload, judged", lambda until: _judged_payload(robot, frame, limit, gains, until))
+    if limit is not None:
+        yield limit
 
 
-def _judged_payload(
-    robot: Robot, state: State, payload: Payload, joint: str, gains: Gains | None, budget: Budget
-) -> Limit:
-    """Whether the arm holds the payload on both sides of the limit."""
-    q, frame, most = state["q"], payload.frame, payload.mass
-    loads = [robot.with_(payload=Payload(frame, part * most)) for part in (WITHIN, BEYOND)]
-    setups = () if gains is None else tuple(_held_by_pd(each, q, gains) for each in loads)
-    (holds, within), (too_heavy, beyond) = (
-        _holds(loaded, q, setup, budget) for loaded, setup in zip(loads, setups or (None, None), strict=True)
-    )
-    what, confirmed = f"gravity torque of a payload at {frame}", holds and not too_heavy
-    return Limit("payload", what, joint, most, "kg", within, beyond, confirmed, listed(state), setups)
-
-
-def _held_by_pd(loaded: Robot, q: np.ndarray, gains: Gains) -> Setup:
-    """The arm held at q by a PD within its effort limits, its gravity balanced."""
-    plant, law = Plant(loaded, [EffortLimit(efforts(loaded))]), PDGravity(loaded, hold(q), *gains)
-    return Setup(plant, q, duration_s=_HOLD_S, controller=law, estimate_error=False, engine="interpreted")
+def _judged_payload(robot: Robot, frame: str, limit: Limit, gains: Gains | None, budget: Budget) -> Limit:
+    """Whether the arm holds the payload on both sides of the limit, by a PD within its effort limits among others."""
+    q, setups, judged = np.array(limit.state["q"]), list[Setup](), list[tuple[bool, str]]()
+    for part in (WITHIN, BEYOND):
+        loaded, setup = robot.with_(payload=Payload(frame, part * limit.value)), None
+        if gains is not None:
+            plant, law = Plant(loaded, [EffortLimit(efforts(loaded))]), PDGravity(loaded, hold(q), *gains)
+            setup = Setup(plant, q, duration_s=_HOLD_S, controller=law, estimate_error=False, engine="interpreted")
+            setups.append(setup)
+        judged.append(_holds(loaded, q, setup, budget))
+    (holds, within), (too_heavy, beyond) = judged
+    return replace(limit, within=within, beyond=beyond, confirmed=holds and not too_heavy, setups=tuple(setups))
 
 
 def _tip(robot: Robot, states: Batch) -> str:
@@ -160,6 +157,5 @@ def _holds(loaded: Robot, q: np.ndarray, setup: Setup | None, budget: Budget) ->
         return part < 1, f"{said}; not run: {error}"
     reached = any(each.kind is RemarkKind.EFFORT_REACHED for each in run.remarks)
     off = float(np.abs(run.q[-1] - q).max())
-    holds = part < 1 and not reached
-    sags = part > 1 and reached
-    return holds if holds or sags else not part < 1, f"{said}; a PD sags by {off:.1e} in {_HOLD_S:g} s"
+    holds = not reached if part < 1 else not (part > 1 and reached)
+    return holds, f"{said}; a PD sags by {off:.1e} in {_HOLD_S:g} s"

@@ -14,9 +14,9 @@ from robot_dyn import Robot
 from robot_dyn.accuracy import Batch, DigitCount, Held, Implementation, digits_of, implementations
 from robot_dyn.queries import FORWARD_DYNAMICS, INVERSE_DYNAMICS, Quantity
 from robot_dyn.report import Budget
-from robot_dyn.tools.stress.finding import WorstCase
+from robot_dyn.tools.stress.result import WorstCase
 from robot_dyn.tools.stress.work import Work
-from robot_dyn.tools.stress.worst import KEPT, listed, shrunk_state
+from robot_dyn.tools.stress.worst import listed, shrunk_state
 
 _OF_FLOAT64 = -log10(2.0**-53)
 _ROUNDS, _MOST_TRIES = 3, 60
@@ -33,43 +33,37 @@ def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, work: Wor
     found, left_out = known
     work.left_out += left_out
     digit_count = DigitCount(robot, states, None, rng)
-    for quantity in quantities:
+    for what, quantity in zip(names, quantities, strict=True):
         for implementation in found:
             if quantity in implementation.quantities and implementation.name not in _OTHER_NUMBERS:
-                made = _lost(digit_count, implementation, quantity, work)
-                if made is not None:
-                    yield made
+                yield from _lost(digit_count, implementation, quantity, what, work)
 
 
-def _lost(digit_count: DigitCount, implementation: Implementation, quantity: Quantity, work: Work) -> WorstCase | None:
-    """What one implementation loses; None for lack of time."""
-    name = f"digits lost in {quantity.name} by {implementation.name}"
-    made = work.do(name, lambda budget: _counted(digit_count, implementation, quantity, budget))
-    if made is None:
-        return None
-    lost = _OF_FLOAT64 - made.searched
+def _lost(
+    digit_count: DigitCount, implementation: Implementation, quantity: Quantity, what: str, work: Work
+) -> Iterator[WorstCase]:
+    """What one implementation loses; nothing for lack of time."""
+    name = f"{what} by {implementation.name}"
+    held = work.do(name, lambda budget: _counted(digit_count, implementation, quantity, budget))
+    if held is None:
+        return
 
     def losses(batch: Batch) -> np.ndarray:
         state = {name: batch[name][0] for name in quantity.arguments}
         return np.array([_OF_FLOAT64 - digits_of(digit_count.judged(implementation, quantity, state))])
 
-    at, least = {name: np.array(x) for name, x in made.state.items()}, KEPT * lost if lost > 0 else -np.inf
-    small = work.do(
-        f"shrinking of {name}", lambda until: shrunk_state(at, digit_count.states, losses, least, until, _MOST_TRIES)
-    )
-    state, minimal = small or (at, lost)
-    typical, random = _OF_FLOAT64 - made.typical, _OF_FLOAT64 - made.random
-    note = f"{implementation.name}: {made.searched:.1f} digits hold, {made.typical:.1f} typically"
-    what = f"digits lost in {quantity.name}"
-    return WorstCase(what, "", "digits", typical, random, max(lost, minimal), minimal, listed(state), note)
+    typical, random, lost = (_OF_FLOAT64 - digits for digits in (held.typical, held.random, held.searched))
+    at = {name: np.array(x) for name, x in held.state.items()}
+    state, minimal = shrunk_state(at, digit_count.states, losses, lost, name, work, _MOST_TRIES)
+    note = f"{implementation.name}: {held.searched:.1f} digits hold, {held.typical:.1f} typically"
+    yield WorstCase(what, "", "digits", typical, random, max(lost, minimal), minimal, listed(state), note)
 
 
 def _counted(digit_count: DigitCount, implementation: Implementation, quantity: Quantity, budget: Budget) -> Held:
     """The fewest digits of some searches."""
-    made = digit_count.count(implementation, quantity, budget.check)
+    best = digit_count.count(implementation, quantity, budget.check)
     for _ in range(_ROUNDS - 1):
-        if made.searched < made.random:
+        if best.searched < best.random:
             break
-        again = digit_count.count(implementation, quantity, budget.check)
-        made = again if again.searched < made.searched else made
-    return made
+        best = min(best, digit_count.count(implementation, quantity, budget.check), key=lambda held: held.searched)
+    return best

@@ -1,40 +1,117 @@
 """Random runs, each error estimate held against two better runs: one that is too small and says nothing misleads.
 
-The better runs share the equations with the run, and neither its method nor its steps: DOP853 and an implicit method
-near rounding. What both miss is found by `compare` and by energy alone.
+Scenes are a free swing, friction, stops and control, with a random method. The better runs share the equations with the
+run, and neither its method nor its steps: DOP853 and an implicit method near rounding. What both miss is found by
+`compare` and by energy alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, final
 
 import numpy as np
 
-from robot_dyn import Robot, RobotDynError, Setup, Trajectory, simulate
-from robot_dyn.accuracy import Batch
-from robot_dyn.integrate import Adaptive
+from robot_dyn import Plant, Robot, RobotDynError, Setup, simulate
+from robot_dyn.accuracy import Batch, evaluate
+from robot_dyn.control import PD, gains_from, quintic
+from robot_dyn.effects import DryFriction, Effect, RegularisedCoulombFriction, RigidStops, ViscousFriction, joint_stops
+from robot_dyn.integrate import Adaptive, method
+from robot_dyn.queries import M
 from robot_dyn.report import Budget
 from robot_dyn.simulation import Ending
-from robot_dyn.tools.stress.confirm import LEAST, says
-from robot_dyn.tools.stress.finding import JudgedRun
-from robot_dyn.tools.stress.scenes import scenes
-from robot_dyn.tools.stress.shrink import shrunk
+from robot_dyn.tools.stress.result import JudgedRun
+from robot_dyn.tools.stress.stability import LEAST, says
 from robot_dyn.tools.stress.work import Work
+from robot_dyn.tools.stress.worst import shrunk
 
+FAMILIES = ("swing", "friction", "dry friction", "stops", "rigid stops", "PD", "sampled PD")
+_METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8", "gauss_4", "rosenbrock_5")
+_DRAWS = 20  # attempts to draw a method that the scene accepts
+_RECORDS = 20
 _BETTER = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-11, 1e-13))
 _ROUNDING = 1e-12  # of 1 + |q|: below it neither can tell
 _ONE_TIME = 1e-12  # [s]
 _MOST_TRIES = 25  # of the start of a run that misleads
 
 
+@final
+@dataclass(frozen=True)
+class Scene:
+    """A setup, and a description of what acts in it."""
+
+    setup: Setup
+    what: str
+
+
+def scenes(robot: Robot, states: Batch, count: int, rng: np.random.Generator) -> Iterator[Callable[[], Scene]]:
+    """Yield `count` scenes, each built when called; the families take turns."""
+    scale = np.median(np.diagonal(evaluate(robot, M, {"q": states["q"][:200]}), axis1=-2, axis2=-1), axis=0)
+    for k in range(count):
+        own = np.random.default_rng(rng.integers(2**63))
+        yield partial(_scene, robot, FAMILIES[k % len(FAMILIES)], scale, own)
+
+
+def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generator) -> Scene:
+    q, n = robot.random_configuration(rng), robot.n
+    v = rng.uniform(-1, 1, n) * np.where(np.isfinite(robot.velocity_limit), np.minimum(robot.velocity_limit, 1.0), 1.0)
+    duration = float(np.round(rng.uniform(0.1, 0.3), 3))
+    plant, control = Plant(robot, _effects(robot, family, q, scale, rng)), _control(family, q, scale, duration, rng)
+    tick = control.period_s if control is not None else 0.0
+    record = tick * max(1, round(duration / tick / _RECORDS)) if tick else duration / _RECORDS
+    for _ in range(_DRAWS):
+        drawn, step = _method(rng)
+        try:
+            setup = Setup(plant, q, v, duration, control, drawn, record_period_s=record, **step)
+        except RobotDynError:  # not every method supports every effect
+            continue
+        steps = f", step {setup.nominal_step_s:g} s" if step else f", rtol {setup.integrator.rtol:.0e}"
+        return Scene(setup, f"{family}: {setup.integrator.name}{steps}")
+    return Scene(Setup(plant, q, v, duration, control), f"{family}: auto")
+
+
+def _effects(robot: Robot, family: str, q: np.ndarray, scale: np.ndarray, rng: np.random.Generator) -> list[Effect]:
+    """Effects of a family; some families include the friction stated in the file, if any."""
+    stated: list[Effect] = list(Plant(robot, "urdf").effects) if family in ("friction", "PD", "sampled PD") else []
+    if family == "friction" and not stated:
+        coulomb = RegularisedCoulombFriction(scale * rng.uniform(0.3, 3, robot.n), float(10 ** rng.uniform(-2, -1)))
+        return [ViscousFriction(scale * rng.uniform(0.1, 2, robot.n)), coulomb]
+    if family == "dry friction":
+        return [DryFriction(scale * rng.uniform(0.3, 8, robot.n))]
+    if "stops" in family:
+        reach = rng.uniform(0.01, 0.3, (2, robot.n))  # within the file's limits, so that the arm reaches the stops
+        lower, upper = np.maximum(robot.lower, q - reach[0]), np.minimum(robot.upper, q + reach[1])
+        if family == "rigid stops":
+            return [RigidStops(lower, upper, rng.uniform(0, 0.9, robot.n))]
+        return list(joint_stops(lower, upper, scale * 10 ** rng.uniform(3, 5), scale * 10 ** rng.uniform(1, 3)))
+    return stated
+
+
+def _control(family: str, q: np.ndarray, scale: np.ndarray, duration: float, rng: np.random.Generator) -> Any:
+    if "PD" not in family:
+        return None
+    period = float(rng.choice([0.001, 0.002, 0.005])) if family == "sampled PD" else 0.0
+    plan = quintic(q, q + rng.uniform(-0.3, 0.3, len(q)), duration)
+    return PD(plan, *gains_from(scale, float(rng.uniform(5, 30)), 0.7), period_s=period)
+
+
+def _method(rng: np.random.Generator) -> tuple[Any, dict[str, Any]]:
+    """A random method, with a step or with tolerances."""
+    if rng.random() < 0.4:
+        rtol = float(f"{10 ** rng.uniform(-10, -5):.0e}")
+        return Adaptive(str(rng.choice(["DOP853", "Rosenbrock"])), rtol, rtol / 100), {}
+    return method(str(rng.choice(_METHODS))), {"step_s": float(np.round(10 ** rng.uniform(-3.3, -2), 5))}
+
+
 def judged_runs(robot: Robot, states: Batch, count: int, rng: np.random.Generator, work: Work) -> Iterator[JudgedRun]:
     """So many random runs."""
-    for k, make in enumerate(scenes(robot, states, count, rng), 1):
+    for k, build in enumerate(scenes(robot, states, count, rng), 1):
         if work.over:
             work.skip(f"runs {k} to {count}" if k < count else f"run {k}")
             return
-        scene = work.do(f"scene of run {k}", lambda _, make=make: make())
+        scene = work.do(f"scene of run {k}", lambda _, build=build: build())
         if scene is None:
             continue
         found = work.do(f"run {k}, {scene.what}", lambda until, of=scene: judged(of.setup, of.what, until))
@@ -50,27 +127,22 @@ def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
         OvertimeError: If the budget ends.
     """
     run = simulate(setup, on_progress=budget.check)
-    report = says(run) if run.outcome.ending is Ending.FINISHED else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
-    error = run.error
-    if error is None or run.outcome.ending is not Ending.FINISHED or not error.until_s:
+    finished, error = run.outcome.ending is Ending.FINISHED, run.error
+    report = says(run) if finished else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
+    if error is None or not finished or not error.until_s:
         return JudgedRun(what, setup.duration_s, np.nan, np.nan, np.nan, report, False, setup)
     sure = replace(setup, step_s=None, estimate_error=False, integrator=_BETTER[0])
     better = [simulate(replace(sure, integrator=each), on_progress=budget.check) for each in _BETTER]
-    known, estimate = run.t <= error.until_s, error.at(error.until_s)
     if any(each.outcome.ending is not Ending.FINISHED for each in better):
         raise RobotDynError("a better run did not finish")
     if any(each.t.shape != run.t.shape or np.abs(each.t - run.t).max() > _ONE_TIME for each in better):
         raise RobotDynError("the better runs have other samples")
-    true = float(np.abs(run.q - better[0].q)[known].max())
-    unsure = float(np.abs(better[1].q - better[0].q)[known].max())
+    known, estimate = run.t <= error.until_s, error.at(error.until_s)
+    true, unsure = (float(np.abs(q - better[0].q)[known].max()) for q in (run.q, better[1].q))
     floor = _ROUNDING * (1 + float(np.abs(run.q).max())) + unsure
-    misleads = not says_more(run) and max(estimate, floor) < LEAST * max(true, floor)
+    warns = bool(error.note) or "does not close" in run.summary
+    misleads = not warns and max(estimate, floor) < LEAST * max(true, floor)
     return JudgedRun(what, setup.duration_s, estimate, true, unsure, report or str(error), misleads, setup)
-
-
-def says_more(run: Trajectory) -> bool:
-    """Whether something but the estimate warns."""
-    return bool(run.error is not None and run.error.note) or "does not close" in run.summary
 
 
 def shrunk_run(setup: Setup, found: JudgedRun, name: str, work: Work) -> JudgedRun:

@@ -12,21 +12,16 @@ from robot_dyn import Robot
 from robot_dyn.accuracy import random_states, warn_below
 from robot_dyn.foundations import function, instance, integer, number
 from robot_dyn.report import Budget, processor_and_versions
-from robot_dyn.tools.stress.finding import JudgedRun, Limit, WorstCase
-from robot_dyn.tools.stress.gains import gain_limit
 from robot_dyn.tools.stress.loads import payload_limit, speed_limit
 from robot_dyn.tools.stress.lost_digits import lost_digits
-from robot_dyn.tools.stress.result import Stress
+from robot_dyn.tools.stress.result import Finding, JudgedRun, Limit, Stress, WorstCase
 from robot_dyn.tools.stress.runs import judged_runs
-from robot_dyn.tools.stress.steps import held, step_limits
+from robot_dyn.tools.stress.stability import gain_limit, held, step_limits
 from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import BY_PD, HELD, pd_gains, worst_configurations
 
 _LEAST_SAMPLES, _MOST_SAMPLES, _MOST_RUNS = 100, 10**6, 10**5
-
 _PIECES = 8  # of the budget; one piece of work may take this part of it
-
-Found = WorstCase | Limit | JudgedRun
 
 
 def stress(
@@ -70,10 +65,10 @@ def stressed(
     seconds = number("budget_s", budget_s, above=0)
     budget = Budget(seconds, function("on_progress", on_progress, "(spent, what)"), clock)
     work = Work(budget, seconds / _PIECES)
-    robot, found, interrupted = warn_below(robot, None), list[Found](), False
+    robot, found, interrupted = warn_below(robot, None), list[Finding](), False
     try:
-        for each in _found(robot, samples, runs, seed, work):
-            found.append(each)
+        for finding in _findings(robot, samples, runs, seed, work):
+            found.append(finding)
     except KeyboardInterrupt:
         interrupted = True
         work.left_out.append("what was to come when it was interrupted")
@@ -87,46 +82,34 @@ def stressed(
     )  # fmt: skip
 
 
-def _found(robot: Robot, samples: int, runs: int, seed: int, work: Work) -> Iterator[Found]:
+def _findings(robot: Robot, samples: int, runs: int, seed: int, work: Work) -> Iterator[Finding]:
     """The findings of all parts, each with a random generator of its own."""
     streams = [np.random.default_rng(each) for each in np.random.SeedSequence(seed).spawn(6)]
     states = work.do("random states", lambda _: random_states(robot, samples, streams[0]), ("all at these",))
     if states is None:
         return
-    moves, fastest = robot.joint_without_inertia is None, None
-    needed_for = ("worst fastest motion under it", *HELD)
-    gains = work.do("gains of a PD", lambda _: pd_gains(robot, states), needed_for) if moves else None
-    for each in worst_configurations(robot, states, streams[1], gains, work):
-        fastest = each if each.note == BY_PD else fastest
-        yield each
-    yield from _kept(speed_limit(robot, states, streams[2], work))
-    yield from _kept(payload_limit(robot, states, streams[3], gains, work))
-    if moves:
-        yield from _of_motion(robot, gains, fastest, seed, work)
-    yield from lost_digits(robot, states, streams[4], work)
-    if moves:
-        yield from judged_runs(robot, states, runs, streams[5], work)
+    gains = setup = None
+    if (massless := robot.joint_without_inertia) is None:
+        needed_for = ("worst fastest motion under it", *HELD)
+        gains = work.do("gains of a PD", lambda _: pd_gains(robot, states), needed_for)
     else:
-        why = f"joint {robot.joint_without_inertia!r} carries no inertia"
-        work.left_out += [f"{what}: {why}" for what in ("κ of M", "fastest motion, steps and gains", "runs")]
-
-
-def _of_motion(robot: Robot, gains: Any, fastest: WorstCase | None, seed: int, work: Work) -> Iterator[Limit]:
-    """The limits of step and gain, where motion is fastest."""
-    if gains is None or fastest is None:
-        return
-    at = np.array(fastest.state["q"])
-    setup = work.do("start of steps and gain", lambda _: held(robot, at, gains, fastest.minimal), HELD)
-    if setup is None:
-        return
-    yield from step_limits(setup, seed, work)
-    yield from _kept(gain_limit(setup, seed, work))
-
-
-def _kept(limit: Limit | None) -> Iterator[Limit]:
-    """A limit, if there was time for it."""
-    if limit is not None:
-        yield limit
+        parts = ("κ of M", "fastest motion, steps and gains", "runs")
+        work.left_out += [f"{part}: joint {massless!r} carries no inertia" for part in parts]
+    fastest = None
+    for case in worst_configurations(robot, states, streams[1], gains, work):
+        fastest = case if case.note == BY_PD else fastest
+        yield case
+    yield from speed_limit(robot, states, streams[2], work)
+    yield from payload_limit(robot, states, streams[3], gains, work)
+    if gains is not None and fastest is not None:
+        at, rate = np.array(fastest.state["q"]), fastest.minimal
+        setup = work.do("start of steps and gain", lambda _: held(robot, at, gains, rate), HELD)
+    if setup is not None:
+        yield from step_limits(setup, seed, work)
+        yield from gain_limit(setup, seed, work)
+    yield from lost_digits(robot, states, streams[4], work)
+    if massless is None:
+        yield from judged_runs(robot, states, runs, streams[5], work)
 
 
 def _unlimited(robot: Robot) -> Iterator[str]:

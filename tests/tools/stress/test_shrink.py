@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robot_dyn.tools.stress.shrink import shrunk
+from robot_dyn.tools.stress.worst import shrunk
 
 STATE = np.array([0.73125, -1.9371, 0.00123456, 2.718281828, -0.4])
 

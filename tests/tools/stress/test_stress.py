@@ -17,10 +17,10 @@ from robot_dyn.accuracy import random_states
 from robot_dyn.integrate import FIXED_STEP
 from robot_dyn.report import Budget
 from robot_dyn.simulation import Ending
-from robot_dyn.tools.stress import confirm, runs, steps, stressed
-from robot_dyn.tools.stress.finding import JudgedRun
+from robot_dyn.tools.stress import runs, stability, stressed
 from robot_dyn.tools.stress.loads import payload_limit
-from robot_dyn.tools.stress.scenes import FAMILIES, scenes
+from robot_dyn.tools.stress.result import JudgedRun
+from robot_dyn.tools.stress.runs import FAMILIES, scenes
 from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import BY_PD, FASTEST, pd_gains, worst, worst_configurations
 from tests.cli.test_command_documents import promised
@@ -69,8 +69,7 @@ def test_largest_payload_of_a_pole_is_that_of_statics() -> None:
     <limit lower="-3" upper="3" effort="30" velocity="2"/></joint>
     <joint name="tip" type="fixed"><parent link="bar"/><child link="end"/><origin xyz="0.8 0 0"/></joint></robot>"""
     robot, rng = rd.Robot.from_text(text), np.random.default_rng(0)
-    payload = payload_limit(robot, random_states(robot, 300, rng), rng, (np.ones(1), np.ones(1)), Work())
-    assert payload is not None
+    (payload,) = payload_limit(robot, random_states(robot, 300, rng), rng, (np.ones(1), np.ones(1)), Work())
     assert payload.value == pytest.approx((30 / 9.80665 - 0.8) / 0.8, rel=1e-6)
     assert payload.confirmed and payload.joint == "hinge" and payload.what.endswith("end")
 
@@ -87,13 +86,13 @@ def test_each_limit_is_confirmed_or_said(name: str) -> None:
 
 def test_a_limit_that_is_too_long_is_refuted(monkeypatch) -> None:
     """Steps 1.1 times as long as the advisor allows leave the equilibrium within the limit already."""
-    advise = steps.advice_about
+    advise = stability.advice_about
 
     def wrong(*arguments, **options):
         advice = advise(*arguments, **options)
         return replace(advice, limits={name: 1.1 * x for name, x in advice.limits.items()})
 
-    monkeypatch.setattr(steps, "advice_about", wrong)
+    monkeypatch.setattr(stability, "advice_about", wrong)
     result = rd.tools.stress.stress(rd.load("pendulum"), samples=200, runs=0, budget_s=FOREVER)
     refuted = {each.what for each in result.limits if each.confirmed is False}
     assert {"explicit_euler", "midpoint", "rk4", "order_8"} <= refuted
@@ -294,8 +293,8 @@ def test_friction_that_is_faster_than_all_else_is_what_the_push_is_along() -> No
     <joint name="hinge" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 1 0"/>
     <limit lower="-1" upper="1" effort="1" velocity="5"/><dynamics damping="5"/></joint></robot>"""
     robot = rd.Robot.from_text(text)
-    setup = steps.held(robot, np.array([0.3]), (np.array([2e-3]), np.array([2e-4])), 40.0)
-    found = {each.what: each for each in islice(steps.step_limits(setup, 0, Work()), 4)}  # the explicit ones
+    setup = stability.held(robot, np.array([0.3]), (np.array([2e-3]), np.array([2e-4])), 40.0)
+    found = {each.what: each for each in islice(stability.step_limits(setup, 0, Work()), 4)}  # the explicit ones
     assert found["explicit_euler"].value == pytest.approx(2 * robot.M(np.array([0.3]))[0, 0] / 5, rel=0.01)
     assert all(each.confirmed for each in found.values())
 
@@ -305,7 +304,7 @@ def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
     robot = rd.load("pendulum")
     law = rd.control.PDGravity(robot, rd.control.hold([0.4]), 133.0, 13.3)
     setup = rd.Setup(rd.Plant(robot), [0.4 + 1e-6], duration_s=2.0, controller=law, integrator="midpoint", step_s=0.11)
-    pushed = confirm.run_from_near(setup, np.array([0.4]), Budget(), True)
+    pushed = stability.run_from_near(setup, np.array([0.4]), Budget(), True)
     assert pushed.growth > 30 and not pushed.misleads  # it says so
 
 

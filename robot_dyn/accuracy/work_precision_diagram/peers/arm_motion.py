@@ -9,6 +9,7 @@ from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
+from time import perf_counter
 from typing import Any, final
 
 import numpy as np
@@ -21,6 +22,7 @@ from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFricti
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring
 from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
 from robot_dyn.model.robot import Robot
+from robot_dyn.report.time_budget import Limit
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -107,6 +109,19 @@ class ArmMotion:
             return total
 
         return torque
+
+    def recorded(
+        self, advance: Callable[[float], tuple[np.ndarray, np.ndarray]], limit: Limit
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return q and v at the records, (k, n) each, of a program that `advance` takes to a time, and its time."""
+        q, v = (np.empty((len(self.times), self.robot.n)) for _ in range(2))
+        q[0], v[0] = self.setup.q0, self.setup.v0
+        limit(0.0)
+        began = perf_counter()
+        for k, t in enumerate(self.times[1:], start=1):
+            q[k], v[k] = advance(t)
+            limit(t)
+        return q, v, perf_counter() - began
 
     def run(self, q: np.ndarray, v: np.ndarray, steps: int | None, evaluations: int | None, time_s: float) -> Run:
         """The result of a run of another program from its q and v, (k, n) each; its energy is known if it is free."""

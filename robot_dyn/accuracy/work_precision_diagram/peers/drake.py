@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib import import_module
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -61,16 +60,13 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
         context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
         at(context, setup.q0, setup.v0)
         simulator.Initialize()
-        q, v = (np.empty((len(motion.times), n)) for _ in range(2))
-        q[0], v[0] = setup.q0, setup.v0
-        limit(0.0)
-        began = perf_counter()
-        for k, t in enumerate(motion.times[1:], start=1):
+
+        def advance(t: float) -> tuple[np.ndarray, np.ndarray]:
             simulator.AdvanceTo(t)
-            q[k], v[k] = plant.GetPositions(context)[places], plant.GetVelocities(context)[places]
-            limit(t)
-        spent = perf_counter() - began
-        steps = integrator.get_num_steps_taken()
-        return motion.run(q, v, steps, integrator.get_num_derivative_evaluations(), spent)
+            return plant.GetPositions(context)[places], plant.GetVelocities(context)[places]
+
+        q, v, spent = motion.recorded(advance, limit)
+        evaluations = integrator.get_num_derivative_evaluations()
+        return motion.run(q, v, integrator.get_num_steps_taken(), evaluations, spent)
 
     return [MethodUnderTest("Drake runge_kutta3", "", True, 3, "tolerance", tolerances, run)]

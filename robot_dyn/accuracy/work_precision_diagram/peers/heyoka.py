@@ -46,7 +46,7 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
         limit(motion.times[-1])
         return motion.run(y[:, :n], y[:, n:], steps, None, spent)
 
-    return [MethodUnderTest("heyoka, Taylor", "", True, None, "tolerance", lambda: iter(_TOLERANCES), run, warm)]
+    return [MethodUnderTest("heyoka, Taylor", "", True, None, "tolerance", lambda: _TOLERANCES, run, warm)]
 
 
 def _in_heyoka(hy: Any, program: Program, y: list[Any], parameters: np.ndarray) -> list[Any]:

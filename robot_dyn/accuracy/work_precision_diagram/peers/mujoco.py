@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import import_module
-from time import perf_counter
-from typing import Any, final
+from typing import Any
 
 import numpy as np
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest, Run, step_ladder
-from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, desired_motion
-from robot_dyn.accuracy.work_precision_diagram.peers.mujoco_model import joint_places, mujoco_model
+from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError, bare_urdf, desired_motion
 from robot_dyn.control.independent_joint import PD
 from robot_dyn.effects.friction import ViscousFriction
 from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
+from robot_dyn.model.robot import Robot
 from robot_dyn.report.time_budget import Limit
 
+STEP_S = 1e-3
 _METHODS = {  # name of the option, order, evaluations of the equation of motion in a step
     "RK4": ("mjINT_RK4", 4, 4), "Euler": ("mjINT_EULER", 1, 1), "implicitfast": ("mjINT_IMPLICITFAST", 1, 1),
 }  # fmt: skip
@@ -26,97 +26,142 @@ _IN_C = ViscousFriction, LineSpring, LineDamper
 
 
 def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
-    """Its three methods."""
+    """Its three methods: viscous friction, lines and servos in C, other torques in Python."""
     module: Any = import_module("mujoco")
-    model, at, callbacks = _model(motion, module)
-    data = module.MjData(model)
+    robot, setup, servo, effects = motion.robot, motion.setup, motion.servo, motion.setup.plant.effects
+    damping: Any = sum((each.damping for each in effects if isinstance(each, ViscousFriction)), start=0.0)
+    gains = None if servo is None else (servo.kp, servo.kd)
+    model = mujoco_model(module, robot, gains, damping, bare=True, lines=motion.lines)
+    at = joint_places(model, robot)
+    others: Any = [each for each in effects if not isinstance(each, _IN_C)]
+    control = None if servo is None else _command(model, servo)
 
-    def forward(t: float, q: np.ndarray, v: np.ndarray) -> None:
-        data.time, data.qpos[at], data.qvel[at] = t, q, v
-        with callbacks.installed(module):
-            module.mj_forward(model, data)
-
-    def mass_matrix(q: np.ndarray) -> np.ndarray:
-        M = np.zeros((model.nv, model.nv))
-        forward(0.0, q, 0 * q)
-        module.mj_fullM(model, data, M)
-        return M[np.ix_(at, at)]
-
-    def bias(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        forward(0.0, q, v)
-        return data.qfrc_bias[at]
-
-    def torque(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        forward(t, q, v)
-        return (data.qfrc_passive + data.qfrc_actuator)[at]
-
-    motion.check(mass_matrix, bias, torque)
-    return [_method(motion, module, name) for name in _METHODS]
-
-
-def _method(motion: ArmMotion, module: Any, name: str) -> MethodUnderTest:
-    option, order, each = _METHODS[name]
-    model, at, callbacks = _model(motion, module)
-    model.opt.integrator = getattr(module.mjtIntegrator, option)
-    setup, records = motion.setup, len(motion.times) - 1
-    period = float(motion.times[-1]) / records
-
-    def run(step: float, limit: Limit) -> Run:
-        data, count = module.MjData(model), round(period / step)
-        model.opt.timestep = period / count
-        data.qpos[at], data.qvel[at] = setup.q0, setup.v0
-        q, v = (np.empty((records + 1, motion.robot.n)) for _ in range(2))
-        q[0], v[0] = setup.q0, setup.v0
-        with callbacks.installed(module), np.errstate(all="ignore"):
-            limit(0.0)
-            began = perf_counter()
-            for k in range(records):
-                module.mj_step(model, data, count)
-                q[k + 1], v[k + 1] = data.qpos[at], data.qvel[at]
-                limit(motion.times[k + 1])
-            spent = perf_counter() - began
-        lost = any(warning.number for warning in data.warning)
-        return motion.run(q * np.nan if lost else q, v, count * records, each * count * records, spent)
-
-    return MethodUnderTest(f"MuJoCo {name}", "", motion.events, order, "step", lambda: step_ladder(period, order), run)
-
-
-@final
-@dataclass(frozen=True)
-class _Callbacks:
-    """What MuJoCo calls at each evaluation: commands of its servos, and torques that it does not have in C."""
-
-    control: Callable[[Any, Any], None] | None
-    passive: Callable[[Any, Any], None] | None
+    def passive(_: Any, data: Any) -> None:
+        for effect in others:
+            data.qfrc_passive[at] += effect.torque(None, data.time, data.qpos[at], data.qvel[at])
 
     @contextmanager
-    def installed(self, module: Any) -> Iterator[None]:
-        """For one run: they are MuJoCo's for all of the process."""
+    def callbacks() -> Iterator[None]:
+        """What MuJoCo calls at each evaluation, for one run: they are MuJoCo's for all of the process."""
         module.set_mju_user_warning(lambda _: None)  # it would print, and write a file: the outcome says the same
-        module.set_mjcb_control(self.control)
-        module.set_mjcb_passive(self.passive)
+        module.set_mjcb_control(control)
+        module.set_mjcb_passive(passive if others else None)
         try:
             yield
         finally:
-            module.set_mju_user_warning(None)
-            module.set_mjcb_control(None)
-            module.set_mjcb_passive(None)
+            for install in (module.set_mju_user_warning, module.set_mjcb_control, module.set_mjcb_passive):
+                install(None)
+
+    def forward(t: float, q: np.ndarray, v: np.ndarray) -> Any:
+        data = module.MjData(model)
+        data.time, data.qpos[at], data.qvel[at] = t, q, v
+        with callbacks():
+            module.mj_forward(model, data)
+        return data
+
+    def mass_matrix(q: np.ndarray) -> np.ndarray:
+        M = np.zeros((model.nv, model.nv))
+        module.mj_fullM(model, forward(0.0, q, 0 * q), M)
+        return M[np.ix_(at, at)]
+
+    def torque(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        data = forward(t, q, v)
+        return (data.qfrc_passive + data.qfrc_actuator)[at]
+
+    motion.check(mass_matrix, lambda q, v: forward(0.0, q, v).qfrc_bias[at], torque)
+    records = len(motion.times) - 1
+    period = float(motion.times[-1]) / records
+
+    def method(name: str, option: str, order: int, evaluations: int) -> MethodUnderTest:
+        def run(step: float, limit: Limit) -> Run:
+            data, count = module.MjData(model), round(period / step)
+            model.opt.integrator, model.opt.timestep = getattr(module.mjtIntegrator, option), period / count
+            data.qpos[at], data.qvel[at] = setup.q0, setup.v0
+
+            def advance(_: float) -> tuple[np.ndarray, np.ndarray]:
+                module.mj_step(model, data, count)
+                return data.qpos[at], data.qvel[at]
+
+            with callbacks(), np.errstate(all="ignore"):
+                q, v, spent = motion.recorded(advance, limit)
+            lost = any(warning.number for warning in data.warning)
+            return motion.run(q * np.nan if lost else q, v, count * records, evaluations * count * records, spent)
+
+        steps = lambda: step_ladder(period, order)  # noqa: E731
+        return MethodUnderTest(f"MuJoCo {name}", "", motion.events, order, "step", steps, run)
+
+    return [method(name, *details) for name, details in _METHODS.items()]
 
 
-def _model(motion: ArmMotion, module: Any) -> tuple[Any, list[int], _Callbacks]:
-    """The arm with viscous friction, lines and servos in C, the places of its joints, and the rest in Python."""
-    servo, effects = motion.servo, motion.setup.plant.effects
-    damping: Any = sum((each.damping for each in effects if isinstance(each, ViscousFriction)), start=0.0)
-    others: Any = [each for each in effects if not isinstance(each, _IN_C)]
-    gains = None if servo is None else (servo.kp, servo.kd)
-    model = mujoco_model(module, motion.robot, gains, damping, bare=True, lines=motion.lines)
-    at = joint_places(model, motion.robot)
+def mujoco_model(
+    mujoco: Any, arm: Robot, gains: tuple[Any, Any] | None = None, damping: Any = 0.0, bare: bool = False,
+    lines: Sequence[LineSpring | LineDamper] = (),
+) -> Any:  # fmt: skip
+    """The arm under RK4 at 1 ms: locked joints fixed, no limits, no contacts; PD with `gains` (kp, kd) on every joint.
 
-    def passive(_: Any, data: Any) -> None:
-        for each in others:
-            data.qfrc_passive[at] += each.torque(None, data.time, data.qpos[at], data.qvel[at])
+    Args:
+        mujoco: The module.
+        arm: The robot.
+        gains: Of a position servo u = kp (ctrl − q) − kd v on each joint, scalars or (n,).
+        damping: Viscous friction of each joint, a scalar or (n,), in [N m s/rad].
+        bare: Whether the constraint solver is switched off with all it would look for.
+        lines: Springs and dampers between points: as its tendons.
 
-    return model, at, _Callbacks(None if servo is None else _command(model, servo), passive if others else None)
+    Raises:
+        PeerError: If it does not take the file, or has other joints or bodies.
+    """
+    urdf = bare_urdf(arm)
+    options = etree.SubElement(urdf, "mujoco")
+    etree.SubElement(options, "compiler", fusestatic="true", balanceinertia="false", boundmass="0", boundinertia="0")
+    try:
+        spec = mujoco.MjSpec.from_string(etree.tostring(urdf, encoding="unicode"))
+        for k, line in enumerate(lines):
+            _add_tendon(spec, line, f"line {k}")
+        if gains is not None:
+            _add_servos(mujoco, spec, arm, *gains)
+        model = spec.compile()
+    except ValueError as error:
+        raise PeerError(f"it does not take the file: {' '.join(str(error).split())}") from None
+    model.opt.gravity[:] = arm.edits.gravity
+    model.opt.timestep, model.opt.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_RK4
+    model.dof_damping[joint_places(model, arm)] = damping
+    for k, line in enumerate(lines):
+        if isinstance(line, LineSpring):
+            model.tendon_stiffness[k], model.tendon_lengthspring[k] = line.stiffness, line.length
+        else:
+            model.tendon_damping[k] = line.damping
+    off = mujoco.mjtDisableBit
+    bits = (off.mjDSBL_CONSTRAINT, off.mjDSBL_LIMIT, off.mjDSBL_EQUALITY, off.mjDSBL_FRICTIONLOSS)
+    for bit in (off.mjDSBL_CONTACT, *(bits if bare else ())):
+        model.opt.disableflags |= int(bit)
+    return model
+
+
+def joint_places(model: Any, arm: Robot) -> list[int]:
+    """Where a model has the joints of the arm, in the order of the arm's; PeerError if it has others."""
+    names = [model.joint(i).name for i in range(model.njnt)]
+    if set(names) != set(arm.joint_names):
+        raise PeerError(f"it has other joints: {', '.join(names)}")
+    return [names.index(name) for name in arm.joint_names]
+
+
+def _add_servos(mujoco: Any, spec: Any, arm: Robot, kp: Any, kd: Any) -> None:
+    """One for each joint, in the order of the arm's."""
+    for name, kp_i, kd_i in zip(arm.joint_names, *(np.broadcast_to(x, arm.n) for x in (kp, kd)), strict=True):
+        servo = spec.add_actuator()
+        servo.target, servo.trntype = name, mujoco.mjtTrn.mjTRN_JOINT
+        servo.gaintype, servo.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+        servo.gainprm[0], servo.biasprm[:3] = kp_i, [0.0, -kp_i, -kd_i]
+
+
+def _add_tendon(spec: Any, line: LineSpring | LineDamper, name: str) -> None:
+    tendon = spec.add_tendon(name=name)
+    for k, (frame, point) in enumerate(((line.frame, line.point), (line.other_frame, line.other_point))):
+        body = spec.worldbody if frame is None else spec.body(frame)
+        if body is None:
+            raise PeerError(f"it has no body {frame!r}")
+        body.add_site(name=f"{name}, end {k}", pos=np.asarray(point))
+        tendon.wrap_site(f"{name}, end {k}")
 
 
 def _command(model: Any, servo: PD) -> Callable[[Any, Any], None]:

@@ -23,54 +23,48 @@ _DAMPED = {"DOP853": 8, "Radau": 5, "LSODA": None}  # damped motion may be stiff
 def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
     """Methods of `solve_ivp`."""
     pin: Any = import_module("pinocchio")
+    from scipy.integrate import solve_ivp
 
-    robot = motion.robot
+    robot, setup, n, times = motion.robot, motion.setup, motion.robot.n, motion.times
     if not robot.couplings.trivial:
         raise PeerError("pin.aba knows no coupled joints")
     model: Any = robot.model
-    data, zero = model.createData(), np.zeros(robot.n)
+    data, torque, zero = model.createData(), _torque(motion, pin), np.zeros(n)
+    start = np.concatenate([setup.q0, setup.v0])
 
     def mass_matrix(q: np.ndarray) -> np.ndarray:
         upper = np.triu(pin.crba(model, data, q))
         return upper + np.triu(upper, 1).T
 
-    motion.check(mass_matrix, lambda q, v: pin.rnea(model, data, q, v, zero), _torque(motion))
-    return [_method(motion, name, order) for name, order in (_FREE if motion.free else _DAMPED).items()]
+    motion.check(mass_matrix, lambda q, v: pin.rnea(model, data, q, v, zero), torque)
+
+    def method(name: str, order: int | None) -> MethodUnderTest:
+        def run(rtol: float, limit: Limit) -> Run:
+            def rate(t: float, y: np.ndarray) -> np.ndarray:
+                limit(t)
+                q, v = y[:n], y[n:]
+                return np.concatenate([v, pin.aba(model, data, q, v, torque(t, q, v))])
+
+            accuracy: Any = {"rtol": max(rtol, _LEAST), "atol": 1e-2 * rtol}
+            q, v, evaluations = *np.full((2, len(times), n), np.nan), None
+            began = perf_counter()
+            # warnings are of steps that it then refuses; a ValueError of Radau, whose iteration overflowed
+            with np.errstate(all="ignore"), suppress(ValueError):
+                found: Any = solve_ivp(rate, (0.0, times[-1]), start, name, t_eval=times, **accuracy)
+                evaluations = found.nfev
+                if found.status == 0:
+                    q, v = found.y[:n].T, found.y[n:].T
+            return motion.run(q, v, None, evaluations, perf_counter() - began)
+
+        return MethodUnderTest(f"SciPy {name} + pin.aba", "", motion.events, order, "tolerance", tolerances, run)
+
+    return [method(name, order) for name, order in (_FREE if motion.free else _DAMPED).items()]
 
 
-def _method(motion: ArmMotion, name: str, order: int | None) -> MethodUnderTest:
-    pin: Any = import_module("pinocchio")
-    from scipy.integrate import solve_ivp
-
-    setup, n, times, torque = motion.setup, motion.robot.n, motion.times, _torque(motion)
-    model: Any = motion.robot.model
-    data, start = model.createData(), np.concatenate([setup.q0, setup.v0])
-
-    def run(rtol: float, limit: Limit) -> Run:
-        def rate(t: float, y: np.ndarray) -> np.ndarray:
-            limit(t)
-            q, v = y[:n], y[n:]
-            return np.concatenate([v, pin.aba(model, data, q, v, torque(t, q, v))])
-
-        accuracy: Any = {"rtol": max(rtol, _LEAST), "atol": 1e-2 * rtol}
-        q, v, evaluations = *np.full((2, len(times), n), np.nan), None
-        began = perf_counter()
-        # warnings are of steps that it then refuses; a ValueError of Radau, whose iteration overflowed
-        with np.errstate(all="ignore"), suppress(ValueError):
-            found: Any = solve_ivp(rate, (0.0, times[-1]), start, name, t_eval=times, **accuracy)
-            evaluations = found.nfev
-            if found.status == 0:
-                q, v = found.y[:n].T, found.y[n:].T
-        return motion.run(q, v, None, evaluations, perf_counter() - began)
-
-    return MethodUnderTest(f"SciPy {name} + pin.aba", "", motion.events, order, "tolerance", tolerances, run)
-
-
-def _torque(motion: ArmMotion) -> Callable[[float, np.ndarray, np.ndarray], np.ndarray]:
+def _torque(motion: ArmMotion, pin: Any) -> Callable[[float, np.ndarray, np.ndarray], np.ndarray]:
     """τ(t, q, v): that of the joints, and of lines by Pinocchio's Jacobians of their points."""
     if not motion.lines:
         return motion.torque
-    pin: Any = import_module("pinocchio")
     model: Any = motion.robot.model
     data, skew, axes = model.createData(), pin.skew, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     lines = [(each, *_ends(motion, model, each)) for each in motion.lines]
