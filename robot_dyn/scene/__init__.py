@@ -5,7 +5,7 @@ effects.py, control.py, references.py    the tables [[effect]], [control] and [r
 tool_tables.py   tables of tools, such as [sweep]: entry points, imported where a scene has them
 declared.py      tables whose keys are the coefficients that classes declare; user_effects.py those of the caller
 schema.py        rules for every table: types of values, units, no unknown key
-messages.py, lines.py    error messages, with the line of the key
+messages.py      the one place where errors of pydantic become messages: line, key, value
 explain.py       what a scene integrates, term by term; manual.py writes docs/reference/scenes.md
 starters/        scenes to start from
 """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -23,7 +23,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
 from robot_dyn.scene.effects import AnyEdit, bare
 from robot_dyn.scene.references import Reference, frame_of
-from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Stated, per_joint
+from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Stated, one_of, per_joint
 
 _BLOCKS: dict[str, tuple[type[Block], ...]] = {  # of each line
     "position": (Noise, Quantisation, LowPass),
@@ -37,10 +37,7 @@ BLOCKS: dict[str, tuple[type[Declared], ...]] = {
     )
     for line, classes in _BLOCKS.items()
 }
-PositionBlock, VelocityBlock, ActuationBlock = (
-    Annotated[Union[BLOCKS[line]], Field(discriminator="kind")]  # pyright: ignore  # noqa: UP007
-    for line in LINES
-)
+PositionBlock, VelocityBlock, ActuationBlock = (one_of(*BLOCKS[line]) for line in LINES)
 
 
 class Model(Part):

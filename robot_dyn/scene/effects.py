@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Annotated, Any, ClassVar, Literal, Union
-
-from pydantic import Field, WrapValidator
+from typing import Annotated, Any, ClassVar, Literal
 
 from robot_dyn.description.edits import STANDARD_GRAVITY, Payload
 from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
@@ -28,6 +26,7 @@ from robot_dyn.foundations.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
 from robot_dyn.scene.schema import (
+    Form,
     NotNegative,
     Number,
     Part,
@@ -36,11 +35,11 @@ from robot_dyn.scene.schema import (
     Stated,
     Vector3,
     kinds_of,
+    one_of,
     per_joint,
-    urdf_or,
 )
 
-Matrix3 = tuple[Vector3, Vector3, Vector3]
+Matrix3 = Annotated[tuple[Vector3, Vector3, Vector3], Form("3 rows of 3 finite numbers", "list of 3 rows of 3 numbers")]
 
 
 class Edit(Part):
@@ -105,7 +104,9 @@ class Gravity(Edit):
     term = EDITED["gravity"]
 
     kind: Literal["gravity"]
-    acceleration_m_s2: Annotated[Vector3, WrapValidator(urdf_or)] = STANDARD_GRAVITY
+    acceleration_m_s2: Annotated[
+        Vector3 | Literal["urdf"], Form("a list of 3 finite numbers, or 'urdf'", 'list of 3 numbers or `"urdf"`')
+    ] = STANDARD_GRAVITY
     """Acceleration of free fall, in base axes; or "urdf", that of a file of MJCF."""
 
     def edit(self, robot: Robot, loaded: Robot) -> Robot:
@@ -261,5 +262,5 @@ ACTING = (
     _declared("actuator_lag", ActuatorLag),
 )  # fmt: skip
 BY_KIND: dict[str, type[Edit | Acting]] = {kinds_of(part)[0]: part for part in (*EDITS, *ACTING)}
-AnyEdit = Annotated[Union[EDITS], Field(discriminator="kind")]  # pyright: ignore  # noqa: UP007
-AnyEffect = Annotated[Union[EDITS + ACTING], Field(discriminator="kind")]  # pyright: ignore  # noqa: UP007
+AnyEdit = one_of(*EDITS)
+AnyEffect = one_of(*EDITS, *ACTING)

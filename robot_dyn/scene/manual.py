@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
-from types import NoneType
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Any
 
 from pydantic.fields import FieldInfo
 
@@ -13,7 +13,7 @@ from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.scene.control import BLOCKS, KINDS, Control, Model
 from robot_dyn.scene.effects import ACTING, EDITS
 from robot_dyn.scene.loading import Loading
-from robot_dyn.scene.references import AnyReference
+from robot_dyn.scene.references import KINDS as REFERENCES
 from robot_dyn.scene.scene import Scene, Start
 from robot_dyn.scene.schema import Part, kinds_of
 from robot_dyn.scene.tool_tables import tool_tables
@@ -42,13 +42,12 @@ _UNITS_OF_KEYS = {
     "q": "rad", "v": "rad/s", "joints": "rad", "points": "rad", "kp": "N m/rad", "kd": "N m s/rad",
     "atol": "rad, rad/s",
 }  # fmt: skip
-_TABLES_BY = {"mass_kg": "link"}  # not by joint
 _LINES = {
     "position": "measured position, from the joints to the controller",
     "velocity": "measured velocity, from the joints to the controller",
     "actuation": "torque, from the controller to the joints",
 }
-_FORMS = {float: "number", int: "integer", bool: "true or false", str: "text"}
+_FORMS = {"boolean": "true or false", "string": "text"}
 
 
 def manual() -> str:
@@ -75,7 +74,7 @@ def manual() -> str:
         parts += [f"## `[[control.{line}]]`\n\nBlocks of the {_LINES[line]}; one table for each, with its `kind`.\n"]
         parts += _kinds(*blocks)
     parts += ["## `[reference]`\n\nWhat the controller follows; one table, with its `kind`.\n"]
-    parts += _kinds(*get_args(get_args(AnyReference)[0]))
+    parts += _kinds(*REFERENCES)
     for name, entry in sorted(tool_tables().items()):
         table = entry.load()
         parts += _section(f"`[{name}]`", _text(table), table)
@@ -93,49 +92,36 @@ def _section(title: str, text: str, part: type[Part], level: int = 2) -> Iterato
     fields = {key: field for key, field in part.model_fields.items() if key != "kind" or part is Control}
     if fields:
         yield "| key | value | unit | default | meaning |\n|---|---|---|---|---|"
-        yield from (_row(key, field) for key, field in fields.items())
+        schemas = part.model_json_schema()["properties"]
+        yield from (_row(key, field, schemas[key]) for key, field in fields.items())
         yield ""
 
 
-def _row(key: str, field: FieldInfo) -> str:
-    form = _form(field)
-    form = form.replace("by joint", f"by {_TABLES_BY[key]}") if key in _TABLES_BY else form
+def _row(key: str, field: FieldInfo, schema: dict[str, Any]) -> str:
+    form = _form(schema)
     unit = _UNITS_OF_KEYS.get(key) or next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
     unit = "" if "text" in form else unit
     return f"| `{key}` | {_cell(form)} | {unit} | {_default(field)} | {_cell(field.description or '')} |"
 
 
-def _form(field: FieldInfo) -> str:
-    """What a value may be, with its sign."""
-    form = _of(field.annotation)
-    signs = {"Gt": "positive", "Ge": "not negative"}
-    sign = next((signs[name] for name in (type(each).__name__ for each in field.metadata) if name in signs), "")
-    return f"{form}, {sign}" if sign else form
+def _form(schema: dict[str, Any]) -> str:
+    """Return what a value may be, by its JSON schema."""
+    if "anyOf" in schema:  # a value, or nothing
+        return _form(schema["anyOf"][0])
+    if "const" in schema or "enum" in schema:
+        return " or ".join(f"`{_toml(value)}`" for value in schema.get("enum", [schema.get("const")]))
+    if schema.get("type") == "array":
+        return f"list of {_several(_form(schema['items']))}"
+    if "additionalProperties" in schema:
+        return f"table by name of {_several(_form(schema['additionalProperties']))}"
+    form = str(schema.get("type", "table"))  # a part has no type, but a reference
+    sign = "positive" if "exclusiveMinimum" in schema else "not negative" if "minimum" in schema else ""
+    return _FORMS.get(form, form) + (f", {sign}" if sign else "")
 
 
-def _of(annotation: Any) -> str:
-    """What a value of a type may be."""
-    if annotation in _FORMS:
-        return _FORMS[annotation]
-    origin, args = get_origin(annotation), [each for each in get_args(annotation) if each is not NoneType]
-    if origin is Literal:
-        return " or ".join(f"`{_toml(each)}`" for each in args)
-    if origin is None:
-        return "table"  # a part
-    first = _of(args[0])
-    if origin is Annotated:
-        return first
-    if origin is dict:
-        return f"table of {_of(args[1])}s by {'name' if args[1] is str else 'joint'}"
-    if origin is tuple and Ellipsis not in args:
-        return f"list of {len(args)} {'lists' if first.startswith('list') else first + 's'}"
-    if origin in (list, tuple):
-        several = first if first.startswith("`") else f"{first}s"
-        return f"list of {'lists of numbers' if first.startswith('list') else several}"
-    ways = dict.fromkeys(map(_of, args))
-    if "list of numbers" in ways:  # as `PerJoint`
-        ways = ["by joint", *(way for way in ways if way.startswith("`"))]
-    return " or ".join(ways)
+def _several(form: str) -> str:
+    """Return the plural of a form: `numbers, positive` for `number, positive`."""
+    return form if form.startswith("`") else re.sub(r"^\w+", lambda word: f"{word[0]}s", form)
 
 
 def _default(field: FieldInfo) -> str:

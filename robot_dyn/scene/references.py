@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
 
 from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
@@ -16,7 +15,7 @@ from robot_dyn.control.samples.measured import from_samples
 from robot_dyn.control.samples.turns import joined_turns
 from robot_dyn.foundations.errors import PlanWarning, SceneError
 from robot_dyn.model.robot import Robot
-from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Truth, Vector3, per_joint
+from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Truth, Vector3, one_of, per_joint
 
 
 class Reference(Part):
@@ -179,7 +178,8 @@ class Circle(Reference):
         )
 
 
-AnyReference = Annotated[Hold | Quintic | ViaPoints | Sampled | Line | Circle, Field(discriminator="kind")]
+KINDS = Hold, Quintic, ViaPoints, Sampled, Line, Circle
+AnyReference = one_of(*KINDS)
 
 
 def frame_of(frame: str | None) -> str:

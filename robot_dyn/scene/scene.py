@@ -6,9 +6,9 @@ import os
 import re
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import ValidationError, WrapValidator
+from pydantic import AfterValidator, ValidationError, WrapValidator, model_validator
 
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
@@ -19,13 +19,13 @@ from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.control import Control
-from robot_dyn.scene.effects import BY_KIND, Acting, AnyEffect, Edit, bare
+from robot_dyn.scene.effects import BY_KIND, AnyEffect, Edit, bare
 from robot_dyn.scene.loading import Loading
-from robot_dyn.scene.messages import located, validation_message, where
+from robot_dyn.scene.messages import validation_message
 from robot_dyn.scene.references import AnyReference, Hold, Sampled, ViaPoints
-from robot_dyn.scene.schema import NotNegative, Part, PerJoint, PlacedError, Positive, Truth, per_joint, placed
-from robot_dyn.scene.tool_tables import with_tool_tables
-from robot_dyn.scene.user_effects import Factories, UserEffect, check_factories, user_defined_or
+from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Truth, per_joint
+from robot_dyn.scene.tool_tables import tool_tables, with_tool_tables
+from robot_dyn.scene.user_effects import Factories, check_factories, user_defined_or
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
 MAX_BYTES = 2**20
@@ -41,6 +41,12 @@ class Start(Part):
     """Velocity."""
 
 
+def _known_method(name: str) -> str:
+    if name not in METHODS:
+        raise ValueError(f"no method {shorten(name)!r}; {nearest(name, METHODS)}")
+    return name
+
+
 class Scene(Part):
     """A scene file."""
 
@@ -50,7 +56,7 @@ class Scene(Part):
     """How its file is read; as it is by default."""
     duration_s: Positive
     """Length of the run."""
-    method: str = Setup.integrator
+    method: Annotated[str, AfterValidator(_known_method)] = Setup.integrator
     """Integrator."""
     step_s: Positive = STEP_S
     """Step of a method with a fixed step; shorter where samples, ticks and switches require it."""
@@ -72,35 +78,60 @@ class Scene(Part):
     """What acts, gravity included; nothing by default."""
     control: Control | None = None
     """What drives the joints; nothing by default."""
-    reference: AnyReference = Hold(kind="hold")
+    reference: AnyReference = Hold(kind="hold")  # pyright: ignore[reportInvalidTypeForm]
     """What the controller follows; rest at the start by default."""
+
+    @classmethod
+    def valid_keys(cls) -> tuple[str, ...]:
+        return (*super().valid_keys(), *tool_tables())
+
+    @model_validator(mode="after")
+    def _every_key_has_an_effect(self) -> Self:
+        stated = self.model_fields_set
+        if self.control is None and "reference" in stated:
+            raise ValueError("reference: nothing follows it; add a [control]")
+        chosen = [key for key in ("method", "step_s", "rtol", "atol") if key in stated]
+        if self.accuracy is not None and chosen:
+            raise ValueError(
+                f"{chosen[0]}: has no effect because accuracy chooses method and tolerance; remove one of the two"
+            )
+        of_other_methods = ("step_s",) if self.method in ADAPTIVE else ("rtol", "atol")
+        if unused := [key for key in of_other_methods if key in stated]:
+            kind = "chooses its own step" if self.method in ADAPTIVE else "has a fixed step"
+            raise ValueError(
+                f"{unused[0]}: has no effect because {self.method} {kind}; remove it, or name another method"
+            )
+        of_model = None if self.control is None else self.control.model.effects
+        for place, effects in (("effect", self.effect), ("control.model.effects", of_model or ())):
+            kinds = [effect.kind for effect in effects]
+            for kind in ("gravity", "armature"):
+                if (count := kinds.count(kind)) > 1:
+                    raise ValueError(f"{place}: {kind} is named {count} times, and only the last would act; keep one")
+        return self
 
     def loaded(self, folder: Path) -> Robot:
         """Return the robot of its file."""
         beside = folder / self.robot
-        with placed("robot"):
-            return self.load.robot(beside if os.path.isfile(beside) else self.robot)
+        return self.load.robot(beside if os.path.isfile(beside) else self.robot)
 
     def setup(self, folder: Path, about: dict[str, str]) -> Setup:
         """Return the setup it describes; paths are relative to `folder`."""
         loaded = self.loaded(folder)
         robot = bare(loaded)
-        for k, effect in enumerate(self.effect):
-            if isinstance(effect, Edit):
-                with placed("effect", k):
-                    robot = effect.edit(robot, loaded)
         acting: list[Effect] = []
-        for k, effect in enumerate(self.effect):
-            if isinstance(effect, Acting | UserEffect):
-                with placed("effect", k):
+        for k, effect in sorted(enumerate(self.effect), key=lambda pair: not isinstance(pair[1], Edit)):  # edits first
+            try:
+                if isinstance(effect, Edit):
+                    robot = effect.edit(robot, loaded)
+                else:
                     acting += effect.build(robot)
-        with placed("start"):
-            q0, v0 = (per_joint(name, value, robot) for name, value in (("q", self.start.q), ("v", self.start.v)))
+            except RobotDynError as error:
+                raise SceneError(f"effect {k + 1} ({effect.kind}): {error}") from None
+        q0, v0 = (per_joint(f"start.{key}", getattr(self.start, key), robot) for key in ("q", "v"))
         reference = self.reference
         if isinstance(reference, Sampled | ViaPoints) and reference.file is not None:
             reference = reference.model_copy(update={"file": str(folder / reference.file)})
-        with placed("control"):
-            controller = None if self.control is None else self.control.build(loaded, robot, q0, reference)
+        controller = None if self.control is None else self.control.build(loaded, robot, q0, reference)
         step_s = self.step_s if "step_s" in self.model_fields_set else None
         return Setup(
             Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),
@@ -137,63 +168,27 @@ def read_both(path: str | Path, effects: Factories | None = None) -> tuple[Scene
         text = data.decode("utf-8")
     except UnicodeDecodeError:
         raise SceneError(f"{path}: is not UTF-8 text; save it as TOML in UTF-8") from None
-    scene, table = _parsed(text, str(path), effects)
+    scene = parse_scene(text, str(path), effects)
     try:
         return scene, scene.setup(Path(path).parent, {"scene": text})
-    except PlacedError as error:
-        named = f"{where(table, error.path)}: {error}" if error.path[0] in ("effect", "start") else str(error)
-        raise SceneError(f"{path}: {located(text, error.path, named)}") from None
     except RobotDynError as error:
         raise SceneError(f"{path}: {error}") from None
 
 
-def parse_scene(text: str, source: str) -> Scene:
+def parse_scene(text: str, source: str, effects: Factories | None = None) -> Scene:
     """Return the scene of a TOML text; `source` names it in messages.
 
     Raises:
         SceneError: If it is not TOML, or a key or value is not allowed.
     """
-    return _parsed(text, source)[0]
-
-
-def _parsed(text: str, source: str, effects: Factories | None = None) -> tuple[Scene, dict[str, Any]]:
     try:
         table = tomllib.loads(text.removeprefix("\ufeff"))  # the mark of some editors for UTF-8
     except (ValueError, RecursionError) as error:
         raise SceneError(f"{source}: {_syntax(error)}; correct the file") from None
-    schema = with_tool_tables(Scene, table)
     try:
-        scene = schema.model_validate(table, context=dict(effects or {}))
+        return with_tool_tables(Scene, table).model_validate(table, context=dict(effects or {}))
     except ValidationError as error:
-        raise SceneError(f"{source}: {validation_message(error, table, text, schema)}") from None
-    if scene.control is None and "reference" in scene.model_fields_set:
-        message = located(text, ["reference"], "reference: nothing follows it; add a [control]")
-        raise SceneError(f"{source}: {message}")
-    if scene.method not in METHODS:
-        names = nearest(scene.method, METHODS)
-        message = located(text, ["method"], f"method: no method {shorten(scene.method)!r}; {names}")
-        raise SceneError(f"{source}: {message}")
-    if why := _without_effect(scene):
-        raise SceneError(f"{source}: {located(text, why.partition(':')[0].split('.'), why)}")
-    return scene, table
-
-
-def _without_effect(scene: Scene) -> str:
-    """Return the first statement of a scene without effect on its run; empty if there is none."""
-    chosen = [key for key in ("method", "step_s", "rtol", "atol") if key in scene.model_fields_set]
-    if scene.accuracy is not None and chosen:
-        return f"{chosen[0]}: has no effect, since accuracy chooses method and tolerance; remove one of the two"
-    of_other_methods = ("step_s",) if scene.method in ADAPTIVE else ("rtol", "atol")
-    if unused := [key for key in of_other_methods if key in scene.model_fields_set]:
-        kind = "chooses its own step" if scene.method in ADAPTIVE else "has a fixed step"
-        return f"{unused[0]}: has no effect, since {scene.method} {kind}; remove it, or name another method"
-    models = [] if scene.control is None else [("control.model.effects", scene.control.model.effects or ())]
-    for place, effects in (("effect", scene.effect), *models):
-        kinds = [effect.kind for effect in effects]
-        for kind in ("gravity", "armature"):
-            if kinds.count(kind) > 1:
-                return f"{place}: {kind} is named {kinds.count(kind)} times, and only the last would act; keep one"
-    return ""
+        raise SceneError(f"{source}: {validation_message(error, table, text)}") from None
 
 
 def _syntax(error: Exception) -> str:

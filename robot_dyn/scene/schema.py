@@ -2,34 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Annotated, Any, Literal, get_args
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Union, get_args
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetCoreSchemaHandler, model_validator
+from pydantic_core import PydanticCustomError, core_schema
 
 from robot_dyn.description.edits import by_joint
 from robot_dyn.foundations.coefficients import URDF
-from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.errors import nearest, shorten
 from robot_dyn.model.robot import Robot
-
-
-class PlacedError(RobotDynError):
-    """An error of a part of a scene, at the `path` of its keys."""
-
-    def __init__(self, message: str, path: tuple[str | int, ...]) -> None:
-        super().__init__(message)
-        self.path = path
-
-
-@contextmanager
-def placed(*path: str | int) -> Iterator[None]:
-    """Errors raised inside carry the path of a scene."""
-    try:
-        yield
-    except RobotDynError as error:
-        raise PlacedError(str(error), path) from None
 
 
 class Part(BaseModel):
@@ -39,10 +22,69 @@ class Part(BaseModel):
         extra="forbid", allow_inf_nan=False, frozen=True, strict=False, use_attribute_docstrings=True
     )
 
+    @classmethod
+    def valid_keys(cls) -> tuple[str, ...]:
+        """Return the keys that the table may have."""
+        return tuple(cls.model_fields)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _table_of_valid_keys(cls, value: Any) -> Any:
+        for key in _table(value):
+            if key not in cls.model_fields:
+                raise wrong_key(key, f"is not a key here; {nearest(key, cls.valid_keys())}")
+        return value
+
+
+def _table(value: object) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise PydanticCustomError("form", "must be a table")
+    return value
+
+
+def wrong_key(key: str, message: str) -> PydanticCustomError:
+    """Return an error of a key of a table, which may be missing."""
+    return PydanticCustomError("wrong_key", "{message}", {"key": key, "message": message})
+
 
 def kinds_of(part: type[Part]) -> tuple[str, ...]:
     """The values that the key `kind` of a part may have."""
     return get_args(part.model_fields["kind"].annotation) if "kind" in part.model_fields else ()
+
+
+def one_of(*parts: type[Part]) -> Any:
+    """Return the type of a table that is one of several parts, by its `kind`."""
+    kinds = [kind for part in parts for kind in kinds_of(part)]
+
+    def with_kind(value: Any) -> Any:
+        if "kind" not in _table(value):
+            raise wrong_key("kind", f"is missing; give one of {', '.join(kinds)}")
+        if (kind := value["kind"]) not in kinds:
+            raise wrong_key("kind", f"no kind {shorten(kind)!r}; {nearest(str(kind), kinds)}")
+        return value
+
+    return Annotated[Union[parts], Field(discriminator="kind"), BeforeValidator(with_kind)]  # noqa: UP007
+
+
+@dataclass(frozen=True)
+class Form:
+    """The form of a value that can be written in several ways, in words.
+
+    Attributes:
+        must_be: For messages.
+        on_page: For the page of scenes.
+    """
+
+    must_be: str
+    on_page: str
+
+    def __get_pydantic_core_schema__(self, source: type, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.custom_error_schema(
+            handler(source), custom_error_type="form", custom_error_message=f"must be {self.must_be}"
+        )
+
+    def __get_pydantic_json_schema__(self, schema: core_schema.CoreSchema, handler: object) -> dict[str, str]:
+        return {"type": self.on_page}
 
 
 # Strict: a text or a truth value is not a number.
@@ -50,14 +92,13 @@ Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Positive = Annotated[float, Field(gt=0, strict=True)]
 NotNegative = Annotated[float, Field(ge=0, strict=True)]
 Truth = Annotated[bool, Field(strict=True)]
-Vector3 = tuple[Number, Number, Number]
-PerJoint = Number | list[Number] | dict[str, Number]  # for all joints, for each, or by name (0 elsewhere)
-Stated = PerJoint | Literal["urdf"]
-
-
-def urdf_or(value: Any, handler: Callable[[Any], Any]) -> Any:
-    """The text "urdf" as it is; anything else as the key has it, with its messages."""
-    return URDF if value == URDF else handler(value)
+Vector3 = Annotated[tuple[Number, Number, Number], Form("a list of 3 finite numbers", "list of 3 numbers")]
+_BY_JOINT = "a finite number, a list of them or a table of them by joint"  # a joint left out of a table has 0
+PerJoint = Annotated[Number | list[Number] | dict[str, Number], Form(_BY_JOINT, "by joint")]
+Stated = Annotated[
+    Number | list[Number] | dict[str, Number] | Literal["urdf"],
+    Form(f"{_BY_JOINT}, or 'urdf'", 'by joint or `"urdf"`'),
+]
 
 
 def per_joint(what: str, value: Any, robot: Robot, elsewhere: float = 0.0) -> Any:

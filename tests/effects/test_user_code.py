@@ -316,14 +316,14 @@ def test_a_scene_names_effects_that_its_reader_names(keys: str, c: Any, tmp_path
     setup = rd.Setup(rd.Plant(ARM, [Drag(c)]), Q, V, 0.1, integrator=rd.integrate.Adaptive(rtol=1e-10, atol=1e-12))
     expected = rd.simulate(setup, record_period_s=0.01, engine="interpreted")
     assert np.array_equal(rd.simulate(own).q, expected.q)
-    with pytest.raises(SceneError, match=r"line 8: effect 2 \(drag\): kind: no kind 'drag'"):
+    with pytest.raises(SceneError, match=r"line 8: effect 2 \(drag\).kind: no kind 'drag'"):
         rd.read_scene(path)
 
 
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ("", r"line 6: effect 1 \(drag\): drag: missing a required argument: 'c'; keys: c, on"),
+        ("", r"effect 1 \(drag\): drag: missing a required argument: 'c'; keys: c, on"),
         ("c = 1.0\nd = 2.0", "unexpected keyword argument 'd'"),
         ("c = inf", "c must be"),
         ("c = {elbow = 1.0}", "elbow"),

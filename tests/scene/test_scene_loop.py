@@ -82,13 +82,13 @@ def test_a_loop_of_a_scene_is_that_of_python(tmp_path: Path) -> None:
     ("old", "new", "words"),
     [
         ("period_s = 0.004\n", "", "give PD a period_s"),
-        ("order = 1", "order = 3", "control: velocity 2 .low_pass.: order"),
+        ("order = 1", "order = 3", "control.velocity 2 .low_pass..order"),
         ("cutoff_rad_per_s = 300.0", "cutoff_rad_per_s = 900.0", "cutoff must be less than"),
         ("resolution_N_m = 0.01", "resolution_rad = 0.01", "resolution_rad"),
         ('[[control.position]]\nkind = "noise"\ndeviation_rad = 1e-3\n', "", "noise_seed: has no effect"),
         ("joint_2 = 2e-4", "elbow = 2e-4", "elbow"),
         ("actuation_delay_periods = 0.4", "actuation_delay_periods = -0.4", "actuation_delay_periods"),
-        ('kind = "differences"', 'kind = "rate_limit"', "line 25: control: velocity 1 .rate_limit.: kind: no kind"),
+        ('kind = "differences"', 'kind = "rate_limit"', "control.velocity 1 .rate_limit..kind: no kind"),
     ],
 )
 def test_loops_of_scenes_that_have_no_meaning_are_refused(tmp_path: Path, old: str, new: str, words: str) -> None:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-import tomllib
 from pathlib import Path
-from typing import Any
 
 import pytest
 from rich.table import Table
@@ -16,8 +14,6 @@ import robot_dyn as rd
 from robot_dyn import RobotDynError
 from robot_dyn.cli import terminal
 from robot_dyn.foundations import SceneError, escaped
-from robot_dyn.scene import starter, starter_names
-from robot_dyn.scene.lines import line_of
 from tests.command import refusal
 from tests.snapshots import assert_text
 
@@ -47,15 +43,15 @@ MISTAKES = [
     GRAVITY + "[[effect]]\nkind = 'spring'\nstiffness_N_m_per_rad = {hing = 1}\n",
 ]
 OF_MANY_KEYS_OR_OF_TOMLLIB = {  # texts that grow with the library, or are of Python's version
-    '[[effect]]\nkin = "gravity"\n': "line 3: effect 1: has no kind; give one of gravity, lock, .*actuator_lag",
-    "color = 3\n": "line 3: 'color' is not a key of a scene; .*duration_s, .*",
+    '[[effect]]\nkin = "gravity"\n': "line 3: effect 1.kind: is missing; give one of gravity, lock, .*actuator_lag",
+    "color = 3\n": "line 3: color: is not a key here; nearest: control",
     "x = \ny = 3": "line 3, column 5: is not TOML: .*",
     "x = [1, 2": "is not TOML: Unclosed array .*",
     "x = " + "9" * 5000: "is not TOML: .*",
     "x = " + "[" * 5000: ".*nested too deeply; correct the file",
-    "x = " + "[" * 90 + "]" * 90: r"line 3: 'x' is not a key of a scene; .*",
+    "x = " + "[" * 90 + "]" * 90: "line 3: x: is not a key here; .*",
     "'\x1b[31m' = 3\n": "line 3, column 2: is not TOML: .*",
-    '"\\u001b[31m\\u202e" = 3\n': r"line 3: '\\+x1b\[31m\\+u202e' is not a key of a scene; .*",
+    '"\\u001b[31m\\u202e" = 3\n': r"\\+x1b\[31m\\+u202e: is not a key here; .*",
 }
 
 
@@ -74,25 +70,17 @@ def test_a_mistake_is_told_as_people_count(tmp_path: Path, mistake: str) -> None
         assert voice not in told.lower(), told
 
 
-@pytest.mark.parametrize("name", starter_names())
-def test_the_line_of_a_key_is_that_which_states_it(name: str) -> None:
-    text = starter(name)
-    lines = text.splitlines()
-
-    def check(value: Any, path: tuple[Any, ...]) -> None:
-        if isinstance(value, dict):
-            for key, below in value.items():
-                line = line_of(text, (*path, key))
-                assert line is not None and re.search(rf"\b{key}\b", lines[line - 1]), (*path, key)
-                check(below, (*path, key))
-        elif isinstance(value, list) and value and isinstance(value[0], dict):
-            assert [line_of(text, (*path, k)) for k in range(len(value))] == [
-                number for number, line in enumerate(lines, 1) if line.startswith(f"[[{path[-1]}]]")
-            ]
-            for k, below in enumerate(value):
-                check(below, (*path, k))
-
-    check(tomllib.loads(text), ())
+def test_a_key_at_the_top_is_told_with_its_line(tmp_path: Path) -> None:
+    """The same for tables at the top: the second [[effect]] is the second line that begins one."""
+    path = tmp_path / "scene.toml"
+    for line, mistake in (
+        (4, "\naccuracy = 'x'\n"),
+        (5, GRAVITY + "[[effect]]\nkind = 'sprng'\n"),
+        (3, "[start]\nq=''\n"),
+    ):
+        path.write_text(BASE + mistake, encoding="utf-8")
+        with pytest.raises(SceneError, match=f"scene.toml: line {line}: "):
+            rd.read_scene(path)
 
 
 def test_a_scene_is_read_within_bounds(tmp_path: Path) -> None:

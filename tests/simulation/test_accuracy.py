@@ -161,5 +161,5 @@ def test_it_is_kept_with_the_run_and_asked_for_in_scenes(tmp_path: Path) -> None
     kept = rd.load_run(rd.save_run(run, tmp_path / "run.npz"))
     assert kept.accuracy == run.accuracy
     scene.write_text(scene.read_text().replace("accuracy", 'method = "rk4"\naccuracy'))
-    with pytest.raises(SceneError, match="line 3: method: has no effect, since accuracy chooses"):
+    with pytest.raises(SceneError, match="method: has no effect because accuracy chooses"):
         rd.read_scene(scene)
