@@ -163,7 +163,7 @@ def test_the_estimate_at_a_time_is_the_largest_up_to_it() -> None:
         whole.at(["soon"])
 
 
-@pytest.mark.parametrize("index", [*range(3), *long(range(3, 8))])
+@pytest.mark.parametrize("index", [1, 3, 6, *long([0, 2, 4, 5, 7])])
 def test_the_largest_error_is_finite_where_the_estimate_holds_to_the_end_of_the_run(index: int) -> None:
     run = rd.simulate(scene_of_all(5, index).setup)
     assert run.error is not None
