@@ -21,6 +21,12 @@ BY_PATH = {"example-robot-data", "meshcat", "pycollada"}
 
 
 @cache
+def homes() -> dict[str, list[str]]:
+    """Distributions by the modules that they install; reading all of their records takes seconds."""
+    return packages_distributions() | HOMES
+
+
+@cache
 def imported(folder: str) -> dict[str, str]:
     """Top-level modules that the files of a folder import and Python does not have, each with one such file."""
     found: dict[str, str] = {}
@@ -61,24 +67,22 @@ DEVELOPMENT = names(GROUPS["dev"])
 )
 def test_what_is_imported_is_declared(folder: str, allowed: set[str]) -> None:
     """Every module comes from a distribution that pyproject.toml names, not from one that another brings along."""
-    homes = packages_distributions() | HOMES
     for module, path in imported(folder).items():
-        if module not in homes:  # not installed: by its own name
+        if module not in homes():  # not installed: by its own name
             assert normal(module) in allowed, f"{path} imports {module}, which nothing declares"
             continue
-        assert {normal(home) for home in homes[module]} & allowed, f"{path} imports {module}, of {homes[module]}"
+        of = {normal(home) for home in homes()[module]}
+        assert of & allowed, f"{path} imports {module}, of {of}"
 
 
 def test_what_is_declared_is_used() -> None:
-    homes = packages_distributions() | HOMES
-    used = {normal(home) for module in imported("robot_dyn") for home in homes.get(module, [module])}
+    used = {normal(home) for module in imported("robot_dyn") for home in homes().get(module, [module])}
     assert used >= DECLARED - BY_PATH
     assert BY_PATH <= DECLARED
 
 
 def test_what_needs_asks_for_is_of_its_extra() -> None:
     """The line that an error names installs the module that was missing."""
-    homes = packages_distributions()
     calls = [
         (module, constants.get(extra, extra).strip('"'))
         for path in (ROOT / "robot_dyn").rglob("*.py")
@@ -90,7 +94,7 @@ def test_what_needs_asks_for_is_of_its_extra() -> None:
     for module, extra in calls:
         of = PROJECT["project"]["optional-dependencies"][extra]
         top = module.partition(".")[0]
-        assert names(of) & {normal(home) for home in homes.get(top, [top])}, (module, extra)
+        assert names(of) & {normal(home) for home in homes().get(top, [top])}, (module, extra)
         assert names(of) <= DEVELOPMENT
 
 

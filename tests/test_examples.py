@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import re
+import runpy
 import subprocess
 import sys
+from contextlib import redirect_stdout
 from functools import cache
 from pathlib import Path
 
@@ -24,11 +27,18 @@ def test_every_page_is_tested_and_fits_a_screen() -> None:
 
 
 def printed_by(page: Path) -> str:
-    """What a page prints; warnings are errors."""
-    command = [sys.executable, "-W", "error", str(page)]
+    """Return what a page prints in this process; warnings are errors."""
+    out = io.StringIO()
+    with redirect_stdout(out):
+        runpy.run_path(str(page), run_name="__main__")
+    return out.getvalue()
+
+
+def test_a_page_runs_as_a_script() -> None:
+    command = [sys.executable, "-W", "error", str(PAGES["pendulum"])]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    assert "energy ledger" in done.stdout
 
 
 def test_the_pages_of_the_textbook_are_there() -> None:

@@ -6,10 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-import jupytext
 import pytest
-from nbclient import NotebookClient
-from nbconvert import HTMLExporter
 
 from tests.browser import View
 from tests.long import long
@@ -21,6 +18,12 @@ MOST_CELLS, MOST_LINES, MOST_WORDS, MOST_CHARACTERS = 12, 8, 25, 1500
 COMPILES = re.compile(r"robot_dyn: compiling .*\n")  # the line that says why a cell takes more than a second
 
 pytestmark = pytest.mark.filterwarnings("default")  # of Jupyter; in the notebook they would show on stderr
+
+
+def read(path: Path) -> Any:
+    import jupytext  # it and its parts take seconds to import, in every process that collects tests
+
+    return jupytext.read(path)
 
 
 def code(notebook: Any) -> list[Any]:
@@ -36,7 +39,7 @@ def test_there_are_five_and_all_cells_are_of_notebooks() -> None:
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_is_short(path: Path) -> None:
     """Blank lines, which the formatter puts around functions, do not count."""
-    notebook = jupytext.read(path)
+    notebook = read(path)
     lengths = [sum(map(bool, map(str.strip, cell.source.splitlines()))) for cell in code(notebook)]
     assert len(lengths) <= MOST_CELLS and max(lengths) <= MOST_LINES, lengths
     words = [cell.source for cell in notebook.cells if cell.cell_type == "markdown"]
@@ -49,9 +52,12 @@ def test_a_notebook_is_short(path: Path) -> None:
 @pytest.mark.parametrize("path", [NOTEBOOKS[0], *long(NOTEBOOKS[1:])], ids=lambda path: path.stem)
 def test_a_notebook_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, browser: Any) -> None:
     """In a kernel of this Python, without settings of the user; a cell that raises fails the test."""
+    from nbclient import NotebookClient
+    from nbconvert import HTMLExporter
+
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
     monkeypatch.delenv("MPLBACKEND", raising=False)
-    notebook = jupytext.read(path)
+    notebook = read(path)
     NotebookClient(notebook, timeout=180, resources={"metadata": {"path": str(tmp_path)}}).execute()
     for output in (output for cell in code(notebook) for output in cell.outputs):
         shown = output.data if "data" in output else {"text/plain": output.text}

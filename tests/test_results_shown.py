@@ -9,12 +9,9 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import nbformat
 import numpy as np
 import pytest
 from lxml import html
-from nbclient import NotebookClient
-from nbconvert import HTMLExporter
 
 import robot_dyn as rd
 from robot_dyn.foundations import Answer, Table
@@ -149,6 +146,9 @@ SETUP = "import numpy as np, robot_dyn as rd\narm, q = rd.load('planar_2r'), np.
 
 
 def executed(*cells: str) -> Any:
+    import nbformat  # it and its parts take seconds to import, in every process that collects tests
+    from nbclient import NotebookClient
+
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(each) for each in (SETUP, *cells)])
     return NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
 
@@ -161,6 +161,8 @@ def test_a_figure_that_a_cell_returns_is_one_picture(before: str) -> None:
 
 @pytest.mark.long
 def test_a_browser_shows_every_result_on_light_and_dark_pages(tmp_path: Any, browser: Any) -> None:
+    from nbconvert import HTMLExporter
+
     notebook = executed(*CELLS.values(), f"rd.plot({RUN}, 'joints')")
     for cell in notebook.cells[1:]:  # beside what is said of compiling, on stderr
         assert [each.output_type for each in cell.outputs if each.get("name") != "stderr"] == ["execute_result"]

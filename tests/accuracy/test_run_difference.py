@@ -165,17 +165,17 @@ def test_an_event_that_no_run_names_does_not_part_one_motion(order: int) -> None
         return replace(run, t=t, error=None, events=(), **columns)
 
     interpolated = 0
-    for _ in range(200):
+    for _ in range(80):
         periods, kink = rng.uniform(0.01, 0.1, 2), rng.uniform(0, 1)
         size = 10 ** rng.uniform(-8, 1)
         made = [recorded(h, kink, size) for h in periods]
         found = rd.compare_runs(*made, tolerance=10 ** rng.uniform(-8, -2))
         assert found.parted is None, (periods, kink, size)
         interpolated += found.common < found.samples
-    assert interpolated > 100
+    assert interpolated > 40
 
 
-@pytest.mark.parametrize("index", [0, 2, 4, 7, 17, *long([1, 3, 6, 8, 19, 20, 22, 23])])
+@pytest.mark.parametrize("index", [0, 4, *long([1, 2, 3, 6, 7, 8, 17, 19, 20, 22, 23])])
 def test_pairs_of_one_motion_do_not_part_and_pairs_that_differ_by_ten_times_their_errors_do(index: int) -> None:
     """Scenes of `run_pairs`; the whole campaign is `python -m tests.campaigns.run_pairs`."""
     one, two = one_motion(7, index), two_motions(7, index)

@@ -295,7 +295,7 @@ def scene(name: str, duration_s: float) -> rd.Setup:
     [
         pytest.param(free_panda(), 0, id="free"),
         *long([pytest.param(scene("ur5_pd", 1.0), 3, id="PD and friction")]),  # where steps are stable
-        pytest.param(scene("stops", 0.5), 5, id="stops"),
+        *long([pytest.param(scene("stops", 0.5), 5, id="stops")]),
         *long([pytest.param(scene("flyball_governor", 0.01), 3, id="springs and dampers of lines")]),
     ],
 )

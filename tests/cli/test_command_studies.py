@@ -11,6 +11,7 @@ import pytest
 import robot_dyn as rd
 from tests.cli.test_command_documents import promised
 from tests.command import document, interrupted_at_work, refusal, run
+from tests.long import long
 from tests.snapshots import assert_text
 
 SCENE = 'robot = "planar_2r"\nduration_s = 0.1\n{}\n[start]\nq = [0.4, 0.9]\n[[effect]]\nkind = "gravity"\n'
@@ -104,7 +105,7 @@ study.take_turns = lambda *given: (tell(), work(*given))[1]
 }
 
 
-@pytest.mark.parametrize("command", WATCHED)
+@pytest.mark.parametrize("command", ["accuracy", *long(["cost"])])
 def test_ctrl_c_ends_the_measurement_and_keeps_what_was_measured(command: str, scene: Path) -> None:
     repeats = ("--repeats", "1000") if command == "cost" else ()
     out = interrupted_at_work(command, scene, "--budget", "3000", *repeats, "--json", watched=WATCHED[command])

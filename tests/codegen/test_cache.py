@@ -199,13 +199,13 @@ from robot_dyn.codegen.store.keys import digest_of_texts
 store = Store(Path(sys.argv[1]), most_bytes=3_000_000)
 payloads = {digest_of_texts([str(n)]): bytes([n]) * 500_000 for n in range(4)}
 found = 0
-for turn in range(40):
+for turn in range(16):
     for name, payload in payloads.items():
         store.save(name, payload, f"turn {turn}")
         back = store.load(name)
         assert back in (None, payload), "torn"
         found += back is not None
-    if turn % 10 == 9:
+    if turn % 4 == 3:
         store.clear()
     store.entries()
 print(found)
@@ -220,7 +220,7 @@ def test_processes_that_write_at_once_never_see_half_an_entry(tmp_path: Path) ->
     for child in children:
         out, err = child.communicate(timeout=120)
         assert (child.returncode, err) == (0, b"")
-        assert int(out) > 80  # of 160 readings: else nothing was tried
+        assert int(out) > 32  # of 64 readings: else nothing was tried
     assert not [path for path in Path(folder).iterdir() if path.suffix != ".kernel"]
 
 
@@ -262,16 +262,12 @@ def ask(folder: Path) -> list:
     return json.loads(done.stdout)
 
 
-def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
+def test_a_second_process_compiles_nothing_and_damaged_code_is_compiled_again(tmp_path: Path) -> None:
     first = ask(tmp_path / "kernels")
     second = ask(tmp_path / "kernels")
     assert first[0] > 0
     assert second[0] == 0
     assert second[1:] == first[1:]
-
-
-def test_damaged_code_is_compiled_anew(tmp_path: Path) -> None:
-    first = ask(tmp_path / "kernels")
     for entry in (tmp_path / "kernels").iterdir():
         damaged = bytearray(entry.read_bytes())
         damaged[len(damaged) // 2] ^= 1

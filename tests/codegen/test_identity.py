@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -56,14 +54,3 @@ def test_an_edit_of_a_plot_changes_no_key() -> None:
     } <= traced
     assert not {each for each in traced if each.startswith(("view/", "cli/", "scene/", "accuracy/", "stress_test/"))}
     assert any(path.name == "plots.py" or "plot" in path.name for path in (ROOT / "view").rglob("*.py"))
-
-
-def test_machine_code_needs_no_numba() -> None:
-    """Neither of a robot nor of a run."""
-    code = (
-        "import sys, robot_dyn as rd\n"
-        "rd.Compiled(rd.load('planar_2r'), cache=False).forward_dynamics([0.1, 0.2], [0.3, 0.4], [0.5, 0.6])\n"
-        "rd.simulate(rd.load('planar_2r'), [0.1, 0.2], engine='compiled', duration_s=0.1)\n"
-        "assert 'numba' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -22,6 +22,7 @@ from robot_dyn.codegen.llvm.sine_groups import in_groups
 from robot_dyn.codegen.program import Kind
 from robot_dyn.codegen.threads import shared
 from tests.codegen.arms import compiled, states
+from tests.long import long
 
 
 class Own(np.ndarray):
@@ -143,8 +144,19 @@ def test_numbers_that_are_not_finite_are_reported(double: Kernel) -> None:
             assert double.many([x], np.empty((20, 3))) is Status.ARGUMENT
 
 
-@pytest.mark.parametrize("width", [1, 2, 7, 8, 9, 15, 17, 36])
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize(
+    ("width", "dtype"),
+    [
+        *((width, "float64") for width in (1, 7, 8, 17)),
+        *((width, "float32") for width in (2, 9)),
+        *long(
+            [
+                *((width, "float64") for width in (2, 9, 15, 36)),
+                *((width, "float32") for width in (1, 7, 8, 15, 17, 36)),
+            ]
+        ),
+    ],
+)
 def test_rows_of_any_width_and_number_are_transposed(width: int, dtype: str) -> None:
     """Blocks of 8 × 8 with a part of one at the end, overlapping last vectors: y = x − 2 exactly, nothing beside it."""
     x = ca.SX.sym("x", width)

@@ -155,7 +155,7 @@ def test_both_engines_make_the_same_run_of_effects_with_states(method: str, peri
     ("name", "values"),
     [
         ("actuator_lag.time_constant", np.array([[0.05, 0.02], [0.01, 0.08]])),
-        ("lugre_friction.coulomb", np.array([[1.0, 0.5], [0.3, 1.2]])),
+        *long([("lugre_friction.coulomb", np.array([[1.0, 0.5], [0.3, 1.2]]))]),
         ("lugre_friction.bristle_stiffness", np.array([120.0, 60.0])),
     ],
 )

@@ -12,6 +12,7 @@ import robot_dyn as rd
 from robot_dyn.foundations import EffectError, QueryError
 from tests.campaigns.estimates.held import held_scene
 from tests.campaigns.estimates.scenes import arms
+from tests.long import long
 
 ENGINES = ["interpreted", "compiled"]
 G = 9.80665
@@ -22,7 +23,7 @@ OPTIONS = {"estimate_error": False, "integrator": TIGHT}
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize(("e", "most"), [(0.5, 100), (0.9, 500)])
+@pytest.mark.parametrize(("e", "most"), [(0.5, 100), *long([(0.9, 500)])])
 def test_a_bouncing_joint_comes_to_rest_when_and_where_it_must(engine: str, e: float, most: int) -> None:
     """From height h: at T = √(2h/g) (1 + e) / (1 − e), to 1e-9, exactly at the stop; the energy it had is lost."""
     h = 0.8

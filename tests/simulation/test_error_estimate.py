@@ -49,7 +49,7 @@ def true_error(run: rd.Trajectory, reference: rd.Trajectory) -> np.ndarray:
 CASES = [pytest.param(scene, id=name) for name, scene in SCENES.items()]
 
 
-@pytest.mark.parametrize("scene", [*CASES[1:3], *long([CASES[0], *CASES[3:]])])
+@pytest.mark.parametrize("scene", [CASES[1], *long([CASES[0], *CASES[2:]])])
 def test_estimate_is_within_a_factor_of_ten_of_the_true_error(scene) -> None:
     """At its end and at most times on the way; order 8 at half the step is exact to 1e-4 of that, and says so."""
     run = rd.simulate(setup(*scene))
@@ -70,7 +70,7 @@ def test_estimate_is_within_a_factor_of_ten_of_the_true_error(scene) -> None:
     assert f"{estimate.largest:.1e}" in run.summary
 
 
-@pytest.mark.parametrize("name", ["rosenbrock_5", "midpoint", *long(["gauss_4", "explicit_euler"])])
+@pytest.mark.parametrize("name", ["midpoint", *long(["rosenbrock_5", "gauss_4", "explicit_euler"])])
 def test_estimate_holds_for_methods_of_every_order(name: str) -> None:
     plant, law, q0, v0, duration, _ = SCENES["planar_2r with friction"]
     step = {"explicit_euler": 5e-4, "midpoint": 2e-3}.get(name, 4e-3)
@@ -98,19 +98,17 @@ def test_estimate_of_a_sampled_controller_is_that_of_the_same_ticks() -> None:
     assert error / 10 < run.error.largest < 10 * error
 
 
-def test_estimate_of_an_adaptive_run_is_near_its_error() -> None:
+@pytest.mark.parametrize("scene", [CASES[1], CASES[4], *long([CASES[0], *CASES[2:4]])])
+def test_estimate_of_an_adaptive_run_is_near_its_error(scene) -> None:
     """A run of a tenth of the tolerance errs about eight times less, so the difference is the error to some 15 %."""
-    for scene in SCENES.values():
-        run = rd.simulate(setup(*scene), integrator=rd.integrate.Adaptive())
-        tight = rd.simulate(
-            setup(*scene), integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False
-        )
-        error = np.abs(run.q - tight.q).max()
-        assert run.error is not None
-        assert 0.3 * error < run.error.largest < 3 * max(error, 2e-12)
+    run = rd.simulate(setup(*scene), integrator=rd.integrate.Adaptive())
+    tight = rd.simulate(setup(*scene), integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False)
+    error = np.abs(run.q - tight.q).max()
+    assert run.error is not None
+    assert 0.3 * error < run.error.largest < 3 * max(error, 2e-12)
 
 
-@pytest.mark.parametrize("step", [0.05, 0.02])
+@pytest.mark.parametrize("step", [0.05, *long([0.02])])
 def test_chaos_at_a_coarse_step_is_not_resolved(step: float) -> None:
     """The double pendulum from 2.5 rad tumbles: errors grow e-fold in less than 1 s, up to the size of the motion."""
     chaos = setup(rd.Plant(DOUBLE), None, [2.5, 0.7], [0.3, 0.5], 20.0, step)
@@ -165,7 +163,7 @@ def test_the_estimate_at_a_time_is_the_largest_up_to_it() -> None:
         whole.at(["soon"])
 
 
-@pytest.mark.parametrize("index", range(8))
+@pytest.mark.parametrize("index", [1, 3, 6, *long([0, 2, 4, 5, 7])])
 def test_the_largest_error_is_finite_where_the_estimate_holds_to_the_end_of_the_run(index: int) -> None:
     run = rd.simulate(scene_of_all(5, index).setup)
     assert run.error is not None
@@ -181,7 +179,7 @@ def test_rounding_alone_is_not_an_error_of_the_method() -> None:
     assert run.error.largest < 1e-11
 
 
-@pytest.mark.parametrize("k", [1, 3, 6, 11])
+@pytest.mark.parametrize("k", [3, *long([1, 6, 11])])
 def test_rounding_that_the_motion_magnifies_is_in_the_estimate_of_an_adaptive_run(k: int) -> None:
     """Upright, q − π = (q₀ − π)(cosh ωt − 1) + v₀ sinh ωt / ω, and e^{ωT} = 2e8 times rounding of 4e-16 is 1e-7 rad.
 

@@ -35,7 +35,7 @@ SMOOTH = [index for index in range(SCENES) if FAMILIES[index % len(FAMILIES)] ==
 SWITCHED = sorted(set(range(SCENES)) - set(SMOOTH))
 
 
-@pytest.mark.parametrize("index", [*SWITCHED[:4], *long(SWITCHED[4:])])
+@pytest.mark.parametrize("index", [*SWITCHED[:2], *long(SWITCHED[2:])])
 def test_no_estimate_misleads_where_something_switches(index: int) -> None:
     """Against SciPy near rounding: an estimate that nothing warns of is at least 0.3 of the error."""
     judged = judge(SEED, index)
@@ -131,7 +131,7 @@ def test_a_switch_in_the_last_step_ends_the_estimate() -> None:
     assert exact > 1e3 * run.error.at(run.error.until_s)
 
 
-@pytest.mark.parametrize(("seed", "index"), [(31, 32), (20261126, 230), (20261128, 283), *long([(31, 46), (41, 3)])])
+@pytest.mark.parametrize(("seed", "index"), [(31, 32), *long([(20261126, 230), (20261128, 283), (31, 46), (41, 3)])])
 def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None:
     """A swing, bristles and stops; longer steps show another order, or by chance that one, or magnify rounding."""
     judged = judge(seed, index, scene_of_all)
@@ -143,9 +143,13 @@ def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None
 @pytest.mark.parametrize(
     ("method", "step", "friction", "motion"),
     [
-        ("rk4", 0.001005, (4.44688, 11.37734, 0.01183), (-0.99752, -1.26294, 0.662, 89.49589)),  # 0.023 of the error
-        ("rk4", 0.003, (10.6, 16.0, 0.0116), (-0.6, -1.5, 0.7, 50.0)),  # 0.011
-        ("midpoint", 0.003249, (6.21, 14.05, 0.0075), (-0.344, -1.474, 0.41, 52.4)),  # 0.095
+        ("rk4", 0.003, (10.6, 16.0, 0.0116), (-0.6, -1.5, 0.7, 50.0)),  # 0.011 of the error
+        *long(
+            [
+                ("rk4", 0.001005, (4.44688, 11.37734, 0.01183), (-0.99752, -1.26294, 0.662, 89.49589)),  # 0.023
+                ("midpoint", 0.003249, (6.21, 14.05, 0.0075), (-0.344, -1.474, 0.41, 52.4)),  # 0.095
+            ]
+        ),
     ],
 )
 def test_a_layer_that_few_steps_cross_shows_no_order(method, step, friction, motion) -> None:
@@ -180,7 +184,7 @@ class SoftStep(Active):
         return -(1 + tanh((q - self.level) / self.width))
 
 
-@pytest.mark.parametrize("level", [0.337, 0.397])
+@pytest.mark.parametrize("level", [0.337, *long([0.397])])
 def test_an_effect_of_a_user_declares_its_layer(level: float) -> None:
     """1 kg at 1 m/s, and steps of 10 mm over a rise of 2 mm: undeclared, companions agree on less than the error."""
     width, found = 0.002, []
@@ -319,7 +323,7 @@ def test_rounding_of_a_far_position_is_in_the_estimate(far: float) -> None:
 
 @pytest.mark.parametrize(
     ("start", "duration", "method"),
-    [(np.pi, 12.0, "rk4"), (np.pi - 1e-12, 8.0, "order_8"), (np.pi - 1e-10, 6.0, "rk4")],
+    [(np.pi - 1e-12, 8.0, "order_8"), *long([(np.pi, 12.0, "rk4"), (np.pi - 1e-10, 6.0, "rk4")])],
 )
 def test_rounding_that_the_motion_magnifies_is_in_the_estimate(start: float, duration: float, method: str) -> None:
     """Upright, a pendulum leaves its start as e^(3.8 t): a unit of rounding is a radian after 10 s."""
@@ -353,7 +357,7 @@ def test_turns_that_no_step_can_see_have_no_estimate() -> None:
     assert "turns by 6.28 rad in a step" in run.error.note
 
 
-@pytest.mark.parametrize("method", ["rosenbrock_5", OwnImplicit()])
+@pytest.mark.parametrize("method", [OwnImplicit(), *long(["rosenbrock_5"])])
 def test_an_oscillation_that_a_method_damps_has_no_estimate(method: Any) -> None:
     """Of q = q₀ cos ω t with ω h = 17 each step leaves next to nothing of it, at any length near h."""
     bar = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))

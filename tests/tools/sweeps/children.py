@@ -11,7 +11,6 @@ _START = """
 import resource, sys
 sys.path.insert(0, {root!r})
 from pathlib import Path
-import zarr, xarray, pyarrow.parquet  # noqa
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.foundations.errors import RobotDynError
 from tests.tools.sweeps.swept import swept

@@ -14,6 +14,7 @@ import pytest
 
 from robot_dyn import RobotDynError
 from robot_dyn.tools import sweeps as sw
+from tests.campaigns.fuzz.campaign import limited
 from tests.long import long
 from tests.tools.sweeps.children import outcome_of
 from tests.tools.sweeps.swept import swept
@@ -147,17 +148,25 @@ def test_damaged_samples_are_refused(copy: Path, damage: Damage) -> None:
         sw.read(copy).samples().q.values  # noqa: B018
 
 
-@pytest.mark.skipif(os.name != "posix", reason="pipes and devices have paths on POSIX alone")
+@pytest.mark.skipif(os.name != "posix", reason="pipes have paths on POSIX alone")
+def test_a_pipe_is_refused_at_once(copy: Path) -> None:
+    pipe("samples/q/zarr.json")(copy)
+    with pytest.raises(RobotDynError), limited(6):
+        sw.read(copy).samples()
+    pipe("sweep.json")(copy)
+    with pytest.raises(RobotDynError), limited(6):
+        sw.read(copy)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="devices have paths on POSIX alone")
 @pytest.mark.parametrize(
     ("damage", "question"),
     [
-        pytest.param(pipe("sweep.json"), "table()", id="specification, pipe"),
         pytest.param(zeros(SHARD), "samples().q.values", id="shard, zeros"),
         *long(
             [
                 pytest.param(design_of_zeros, "table()", id="design, zeros"),
                 pytest.param(zeros(ROWS), "table()", id="rows, zeros"),
-                pytest.param(pipe("samples/q/zarr.json"), "samples().q.values", id="array, pipe"),
                 pytest.param(zeros("samples/t/zarr.json"), "samples().q.values", id="times, zeros"),
             ]
         ),

@@ -17,6 +17,7 @@ import robot_dyn as rd
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from tests import command
+from tests.long import long
 from tests.tools.sweeps.swept import VARY, scene
 
 CODE = """
@@ -152,7 +153,7 @@ def test_a_specification_made_by_hand_calls_nothing(received: Path, monkeypatch:
     assert no_code_ran()
 
 
-@pytest.mark.parametrize("names", ["", ", scene='code_of_a_test:setup'"])
+@pytest.mark.parametrize("names", [", scene='code_of_a_test:setup'", *long([""])])
 def test_a_folder_from_which_python_imports_is_refused(received: Path, names: str) -> None:
     """Else a file of the folder would be imported for one of the library's own dependencies."""
     shutil.copy("code_of_a_test.py", received)

@@ -56,15 +56,15 @@ def test_runs_that_fail_are_rows_with_a_reason(done: sw.SweepResult) -> None:
 def test_remarks_of_rows_are_those_of_rollouts(tmp_path: Path) -> None:
     """A weak motor, and friction that holds a joint in some runs; of each run alone, whatever the chunks."""
     path = scene(tmp_path, WEAK)
-    plan = sw.Sweep(str(path), 60, {"mass_scale": sw.uniform(low=0.2, high=3.0)}, {"error": sw.rms_error()}, seed=3)
-    done = sw.run(plan, tmp_path / "a", chunk=60)
+    plan = sw.Sweep(str(path), 20, {"mass_scale": sw.uniform(low=0.2, high=3.0)}, {"error": sw.rms_error()}, seed=3)
+    done = sw.run(plan, tmp_path / "a", chunk=20)
     rows = done.table("mass_scale", "remarks")
     runs = rd.rollouts(plan.setup, params={"mass_scale": rows["mass_scale"]})
     assert rows["remarks"].tolist() == runs.table()["remarks"].tolist()
     assert sw.run(plan, tmp_path / "b", chunk=7).table("remarks")["remarks"].tolist() == rows["remarks"].tolist()
     for text, count in (done.remarks or {}).items():
         assert count == sum(text in each for each in rows["remarks"])
-        assert f"remark on {count} of 60 runs: {text}" in str(done)
+        assert f"remark on {count} of 20 runs: {text}" in str(done)
     kinds = " ".join(done.remarks or {})
     assert "effort_limit_reached" in kinds and "held_while_reference_moves" in kinds
 
