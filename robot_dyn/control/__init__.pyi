@@ -5,7 +5,7 @@ from robot_dyn.control.cartesian import line as line
 from robot_dyn.control.computed_torque import ComputedTorque as ComputedTorque
 from robot_dyn.control.computed_torque import FeedForward as FeedForward
 from robot_dyn.control.computed_torque import PDGravity as PDGravity
-from robot_dyn.control.control_law import ControlLaw as ControlLaw
+from robot_dyn.control.controller import ControlLaw as ControlLaw
 from robot_dyn.control.controller import Controller as Controller
 from robot_dyn.control.controller import Stateless as Stateless
 from robot_dyn.control.digital_loop.block import Block as Block

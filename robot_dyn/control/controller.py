@@ -1,4 +1,4 @@
-"""Base classes of controllers: τ = τ(t, q, v, z), with states ż = rate(t, q, v, z) where one needs some.
+"""Base classes of controllers: τ = τ(t, q, v, z), with states ż = rate(t, q, v, z) where one needs some; `ControlLaw`.
 
 The controller states z are states like q and v: a continuous controller (`period_s` 0) has them integrated with the
 plant, a sampled one takes z⁺ = z + period · rate at its ticks and keeps its torque between them (zero-order hold).
@@ -8,8 +8,11 @@ plant, a sampled one takes z⁺ = z + period · rate at its ticks and keeps its 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from inspect import signature
+from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
@@ -285,3 +288,46 @@ def nested(of: Controller, attribute: str, label: str) -> tuple[Nested, ...]:
     part: Controller = getattr(of, attribute)
     below = (Nested(f"{attribute}.{path}", f"{label}{inner}", each) for path, inner, each in part.parts)
     return Nested(attribute, label, part), *below
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ControlLaw(Stateless):
+    """A function (t, q, v) → τ as a continuous controller.
+
+    An arm inside a function cannot be traced: make it an attribute of a `Stateless` controller.
+
+    Attributes:
+        function: Returns the torque of each joint, shape (n,), in [N m] or [N].
+        joints: n.
+
+    Raises:
+        ControlError: If the function does not take three arguments.
+    """
+
+    function: Callable[[float, Array, Array], Any]
+    joints: int
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        with suppress(ValueError):  # the arguments of some functions written in C are unknown
+            known = signature(self.function)
+            try:
+                known.bind(0.0, None, None)
+            except TypeError:
+                raise ControlError(f"controller {self.name}{known}: give a function of (t, q, v)") from None
+
+    @property
+    def name(self) -> str:
+        return getattr(self.function, "__name__", type(self.function).__name__)
+
+    @property
+    def term(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return f"{self.name}(t, q, v)"
+
+    @property
+    def n(self) -> int:
+        return self.joints
+
+    def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
+        return np.asarray(self.function(t, q, v))

@@ -1,7 +1,7 @@
 """From a file to checked numbers.
 
 catalog, packages: which file a name means · sources: of other packages · markup, description: a text read safely
-urdf, connections: elements checked, links and joints one tree · structure, mobile_base: which links move together
+urdf, connections: elements checked, links and joints one tree · structure: which links move together
 edits: gravity, locks, payloads, armature · couplings: mimic joints, q_full = S q + s₀
 inertia, solids, inertial_parameters: mass properties of bodies
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,6 +16,13 @@ from robot_dyn.description.couplings import Mimic, resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.foundations.arithmetic import FLOAT64
+
+_WORLD = ("world", "map", "odom")  # root links of a file that places its base itself
+_BASE = re.compile(r"(?i:footprint|flying|quadrotor|hexarotor|drone)")
+_PARTS = re.compile(
+    r"(?i:foot(?!print)|feet|thigh|ankle|knee|shank|wheel|caster|propeller|rotor_?\d)"
+    r"|(?i:leg|toe|shin|calf)[sS]?(?![a-z])"  # no part of a longer word, such as allegro
+)
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _FAR = 10.0  # times the longest distance between joints
@@ -184,3 +192,22 @@ def _joint(joint: etree._Element) -> StatedJoint:
 
 def _triple(element: etree._Element) -> Triple:
     return tuple(map(float, element.find("origin").get("xyz").split()))
+
+
+def stands_on(robot: Structure) -> tuple[str, ...]:
+    """Return the links by whose names a robot stands, rolls or flies by itself; none for an arm or a hand.
+
+    No number of a URDF says whether its base is bolted down: a hand has the tree of a quadruped. The names do.
+
+    Either a link is named after a base that moves (footprint, flying, drone, …), or at least two bodies at the ends of
+    different branches have a link named after a part of a leg, a wheel or a rotor. A root link called `world` says that
+    the file fixes its base on purpose.
+    """
+    if robot.root.lower() in _WORLD:
+        return ()
+    if base := next(filter(_BASE.search, robot.links), ""):
+        return (base,)
+    named = {joint: hit for joint, links in robot.bodies.items() if (hit := next(filter(_PARTS.search, links), None))}
+    inner = {ancestor for joint in named for ancestor in robot.ancestors(joint)}
+    outer = tuple(link for joint, link in named.items() if joint not in inner)
+    return outer if len(outer) > 1 else ()

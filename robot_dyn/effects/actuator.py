@@ -57,6 +57,10 @@ class EffortLimit(Bound):
     def actuation(self, u: Array) -> Array:
         return saturated(u, self.limit, self._middle)
 
+    @property
+    def largest(self) -> Any:
+        return self.limit
+
 
 @final
 @dataclass(frozen=True, eq=False)

@@ -244,6 +244,11 @@ class Bound(Effect, ABC):
     def actuation(self, u: Array) -> Array:
         """Return the bounded actuation for u, (..., n), in [N m] or [N]."""
 
+    @property
+    def largest(self) -> Any:
+        """Largest |u| that it lets through, a scalar or (n,), in [N m] or [N]; inf by default. Runs report it."""
+        return inf
+
 
 class Timed(Effect):
     """A smooth effect that acts only from time `start_s` until `end_s`, in [s]."""

@@ -16,8 +16,7 @@ from robot_dyn.description.couplings import resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.inertia import implausibility
-from robot_dyn.description.mobile_base import stands_on
-from robot_dyn.description.structure import StatedLink, Structure, structure_of
+from robot_dyn.description.structure import StatedLink, Structure, stands_on, structure_of
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import shorten
 from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, Regularity

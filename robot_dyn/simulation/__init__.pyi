@@ -25,4 +25,4 @@ from robot_dyn.simulation.run.outcome import Ending as Ending
 from robot_dyn.simulation.run.outcome import Outcome as Outcome
 from robot_dyn.simulation.setup.segment_table import segment_table as segment_table
 from robot_dyn.simulation.setup.settings import settings_of as settings_of
-from robot_dyn.simulation.setup.size import MOST_BYTES as MOST_BYTES
+from robot_dyn.simulation.setup.setup import MOST_BYTES as MOST_BYTES

@@ -13,7 +13,6 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.simulation.diagnostics.damped_task import damped
 from robot_dyn.simulation.diagnostics.imbalance import cause
 from robot_dyn.simulation.diagnostics.step_remarks import remarks
-from robot_dyn.simulation.diagnostics.stiffness import bounded_by_stability
 from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.observer import Observer
@@ -26,6 +25,7 @@ from robot_dyn.simulation.results.provenance import edits_of_machine_code, origi
 from robot_dyn.simulation.results.samples import Columns, Tracking, columns, ledger, tracking_of
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.run.recording import Recording
+from robot_dyn.simulation.run.stiffness import bounded_by_stability
 from robot_dyn.simulation.setup.setup import Setup
 
 

@@ -33,8 +33,7 @@ from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Accumulation, Ending, Outcome, Stiff, TooLong
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options
-from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.setup.size import check_record
+from robot_dyn.simulation.setup.setup import Setup, check_record
 
 
 @takes_options

@@ -11,7 +11,7 @@ from flint import arb
 from robot_dyn import RobotDynError
 from robot_dyn.foundations import Ball, OverflowedError
 from robot_dyn.integrate import Gauss, IntegrationError, Integrator, Rosenbrock, RosenbrockTable, System, method
-from robot_dyn.integrate.fixed_point import MOST_ITERATIONS
+from robot_dyn.integrate.primitives import MOST_ITERATIONS
 from tests.integrate.test_integrate import ALL, OSCILLATOR, PENDULUM, RNG, STIFF, name_of, oscillator, pendulum
 from tests.long import long
 

@@ -6,8 +6,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError
-from robot_dyn.simulation.setup.setup import segments, steps
-from robot_dyn.simulation.setup.size import check_record, samples
+from robot_dyn.simulation.setup.setup import check_record, samples, segments, steps
 
 ARM = rd.Plant(rd.load("planar_2r"), [rd.effects.ExternalWrench("tip", [1.0] * 6, start_s=0.3, end_s=0.7)])
 LAW = rd.control.PD(rd.control.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.01)

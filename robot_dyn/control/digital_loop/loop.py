@@ -3,7 +3,10 @@
     q, v at t_k − τ_m ─ blocks ─► q̂, v̂ ─ controller at t_k ─► blocks ─► u from t_k + τ_u on
 
 All of it is a map of the states z of a sampled controller: z holds the signals in delays, and the states of blocks.
-A delay that is not a whole number of periods adds a second instant to each period.
+Whole periods of a delay are a queue of signals; the rest of a period is a second instant in each period:
+
+    measured at t_k − τ_m: x_{k−d} of the instants t_k − (τ_m mod T);   acts from t_k + τ_u on: at t_{k+d} + (τ_u mod T)
+
 [Åström, Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, sec. 2.3 and ch. 9]
 """
 
@@ -13,21 +16,32 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import ceil
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 
 from robot_dyn.control.controller import Controller, Nested, check_joints, check_sampled, nested
 from robot_dyn.control.digital_loop.block import Block
-from robot_dyn.control.digital_loop.delay import Instant, delay, instants, shifted
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import ControlError, shown
 from robot_dyn.foundations.threshold import smooth
-from robot_dyn.foundations.validate import integer
+from robot_dyn.foundations.validate import integer, number
 
 SIGNALS = {"position": "rad", "velocity": "rad/s", "actuation": "N m"}  # of each line, the unit of what goes through it
 LINES = tuple(SIGNALS)
+_LEAST = 1e-6  # of a period, between two instants
+_MOST = 1000  # periods of a delay: each is a state of every joint
+_ROUNDED = 1e-9  # of a period
+
+
+class Instant(NamedTuple):
+    """A part of each period at which the loop measures, computes, or lets a torque act."""
+
+    part: float
+    measures: bool
+    computes: bool
+    acts: bool
 
 
 @final
@@ -292,3 +306,34 @@ def _at_rest(loop: Loop, q: Array, v: Array, z: Array) -> Array:
             continue  # no torque, no noise
         signals[line] = block.output(x, states[name], loop.period_s)
     return np.concatenate([*states.values()])
+
+
+def instants(measurement_delay: float, actuation_delay: float) -> tuple[Instant, ...]:
+    """Return the instants of each period, the computation first, for delays in periods.
+
+    Raises:
+        ControlError: If two instants lie too close together.
+    """
+    measured, acted = -measurement_delay % 1.0, actuation_delay % 1.0
+    parts = sorted({0.0, measured, acted})
+    if (np.diff([*parts, 1.0]) < _LEAST).any():
+        raise ControlError(
+            f"measurement_delay = {measurement_delay!r} and actuation_delay = {actuation_delay!r} make instants that"
+            f" lie closer together than {_LEAST:g} of a period; make them one, or move them apart"
+        )
+    return tuple(Instant(part, part == measured, part == 0.0, part == acted) for part in parts)
+
+
+def delay(name: str, given: Any) -> float:
+    """Return a delay in periods, rounded to a whole number if it is that but for rounding."""
+    periods = number(name, given, error=ControlError)
+    if not 0 <= periods <= _MOST:
+        raise ControlError(f"{name} must be from 0 to {_MOST} periods, got {periods:g}; take another period")
+    return float(round(periods)) if abs(periods - round(periods)) < _ROUNDED else periods
+
+
+def shifted(x: Array, past: Array) -> tuple[Array, Array]:
+    """Return what leaves a delay of whole periods when x enters it, and its content then, the newest first."""
+    if not len(past):
+        return x, past
+    return past[-len(x) :], np.concatenate([x, past[: -len(x)]])

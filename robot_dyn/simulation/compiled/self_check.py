@@ -20,7 +20,6 @@ from robot_dyn.integrate.differences import INSIDE, by_state, by_time, rowwise
 from robot_dyn.model.right_angles import models_in_full
 from robot_dyn.simulation.compiled.cache import robot_to_compile
 from robot_dyn.simulation.compiled.machine_code import STEP, MachineCode, States
-from robot_dyn.simulation.dynamics.bodies import bodies
 from robot_dyn.simulation.dynamics.moreau_jean import stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.interpreted import Interpreted, sample
@@ -155,7 +154,7 @@ def _results_of_lane(code: MachineCode, at: _Evaluated, lane: int) -> Pairs:
     if "events" in ours:
         yield ours["events"], equation.event_values(t, y, held)
     if "bodies" in ours:
-        both = ours["bodies"], bodies(equation, t, y, held)
+        both = ours["bodies"], equation.bodies(t, y, held)
         yield from zip(*(np.split(each, [n * n]) for each in both), strict=True)
     if "tick" in ours:
         after, command = equation.tick(t, y)

@@ -24,7 +24,6 @@ from robot_dyn.codegen.trace.symbolic_plant import Piece, symbolic_controller, s
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import call
-from robot_dyn.simulation.dynamics.bodies import bodies as bodies_of
 from robot_dyn.simulation.dynamics.event import Event
 from robot_dyn.simulation.dynamics.moreau_jean import behind, problem, solution
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -79,7 +78,7 @@ def trace(
         if not single and (not equation.sampled or equation.equation_of_motion.bounds_at_all_times):
             results["actuation"] = parts["u"]
         if single and equation.impulses and not nonsmooth:
-            results["bodies"] = bodies_of(symbolic, time, state, held_here)
+            results["bodies"] = symbolic.bodies(time, state, held_here)
         if equation.events or equation.limited:
             demands = symbolic.demands(time, q, v, z, held_here, equation.limited)
             values = [wide(each, n) for each in demands] + [_value(each, time, q, v) for each in equation.events]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.effects.dry_friction import DryFriction
+from robot_dyn.effects.set_valued import SetValued
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -64,8 +64,9 @@ def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Ite
         return
     rubs = np.zeros(setup.plant.dynamics.n, dtype=bool)
     for effect in setup.plant.effects:
-        if isinstance(effect, DryFriction):
-            rubs |= np.asarray(effect.friction(0 * setup.v0)) > 0
+        if isinstance(effect, SetValued):
+            least, most = effect.at_rest(setup.q0)
+            rubs |= (least < 0) & (most > 0)
     path = reference.at(t)[0]
     span, moves = np.ptp(path, axis=0), _moves(path)
     for i in np.flatnonzero(rubs & at_rest(extremes) & moves):

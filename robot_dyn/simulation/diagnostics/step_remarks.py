@@ -11,12 +11,12 @@ import numpy as np
 from robot_dyn.control.digital_loop.block import Noise, Quantisation
 from robot_dyn.control.digital_loop.loop import Loop
 from robot_dyn.effects.effect import Conservative, Dissipative, Stateful
+from robot_dyn.effects.friction import RegularisedCoulombFriction
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.values import cached, copied
 from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import unit
-from robot_dyn.simulation.diagnostics.creep import creeping
 from robot_dyn.simulation.diagnostics.reference_remarks import held, jumps
 from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level, guard_levels
@@ -30,6 +30,9 @@ QUANTITIES = ("q", "v", "u")
 KINDS = RemarkKind.EFFORT_REACHED, RemarkKind.STOP_REACHED, RemarkKind.BEYOND  # of levels, in the order of a summary
 _HIDDEN = 0.1  # of the range of a quantity: what the samples beside a window leave out
 _ROUNDING = 1e-9  # of a quantity: a smaller range is noise
+_LAST, _LEAST = 0.1, 5  # part of a run in which creep is looked for, and samples in it
+_STEADY = 0.1  # of a velocity, by which it may change there
+_LOADED = 0.01, 0.96  # of the level of friction: less is rest, and with more a joint slides
 
 
 def observer_of(setup: Setup, of: GuardLevels | None = None) -> Observer:
@@ -78,7 +81,7 @@ def remarks(
     )
     return (
         *of_steps(*of_run), *_coarse(setup, observer, t, samples, units), *_gaining(setup, t, power),
-        *creeping(setup, t, v, units), *of_reference(setup, t, of.extremes[0], units),
+        *_creeping(setup, t, v, units), *of_reference(setup, t, of.extremes[0], units),
     )  # fmt: skip
 
 
@@ -122,6 +125,27 @@ def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Itera
             RemarkKind.GAINS, name, "power", float(t[at]), 0.0, float(t[at]), float(P[at]), 0.0, text,
             "declare it Active, or see to the sign of its torque",
         )  # fmt: skip
+
+
+def _creeping(setup: Setup, t: np.ndarray, v: np.ndarray, units: Units) -> Iterator[Remark]:
+    """Joints that creep at the end of a run: regularised friction f moves them by v = v_s artanh(τ / f) if τ < f."""
+    late = t >= t[-1] - _LAST * setup.duration_s
+    if late.sum() < _LEAST:
+        return
+    v, start = v[late], float(t[late][0])
+    lasted, mean = float(t[-1]) - start, v.mean(axis=0)
+    steady = np.ptp(v, axis=0) < _STEADY * np.abs(mean)
+    for effect in setup.plant.effects:
+        if not isinstance(effect, RegularisedCoulombFriction):
+            continue
+        level, part = np.broadcast_to(effect.friction, mean.shape), np.abs(np.tanh(mean / effect.velocity_scale))
+        for i in np.flatnonzero(steady & (level > 0) & (part > _LOADED[0]) & (part < _LOADED[1])):
+            name, (_, of_v, of_u) = setup.plant.dynamics.joint_names[i], units[i]
+            text = f"{name} at {mean[i]:.3g} {of_v}, under {part[i] * level[i]:.3g} of {level[i]:.3g} {of_u}"
+            yield Remark(
+                RemarkKind.CREEPS, name, "v", start, lasted, float(t[-1]), float(mean[i]), None, text,
+                "dry_friction would hold what is below its level",
+            )  # fmt: skip
 
 
 def units_of(dynamics: Any) -> Units:

@@ -1,6 +1,6 @@
 """The equation that a run integrates, and what follows from it without a run.
 
-- `state_equation`: y' = f(t, y) of a plant under a controller; `bodies`, `moreau_jean`: its forms for impacts
+- `state_equation`: y' = f(t, y) of a plant under a controller; `moreau_jean`: its form for time stepping
 - `loop_state`: the arrays on which loops work
 - `linearise`, `fastest_motion`, `stability`, `sampled_loop`: linear models, eigenvalues, stable steps and periods
 - `smooth_differences`: derivatives at the step that errs least

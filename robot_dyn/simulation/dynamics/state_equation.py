@@ -276,6 +276,21 @@ class StateEquation(Caching):
         """The values of the events, in floats or symbols."""
         return [call(each.function, t, q, v) for each in self.events]
 
+    def bodies(self, t: Any, y: Array, held: Array | None) -> Array:
+        """Return what the convex problems of events take, by rows, (n² + n + motors,): M, load and u_m.
+
+            load = τ + Σ τ_effect − C v − ∂V/∂q,   u_m = u − b θ̇ of each motor in a rigid backlash
+
+        It is evaluated in a mode in which no motor rests, in floats or symbols; arguments as of `rate`.
+        """
+        motion, n, (q, v, z, _) = self.equation_of_motion, self.plant.dynamics.n, self.state(y)
+        u, of_effects = self.actuation(t, q, v, z, held), z[self.state_size :]
+        torques = motion.torques(t, q, v, z=of_effects)
+        load = sum(torques, start=motion.on_joints(u)) - self.plant.dynamics.inverse_dynamics(q, v, 0 * v)
+        coupled: dict[int, Any] = {k: drive for k, drive in motion.drives.items() if drive.coupled}
+        motors = [u[list(x.driven(n))] - x.drag(n, of_effects[motion.states[k]]) for k, x in coupled.items()]
+        return np.concatenate([self.plant.M(q).ravel(), load, *motors])
+
     def event_values(self, t: float, y: Array, held: Array | None) -> Array:
         """Return what reaches each limited part, (n,) each, and the values of the events, (G,), in a state (m,)."""
         q, v, z, _ = self.state(y)

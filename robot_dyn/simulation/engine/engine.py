@@ -61,7 +61,7 @@ class Engine(Protocol):
         energy     K and V, in [J]                                            (2, 1)
         sample     y', u, K and V                                             (m + n + 2, 1)
         tick       u in zero-order hold, then the states of the controller    (n + z, 1)
-        bodies     M by rows, loads, loads of motors; see `bodies`            (n² + n + motors, 1)
+        bodies     M by rows, loads, loads of motors; see `StateEquation.bodies`            (n² + n + motors, 1)
         events     what reaches limited parts, then user-defined events       (F, 1)
         step       a step in which velocities may jump; see `RightSide`, also for `behind`
 

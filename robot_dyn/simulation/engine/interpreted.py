@@ -15,7 +15,6 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.primitives import evaluate
-from robot_dyn.simulation.dynamics.bodies import bodies
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.moreau_jean import behind, stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -112,7 +111,7 @@ def interpreted(equation: StateEquation, watch: Watched) -> Functions:
         out[:, 0] = behind(equation, x[:, 0], found[:, 0])
 
     def of_bodies(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
-        out[:, 0] = bodies(equation, *at(t, y, p, run_parameters))
+        out[:, 0] = equation.bodies(*at(t, y, p, run_parameters))
 
     def events(t: float, y: Array, p: Array, run_parameters: Array, out: Array) -> None:
         out[:, 0] = equation.event_values(*at(t, y, p, run_parameters))

@@ -18,7 +18,6 @@ from robot_dyn.integrate.adaptive import LEAST_RTOL, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.simulation.diagnostics.missed_events import cut_alike, stepped_over
 from robot_dyn.simulation.diagnostics.smoothness import first_crossing, first_kink
-from robot_dyn.simulation.diagnostics.stiffness import damped_oscillation
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.estimate.verdicts import (
     COARSE,
@@ -32,7 +31,9 @@ from robot_dyn.simulation.estimate.verdicts import (
     rounding,
 )
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, Verdict, no_estimate
+from robot_dyn.simulation.results.samples import ledger
 from robot_dyn.simulation.run.recording import Path, Recording
+from robot_dyn.simulation.run.stiffness import damped_oscillation
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -69,7 +70,8 @@ def estimate(setup: Setup, run: Recording, companion: Companion) -> ErrorEstimat
     if method.controls_error:
         result = _by_refinement(setup, method, run, estimated, companion)
     else:
-        if motion := damped_oscillation(setup, run):
+        damps = method.stiff and not ledger(equation, run).closes
+        if damps and (motion := damped_oscillation(setup, run)):
             return no_estimate(
                 f"the energy ledger does not close: {motion}, which {method.name} damps in steps longer than"
                 f" {1 / abs(motion.eigenvalue):.0e} s, so that runs with other steps do not show it; take shorter ones"

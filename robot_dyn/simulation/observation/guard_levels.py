@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from robot_dyn.control.controller import Controller
-from robot_dyn.effects.actuator import EffortLimit
-from robot_dyn.effects.effect import Effect
+from robot_dyn.effects.effect import Bound, Effect
 from robot_dyn.effects.joint_limit import JointStopSpring
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.model.robot import Robot
@@ -84,7 +83,7 @@ def _bounds(
     """Kind, 0, 1, 2 for q, v, u, side, bounds (n,) or (W, n), and the part of a bound by which it must be passed."""
     n, robot = dynamics.n, getattr(dynamics, "robot", dynamics)
     effort: Any = np.inf if controller is None else controller.saturation
-    for limit in (effect.limit for effect in effects if isinstance(effect, EffortLimit)):
+    for limit in (effect.largest for effect in effects if isinstance(effect, Bound)):
         effort = np.minimum(effort, limit)
     yield from ((RemarkKind.EFFORT_REACHED, 2, side, side * effort, -_ROUNDING) for side in (1, -1))
     lower, upper = np.full(n, -np.inf), np.full(n, np.inf)

@@ -11,9 +11,8 @@ from robot_dyn.effects.causes import Causes
 from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.simulation.columns import Column
 from robot_dyn.simulation.results.causes import causes_of
-from robot_dyn.simulation.results.html import trajectory_html
 from robot_dyn.simulation.results.run_data import TrajectoryData
-from robot_dyn.simulation.results.summary import summary
+from robot_dyn.simulation.results.summary import summary, trajectory_html
 from robot_dyn.simulation.results.table import columns
 
 

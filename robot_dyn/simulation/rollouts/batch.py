@@ -18,8 +18,7 @@ from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.sweepable import parts_of_run
 from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.setup.size import check_batch
+from robot_dyn.simulation.setup.setup import Setup, check_batch
 
 
 class Ends(NamedTuple):

@@ -5,6 +5,6 @@
 - `time_loop`, `fixed_step`: steps of fixed length, one run or many in lock step, and the driver of one
 - `event_loop`, `event_run`, `switched_run`: steps that are chosen or cut at events, and the driver
 - `recording`: what both loops record, and its result
-- `watch`: when a run has diverged; `stiffness`: when another method is faster
+- `watch`: when a run has diverged; `stiffness`: where stability bounds the steps, and another method is faster
 - `philox`: noise by number
 """

@@ -38,7 +38,7 @@ from robot_dyn.simulation.run.watch import DivergedError, Watch, one_step
 from robot_dyn.simulation.setup.schedule import nodes
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
-from robot_dyn.simulation.setup.size import samples as most_samples
+from robot_dyn.simulation.setup.setup import samples as most_samples
 
 _SAMPLES = 1000  # of a run without a record period
 _GROWS = "y grows without bound, or tolerances are too tight"
