@@ -33,6 +33,8 @@ class _JointStops(Effect):
     lower: Any = field(metadata=LOWER)
     upper: Any = field(metadata=UPPER)
 
+    name = "joint_stops"
+
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("lower", "upper"):
@@ -47,10 +49,6 @@ class _JointStops(Effect):
         if np.ndim(lower) == np.ndim(upper) == 1 and len(lower) != len(upper):
             raise EffectError(f"lower and upper stops must be of the same joints, got {lower} and {upper}")
         require("lower stops must lie below upper ones", np.less, lower, upper)
-
-    @property
-    def name(self) -> str:
-        return "joint_stops"
 
     @property
     def _coefficient(self) -> Any:
@@ -91,6 +89,9 @@ class JointStopSpring(_JointStops, Conservative):
         lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m].
         upper: Position of the upper stop, inf for none, above the lower one.
         stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative.
+
+    Example:
+        >>> rd.effects.JointStopSpring(lower=[-1.0, -2.0], upper=1.0, stiffness=50.0)
     """
 
     stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))
@@ -117,6 +118,9 @@ class JointStopDamper(_JointStops, Dissipative):
     Attributes:
         lower, upper: Positions of the stops, as of the spring.
         damping: c, damping for each unit of depth, a scalar or (n,), in [N m s/rad²] or [N s/m²], not negative.
+
+    Example:
+        >>> rd.effects.JointStopDamper(lower=[-1.0, -2.0], upper=1.0, damping=20.0)
     """
 
     damping: Any = field(metadata=coefficient("N m s/rad²", symbol="c, damping for each unit of depth", least=0))
@@ -134,5 +138,9 @@ class JointStopDamper(_JointStops, Dissipative):
 def joint_stops(
     lower: Any, upper: Any, stiffness: Any = 1e4, damping: Any = 1e3
 ) -> tuple[JointStopSpring, JointStopDamper]:
-    """Both parts of joint stops; the limits of a robot are `robot.lower` and `robot.upper`."""
+    """Return both parts of joint stops; the limits of a robot are `robot.lower` and `robot.upper`.
+
+    Example:
+        >>> rd.effects.joint_stops(lower=[-1.0, -2.0], upper=1.0, stiffness=50.0, damping=20.0)
+    """
     return JointStopSpring(lower, upper, stiffness), JointStopDamper(lower, upper, damping)

@@ -16,6 +16,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference
+from tests.effect_examples import EFFECTS, example
 from tests.short_stress import short_stress
 from tests.wrong_arguments import FOR_AUTHORS, ROOMS
 
@@ -63,8 +64,6 @@ def values() -> dict[str, Any]:
     }
     setup = rd.Setup(plant, Q, **options)
     run, runs = rd.simulate(setup), rd.rollouts(setup, q0=[Q, Q + 0.1], params={"kp": [1.0, 2.0]})
-    spring, damper = rd.effects.joint_stops([-1.0, -1.0], [1.0, 1.0])
-    strut = rd.effects.LineSpringDamper("tip", None, stiffness=9.0, damping=1.0, length=0.3)
     loop = rd.control.Loop(
         rd.control.PD(PLAN, [1.0, 2.0], 1.0, 0.01),
         [rd.control.Noise([0.1, 0.2]), rd.control.Quantisation(0.1)],
@@ -80,15 +79,7 @@ def values() -> dict[str, Any]:
         rd.control.PDGravity(ARM, PLAN, 1.0, 1.0),
         rd.control.FeedForward(ARM, PLAN, 1.0, 1.0), rd.control.ComputedTorque(ARM, PLAN, 1.0, 1.0),
         rd.control.OperationalSpace(ARM, "tip", LINE, 1.0, 1.0, posture=Q, rows=(0, 2)),
-        rd.effects.EffortLimit([1.0, 2.0]),
-        rd.effects.ExternalWrench("tip", np.ones(6)), spring, damper,
-        rd.effects.RegularisedCoulombFriction([0.1, 0.2]), strut,
-        *strut.parts, rd.effects.Spring([1.0, 2.0]), rd.effects.ViscousFriction([1.0, 2.0]), PLAN,
-        rd.effects.DryFriction([1.0, 2.0], 2.0, 0.1), rd.effects.RigidStops(-1.0, [1.0, 2.0], 0.5),
-        rd.effects.ActuatorLag([0.1, 0.2]), rd.effects.LuGreFriction(9.0, 1.0, 1.0, [1.0, 2.0], 2.0, 0.1),
-        rd.effects.DahlFriction(9.0, [1.0, 2.0], 1.5), rd.effects.CarriedPayload(rd.Payload("tip", 1.0)),
-        rd.effects.RigidBacklash([0.1, 0.0], 0.1, 3.0, 0.5, 0.2),
-        rd.effects.SeriesElastic([9.0, 0.0], 0.1, 3.0, 0.1, 0.2, 0.01),
+        *map(example, EFFECTS), PLAN,
         rd.control.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
         loop, loop.controller, *loop.position, *loop.velocity, *loop.actuation,
         setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
