@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, final
+from typing import Any, ClassVar, final
 
 import numpy as np
 
@@ -34,6 +34,7 @@ class _JointStops(Effect):
     upper: Any = field(metadata=UPPER)
 
     name = "joint_stops"
+    through: ClassVar[str]  # the coefficient that acts: a joint where it is 0 has no stops
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -51,17 +52,12 @@ class _JointStops(Effect):
         require("lower stops must lie below upper ones", np.less, lower, upper)
 
     @property
-    def _coefficient(self) -> Any:
-        """Its coefficient: a joint where it is 0 has no stops."""
-        raise NotImplementedError
-
-    @property
     def widths(self) -> tuple[Any, Any]:
         with np.errstate(divide="ignore"):  # the depth at which a stop holds 1 N m or 1 N: loads that matter lie deeper
-            return np.divide(1.0, self._coefficient), inf
+            return np.divide(1.0, getattr(self, self.through)), inf
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
-        acts = np.broadcast_to(self._coefficient, n) > 0
+        acts = np.broadcast_to(getattr(self, self.through), n) > 0
         return tuple(
             Threshold(i, float(level), *words)
             for words, levels in ((_LOWER_STOP, self.lower), (_UPPER_STOP, self.upper))
@@ -96,11 +92,8 @@ class JointStopSpring(_JointStops, Conservative):
 
     stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))
 
+    through = "stiffness"
     term = "k (δ₋ − δ₊)"
-
-    @property
-    def _coefficient(self) -> Any:
-        return self.stiffness
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return self.stiffness * (positive_part(self.lower - q) - positive_part(q - self.upper))
@@ -125,11 +118,8 @@ class JointStopDamper(_JointStops, Dissipative):
 
     damping: Any = field(metadata=coefficient("N m s/rad²", symbol="c, damping for each unit of depth", least=0))
 
+    through = "damping"
     term = "−c (δ₋ + δ₊) v"
-
-    @property
-    def _coefficient(self) -> Any:
-        return self.damping
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.damping * (positive_part(self.lower - q) + positive_part(q - self.upper)) * v
