@@ -277,15 +277,6 @@ def test_a_velocity_of_the_wrong_shape_is_refused(method: str) -> None:
         getattr(plant, method)(0.0, np.ones(2), np.ones(3), *arguments)
 
 
-def test_coefficients_are_copied_and_frozen() -> None:
-    given = np.array([1.0, 2.0])
-    effect = rd.effects.ViscousFriction(given)
-    given[0] = 9.0
-    assert effect.damping[0] == 1.0
-    with pytest.raises(ValueError, match="read-only"):
-        effect.damping[0] = 3.0
-
-
 @pytest.mark.parametrize(
     ("effect", "coefficient"),
     [
