@@ -15,8 +15,9 @@ import numpy as np
 import robot_dyn as rd
 from robot_dyn.control import Controller
 from robot_dyn.effects import Bound, Conservative, Drive, Effect, Force, Stateful
-from robot_dyn.foundations import Answer, Arithmetic
+from robot_dyn.foundations import Answer, Arithmetic, declared
 from robot_dyn.integrate import System
+from tests.effect_examples import EFFECTS, arguments
 from tests.queries import ARGUMENTS, FRAMED
 
 Example = tuple[Callable[..., Any], dict[str, Any]]
@@ -63,16 +64,15 @@ LAX = {  # arguments that may be infinite or unknown, or of any shape
     "choice": {"values"},
     "ExternalWrench.acts": {"t"},
     "Adaptive": {"max_step_s"}, "Adaptive.with_tolerances": {"longest_s"},
-    "CarriedPayload": {"end_s"}, "EffortLimit": {"limit"}, "Event": {"direction"},
-    "ExternalWrench": {"start_s", "end_s"},
-    "JointStopDamper": {"lower", "upper"}, "JointStopSpring": {"lower", "upper"}, "PID": {"effort_limit"},
+    "Event": {"direction"}, "PID": {"effort_limit"},
     "PiecewisePolynomial.at": {"t"}, "Samples.at": {"t"},
     "Rollouts.outcome": {"run"}, "Rollouts.setup_of": {"run"}, "Robot.with_": {"lock", "armature"},
     "midpoint": {"x"}, "radius": {"x"}, "coefficient": {"elsewhere"},
-    "joint_stops": {"lower", "upper"}, "RigidStops": {"lower", "upper"}, "plot": {"limits"},
+    "joint_stops": {"lower", "upper"}, "plot": {"limits"},
     "path": {"acceleration", "effort", "velocity"}, "budget": {"continuous", "effort", "velocity"},
     "point_to_point": {"jerk", "velocity"},
 }  # fmt: skip
+LAX |= {name: {key for key, each in declared(kind).items() if each.infinite} for name, kind in EFFECTS.items()}
 SIGNED = {"Adaptive": ("rtol", "atol", "max_step_s"), "Payload": ("mass",), "Setup": ("duration_s", "step_s")}
 
 
@@ -133,7 +133,6 @@ def examples(folder: Path) -> dict[str, Example]:
     needs = rd.tools.motors.budget(rd.control.quintic(q, v, 1.0), plant, effort=50.0, velocity=4.0)
     adaptive = rd.integrate.Adaptive()
     system = System(lambda t, y: -y, 1)
-    linked = {"frame": "pole", "expressed_in": "body"}
     given = {"q": q, "v": v, "a": u, "tau": u}
     made: dict[str, Example] = {
         f"{kind}.{method}": (
@@ -147,12 +146,11 @@ def examples(folder: Path) -> dict[str, Example]:
         for method in ("jacobian", "jacobian_rate"):
             made[f"{kind}.{method}"][1]["expressed_in"] = "body"
         made[f"{kind}.total_energy"] = getattr(dynamics, "total_energy", None), {"q": q, "v": v}
-    stops = {"lower": [-1.0, -2.0], "upper": 1.0}
-    strut = {"frame": "pole", "other_frame": "cart", "point": [0.1, 0.2, 0.3], "other_point": [0.4, 0.2, 0.1]}
     pair = {"model": robot, "reference": hold, "kp": 9.0, "kd": [6.0, 2.0], "period_s": 0.01}
     points, eye = [q, u, v], np.eye(3)
     sampled = rd.control.PD(hold, 9.0, 6.0, 0.01)
     path: Any = rd.control.line([0.1, 0.2, 0.3], [0.4, 0.2, 0.1], 1.0)
+    made |= {thing.__name__: (thing, arguments(thing)) for thing in (*EFFECTS.values(), rd.effects.joint_stops)}
     return made | {
         "Adaptive": (rd.integrate.Adaptive, {"method": "Rosenbrock", "rtol": 1e-8, "atol": 1e-9, "max_step_s": 0.5}),
         "Adaptive.solve": (adaptive.solve, {"system": system, "t0": 0.0, "y0": q, "t1": 1.0, "stop": lambda t, y: 1.0}),
@@ -161,15 +159,8 @@ def examples(folder: Path) -> dict[str, Example]:
         "Ball": (rd.accuracy.Ball, {"bits": 53}),
         "Compiled": (rd.Compiled, {"robot_or_plant": robot, "dtype": "float64", "threads": 1, "cache": False}),
         "ComputedTorque": (rd.control.ComputedTorque, pair),
-        "ActuatorLag": (rd.effects.ActuatorLag, {"time_constant": [0.1, 0.2]}),
         "Differences": (rd.control.Differences, {}),
-        "DryFriction": (rd.effects.DryFriction, {"level": [1.0, 2.0], "static": [1.5, 2.0], "stribeck_velocity": 0.1}),
-        "EffortLimit": (rd.effects.EffortLimit, {"limit": [1.0, 2.0]}),
         "Event": (rd.Event, {"function": lambda t, q, v: 1.0, "direction": 1, "terminal": True, "name": "high"}),
-        "ExternalWrench": (
-            rd.effects.ExternalWrench,
-            linked | {"wrench": [1.0, 2.0, 3.0, 0.1, 0.2, 0.3], "start_s": 0.1, "end_s": 0.2},
-        ),
         "CarriedPayload.acts": (rd.effects.CarriedPayload(rd.Payload("pole", 1.0), 0.5).acts, {"t": 0.1}),
         "ExternalWrench.acts": (rd.effects.ExternalWrench("pole", np.ones(6)).acts, {"t": 0.1}),
         "ExternalWrench.at": (rd.effects.ExternalWrench("pole", np.ones(6)).at, {"placement": np.eye(4)}),
@@ -194,8 +185,6 @@ def examples(folder: Path) -> dict[str, Example]:
         "Noise": (rd.control.Noise, {"deviation": [0.1, 0.2]}),
         "Quantisation": (rd.control.Quantisation, {"resolution": [0.1, 0.2]}),
         "RateLimit": (rd.control.RateLimit, {"rate": [0.1, 0.2]}),
-        "JointStopDamper": (rd.effects.JointStopDamper, stops | {"damping": 0.1}),
-        "JointStopSpring": (rd.effects.JointStopSpring, stops | {"stiffness": 0.1}),
         "Lagrangian": (rd.Lagrangian, {"robot": robot, "dtype": np.float32}),
         "Lagrangian.mass_matrix_derivative": (own.mass_matrix_derivative, {"q": q}),
         "OperationalSpace": (
@@ -225,9 +214,6 @@ def examples(folder: Path) -> dict[str, Example]:
         "Plant.held": (plant.held, {"t": 0.1, "q": q, "v": v, "u": u}),
         "Plant.inverse_dynamics": (plant.inverse_dynamics, {"t": 0.1, "q": q, "v": v, "a": u}),
         "Plant.torque": (plant.torque, {"t": 0.1, "q": q, "v": v}),
-        "RegularisedCoulombFriction": (
-            rd.effects.RegularisedCoulombFriction, {"friction": 0.1, "velocity_scale": [0.1, 0.2]}
-        ),
         "Robot": (rd.Robot, {"description": robot.description, "edits": robot.edits}),
         "Robot.announced": (robot.announced, {}),
         "Robot.from_pinocchio": (rd.Robot.from_pinocchio, {"model": robot.model}),
@@ -251,13 +237,11 @@ def examples(folder: Path) -> dict[str, Example]:
              "integrator": rd.integrate.method("rk4"), "step_s": 1e-3, "record_period_s": 0.01, "estimate_error": True,
              "about": {"note": "text"}, "engine": "interpreted"},
         ),
-        "Spring": (rd.effects.Spring, {"stiffness": 2.0, "rest": [0.1, -0.2]}),
         "Layer": (rd.effects.Layer, {"joint": 1, "width": 0.01, "level": 0.5, "of_velocity": True}),
         "Threshold": (
             rd.effects.Threshold,
             {"joint": 1, "level": 0.5, "name": "stop", "rising": "touched", "falling": "left", "of_velocity": True},
         ),
-        "ViscousFriction": (rd.effects.ViscousFriction, {"damping": [0.1, 0.2]}),
         "certify": (
             rd.accuracy.certify,
             {"robot": robot, "q": q, "v": v, "a": u, "tau": u, "samples": 100, "seed": 3, "repeats": 1,
@@ -303,31 +287,6 @@ def examples(folder: Path) -> dict[str, Example]:
         ),
         "gains_from": (rd.control.gains_from, {"inertia_diagonal": [1.0, 2.0], "frequency": 3.0, "damping_ratio": 0.9}),
         "hold": (rd.control.hold, {"q": q}),
-        "LuGreFriction": (
-            rd.effects.LuGreFriction,
-            {
-                "bristle_stiffness": 90.0, "bristle_damping": 0.3, "viscous": 0.1, "coulomb": 1.0,
-                "breakaway": [1.5, 1.2], "stribeck_velocity": 0.1,
-            },
-        ),
-        "DahlFriction": (rd.effects.DahlFriction, {"bristle_stiffness": 90.0, "coulomb": [1.5, 1.2], "exponent": 1.5}),
-        "CarriedPayload": (
-            rd.effects.CarriedPayload,
-            {"payload": rd.Payload("pole", 0.5), "start_s": 0.1, "end_s": 0.5, "at_rest": True}
-        ),
-        "SeriesElastic": (
-            rd.effects.SeriesElastic,
-            {"stiffness": [90.0, 1.0], "inertia": 0.1, "ratio": 3.0, "damping": 0.1, "friction": 0.2, "backlash": 0.01},
-        ),
-        "RigidBacklash": (
-            rd.effects.RigidBacklash,
-            {"gap": [0.1, 0.0], "inertia": 0.1, "ratio": 3.0, "restitution": 0.5, "viscous": 0.2}
-        ),
-        "RigidStops": (rd.effects.RigidStops, stops | {"restitution": 0.5}),
-        "LineDamper": (rd.effects.LineDamper, strut | {"damping": 0.1}),
-        "LineSpring": (rd.effects.LineSpring, strut | {"stiffness": 10.0, "length": 0.2}),
-        "LineSpringDamper": (rd.effects.LineSpringDamper, strut | {"stiffness": 10.0, "damping": 0.1, "length": 0.2}),
-        "joint_stops": (rd.effects.joint_stops, stops | {"stiffness": 10.0, "damping": 0.1}),
         "inverse_kinematics": (
             rd.control.inverse_kinematics,
             {"arm": robot, "pose": robot.placement(q, "pole"), "frame": "pole", "q0": q, "seed": 1, "starts": 2,

@@ -1,6 +1,7 @@
 """Docstrings as reStructuredText: they are plain text, so that what would be markup there is escaped first.
 
-A block that is indented after an empty line is an equation, or code: it is shown as it stands. `name` is code.
+A block that is indented after an empty line is an equation, or code: it is shown as it stands, as an example after
+`>>>` is. `name` is code.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ def escaped(lines: list[str]) -> list[str]:
         if not section and not block and line.startswith("  ") and before_is_empty:
             out += ["::", ""]
             block = True
-        out.append(line if block else _escape(line))
+        out.append(line if block or line.lstrip().startswith((">>>", "...")) else _escape(line))
     return out
 
 

@@ -177,8 +177,8 @@ class CompiledPlant:
             torque = sum(equation.torques(ts[0], qs, vs), start=0 * vs)
             formulas: dict[str, Callable[[], Any]] = {
                 "torque": lambda: torque,
-                "N": lambda: equation.N(qs, torque),
-                "inverse_dynamics": lambda: equation.inverse_dynamics(qs, vs, us, torque),
+                "N": lambda: equation.dynamics.N(qs) - torque,
+                "inverse_dynamics": lambda: equation.dynamics.inverse_dynamics(qs, vs, us) - torque,
                 "forward_dynamics": lambda: equation.acceleration(
                     qs, vs, equation.on_joints(equation.actuation(us)) + torque
                 ),

@@ -27,6 +27,9 @@ class EffortLimit(Bound):
     Attributes:
         limit: u_max, a scalar or (n,), inf for none, in [N m] or [N], not negative; "urdf" for those in the
             file, which must not be 0.
+
+    Example:
+        >>> rd.effects.EffortLimit(limit=[3.0, 2.0])
     """
 
     limit: Any = field(
@@ -71,6 +74,9 @@ class ActuatorLag(Stateful, Bound):
 
     Attributes:
         time_constant: T, a scalar or (n,), in [s], positive.
+
+    Example:
+        >>> rd.effects.ActuatorLag(time_constant=[0.02, 0.05])
     """
 
     time_constant: Any = field(metadata=coefficient("s", symbol="T", above=0))

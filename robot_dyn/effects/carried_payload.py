@@ -37,6 +37,9 @@ class CarriedPayload(Timed):
         start_s: Time at which it is picked up, in [s].
         end_s: Time at which it is dropped, in [s].
         at_rest: Whether it is at rest until it is picked up; otherwise it moves with the link by then.
+
+    Example:
+        >>> rd.effects.CarriedPayload(payload=rd.Payload("tip", 0.5), start_s=0.004, end_s=0.5, at_rest=True)
     """
 
     payload: Payload

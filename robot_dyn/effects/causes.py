@@ -12,7 +12,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.effects.carried_payload import CarriedPayload, robot_with
+from robot_dyn.effects.carried_payload import robot_with
 from robot_dyn.effects.effect import Drive, Stateful, numbered
 from robot_dyn.effects.plant import Plant, carrying
 from robot_dyn.effects.set_valued import SetValued
@@ -139,8 +139,7 @@ def exerted_torques(
         tau: Actuation, (k, n), or None where it follows from the motion.
         states: States of the effects, (k, state_size); None for those of the start.
     """
-    payloads = [each for each in plant.effects if isinstance(each, CarriedPayload)]
-    forces = plant.forces
+    payloads, forces = plant.equation_of_motion.payloads, plant.forces
     names = numbered(*(each.name for each in (*forces, *payloads)))
     exerted = {name: np.zeros_like(q) for name in names}
     carried = np.stack([each.acts(t) for each in payloads], axis=-1) if payloads else np.zeros((len(t), 0), bool)

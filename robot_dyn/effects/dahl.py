@@ -36,6 +36,9 @@ class DahlFriction(Bristles, Dissipative):
         bristle_stiffness: σ, a scalar or (n,), in [N m/rad] or [N/m], not negative.
         coulomb: f_c, in [N m] or [N], positive.
         exponent: α, not less than 1; 1 by default.
+
+    Example:
+        >>> rd.effects.DahlFriction(bristle_stiffness=300.0, coulomb=[0.7, 1.0], exponent=1.5)
     """
 
     bristle_stiffness: Any = field(metadata=coefficient("N m/rad", symbol="σ", least=0))

@@ -34,6 +34,9 @@ class DryFriction(SetValued):
         static: f_s, static friction, not less than f_k; f_k by default.
         stribeck_velocity: v_s, a scalar or (n,), in [rad/s] or [m/s], positive; without it friction drops
             from f_s to f_k where sliding starts.
+
+    Example:
+        >>> rd.effects.DryFriction(level=[0.4, 0.2], static=0.6, stribeck_velocity=0.1)
     """
 
     level: Any = field(metadata=coefficient("N m", symbol="f_k", least=0, stated="friction"))

@@ -25,6 +25,13 @@ from robot_dyn.foundations.values import Value
 from robot_dyn.queries.dynamics import Dynamics
 
 
+class _ClassName:
+    """The name of an effect that states none: the name of its class in snake case."""
+
+    def __get__(self, effect: Effect | None, kind: type[Effect]) -> str:
+        return re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower()
+
+
 class Effect(Value):
     """Anything that acts on the joints: a `Force`, a `Bound`, or a combination of these, its `parts`.
 
@@ -42,18 +49,15 @@ class Effect(Value):
     be given by joint name, or as "urdf" where files state them.
 
     Attributes:
+        name: Name in scenes and ledgers: the class name in snake case, unless the class states another.
         term: Equation in short form, for `explain`.
     """
 
+    name: ClassVar[str] = _ClassName()  # pyright: ignore[reportAssignmentType]
     term: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         check_coefficients(self, EffectError, resolved=True)
-
-    @property
-    def name(self) -> str:
-        """Name in scenes and ledgers: the class name in snake case."""
-        return re.sub(r"(?<!^)(?=[A-Z])", "_", type(self).__name__).lower()
 
     def on(self, dynamics: Any) -> Effect:
         """Return this effect with coefficients given by joint name or as "urdf" replaced by arrays (n,).

@@ -141,10 +141,7 @@ class EquationOfMotion:
 
     def commanded(self, u: Array) -> Array:
         """Return the actuation after the bounds before the first one with states."""
-        for effect in self.effects[: self._lags]:
-            if isinstance(effect, Bound):
-                u = self._bounded(effect, u)
-        return u
+        return self.applied(u, u, range(self._lags))[0]
 
     @cached_property
     def bounds_at_all_times(self) -> range:
@@ -183,14 +180,6 @@ class EquationOfMotion:
             more = (a,) if isinstance(effect, Drive) and effect.coupled else ()
             rates.append((place, call(effect.state_rate, self.dynamics, t, q, v, reached.get(k, u), z[place], *more)))
         return rates
-
-    def N(self, q: Array, torque: Array) -> Array:
-        """All forces but actuation, for the torque Σ τ_effect."""
-        return self.dynamics.N(q) - torque
-
-    def inverse_dynamics(self, q: Array, v: Array, a: Array, torque: Array) -> Array:
-        """The actuation that gives the acceleration a."""
-        return self.dynamics.inverse_dynamics(q, v, a) - torque
 
     def acceleration(self, q: Array, v: Array, total: Array) -> Array:
         """The acceleration under the total torque τ + Σ τ_effect."""

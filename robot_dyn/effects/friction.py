@@ -22,6 +22,9 @@ class ViscousFriction(Dissipative):
 
     Attributes:
         damping: b, a scalar or (n,), in [N m s/rad] or [N s/m], not negative.
+
+    Example:
+        >>> rd.effects.ViscousFriction(damping=[0.3, 0.1])
     """
 
     damping: Any = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
@@ -43,6 +46,9 @@ class RegularisedCoulombFriction(Dissipative):
     Attributes:
         friction: f, a scalar or (n,), in [N m] or [N], not negative.
         velocity_scale: v_s, a scalar or (n,), in [rad/s] or [m/s], positive.
+
+    Example:
+        >>> rd.effects.RegularisedCoulombFriction(friction=0.2, velocity_scale=[0.05, 0.1])
     """
 
     friction: Any = field(metadata=coefficient("N m", symbol="f", least=0, stated="friction"))

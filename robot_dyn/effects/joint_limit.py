@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, final
+from typing import Any, ClassVar, final
 
 import numpy as np
 
@@ -33,6 +33,9 @@ class _JointStops(Effect):
     lower: Any = field(metadata=LOWER)
     upper: Any = field(metadata=UPPER)
 
+    name = "joint_stops"
+    through: ClassVar[str]  # the coefficient that acts: a joint where it is 0 has no stops
+
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("lower", "upper"):
@@ -49,21 +52,12 @@ class _JointStops(Effect):
         require("lower stops must lie below upper ones", np.less, lower, upper)
 
     @property
-    def name(self) -> str:
-        return "joint_stops"
-
-    @property
-    def _coefficient(self) -> Any:
-        """Its coefficient: a joint where it is 0 has no stops."""
-        raise NotImplementedError
-
-    @property
     def widths(self) -> tuple[Any, Any]:
         with np.errstate(divide="ignore"):  # the depth at which a stop holds 1 N m or 1 N: loads that matter lie deeper
-            return np.divide(1.0, self._coefficient), inf
+            return np.divide(1.0, getattr(self, self.through)), inf
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
-        acts = np.broadcast_to(self._coefficient, n) > 0
+        acts = np.broadcast_to(getattr(self, self.through), n) > 0
         return tuple(
             Threshold(i, float(level), *words)
             for words, levels in ((_LOWER_STOP, self.lower), (_UPPER_STOP, self.upper))
@@ -91,15 +85,15 @@ class JointStopSpring(_JointStops, Conservative):
         lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m].
         upper: Position of the upper stop, inf for none, above the lower one.
         stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative.
+
+    Example:
+        >>> rd.effects.JointStopSpring(lower=[-1.0, -2.0], upper=1.0, stiffness=50.0)
     """
 
     stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))
 
+    through = "stiffness"
     term = "k (δ₋ − δ₊)"
-
-    @property
-    def _coefficient(self) -> Any:
-        return self.stiffness
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return self.stiffness * (positive_part(self.lower - q) - positive_part(q - self.upper))
@@ -117,15 +111,15 @@ class JointStopDamper(_JointStops, Dissipative):
     Attributes:
         lower, upper: Positions of the stops, as of the spring.
         damping: c, damping for each unit of depth, a scalar or (n,), in [N m s/rad²] or [N s/m²], not negative.
+
+    Example:
+        >>> rd.effects.JointStopDamper(lower=[-1.0, -2.0], upper=1.0, damping=20.0)
     """
 
     damping: Any = field(metadata=coefficient("N m s/rad²", symbol="c, damping for each unit of depth", least=0))
 
+    through = "damping"
     term = "−c (δ₋ + δ₊) v"
-
-    @property
-    def _coefficient(self) -> Any:
-        return self.damping
 
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
         return -self.damping * (positive_part(self.lower - q) + positive_part(q - self.upper)) * v
@@ -134,5 +128,9 @@ class JointStopDamper(_JointStops, Dissipative):
 def joint_stops(
     lower: Any, upper: Any, stiffness: Any = 1e4, damping: Any = 1e3
 ) -> tuple[JointStopSpring, JointStopDamper]:
-    """Both parts of joint stops; the limits of a robot are `robot.lower` and `robot.upper`."""
+    """Return both parts of joint stops; the limits of a robot are `robot.lower` and `robot.upper`.
+
+    Example:
+        >>> rd.effects.joint_stops(lower=[-1.0, -2.0], upper=1.0, stiffness=50.0, damping=20.0)
+    """
     return JointStopSpring(lower, upper, stiffness), JointStopDamper(lower, upper, damping)

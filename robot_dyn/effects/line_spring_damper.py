@@ -21,8 +21,8 @@ from robot_dyn.foundations.threshold import smooth
 from robot_dyn.foundations.validate import instance
 from robot_dyn.queries.dynamics import Dynamics
 
-_POINT = coefficient("m", symbol="p, in the axes of the frame", shapes=((3,),))
-_OTHER = coefficient("m", symbol="p', in the axes of the other frame, or of the base", shapes=((3,),))
+_POINT = coefficient("m", symbol="p, a point of the frame, in its axes", shapes=((3,),))
+_OTHER = coefficient("m", symbol="p', a point of the other frame, in its axes, or of the world", shapes=((3,),))
 _STIFFNESS = coefficient("N/m", symbol="k", shapes=((),), least=0)
 _DAMPING = coefficient("N s/m", symbol="c", shapes=((),), least=0)
 _LENGTH = coefficient("m", symbol="ℓ₀, the length without force", shapes=((),), least=0)
@@ -37,6 +37,7 @@ class _Line(Effect):
     point: Any = field(default=(0.0, 0.0, 0.0), metadata=_POINT)
     other_point: Any = field(default=(0.0, 0.0, 0.0), metadata=_OTHER)
 
+    name = "line_spring_damper"
     thresholds = smooth
 
     def __post_init__(self) -> None:
@@ -47,10 +48,6 @@ class _Line(Effect):
                 f"both points are fixed to {self.frame!r}, so their distance is constant: name another frame"
             )
         super().__post_init__()
-
-    @property
-    def name(self) -> str:
-        return "line_spring_damper"
 
     @property
     def _frames(self) -> tuple[str, ...]:
@@ -105,6 +102,10 @@ class LineSpring(_Line, Conservative):
 
     Attributes:
         frame, other_frame, point, other_point, stiffness, length: As of `LineSpringDamper`.
+
+    Example:
+        >>> rd.effects.LineSpring(frame="tip", other_frame="bar_1", point=[0.1, 0.0, 0.2],
+        ...     other_point=[0.0, 0.0, 0.4], stiffness=30.0, length=0.7)
     """
 
     stiffness: Any = field(kw_only=True, metadata=_STIFFNESS)
@@ -128,6 +129,10 @@ class LineDamper(_Line, Dissipative):
 
     Attributes:
         frame, other_frame, point, other_point, damping: As of `LineSpringDamper`.
+
+    Example:
+        >>> rd.effects.LineDamper(frame="tip", other_frame="bar_1", point=[0.1, 0.0, 0.2],
+        ...     other_point=[0.0, 0.0, 0.4], damping=2.0)
     """
 
     damping: Any = field(kw_only=True, metadata=_DAMPING)
@@ -155,13 +160,15 @@ class LineSpringDamper(_Line):
         stiffness: k, in [N/m], not negative.
         damping: c, in [N s/m], not negative.
         length: ℓ₀, without force, in [m], not negative.
+
+    Example:
+        >>> rd.effects.LineSpringDamper(frame="tip", other_frame="bar_1", point=[0.1, 0.0, 0.2],
+        ...     other_point=[0.0, 0.0, 0.4], stiffness=30.0, damping=2.0, length=0.7)
     """
 
     stiffness: Any = field(kw_only=True, metadata=_STIFFNESS)
     damping: Any = field(kw_only=True, metadata=_DAMPING)
     length: Any = field(kw_only=True, metadata=_LENGTH)
-
-    term = f"{LineSpring.term} {LineDamper.term}".replace(" −(", " − (")
 
     @property
     def parts(self) -> tuple[Effect, ...]:

@@ -64,6 +64,10 @@ class LuGreFriction(Bristles, Active):
         coulomb: f_c, of sliding, in [N m] or [N], positive.
         breakaway: f_s, of rest, in [N m] or [N], not less than f_c.
         stribeck_velocity: v_s, in [rad/s] or [m/s], positive.
+
+    Example:
+        >>> rd.effects.LuGreFriction(bristle_stiffness=300.0, bristle_damping=1.0, viscous=0.4, coulomb=[0.7, 1.0],
+        ...     breakaway=1.2, stribeck_velocity=0.1)
     """
 
     bristle_stiffness: Any = field(metadata=coefficient("N m/rad", symbol="σ₀", least=0))
@@ -73,15 +77,12 @@ class LuGreFriction(Bristles, Active):
     breakaway: Any = field(metadata=coefficient("N m", symbol="f_s", above=0, elsewhere=1.0))
     stribeck_velocity: Any = field(metadata=coefficient("rad/s", symbol="v_s", above=0, elsewhere=1.0))
 
+    name = "lugre_friction"
     term = "−(σ₀ z + σ₁ z' + σ₂ v), z' = v − σ₀ |v| z / g(v)"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require("breakaway must not be less than coulomb", np.greater_equal, self.breakaway, self.coulomb)
-
-    @property
-    def name(self) -> str:
-        return "lugre_friction"
 
     @property
     def widths(self) -> tuple[Any, Any]:

@@ -119,7 +119,7 @@ class Plant:
 
     def N(self, t: float, q: Array, v: Array) -> Array:
         """All forces but actuation, with the sign of a load: N = ∂V/∂q − Σ τ_effect, (..., n)."""
-        return self._finite(self.at(t).equation_of_motion.N(q, self.torque(t, q, v)))
+        return self._finite(self.at(t).dynamics.N(q) - self.torque(t, q, v))
 
     def torque(self, t: float, q: Array, v: Array) -> Array:
         """Σ τ_effect, the torque of all effects on the joints, (..., n); 0 without effects.
@@ -145,7 +145,7 @@ class Plant:
 
     def inverse_dynamics(self, t: float, q: Array, v: Array, a: Array) -> Array:
         """Actuation τ = M a + C v + N that gives the acceleration a, (..., n)."""
-        return self._finite(self.at(t).equation_of_motion.inverse_dynamics(q, v, a, self.torque(t, q, v)))
+        return self._finite(self.at(t).dynamics.inverse_dynamics(q, v, a) - self.torque(t, q, v))
 
     def forward_dynamics(self, t: float, q: Array, v: Array, u: Array) -> Array:
         """Acceleration under the actuation u, (..., n)."""

@@ -39,6 +39,9 @@ class RigidBacklash(GearedMotor, SetValued):
         ratio: n of the gear; 1 by default.
         restitution: e, a scalar or (n,), 0 to 1; 0 by default.
         viscous: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
+
+    Example:
+        >>> rd.effects.RigidBacklash(gap=[0.01, 0.0], inertia=0.02, ratio=5.0, restitution=0.4, viscous=0.2)
     """
 
     gap: Any = field(metadata=coefficient("rad", symbol="β", least=0))

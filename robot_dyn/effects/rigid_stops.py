@@ -30,6 +30,9 @@ class RigidStops(SetValued):
         lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m]; "urdf" for the file's.
         upper: Position of the upper stop, inf for none, above the lower one.
         restitution: e, a scalar or (n,), 0 to 1; 0 by default.
+
+    Example:
+        >>> rd.effects.RigidStops(lower=-1.0, upper=[1.0, 2.0], restitution=0.3)
     """
 
     lower: Any = field(metadata=LOWER)

@@ -45,6 +45,10 @@ class SeriesElastic(GearedMotor, Dissipative):
         damping: d of the spring, in [N m s/rad] or [N s/m], not negative; 0 by default.
         friction: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
         backlash: β, to each side, in [rad] or [m], not negative; 0 by default.
+
+    Example:
+        >>> rd.effects.SeriesElastic(stiffness=[0.0, 80.0], inertia=0.02, ratio=5.0, damping=0.1, friction=0.2,
+        ...     backlash=0.01)
     """
 
     stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))

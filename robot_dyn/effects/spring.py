@@ -20,6 +20,9 @@ class Spring(Conservative):
     Attributes:
         stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative.
         rest: q₀, a scalar or (n,), in [rad] or [m].
+
+    Example:
+        >>> rd.effects.Spring(stiffness=2.0, rest=[0.1, -0.2])
     """
 
     stiffness: Any = field(metadata=coefficient("N m/rad", symbol="k", least=0))

@@ -30,6 +30,10 @@ class ExternalWrench(Timed, Active):
         expressed_in: "world_aligned": at the frame's origin, base axes; "body": its axes; "world": at the base.
         start_s: When it starts, in [s].
         end_s: When it ends, in [s]; it acts for start_s ≤ t < end_s.
+
+    Example:
+        >>> rd.effects.ExternalWrench(frame="tip", wrench=[1.0, 0.0, 2.0, 0.0, 0.5, 0.0], expressed_in="body",
+        ...     start_s=0.0, end_s=0.2)
     """
 
     frame: str

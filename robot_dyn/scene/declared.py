@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from inspect import Parameter, getdoc, signature
 from math import isinf
 from typing import Any, ClassVar, Literal, TypeVar
@@ -12,7 +13,7 @@ from pydantic import ConfigDict, Field, create_model
 from robot_dyn.control.digital_loop.block import SIGNAL
 from robot_dyn.foundations.coefficients import URDF, Coefficient, declared
 from robot_dyn.model.robot import Robot
-from robot_dyn.scene.schema import Part, PerJoint, Stated, per_joint
+from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Stated, Vector3, per_joint
 
 _SPELLED = {" ": "_", "/": "_per_", "²": "2", "(": "", ")": ""}
 
@@ -31,7 +32,8 @@ class Declared(Part):
         """What the factory returns for the values of the table."""
         values = ((name, getattr(self, key), each) for key, (name, each) in self.keys.items())
         return type(self).factory(**{
-            name: per_joint(name, value, robot, elsewhere=each.elsewhere) if each and value is not None else value
+            name: value if each is None or value is None or not each.of_joints
+            else per_joint(name, value, robot, elsewhere=each.elsewhere)
             for name, value, each in values
         })  # fmt: skip
 
@@ -61,24 +63,32 @@ def declared_part(
     """
     factory = factory or classes[0]
     keys, parameters = keys_of(factory, *classes, signal=signal), signature(factory).parameters
-    fields: dict[str, Any] = {"kind": (Literal[kind], ...)}  # pyright: ignore[reportInvalidTypeForm]
+    fields: dict[str, Any] = {"kind": (Literal[kind], ...)} | others  # pyright: ignore[reportInvalidTypeForm]
     for key, (name, each) in keys.items():
         default = parameters[name].default
         default = (URDF if each.stated else ...) if default is Parameter.empty else default
         none = f"; joints left out have {'none' if isinf(each.elsewhere) else f'{each.elsewhere:g}'}"
         none = none if each.elsewhere else ""
-        fields[key] = (Stated if each.stated else PerJoint, Field(default, description=f"{each.symbol}{none}."))
+        fields[key] = (_type(each), Field(default, description=f"{each.symbol}{none}."))
     text = text or (getdoc(classes[0]) or "").partition("\n\nAttributes:")[0]
-    part = create_model(kind, __base__=base, __doc__=text, **fields, **others)
+    part = create_model(kind, __base__=base, __doc__=text, **fields)
     part.factory, part.keys = staticmethod(factory), keys | {name: (name, None) for name in others}
     return part
 
 
+def _type(known: Coefficient) -> Any:
+    """The type of a key: a value by joint, three numbers, or one."""
+    if known.of_joints:
+        return Stated if known.stated else PerJoint
+    return Vector3 if known.shapes == ((3,),) else Number if known.least is None else NotNegative
+
+
 def keys_of(factory: Callable[..., Any], *classes: type, signal: str = SIGNAL) -> dict[str, tuple[str, Coefficient]]:
     """The keys of the coefficients that classes declare and `factory` takes, with the argument of each."""
-    known = {name: each for kind in reversed(classes) for name, each in declared(kind).items()}
+    stated = {name: known for kind in reversed(classes) for name, known in declared(kind).items()}
+    known = {name: replace(known, unit=known.unit.replace(SIGNAL, signal)) for name, known in stated.items()}
     names = [name for name in signature(factory).parameters if name in known]
-    return {_key(name, known[name].unit.replace(SIGNAL, signal)): (name, known[name]) for name in names}
+    return {_key(name, known[name].unit): (name, known[name]) for name in names}
 
 
 def _key(name: str, unit: str) -> str:

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from inspect import isabstract, isclass
 from math import inf
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
+from pydantic import Field
+
+from robot_dyn import effects
 from robot_dyn.description.edits import STANDARD_GRAVITY, Payload
-from robot_dyn.effects.actuator import ActuatorLag, EffortLimit
 from robot_dyn.effects.carried_payload import CarriedPayload
-from robot_dyn.effects.dahl import DahlFriction
-from robot_dyn.effects.dry_friction import DryFriction
 from robot_dyn.effects.effect import Effect
-from robot_dyn.effects.explanation import EDITED, term_of
-from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring, joint_stops
 from robot_dyn.effects.line_spring_damper import LineSpringDamper
-from robot_dyn.effects.lugre import LuGreFriction
-from robot_dyn.effects.rigid_backlash import RigidBacklash
-from robot_dyn.effects.rigid_stops import RigidStops
-from robot_dyn.effects.series_elastic import SeriesElastic
-from robot_dyn.effects.spring import Spring
 from robot_dyn.effects.wrench import ExternalWrench
 from robot_dyn.foundations.coefficients import URDF
 from robot_dyn.foundations.errors import SceneError
@@ -45,8 +40,6 @@ Matrix3 = Annotated[tuple[Vector3, Vector3, Vector3], Form("3 rows of 3 finite n
 class Edit(Part):
     """An edit of the robot."""
 
-    term: ClassVar[str] = ""
-    """What it does, in a line."""
     kind: Any
 
     def edit(self, robot: Robot, loaded: Robot) -> Robot:
@@ -62,8 +55,6 @@ def bare(loaded: Robot) -> Robot:
 class Acting(Part):
     """An effect of the plant."""
 
-    term: ClassVar[str] = ""
-    """Its equation in a line."""
     kind: Any
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
@@ -75,8 +66,8 @@ class DeclaredEffect(Declared, Acting):
     """An effect made of the coefficients that its classes declare."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
-        effects = self.call(robot)
-        return effects if isinstance(effects, tuple) else (effects,)
+        called = self.call(robot)
+        return called if isinstance(called, tuple) else called.parts
 
 
 class Body(Part):
@@ -101,8 +92,6 @@ class Body(Part):
 class Gravity(Edit):
     """Gravity: ∂V/∂q in N, with V = −Σ m gᵀ p."""
 
-    term = EDITED["gravity"]
-
     kind: Literal["gravity"]
     acceleration_m_s2: Annotated[
         Vector3 | Literal["urdf"], Form("a list of 3 finite numbers, or 'urdf'", 'list of 3 numbers or `"urdf"`')
@@ -117,8 +106,6 @@ class Gravity(Edit):
 class Lock(Edit):
     """Joints held at a value: their links become part of the links before them."""
 
-    term = EDITED["lock"]
-
     kind: Literal["lock"]
     joints: dict[str, Number]
     """Value by joint, in rad, or m for a prismatic joint."""
@@ -130,8 +117,6 @@ class Lock(Edit):
 class Load(Edit, Body):
     """A rigid body fixed to a link, in M, C and N."""
 
-    term = EDITED["payload"]
-
     kind: Literal["payload"]
 
     def edit(self, robot: Robot, loaded: Robot) -> Robot:
@@ -140,8 +125,6 @@ class Load(Edit, Body):
 
 class Armature(Edit):
     """Inertia of the drives felt at the joints, added to the diagonal of M."""
-
-    term = EDITED["armature"]
 
     kind: Literal["armature"]
     inertia_kg_m2: Stated
@@ -164,8 +147,6 @@ class Armature(Edit):
 class Carried(Acting, Body):
     """A rigid body on a link that is picked up and dropped: in M, C and N for start_s ≤ t < end_s."""
 
-    term = CarriedPayload.term
-
     kind: Literal["carried_payload"]
     start_s: NotNegative = 0.0
     """When it is picked up; 0 if the arm starts with it."""
@@ -181,8 +162,6 @@ class Carried(Acting, Body):
 
 class Wrench(Acting):
     """A force and a torque on a link, for start_s ≤ t < end_s: τ = Jᵀ F."""
-
-    term = ExternalWrench.term
 
     kind: Literal["external_wrench"]
     frame: str
@@ -205,62 +184,29 @@ class Wrench(Acting):
         return (ExternalWrench(self.frame, [*self.force_N, *self.torque_N_m], self.expressed_in, self.start_s, end),)
 
 
-class Line(Acting):
-    """A spring and a damper along the line between two points: τ = −(∂ℓ/∂q)ᵀ (k (ℓ − ℓ₀) + c ℓ'), ℓ their distance."""
-
-    term = LineSpringDamper.term
-
-    kind: Literal["line_spring_damper"]
-    frame: str
-    """A link."""
-    other_frame: str | None = None
-    """Another one; the world unless given."""
-    point_m: Vector3 = (0.0, 0.0, 0.0)
-    """A point of the link, in its axes."""
-    other_point_m: Vector3 = (0.0, 0.0, 0.0)
-    """A point of the other link, in its axes, or of the world, in those of the base."""
-    stiffness_N_per_m: NotNegative
-    """k."""
-    damping_N_s_per_m: NotNegative
-    """c."""
-    length_m: NotNegative
-    """ℓ₀, the length without force."""
-
-    def build(self, robot: Robot) -> tuple[Effect, ...]:
-        line = LineSpringDamper(
-            self.frame, self.other_frame, self.point_m, self.other_point_m,
-            stiffness=self.stiffness_N_per_m, damping=self.damping_N_s_per_m, length=self.length_m,
-        )  # fmt: skip
-        return line.parts
-
-
-def _declared(kind: str, *classes: type[Effect], **choices: Any) -> type[DeclaredEffect]:
-    part = declared_part(DeclaredEffect, kind, *classes, **choices)
-    part.term = term_of(classes)
-    return part
-
-
 EDITS = Gravity, Lock, Load, Armature
-ACTING = (
-    _declared("viscous_friction", ViscousFriction),
-    _declared("regularised_coulomb_friction", RegularisedCoulombFriction),
-    _declared("dry_friction", DryFriction),
-    _declared("lugre_friction", LuGreFriction),
-    _declared("dahl_friction", DahlFriction),
-    _declared("spring", Spring),
-    _declared(
-        "joint_stops", JointStopSpring, JointStopDamper, factory=joint_stops,
-        text="Soft joint stops: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth beyond a stop.",
-    ),
-    _declared("rigid_stops", RigidStops),
-    Line,
-    Wrench,
-    Carried,
-    _declared("series_elastic", SeriesElastic),
-    _declared("rigid_backlash", RigidBacklash),
-    _declared("effort_limit", EffortLimit),
-    _declared("actuator_lag", ActuatorLag),
+_JOINT_STOPS = declared_part(
+    DeclaredEffect, "joint_stops", JointStopSpring, JointStopDamper, factory=joint_stops,
+    text="Soft joint stops: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth beyond a stop.",
 )  # fmt: skip
+_LINE = declared_part(
+    DeclaredEffect, "line_spring_damper", LineSpringDamper,
+    frame=(str, Field(description="A frame of the arm.")),
+    other_frame=(str | None, Field(None, description="Another one; the world unless given.")),
+)  # fmt: skip
+_OTHERS: dict[str, type[Acting]] = {kinds_of(part)[0]: part for part in (_JOINT_STOPS, _LINE, Wrench, Carried)}
+"""By kind, the tables that are not made of the coefficients of one class."""
+
+
+def _acting() -> Iterator[type[Acting]]:
+    """A table for each effect that `robot_dyn.effects` lists."""
+    listed = [getattr(effects, name) for name in effects.__all__]
+    classes = [kind for kind in listed if isclass(kind) and issubclass(kind, Effect) and not isabstract(kind)]
+    for name, kind in {kind.name: kind for kind in classes if kind is not Effect}.items():
+        yield _OTHERS[name] if name in _OTHERS else declared_part(DeclaredEffect, name, kind)
+
+
+ACTING = tuple(_acting())
 BY_KIND: dict[str, type[Edit | Acting]] = {kinds_of(part)[0]: part for part in (*EDITS, *ACTING)}
 AnyEdit = one_of(*EDITS)
 AnyEffect = one_of(*EDITS, *ACTING)

@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.control.digital_loop.loop import LINES, Loop
-from robot_dyn.effects.explanation import Explanation, Number, Term, as_they_act, edit_terms, explanation
+from robot_dyn.effects.explanation import (
+    EDITED,
+    Explanation,
+    Number,
+    Term,
+    as_they_act,
+    edit_terms,
+    explanation,
+    term_of,
+)
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.coefficients import URDF
 from robot_dyn.foundations.errors import RobotDynError
@@ -85,7 +94,7 @@ def _terms(scene: Scene, setup: Setup) -> Iterator[Term]:
         numbers, acting = _numbers(effect), as_they_act(parts, robot)
         if isinstance(effect, Edit) and any(each.source == OF_FILE for each in numbers):
             acting = edited.get(effect.kind, ())
-        yield Term(effect.kind, BY_KIND[effect.kind].term, numbers, acting)
+        yield Term(effect.kind, term_of(parts) if parts else EDITED[effect.kind], numbers, acting)
 
 
 def _control(scene: Scene, control: Control, setup: Setup) -> Iterator[str]:

@@ -11,6 +11,7 @@ from pydantic.fields import FieldInfo
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.scene.control import BLOCKS, KINDS, Control, Model
+from robot_dyn.scene.declared import Declared
 from robot_dyn.scene.effects import ACTING, EDITS
 from robot_dyn.scene.loading import Loading
 from robot_dyn.scene.references import KINDS as REFERENCES
@@ -31,12 +32,10 @@ integrates, and where each number comes from. This page is written from the sche
 - `"urdf"` takes what the file of the robot states.
 - Numbers are finite. A key that is not listed here is refused.
 """
-# by the end of a key, the longest first
+# of keys that no class declares, by the end of a key, the longest first
 _UNITS = {
-    "_N_m_s_per_rad2": "N m s/rad²", "_N_m_s_per_rad": "N m s/rad", "_N_m_per_rad": "N m/rad", "_rad_per_s": "rad/s",
-    "_N_m_per_s": "N m/s", "_periods": "periods", "_kg_m2": "kg m²", "_m_s2": "m/s²", "_per_s": "1/s", "_N_m": "N m",
-    "_rad": "rad", "_kg_per_m3": "kg/m³", "_kg": "kg", "_N": "N", "_N_s_per_m": "N s/m", "_N_per_m": "N/m", "_m": "m",
-    "_s": "s",
+    "_rad_per_s": "rad/s", "_periods": "periods", "_kg_m2": "kg m²", "_m_s2": "m/s²", "_per_s": "1/s", "_N_m": "N m",
+    "_kg_per_m3": "kg/m³", "_kg": "kg", "_N": "N", "_m": "m", "_s": "s",
 }  # fmt: skip
 _UNITS_OF_KEYS = {
     "q": "rad", "v": "rad/s", "joints": "rad", "points": "rad", "kp": "N m/rad", "kd": "N m s/rad",
@@ -93,13 +92,20 @@ def _section(title: str, text: str, part: type[Part], level: int = 2) -> Iterato
     if fields:
         yield "| key | value | unit | default | meaning |\n|---|---|---|---|---|"
         schemas = part.model_json_schema()["properties"]
-        yield from (_row(key, field, schemas[key]) for key, field in fields.items())
+        yield from (_row(key, field, schemas[key], _unit(part, key)) for key, field in fields.items())
         yield ""
 
 
-def _row(key: str, field: FieldInfo, schema: dict[str, Any]) -> str:
+def _unit(part: type[Part], key: str) -> str:
+    """The unit that a coefficient declares, or that the name of the key ends with."""
+    _, known = part.keys.get(key, ("", None)) if issubclass(part, Declared) else ("", None)
+    if known is not None:
+        return known.unit
+    return _UNITS_OF_KEYS.get(key) or next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
+
+
+def _row(key: str, field: FieldInfo, schema: dict[str, Any], unit: str) -> str:
     form = _form(schema)
-    unit = _UNITS_OF_KEYS.get(key) or next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
     unit = "" if "text" in form else unit
     return f"| `{key}` | {_cell(form)} | {unit} | {_default(field)} | {_cell(field.description or '')} |"
 

@@ -143,10 +143,6 @@ class Odd(Active):
     def __init__(self, does) -> None:
         self.does = does
 
-    @property
-    def name(self) -> str:
-        return "odd"
-
     def torque(self, dynamics, t, q, v):
         return self.does(q, v)
 

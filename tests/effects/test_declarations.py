@@ -19,6 +19,7 @@ from robot_dyn.simulation import MachineError, Verdict
 from robot_dyn.simulation.diagnostics.smoothness import LOOKS
 from robot_dyn.simulation.dynamics.declarations import undeclared
 from robot_dyn.simulation.engine.choice import choose
+from tests.effect_examples import EFFECTS, example
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.9])
@@ -188,20 +189,13 @@ def test_no_part_of_the_library_is_undeclared() -> None:
         velocity=[rd.control.Differences(), *blocks],
         actuation=rd.control.RateLimit(1.0),
     )
-    one = np.ones(2)
-    effects = [
-        rd.effects.ViscousFriction(1.0), rd.effects.Spring(1.0), rd.effects.EffortLimit(1.0),
-        rd.effects.ActuatorLag(1.0), rd.effects.DryFriction(1.0, 1.0),
-        rd.effects.RigidStops(-2.0, 2.0), rd.effects.DahlFriction(1.0, 1.0), rd.effects.LuGreFriction(*np.ones((6, 2))),
-        rd.effects.ExternalWrench(ARM.frame_names[-1], np.ones(6)), *rd.effects.joint_stops(-one, one),
-    ]  # fmt: skip
+    effects = [example(name) for name in EFFECTS]
     for controller in (
         loop,
         rd.control.PID(rd.control.hold(Q), 4.0, 1.0, 1.0),
         rd.control.FeedForward(ARM, rd.control.hold(Q), 4.0, 1.0),
     ):
         assert undeclared(rd.Plant(ARM, effects), controller) == ()
-    assert undeclared(rd.Plant(ARM, [rd.effects.SeriesElastic(one, one), rd.effects.Spring(1.0)]), None) == ()
 
 
 STATE = {"count": 0, "gain": 2.0}

@@ -8,6 +8,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations import EffectError
 from robot_dyn.scene import BY_KIND
+from tests.effect_examples import EFFECTS, example
 
 ROBOT = rd.load("cart_pole")
 
@@ -58,36 +59,14 @@ def test_names_and_values_are_checked_when_the_joints_are_known(make, message: s
 
 
 def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:
-    """The kinds of a scene are the names of the effects they build; those that work have them in the ledger."""
-    robot = rd.load("planar_2r")
-    built = {
-        "viscous_friction": [rd.effects.ViscousFriction(0.3)],
-        "regularised_coulomb_friction": [rd.effects.RegularisedCoulombFriction(0.2)],
-        "dry_friction": [rd.effects.DryFriction(0.2)],
-        "lugre_friction": [rd.effects.LuGreFriction(100.0, 0.1, 0.2, 1.0, 1.2, 0.1)],
-        "dahl_friction": [rd.effects.DahlFriction(100.0, 1.0, 1.5)],
-        "spring": [rd.effects.Spring(2.0)],
-        "joint_stops": rd.effects.joint_stops(-1.0, 1.0),
-        "rigid_stops": [rd.effects.RigidStops(-1.0, 1.0)],
-        "line_spring_damper": rd.effects.LineSpringDamper("tip", None, stiffness=1.0, damping=0.3, length=0.2).parts,
-        "external_wrench": [rd.effects.ExternalWrench("tip", [1.0, 0, 0, 0, 0, 0])],
-        "carried_payload": [rd.effects.CarriedPayload(rd.Payload("tip", 0.5), 0.004)],
-        "series_elastic": [rd.effects.SeriesElastic({"joint_2": 90.0}, 0.1, 3.0, backlash=1e-3)],
-        "rigid_backlash": [rd.effects.RigidBacklash({"joint_1": 0.01}, 0.1, 3.0)],
-        "effort_limit": [rd.effects.EffortLimit(5.0)],
-        "actuator_lag": [rd.effects.ActuatorLag(0.05)],
+    """The kinds of a scene are the names of the effects listed; those that work have them in the ledger."""
+    effects = [example(name) for name in EFFECTS if not issubclass(EFFECTS[name], rd.effects.LineSpringDamper)]
+    assert set(BY_KIND) == {effect.name for effect in effects} | {"gravity", "lock", "payload", "armature"}
+    assert len({effect.name for effect in effects}) == len(effects) - 2  # stops and lines have two parts each
+    run = rd.simulate(rd.Plant(rd.load("planar_2r"), effects), q0=[0.3, 0.4], duration_s=0.01, estimate_error=False)
+    assert set(run.power) - {"control", "pick_up"} == {
+        effect.name for effect in effects if not isinstance(effect, rd.effects.Conservative | rd.effects.Bound)
     }
-    assert [kind for kind in BY_KIND if kind in built] == list(built)
-    assert set(BY_KIND) - set(built) == {"gravity", "lock", "payload", "armature"}
-    for kind, effects in built.items():
-        assert {effect.name for effect in effects} == {kind}
-    plant = rd.Plant(robot, [effect for effects in built.values() for effect in effects])
-    run = rd.simulate(plant, q0=[0.3, 0.4], duration_s=0.01, estimate_error=False)
-    assert list(run.power) == [
-        "control", "viscous_friction", "regularised_coulomb_friction", "dry_friction", "lugre_friction",
-        "dahl_friction", "joint_stops", "rigid_stops", "line_spring_damper", "external_wrench", "series_elastic",
-        "rigid_backlash", "carried_payload", "pick_up",
-    ]  # fmt: skip
 
 
 def test_a_stop_that_differs_from_run_to_run_moves_both_of_its_parts() -> None:

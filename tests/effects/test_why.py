@@ -44,20 +44,6 @@ def test_causes_add_up_to_inverse_dynamics(name: str) -> None:
             assert abs(sum(parts) - tau[i]) <= 1e-13 * (1.0 + sum(map(abs, parts)))
 
 
-def test_each_cause_is_its_term_of_the_equation() -> None:
-    """Columns are M a, C v, ∂V/∂q, and −τ_effect of each effect."""
-    plant = plants()["ur5 with payload"]
-    q, v, a = np.random.default_rng(6).uniform(-1.5, 1.5, (3, 6))
-    arm = plant.dynamics
-    for i, joint in enumerate(arm.joint_names):
-        cause = rd.why(plant, q, v, a, joint)
-        of = {name: sum(getattr(each, name) for each in cause.shares) for name in ("inertia", "coriolis", "gravity")}
-        assert of["inertia"] == pytest.approx((arm.M(q) @ a)[i], abs=1e-11)
-        assert of["coriolis"] == pytest.approx((arm.C(q, v) @ v)[i], abs=1e-11)
-        assert of["gravity"] == pytest.approx(arm.N(q)[i], abs=1e-11)
-        assert cause.effects["viscous_friction"] == pytest.approx(0.5 * v[i], rel=1e-13)
-
-
 def test_from_the_torque_of_a_joint_at_rest_friction_is_the_rest() -> None:
     """λ = u − N of one that sticks; a torque given as `tau` is the torque that is split."""
     plant = rd.Plant(rd.load("planar_2r"), [rd.effects.DryFriction(50.0)])

@@ -16,6 +16,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference
+from tests.effect_examples import EFFECTS, arguments, example
 from tests.short_stress import short_stress
 from tests.wrong_arguments import FOR_AUTHORS, ROOMS
 
@@ -63,8 +64,6 @@ def values() -> dict[str, Any]:
     }
     setup = rd.Setup(plant, Q, **options)
     run, runs = rd.simulate(setup), rd.rollouts(setup, q0=[Q, Q + 0.1], params={"kp": [1.0, 2.0]})
-    spring, damper = rd.effects.joint_stops([-1.0, -1.0], [1.0, 1.0])
-    strut = rd.effects.LineSpringDamper("tip", None, stiffness=9.0, damping=1.0, length=0.3)
     loop = rd.control.Loop(
         rd.control.PD(PLAN, [1.0, 2.0], 1.0, 0.01),
         [rd.control.Noise([0.1, 0.2]), rd.control.Quantisation(0.1)],
@@ -80,15 +79,7 @@ def values() -> dict[str, Any]:
         rd.control.PDGravity(ARM, PLAN, 1.0, 1.0),
         rd.control.FeedForward(ARM, PLAN, 1.0, 1.0), rd.control.ComputedTorque(ARM, PLAN, 1.0, 1.0),
         rd.control.OperationalSpace(ARM, "tip", LINE, 1.0, 1.0, posture=Q, rows=(0, 2)),
-        rd.effects.EffortLimit([1.0, 2.0]),
-        rd.effects.ExternalWrench("tip", np.ones(6)), spring, damper,
-        rd.effects.RegularisedCoulombFriction([0.1, 0.2]), strut,
-        *strut.parts, rd.effects.Spring([1.0, 2.0]), rd.effects.ViscousFriction([1.0, 2.0]), PLAN,
-        rd.effects.DryFriction([1.0, 2.0], 2.0, 0.1), rd.effects.RigidStops(-1.0, [1.0, 2.0], 0.5),
-        rd.effects.ActuatorLag([0.1, 0.2]), rd.effects.LuGreFriction(9.0, 1.0, 1.0, [1.0, 2.0], 2.0, 0.1),
-        rd.effects.DahlFriction(9.0, [1.0, 2.0], 1.5), rd.effects.CarriedPayload(rd.Payload("tip", 1.0)),
-        rd.effects.RigidBacklash([0.1, 0.0], 0.1, 3.0, 0.5, 0.2),
-        rd.effects.SeriesElastic([9.0, 0.0], 0.1, 3.0, 0.1, 0.2, 0.01),
+        *map(example, EFFECTS), PLAN,
         rd.control.Samples([0.0, 1.0, 2.0], np.ones((3, 2))), LINE,
         loop, loop.controller, *loop.position, *loop.velocity, *loop.actuation,
         setup, run, runs, run.ledger, run.error, run.statistics, run.outcome, ARM.couplings, ARM.edits,
@@ -154,29 +145,23 @@ def test_values_cannot_be_changed(name: str) -> None:
 
 def test_values_keep_copies_of_what_they_are_given() -> None:
     """What the caller does to an array afterwards changes nothing, and the array of the caller stays writeable."""
-    x, six, points, three = np.array([0.3, 0.4]), np.ones(6), np.ones((3, 2)), np.ones(3)
+    x, points = np.array([0.3, 0.4]), np.ones((3, 2))
     times, about = np.array([0.0, 1.0, 2.0]), {"author": "me"}
     made: list[tuple[Any, tuple[str, ...]]] = [
         (rd.control.PD(PLAN, x, x), ("kp", "kd")),
         (rd.control.ComputedTorque(ARM, PLAN, x, x), ("kp", "kd")),
         (rd.control.PID(PLAN, x, x, x, x), ("kp", "ki", "kd", "effort_limit")),
-        (rd.effects.ViscousFriction(x), ("damping",)),
-        (rd.effects.RegularisedCoulombFriction(x), ("friction",)),
-        (rd.effects.Spring(x, x), ("stiffness", "rest")),
-        (rd.effects.joint_stops(-x, x, x)[0], ("upper", "stiffness")),
-        (rd.effects.EffortLimit(x), ("limit",)),
-        (rd.effects.DryFriction(x, x, x), ("level", "static", "stribeck_velocity")),
-        (rd.effects.RigidStops(-x, x, x), ("upper", "restitution")),
-        (rd.effects.ExternalWrench("tip", six), ("wrench",)),
-        (
-            rd.effects.LineSpringDamper("tip", None, three, three, stiffness=1.0, damping=1.0, length=1.0),
-            ("point", "other_point"),
-        ),
         (rd.control.Samples(times, points), ("breaks", "coefficients")),
         (rd.Setup(rd.Plant(ARM), x, x, about=about), ("q0", "v0", "about")),
     ]
+    arrays = [x, points, times]
+    for kind in EFFECTS.values():
+        given = {key: np.array(value) if isinstance(value, list) else value for key, value in arguments(kind).items()}
+        names = tuple(key for key, value in given.items() if isinstance(value, np.ndarray))
+        made.append((kind(**given), names))
+        arrays += [given[name] for name in names]
     before = [[deepcopy(getattr(value, name)) for name in names] for value, names in made]
-    for array in (x, six, points, three, times):
+    for array in arrays:
         array += 7.0
     about["author"] = "you"
     for (value, names), kept in zip(made, before, strict=True):

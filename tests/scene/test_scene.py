@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+from typing import Any
+
 import numpy as np
 import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import SceneError
 from robot_dyn.scene import BY_KIND, of_scene, parse_scene, read_both, starter, starter_names
+from tests.effect_examples import arguments
 from tests.long import long
 
 SCENE = """
@@ -72,79 +76,59 @@ def test_start_is_by_joint_or_in_order(write) -> None:
     np.testing.assert_array_equal(setup.v0, [0.0, 0.5])
 
 
-EFFECTS = {
-    "gravity": "",
-    "viscous_friction": "damping_N_m_s_per_rad = 0.3",
-    "regularised_coulomb_friction": "friction_N_m = {joint_1 = 0.2}",
-    "spring": "stiffness_N_m_per_rad = 2.0\nrest_rad = [0.1, 0.2]",
-    "joint_stops": "lower_rad = -1.0\nupper_rad = {joint_1 = 1.0}",
-    "line_spring_damper": (
-        'frame = "tip"\npoint_m = [0.1, 0.0, 0.2]\nother_point_m = [0.5, 0.0, 0.4]\n'
-        "stiffness_N_per_m = 30.0\ndamping_N_s_per_m = 2.0\nlength_m = 0.7"
+ARM = rd.load("planar_2r").with_(gravity=(0, 0, 0))
+WRITTEN = {  # kinds whose keys are not the coefficients of a class, and the plants that they are
+    "gravity": ("", lambda: rd.Plant(rd.load("planar_2r"))),
+    "lock": ("joints = {joint_1 = 0.2}", lambda: rd.Plant(ARM.with_(lock={"joint_1": 0.2}))),
+    "payload": ('frame = "tip"\nmass_kg = 0.5', lambda: rd.Plant(ARM.with_(payload=rd.Payload("tip", 0.5)))),
+    "armature": (
+        "inertia_kg_m2 = {joint_1 = 0.002, joint_2 = 0.001}\ngear_ratio = {joint_1 = 9.0}",
+        lambda: rd.Plant(ARM.with_(armature=[0.002 * 81.0, 0.001])),
     ),
-    "external_wrench": 'frame = "tip"\nforce_N = [1.0, 0.0, 0.0]',
-    "effort_limit": "limit_N_m = 3.0",
-    "actuator_lag": "time_constant_s = {joint_1 = 0.02, joint_2 = 0.05}",
-    "dry_friction": "level_N_m = {joint_1 = 0.4, joint_2 = 0.2}\nstatic_N_m = 0.6",
-    "rigid_stops": "lower_rad = -1.0\nupper_rad = {joint_1 = 1.0}\nrestitution = 0.3",
-    "lugre_friction": (
-        "bristle_stiffness_N_m_per_rad = 300.0\nbristle_damping_N_m_s_per_rad = 1.0\nviscous_N_m_s_per_rad = 0.4\n"
-        "coulomb_N_m = {joint_1 = 0.7}\nbreakaway_N_m = [1.1, 1.2]\nstribeck_velocity_rad_per_s = 0.1"
+    "carried_payload": (
+        'frame = "tip"\nmass_kg = 0.5\nend_s = 0.07\npicked_up = "at_speed_of_link"',
+        lambda: rd.Plant(ARM, [rd.effects.CarriedPayload(rd.Payload("tip", 0.5), end_s=0.07, at_rest=False)]),
     ),
-    "dahl_friction": "bristle_stiffness_N_m_per_rad = 300.0\ncoulomb_N_m = {joint_1 = 0.7}\nexponent = 1.5",
-    "carried_payload": 'frame = "tip"\nmass_kg = 0.5\nend_s = 0.07\npicked_up = "at_speed_of_link"',
-    "series_elastic": (
-        "stiffness_N_m_per_rad = {joint_2 = 80.0}\ninertia_kg_m2 = 0.02\nratio = 5.0\nbacklash_rad = 0.01"
+    "external_wrench": (
+        'frame = "tip"\nforce_N = [1.0, 0.0, 0.0]',
+        lambda: rd.Plant(ARM, [rd.effects.ExternalWrench("tip", [1, 0, 0, 0, 0, 0])]),
     ),
-    "rigid_backlash": "gap_rad = {joint_2 = 0.01}\ninertia_kg_m2 = 0.02\nratio = 5.0\nrestitution = 0.4",
-    "payload": 'frame = "tip"\nmass_kg = 0.5',
-    "armature": "inertia_kg_m2 = {joint_1 = 0.002, joint_2 = 0.001}\ngear_ratio = {joint_1 = 9.0}",
-    "lock": "joints = {joint_1 = 0.2}",
 }
+DECLARED: dict[str, Any] = {kind: part for kind, part in BY_KIND.items() if kind not in WRITTEN}
 
 
-def test_every_kind_of_effect_is_tried() -> None:
-    assert set(EFFECTS) == set(BY_KIND)
+def stated(value: Any, known: Any, form: str) -> tuple[str, Any]:
+    """A value of an example in TOML: as it is, or by joint, some joints left out; and the value that this means."""
+    if form == "as it is" or not isinstance(value, list) or not known.of_joints:
+        return json.dumps(value), value
+    required = known.above is not None and known.elsewhere <= known.above
+    joints = [0, 1] if required or form == "by joint" else [int(np.argmax(np.abs(value)))]
+    table = ", ".join(f"joint_{i + 1} = {value[i]}" for i in joints)
+    return f"{{{table}}}", [value[i] if i in joints else known.elsewhere for i in (0, 1)]
 
 
-@pytest.mark.parametrize("kind", EFFECTS)
+@pytest.mark.parametrize("form", ["as it is", "by joint", "joints left out"])
+@pytest.mark.parametrize("kind", DECLARED)
+def test_a_declared_effect_of_a_scene_is_that_of_python(write, kind: str, form: str) -> None:
+    """The example in the docstring of its class, written as a table."""
+    part = DECLARED[kind]
+    given = arguments(part.factory)
+    texts = {key: (name, *stated(given[name], known, form)) for key, (name, known) in part.keys.items()}
+    made = part.factory(**{name: value for name, _, value in texts.values()})
+    text = "\n".join(f"{key} = {written}" for key, (_, written, _) in texts.items())
+    same_motion(write, kind, text, rd.Plant(ARM, made if isinstance(made, tuple) else [made]))
+
+
+@pytest.mark.parametrize("kind", WRITTEN)
 def test_effect_of_a_scene_is_that_of_python(write, kind: str) -> None:
-    """Each kind read from a file changes the motion as the object of the same name made by hand."""
-    text = 'robot = "planar_2r"\nduration_s = 0.1\n' + f'[[effect]]\nkind = "{kind}"\n{EFFECTS[kind]}\n'
-    robot = rd.load("planar_2r").with_(gravity=(0, 0, 0))
-    by_hand = {
-        "gravity": lambda: rd.Plant(rd.load("planar_2r")),
-        "viscous_friction": lambda: rd.Plant(robot, [rd.effects.ViscousFriction(0.3)]),
-        "regularised_coulomb_friction": lambda: rd.Plant(robot, [rd.effects.RegularisedCoulombFriction([0.2, 0.0])]),
-        "spring": lambda: rd.Plant(robot, [rd.effects.Spring(2.0, [0.1, 0.2])]),
-        "joint_stops": lambda: rd.Plant(robot, rd.effects.joint_stops([-1.0, -1.0], [1.0, 1e9])),
-        "line_spring_damper": lambda: rd.Plant(
-            robot,
-            [
-                rd.effects.LineSpringDamper(
-                    "tip", None, [0.1, 0, 0.2], [0.5, 0, 0.4], stiffness=30.0, damping=2.0, length=0.7
-                )
-            ],
-        ),
-        "external_wrench": lambda: rd.Plant(robot, [rd.effects.ExternalWrench("tip", [1, 0, 0, 0, 0, 0])]),
-        "effort_limit": lambda: rd.Plant(robot, [rd.effects.EffortLimit(3.0)]),
-        "actuator_lag": lambda: rd.Plant(robot, [rd.effects.ActuatorLag([0.02, 0.05])]),
-        "lugre_friction": lambda: rd.Plant(
-            robot, [rd.effects.LuGreFriction(300.0, 1.0, 0.4, [0.7, 1.0], [1.1, 1.2], 0.1)]
-        ),
-        "dahl_friction": lambda: rd.Plant(robot, [rd.effects.DahlFriction(300.0, [0.7, 1.0], 1.5)]),
-        "carried_payload": lambda: rd.Plant(
-            robot, [rd.effects.CarriedPayload(rd.Payload("tip", 0.5), end_s=0.07, at_rest=False)]
-        ),
-        "series_elastic": lambda: rd.Plant(robot, [rd.effects.SeriesElastic([0.0, 80.0], 0.02, 5.0, backlash=0.01)]),
-        "rigid_backlash": lambda: rd.Plant(robot, [rd.effects.RigidBacklash([0.0, 0.01], 0.02, 5.0, 0.4)]),
-        "dry_friction": lambda: rd.Plant(robot, [rd.effects.DryFriction([0.4, 0.2], 0.6)]),
-        "rigid_stops": lambda: rd.Plant(robot, [rd.effects.RigidStops(-1.0, [1.0, np.inf], 0.3)]),
-        "payload": lambda: rd.Plant(robot.with_(payload=rd.Payload("tip", 0.5))),
-        "armature": lambda: rd.Plant(robot.with_(armature=[0.002 * 81.0, 0.001])),
-        "lock": lambda: rd.Plant(robot.with_(lock={"joint_1": 0.2})),
-    }[kind]()
-    plant = rd.read_scene(write(text)).plant
+    text, by_hand = WRITTEN[kind]
+    same_motion(write, kind, text, by_hand())
+
+
+def same_motion(write, kind: str, text: str, by_hand: rd.Plant) -> None:
+    """The kind read from a file changes the motion as the object made by hand."""
+    path = write(f'robot = "planar_2r"\nduration_s = 0.1\n[[effect]]\nkind = "{kind}"\n{text}\n')
+    plant = rd.read_scene(path).plant
     assert [type(each) for each in plant.effects] == [type(each) for each in by_hand.effects]
     q, v, u = np.random.default_rng(3).uniform(1.0, 4.0, (3, plant.dynamics.n))
     expected = by_hand.forward_dynamics(0.05, q, v, u)

@@ -22,8 +22,8 @@ PARTS = [
 
 
 def test_the_page_is_that_of_the_schema() -> None:
-    """Write it again by python -m robot_dyn.scene.manual > docs/reference/scenes.md."""
-    assert PAGE.read_text(encoding="utf-8") == manual()
+    command = "python -m robot_dyn.scene.manual > docs/reference/scenes.md"
+    assert PAGE.read_text(encoding="utf-8") == manual(), f"the page is out of date; write it by {command}"
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda each: each.__name__)

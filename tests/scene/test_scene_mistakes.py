@@ -43,7 +43,7 @@ MISTAKES = [
     GRAVITY + "[[effect]]\nkind = 'spring'\nstiffness_N_m_per_rad = {hing = 1}\n",
 ]
 OF_MANY_KEYS_OR_OF_TOMLLIB = {  # texts that grow with the library, or are of Python's version
-    '[[effect]]\nkin = "gravity"\n': "line 3: effect 1.kind: is missing; give one of gravity, lock, .*actuator_lag",
+    '[[effect]]\nkin = "gravity"\n': "line 3: effect 1.kind: is missing; give one of gravity, lock, .*viscous_friction",
     "color = 3\n": "line 3: color: is not a key here; nearest: control",
     "x = \ny = 3": "line 3, column 5: is not TOML: .*",
     "x = [1, 2": "is not TOML: Unclosed array .*",

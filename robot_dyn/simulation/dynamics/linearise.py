@@ -119,7 +119,7 @@ def linearise(
         x[2 * n : 2 * n + size] = numbers("z", z, (size,))
     if u is None:
         torque = sum(rates.equation.torques(t, q, v, (n,)), start=np.zeros(n))
-        x[-n:] = rates.equation.inverse_dynamics(q, v, np.zeros(n), torque)
+        x[-n:] = rates.equation.dynamics.inverse_dynamics(q, v, np.zeros(n)) - torque
         unknown[-n:] = True
     else:
         x[-n:] = one_state("u", u, names)
