@@ -66,7 +66,7 @@ def sweep(
     what is left, `verify` reads all files, `report` writes a page, `export` a table as .csv or .parquet.
     """
     from robot_dyn.tools import sweeps as sw
-    from robot_dyn.tools.sweeps.plan.texts import assignment
+    from robot_dyn.tools.sweeps.plan.from_scene import assignment
 
     verified: list[str] = []
     options: dict[str, Any] = {"threads": threads, "cluster": cluster, "share": share}
@@ -106,7 +106,7 @@ def sweep(
 def _stated(scene: str, given: dict[str, Any], vary: list[str], figure: list[str]) -> Sweep:
     """The sweep of a scene and of options, which take the place of what its table states."""
     from robot_dyn.tools import sweeps as sw
-    from robot_dyn.tools.sweeps.plan.texts import assignment, distribution_of, figure_of, samples_of_text
+    from robot_dyn.tools.sweeps.plan.from_scene import assignment, distribution_of, figure_of, samples_of_text
 
     varies = [assignment("--vary", each) for each in vary]
     figures = [assignment("--figure", text) for text in figure]

@@ -23,7 +23,7 @@ import numpy as np
 from robot_dyn.foundations import SweepError, needs, read, reading, why
 from robot_dyn.tools.sweeps.folder.files import Exclusive, Files, make_folder, remove_abandoned, write
 from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows, digest_of, schema, type_of
-from robot_dyn.tools.sweeps.folder.samples import SampleStore
+from robot_dyn.tools.sweeps.folder.samples import Samples, SampleStore
 
 MOST_FILES = 20_000  # of a folder
 _MOST_TEXT, _MOST_TABLE = 2**26, 2**34
@@ -194,8 +194,7 @@ def _errors_of(path: Path) -> Iterator[None]:
 def folder_of(path: Path, data: dict[str, Any], digest: str, names: tuple[str, ...], about: dict[str, Any]) -> Folder:
     """The folder of a specification with the size of its chunks."""
     kept = data["samples"]
-    dense = kept is not None and kept["every"] == 1 and not kept["failed"]
-    store = kept and SampleStore(path / _SAMPLES, data["runs"], data["chunk"], tuple(kept["names"]), dense)
+    store = kept and SampleStore(path / _SAMPLES, data["runs"], data["chunk"], Samples(**kept))
     return Folder(path, data["runs"], data["chunk"], digest, names, about, store)
 
 

@@ -21,10 +21,10 @@ from robot_dyn.foundations import SweepError, nearest, shorten, shown
 from robot_dyn.simulation import settings_of
 from robot_dyn.tools.sweeps import distributions
 from robot_dyn.tools.sweeps.designs import MOST_ROWS
+from robot_dyn.tools.sweeps.folder.samples import samples
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_named, digest_of
 from robot_dyn.tools.sweeps.plan import figures
 from robot_dyn.tools.sweeps.plan.figures import Figure, UserFigure
-from robot_dyn.tools.sweeps.plan.samples import samples
 from robot_dyn.tools.sweeps.plan.stated import StatedScene, stated_scene
 from robot_dyn.tools.sweeps.plan.sweep import Sweep, is_scene
 

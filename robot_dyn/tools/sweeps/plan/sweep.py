@@ -16,9 +16,9 @@ from robot_dyn.queries import joint_types_of, unit
 from robot_dyn.tools.sweeps.designs import Design, design, given
 from robot_dyn.tools.sweeps.distributions import Distribution, distribution
 from robot_dyn.tools.sweeps.folder.rows import FIXED, NUMBERS, OUTCOMES, TEXTS
+from robot_dyn.tools.sweeps.folder.samples import Samples, samples_of
 from robot_dyn.tools.sweeps.imported import imported, path_of
 from robot_dyn.tools.sweeps.plan.figures import Figure, figure
-from robot_dyn.tools.sweeps.plan.samples import Samples, samples_of
 from robot_dyn.tools.sweeps.plan.stated import StatedScene
 
 READER = "robot_dyn.scene.scene:read_scene"  # of scenes, a room above: it is named as users' functions are
