@@ -15,12 +15,12 @@ from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.tools.sweeps.folder.folder import (
     Folder,
     begin,
-    folder_of,
     has_specification,
     read_design,
     read_specification,
 )
 from robot_dyn.tools.sweeps.folder.rows import RAISED
+from robot_dyn.tools.sweeps.folder.samples import SampleStore
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
 from robot_dyn.tools.sweeps.plan.specification import (
     Specification,
@@ -46,10 +46,10 @@ def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Work]:
     where = str(path / "sweep.json")
     stored = parsed(read_specification(path), where)
     try:
-        sweep = sweep_of(stored.data, read_design(path, stored.rows_digest), where, names, path)
+        sweep = sweep_of(stored, read_design(path, stored.rows_sha256), where, names, path)
     except SceneError as error:
         raise SweepError(f"{where}: {error}; sw.read(folder, scene=…), --scene, where it lies now") from None
-    stored.check_same(specification(sweep).with_chunk(stored.chunk), where, versions=False)
+    stored.check_same(specification(sweep, stored.chunk), where, versions=False)
     return _folder(path, sweep, stored), Work(sweep)
 
 
@@ -58,13 +58,13 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
     if chunk is not None:
         chunk = integer("chunk", chunk, least=1, most=2**31, error=SweepError)
     needs("pyarrow", extra="sweeps")
-    own, where = specification(sweep), str(path / "sweep.json")
+    where = str(path / "sweep.json")
     if not has_specification(path):
         _check_room(sweep, path)
-        stated = own.with_chunk(pilot(sweep, chunk))
-        begin(path, stated.text, sweep.points.rows, stated.rows_digest)
+        stated = specification(sweep, pilot(sweep, chunk))
+        begin(path, stated.text, sweep.points.rows, stated.rows_sha256)
     stored = parsed(read_specification(path), where)
-    stored.check_same(own.with_chunk(chunk or stored.chunk), where)
+    stored.check_same(specification(sweep, chunk or stored.chunk), where)
     folder = _folder(path, sweep, stored)
     if folder.samples is not None and not folder.present().any():
         folder.samples.create(Work(sweep).times(), sweep.setup.plant.dynamics.joint_names)
@@ -81,8 +81,9 @@ def _check_room(sweep: Sweep, path: Path) -> None:
 
 
 def _folder(path: Path, sweep: Sweep, stated: Specification) -> Folder:
-    names = (*sweep.columns, *sweep.figures)
-    return folder_of(path, stated.data, stated.digest, names, {"versions": versions()} | processor())
+    store = sweep.samples and SampleStore(path / "samples", stated.runs, stated.chunk, sweep.samples)
+    names, about = (*sweep.columns, *sweep.figures), {"versions": versions()} | processor()
+    return Folder(path, stated.runs, stated.chunk, stated.digest, names, about, store)
 
 
 def pilot(sweep: Sweep, chunk: int | None = None) -> int:

@@ -266,7 +266,7 @@ class SweepResult(Answer):
     @reported
     def specification(self) -> dict[str, Any]:
         """As the folder states it."""
-        return specification(self.sweep).data
+        return specification(self.sweep, self.folder.chunk).model_dump()
 
     @reported
     def units(self) -> dict[str, str]:

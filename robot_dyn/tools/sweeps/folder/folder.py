@@ -23,11 +23,11 @@ import numpy as np
 from robot_dyn.foundations import SweepError, needs, read, reading, why
 from robot_dyn.tools.sweeps.folder.files import Exclusive, Files, make_folder, remove_abandoned, write
 from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows, digest_of, schema, type_of
-from robot_dyn.tools.sweeps.folder.samples import Samples, SampleStore
+from robot_dyn.tools.sweeps.folder.samples import SampleStore
 
 MOST_FILES = 20_000  # of a folder
 _MOST_TEXT, _MOST_TABLE = 2**26, 2**34
-_SPECIFICATION, _SAMPLES = "sweep.json", "samples"
+_SPECIFICATION = "sweep.json"
 _SUFFIX, _FOOTER = ".parquet", b"footer"
 _REMEDY = "run the sweep again, after removing this file"
 _NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
@@ -189,13 +189,6 @@ def _errors_of(path: Path) -> Iterator[None]:
         raise
     except Exception as error:  # pyarrow promises no kinds
         raise SweepError(f"{path}: is not a complete chunk ({type(error).__name__}); {_REMEDY}") from None
-
-
-def folder_of(path: Path, data: dict[str, Any], digest: str, names: tuple[str, ...], about: dict[str, Any]) -> Folder:
-    """The folder of a specification with the size of its chunks."""
-    kept = data["samples"]
-    store = kept and SampleStore(path / _SAMPLES, data["runs"], data["chunk"], Samples(**kept))
-    return Folder(path, data["runs"], data["chunk"], digest, names, about, store)
 
 
 def has_specification(path: Path) -> bool:

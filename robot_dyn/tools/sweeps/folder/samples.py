@@ -20,6 +20,7 @@ from robot_dyn.foundations import SweepError, Value, choice, integer, needs, rea
 from robot_dyn.queries import joint_units
 from robot_dyn.simulation import SAMPLED
 from robot_dyn.tools.sweeps.folder.files import Files, make_folder, write
+from robot_dyn.tools.sweeps.texts import called
 
 RECORDED = ("q", "v", "u")
 _INNER = 64  # runs that are read together, where all are kept
@@ -64,7 +65,9 @@ def samples(*names: str, every: int = 1, failed: bool = False) -> Samples:
 
 
 def samples_of(given: Any) -> Samples | None:
-    """What `Sweep.samples` may be: None, a name, or `samples(…)`; SweepError otherwise."""
+    """What `Sweep.samples` may be: None, a name, or `samples(…)`, also as a text; SweepError otherwise."""
+    if isinstance(given, str) and given not in RECORDED:
+        return called("samples", given, {"samples": samples})
     return given if given is None or isinstance(given, Samples) else samples(given)
 
 

@@ -36,9 +36,9 @@ class Sweep(Answer, Value, Caching):
             sweep that was read from a folder without naming its function: its stored description.
         runs: N.
         vary: Distributions by name: a parameter of `rollouts(params=…)`, "q0" or "v0". A frozen distribution of
-            scipy.stats is one.
+            scipy.stats is one, and a text such as "uniform(low=0, high=3)".
         figures: What to keep of each run, by name: `rms_error()`, `peak("u")`, `final("q", joint)`, or a function of a
-            `Run` by import path.
+            `Run` by import path. Texts such as "peak('u')" are figures too.
         design: "random", "sobol", "halton", "latin", "saltelli", "grid"; or rows in [0, 1), (N, d), a column for each
             number that varies.
         seed: Of the design.
