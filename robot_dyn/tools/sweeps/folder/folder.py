@@ -21,7 +21,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.foundations import SweepError, needs, read, reading, why
-from robot_dyn.tools.sweeps.folder.files import Exclusive, Files, make_folder, remove_abandoned, write
+from robot_dyn.tools.sweeps.folder.files import make_folder, remove_abandoned, write
 from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows, digest_of, schema, type_of
 from robot_dyn.tools.sweeps.folder.samples import SampleStore
 
@@ -46,7 +46,6 @@ class Folder:
         names: Of what varies and of figures.
         about: What footers state beside the digest: versions and processor.
         samples: Where samples of runs are; None where none are kept.
-        files: The calls that a write consists of.
     """
 
     path: Path
@@ -56,7 +55,6 @@ class Folder:
     names: tuple[str, ...]
     about: dict[str, Any] = field(default_factory=dict)
     samples: SampleStore | None = None
-    files: Files = field(default_factory=Files, compare=False)
 
     @property
     def count(self) -> int:
@@ -113,8 +111,8 @@ class Folder:
         start, stop = self.of(chunk)
         footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": digest_of([rows])}
         try:
-            kept = {} if self.samples is None else self.samples.write(chunk, samples, self.files)
-            write(self.file(chunk), self._packed(rows, footer | {"samples": kept} | self.about), self.files)
+            kept = {} if self.samples is None else self.samples.write(chunk, samples)
+            write(self.file(chunk), self._packed(rows, footer | {"samples": kept} | self.about))
         except OSError as error:
             raise SweepError(
                 f"chunk {chunk} (runs {start} to {stop - 1}) cannot be written to {self.file(chunk)} ({why(error)});"
@@ -211,7 +209,7 @@ def read_design(path: Path, digest: str) -> np.ndarray:
         raise SweepError(f"{file}: is not a table of numbers ({error})") from None
 
 
-def begin(path: Path, text: str, rows: np.ndarray, digest: str, files: Files | None = None) -> None:
+def begin(path: Path, text: str, rows: np.ndarray, digest: str) -> None:
     """Write the specification of a new sweep, unless another process was first.
 
     The file of a design is named after its rows, so that two sweeps that begin at one time do not mix.
@@ -227,9 +225,9 @@ def begin(path: Path, text: str, rows: np.ndarray, digest: str, files: Files | N
     try:
         stream = io.BytesIO()
         np.save(stream, rows, allow_pickle=False)
-        write(_design(path, digest), stream.getvalue(), files)
+        write(_design(path, digest), stream.getvalue())
         with suppress(FileExistsError):
-            write(path / _SPECIFICATION, text.encode(), files or Exclusive())
+            write(path / _SPECIFICATION, text.encode(), exclusive=True)
     except OSError as error:
         raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
 

@@ -19,7 +19,7 @@ import numpy as np
 from robot_dyn.foundations import SweepError, Value, choice, integer, needs, reading, truth, why
 from robot_dyn.queries import joint_units
 from robot_dyn.simulation import SAMPLED
-from robot_dyn.tools.sweeps.folder.files import Files, make_folder, write
+from robot_dyn.tools.sweeps.folder.files import make_folder, write
 from robot_dyn.tools.sweeps.texts import called
 
 RECORDED = ("q", "v", "u")
@@ -109,7 +109,7 @@ class SampleStore:
         with self._reading():
             return zarr.open_group(self.path, mode="r")["t"][:]
 
-    def write(self, chunk: int, samples: Mapping[str, np.ndarray], files: Files) -> dict[str, str]:
+    def write(self, chunk: int, samples: Mapping[str, np.ndarray]) -> dict[str, str]:
         """Write the samples (k, m, n) of the runs of a chunk, nan where they are not kept; OSError if that fails.
 
         Returns:
@@ -126,7 +126,7 @@ class SampleStore:
             shard = memory._store_dict.get(f"{name}/c/{chunk}/0/0")
             if shard is not None:  # it has something
                 data = shard.to_bytes()
-                write(path, data, files)
+                write(path, data)
                 digests[name] = sha256(data).hexdigest()
         return digests
 
