@@ -71,7 +71,7 @@ class SweepResult(Answer):
     @property
     def columns(self) -> dict[str, str]:
         """Meaning of each column of the table, by name; units are in `units`."""
-        varied = dict.fromkeys(self.sweep.columns, "value of what varies")
+        varied = dict.fromkeys(self.sweep.columns, "value of a varied parameter")
         figures = dict.fromkeys(self.sweep.figures, "figure of the run; nan if it failed")
         fixed = {column.name: column.meaning for column in FIXED}
         return {"run": "number of the run"} | varied | figures | fixed
@@ -213,7 +213,7 @@ class SweepResult(Answer):
         return save(path, lambda stream: stream.write(data), SweepError)
 
     def _reported(self, name: str) -> FigureReport:
-        """What the report shows of a figure."""
+        """Return the part of the report on a figure."""
         from robot_dyn.tools.sweeps.report import PROBABILITIES, WORST, FigureReport
 
         x = self._figure(name)

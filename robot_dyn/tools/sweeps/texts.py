@@ -19,7 +19,7 @@ def called(what: str, text: str, functions: Mapping[str, Callable[..., Any]]) ->
     """Return what a function returns of the literal arguments of a text.
 
     Args:
-        what: What it makes, "distribution", "figure" or "samples".
+        what: Its kind, "distribution", "figure" or "samples".
         text: A call, or a name without arguments.
         functions: By name.
 

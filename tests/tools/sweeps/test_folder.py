@@ -20,6 +20,7 @@ from robot_dyn.tools.sweeps import Work, begun, opening
 from robot_dyn.tools.sweeps.folder import files
 from robot_dyn.tools.sweeps.folder.files import remove_abandoned, write
 from robot_dyn.tools.sweeps.folder.folder import MOST_FILES, Folder
+from robot_dyn.tools.sweeps.folder.rows import NUMBERS, TEXTS
 from tests.tools.sweeps.swept import digest, names_in, swept
 
 CALLS = ("open", "write", "fsync", "close", "replace")
@@ -219,7 +220,8 @@ def test_a_folder_is_moved_with_its_scene(tmp_path: Path) -> None:
 
 def test_a_disk_without_room_is_said_before_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sweep = swept(tmp_path, 1000, design="random")
-    assert sweep.bytes_expected == 1000 * (8 * 9 + 4 * 3)  # 5 numbers that vary, 3 figures, the end; 3 texts
+    numbers, texts = 5 + 3 + len(NUMBERS), len(TEXTS)  # 5 numbers that vary, 3 figures
+    assert sweep.bytes_expected == 1000 * (8 * numbers + 4 * texts)
     monkeypatch.setattr(opening, "disk_usage", lambda _: SimpleNamespace(free=80_000))
     with pytest.raises(SweepError, match=r"the sweep will take .* GiB, and .* has"):
         sw.run(sweep, tmp_path / "out")

@@ -43,7 +43,7 @@ class Folder:
         runs: N.
         chunk: Runs of a chunk; the last one may have fewer.
         digest: Of the specification.
-        names: Of what varies and of figures.
+        names: Of varied parameters and of figures.
         about: What footers state beside the digest: versions and processor.
         samples: Where samples of runs are; None where none are kept.
     """
@@ -180,7 +180,7 @@ class Folder:
 
 @contextmanager
 def _errors_of(path: Path) -> Iterator[None]:
-    """Raise what is wrong with a file as a SweepError with its path."""
+    """Raise errors of a file as a SweepError with its path."""
     try:
         yield
     except SweepError:
