@@ -29,7 +29,7 @@ from robot_dyn.tools.sweeps.folder import files
 from robot_dyn.tools.sweeps.opening import begun
 
 RUNS, CHUNK = 20_000, 256
-CALLS = "open", "write", "sync", "close", "rename", "sync_folder"
+CALLS = "open", "write", "fsync", "close", "replace"
 
 
 def sweep(folder: str) -> sw.Sweep:
@@ -45,24 +45,29 @@ def sweep(folder: str) -> sw.Sweep:
 
 def fill(plan: sw.Sweep, out: str, calls: int, options: dict[str, Any]) -> None:
     """A driver; after so many calls inside writes it ends itself, if that is not 0."""
-    left = [calls]
-    for name in CALLS if calls else ():
-        setattr(files.Files, name, _counted(name, getattr(files.Files, name), left))
+    if calls:
+        files.os = Counted(calls)
     sw.run(plan, out, **options)
 
 
-def _counted(name: str, plain: Any, left: list[int]) -> Any:
-    """A call that ends the process when no more are left."""
+class Counted:
+    """The module `os`, whose calls inside writes end the process when no more are left."""
 
-    def call(self: Any, *given: Any) -> Any:
-        left[0] -= 1
-        if left[0] == 0:
-            if name == "write":
-                plain(self, given[0], given[1][: len(given[1]) // 2])
-            os._exit(9)
-        return plain(self, *given)
+    def __init__(self, calls: int) -> None:
+        self.left = calls
 
-    return call
+    def __getattr__(self, name: str) -> Any:
+        plain = getattr(os, name)
+
+        def call(*given: Any) -> Any:
+            self.left -= 1
+            if self.left == 0:
+                if name == "write":
+                    plain(given[0], given[1][: len(given[1]) // 2])
+                os._exit(9)
+            return plain(*given)
+
+        return call if name in CALLS else plain
 
 
 def start(plan: sw.Sweep, out: str, calls: int = 0, **options: Any) -> Any:

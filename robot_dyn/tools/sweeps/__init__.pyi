@@ -6,12 +6,12 @@ from robot_dyn.tools.sweeps.distributions import normal as normal
 from robot_dyn.tools.sweeps.distributions import triangular as triangular
 from robot_dyn.tools.sweeps.distributions import uniform as uniform
 from robot_dyn.tools.sweeps.estimate import Estimate as Estimate
+from robot_dyn.tools.sweeps.folder.samples import samples as samples
 from robot_dyn.tools.sweeps.plan.figures import final as final
 from robot_dyn.tools.sweeps.plan.figures import peak as peak
 from robot_dyn.tools.sweeps.plan.figures import rms_error as rms_error
 from robot_dyn.tools.sweeps.plan.from_scene import from_scene as from_scene
 from robot_dyn.tools.sweeps.plan.runs import Run as Run
-from robot_dyn.tools.sweeps.plan.samples import samples as samples
 from robot_dyn.tools.sweeps.plan.sweep import Sweep as Sweep
 from robot_dyn.tools.sweeps.result import SweepResult as SweepResult
 from robot_dyn.tools.sweeps.run_sweep import read as read

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from robot_dyn.cli import Force, Json, app, bar, say, say_json, to_stderr
-from robot_dyn.foundations import SweepError, nearest
+from robot_dyn.foundations import SweepError, nearest, shorten
 
 if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.plan.sweep import Sweep
@@ -66,7 +66,6 @@ def sweep(
     what is left, `verify` reads all files, `report` writes a page, `export` a table as .csv or .parquet.
     """
     from robot_dyn.tools import sweeps as sw
-    from robot_dyn.tools.sweeps.plan.texts import assignment
 
     verified: list[str] = []
     options: dict[str, Any] = {"threads": threads, "cluster": cluster, "share": share}
@@ -83,7 +82,7 @@ def sweep(
             )
         if folder is None:
             raise SweepError(f"{what}: of which folder? robot-dyn sweep {what} FOLDER")
-        result = sw.read(folder, scene, dict(assignment("--figure", text) for text in figure or []))
+        result = sw.read(folder, scene, _assignments("--figure", figure or []))
         if what == "run":
             result = _run(result.sweep, folder, options)
         elif what == "verify":
@@ -106,19 +105,20 @@ def sweep(
 def _stated(scene: str, given: dict[str, Any], vary: list[str], figure: list[str]) -> Sweep:
     """The sweep of a scene and of options, which take the place of what its table states."""
     from robot_dyn.tools import sweeps as sw
-    from robot_dyn.tools.sweeps.plan.texts import assignment, distribution_of, figure_of, samples_of_text
 
-    varies = [assignment("--vary", each) for each in vary]
-    figures = [assignment("--figure", text) for text in figure]
     changes = {name: value for name, value in given.items() if value is not None}
-    if "samples" in changes:
-        changes["samples"] = samples_of_text(changes["samples"])
-    return sw.from_scene(
-        scene,
-        vary={name: distribution_of(text) for name, text in varies},
-        figures={name: figure_of(name, text, imports=True) for name, text in figures},
-        **changes,
-    )
+    return sw.from_scene(scene, vary=_assignments("--vary", vary), figures=_assignments("--figure", figure), **changes)
+
+
+def _assignments(option: str, texts: list[str]) -> dict[str, str]:
+    """Names and values of texts NAME=VALUE; SweepError if one has another form."""
+    values = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip():
+            raise SweepError(f"{option} must be NAME=VALUE, got {shorten(text)!r}")
+        values[name.strip()] = value.strip()
+    return values
 
 
 def _run(stated: Sweep, folder: str, options: dict[str, Any]) -> SweepResult:

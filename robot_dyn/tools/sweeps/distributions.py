@@ -13,6 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.foundations import Caching, SweepError, Value, nearest, numbers, shown
+from robot_dyn.tools.sweeps.texts import called
 
 LEAST, MOST = 2.0**-54, 1 - 2.0**-53
 """Between which numbers are taken: F⁻¹(0) may be infinite."""
@@ -146,13 +147,15 @@ CONSTRUCTORS = {each.__name__: each for each in (uniform, normal, lognormal, tri
 
 
 def distribution(value: Any) -> Distribution:
-    """A distribution of this module as it is, and a frozen one of scipy.stats by its name and numbers.
+    """A distribution of this module as it is or as a text; a frozen one of scipy.stats by its name and numbers.
 
     Raises:
-        SweepError: If the value is neither.
+        SweepError: If the value is none of them.
     """
     if isinstance(value, Distribution):
         return value
+    if isinstance(value, str):
+        return called("distribution", value, CONSTRUCTORS)
     kind = getattr(value, "dist", None)
     name, stored = getattr(kind, "name", ""), None
     if isinstance(name, str) and kind is not None and type(value).__module__.startswith("scipy.stats"):

@@ -37,7 +37,7 @@ def _write(sweep: Sweep, folder: Folder, stream: BinaryIO, is_csv: bool) -> None
     fields = [
         field.with_name(cell(heading(sweep, field.name))).with_metadata(about.get(field.name)) for field in of_files
     ]
-    stated = pa.schema(fields, metadata={"title": "runs of robot_dyn", "sweep": _about(sweep)})
+    stated = pa.schema(fields, metadata={"title": "runs of robot_dyn", "sweep": _about(sweep, folder)})
     with _writer(stream, stated, is_csv) as writer:
         for chunk in range(folder.count):
             rows = folder.read(chunk) | {"run": np.arange(*folder.of(chunk))}
@@ -52,9 +52,11 @@ def _writer(stream: BinaryIO, stated: Any, is_csv: bool) -> Any:
     return needs("pyarrow.parquet", extra="sweeps").ParquetWriter(stream, stated)
 
 
-def _about(sweep: Sweep) -> str:
+def _about(sweep: Sweep, folder: Folder) -> str:
     """The specification as JSON, with the name of the scene in place of its path."""
-    return json.dumps(specification(sweep).data | {"scene": Path(sweep.source).name}, ensure_ascii=False)
+    return json.dumps(
+        specification(sweep, folder.chunk).model_dump() | {"scene": Path(sweep.source).name}, ensure_ascii=False
+    )
 
 
 def _about_columns(sweep: Sweep) -> dict[str, dict[str, str]]:

@@ -57,6 +57,11 @@ def named(scene: Any, figures: Any) -> Named:
     return Named(scene, {name: path_of(function) for name, function in (figures or {}).items()})
 
 
+def is_import_path(text: str) -> bool:
+    """Return True for the form of an import path, False for a call such as "peak('u')"."""
+    return ":" in text and "(" not in text
+
+
 def path_of(function: Any) -> str:
     """The import path of a function, or of a text that is one.
 

@@ -1,21 +1,27 @@
-"""The folder of a sweep, opened or begun, with the work that fills it."""
+"""The folder of a sweep, opened or begun, with the work that fills it.
+
+It begins with a pilot of 64 runs, from which the size of chunks follows: about 2 s of work, then fixed for ever. Its
+time is that of the processor: a busy machine would give small chunks.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 from shutil import disk_usage
+from time import process_time
 
 from robot_dyn.foundations import SceneError, SweepError, integer, needs
+from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.tools.sweeps.folder.folder import (
     Folder,
     begin,
-    folder_of,
     has_specification,
     read_design,
     read_specification,
 )
+from robot_dyn.tools.sweeps.folder.rows import RAISED
+from robot_dyn.tools.sweeps.folder.samples import SampleStore
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
-from robot_dyn.tools.sweeps.plan.pilot import pilot
 from robot_dyn.tools.sweeps.plan.specification import (
     Specification,
     parsed,
@@ -27,6 +33,12 @@ from robot_dyn.tools.sweeps.plan.specification import (
 from robot_dyn.tools.sweeps.plan.sweep import Sweep
 from robot_dyn.tools.sweeps.plan.work import Work
 
+_RUNS = 64
+_CHUNK_S = 2.0
+_MOST = 16_384
+_SAMPLE_BYTES = 2**26
+_LEAST_CHUNKS = 32  # so that threads and machines share even a short sweep
+
 
 def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Work]:
     """The folder of a sweep, and its work; arguments and errors as of `read`."""
@@ -34,10 +46,10 @@ def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Work]:
     where = str(path / "sweep.json")
     stored = parsed(read_specification(path), where)
     try:
-        sweep = sweep_of(stored.data, read_design(path, stored.rows_digest), where, names, path)
+        sweep = sweep_of(stored, read_design(path, stored.rows_sha256), where, names, path)
     except SceneError as error:
         raise SweepError(f"{where}: {error}; sw.read(folder, scene=…), --scene, where it lies now") from None
-    stored.check_same(specification(sweep).with_chunk(stored.chunk), where, versions=False)
+    stored.check_same(specification(sweep, stored.chunk), where, versions=False)
     return _folder(path, sweep, stored), Work(sweep)
 
 
@@ -46,13 +58,13 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
     if chunk is not None:
         chunk = integer("chunk", chunk, least=1, most=2**31, error=SweepError)
     needs("pyarrow", extra="sweeps")
-    own, where = specification(sweep), str(path / "sweep.json")
+    where = str(path / "sweep.json")
     if not has_specification(path):
         _check_room(sweep, path)
-        stated = own.with_chunk(pilot(sweep, chunk))
-        begin(path, stated.text, sweep.points.rows, stated.rows_digest)
+        stated = specification(sweep, pilot(sweep, chunk))
+        begin(path, stated.text, sweep.points.rows, stated.rows_sha256)
     stored = parsed(read_specification(path), where)
-    stored.check_same(own.with_chunk(chunk or stored.chunk), where)
+    stored.check_same(specification(sweep, chunk or stored.chunk), where)
     folder = _folder(path, sweep, stored)
     if folder.samples is not None and not folder.present().any():
         folder.samples.create(Work(sweep).times(), sweep.setup.plant.dynamics.joint_names)
@@ -69,5 +81,40 @@ def _check_room(sweep: Sweep, path: Path) -> None:
 
 
 def _folder(path: Path, sweep: Sweep, stated: Specification) -> Folder:
-    names = (*sweep.columns, *sweep.figures)
-    return folder_of(path, stated.data, stated.digest, names, {"versions": versions()} | processor())
+    store = sweep.samples and SampleStore(path / "samples", stated.runs, stated.chunk, sweep.samples)
+    names, about = (*sweep.columns, *sweep.figures), {"versions": versions()} | processor()
+    return Folder(path, stated.runs, stated.chunk, stated.digest, names, about, store)
+
+
+def pilot(sweep: Sweep, chunk: int | None = None) -> int:
+    """The number of runs of a chunk, from the time of the pilot's runs unless it is given.
+
+    Raises:
+        SweepError: If all of them raise, or a figure cannot be computed of them; says why.
+    """
+    work, count = Work(sweep), min(_RUNS, sweep.runs)
+    rows = work.rows(0, count)  # with what is compiled first
+    if (rows["outcome"] == RAISED).all():
+        raise SweepError(f"all {count} runs of the pilot raise; the first: {rows['reason'][0]}")
+    work.check_figures(0, count)
+    if chunk is not None:
+        return chunk
+    began = process_time()
+    work.rows(0, count)
+    run_s = (process_time() - began) / count
+    return min(chunk_of(run_s, sweep.runs), most_of_samples(sweep, work))
+
+
+def most_of_samples(sweep: Sweep, work: Work) -> int:
+    """Number of runs of which samples take 64 MiB, in whole tiles."""
+    if sweep.samples is None:
+        return _MOST
+    size = 8 * len(work.times()) * sweep.setup.plant.dynamics.n * len(sweep.samples.names)
+    return LANES * max(1, _SAMPLE_BYTES // (size * LANES))
+
+
+def chunk_of(run_s: float, runs: int) -> int:
+    """About 2 s of runs that take so long, in whole tiles."""
+    most = min(_MOST, max(LANES, -(-runs // _LEAST_CHUNKS)))
+    tiles = max(1, round(min(_CHUNK_S / max(run_s, 1e-9), most) / LANES))
+    return tiles * LANES

@@ -38,7 +38,7 @@ class FigureReport:
         values: Of all runs, (N,).
         quantiles: Of `PROBABILITIES`.
         worst: Numbers of runs with the largest values.
-        sensitivity: To what varies; a text if there is none.
+        sensitivity: To varied parameters; a text if there is none.
     """
 
     heading: str
@@ -58,8 +58,8 @@ def report(
         result: Whose title and blocks are shown.
         failure: Probability of a failure.
         table: Columns of all runs.
-        varied: Headings of what varies, by column.
-        figures: What is shown of each figure.
+        varied: Headings of varied parameters, by column.
+        figures: Parts on figures, in their order.
         repeat: Python that repeats a run, without its number.
     """
     failed = table["outcome"] != FINISHED

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
@@ -17,28 +20,29 @@ from robot_dyn.foundations import (
     SweepError,
     choice,
     integer,
+    nearest,
     reported,
     save,
-    shown,
     target,
     truth,
 )
-from robot_dyn.tools.sweeps import counts
-from robot_dyn.tools.sweeps.event import happened
+from robot_dyn.tools.sweeps import statistics
+from robot_dyn.tools.sweeps.estimate import Estimate
 from robot_dyn.tools.sweeps.export import export, inputs_of
+from robot_dyn.tools.sweeps.expression import Expression, Truth
 from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
 from robot_dyn.tools.sweeps.folder.rows import FINISHED, FIXED, NUMBERS, OUTCOMES, digest_of
 from robot_dyn.tools.sweeps.plan.specification import specification
 from robot_dyn.tools.sweeps.plan.sweep import Sweep, heading, is_scene
 from robot_dyn.tools.sweeps.plan.work import Work
+from robot_dyn.tools.sweeps.sensitivity import Sensitivity, by_values, saltelli
 
 if TYPE_CHECKING:
-    from robot_dyn.tools.sweeps.estimate import Estimate
     from robot_dyn.tools.sweeps.report import FigureReport
-    from robot_dyn.tools.sweeps.sensitivity import Sensitivity
 
 _SHOWN = 5  # reasons, and worst runs
 _GIVEN = "finished", "known"
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
 
 @final
@@ -67,7 +71,7 @@ class SweepResult(Answer):
     @property
     def columns(self) -> dict[str, str]:
         """Meaning of each column of the table, by name; units are in `units`."""
-        varied = dict.fromkeys(self.sweep.columns, "value of what varies")
+        varied = dict.fromkeys(self.sweep.columns, "value of a varied parameter")
         figures = dict.fromkeys(self.sweep.figures, "figure of the run; nan if it failed")
         fixed = {column.name: column.meaning for column in FIXED}
         return {"run": "number of the run"} | varied | figures | fixed
@@ -99,9 +103,7 @@ class SweepResult(Answer):
         Raises:
             SweepError: If an argument is not allowed, or a run that finished has no value and `given` is not "known".
         """
-        from robot_dyn.tools.sweeps import statistics
-
-        x, keep, failed = self._asked(figure, given)
+        x, keep, failed = self._values(figure, given)
         x = np.where(np.isnan(x), np.inf, x)[keep]
         found = statistics.quantiles(x, probabilities, level, self._scrambling(keep), failed=failed)
         return tuple(self._named(each, figure, given) for each in found)
@@ -118,12 +120,10 @@ class SweepResult(Answer):
         Raises:
             SweepError: If the event is unknown in a run, of which there is no figure.
         """
-        from robot_dyn.tools.sweeps import statistics
-
         self._check_complete()
-        truth, failed = happened(self.sweep, self.folder, event), self._failed
+        truth, failed = self._happened(event), self._failed
         known = truth.certain == truth.possible
-        keep = known if _checked(given) == "known" else np.ones(len(failed), bool) if given is None else ~failed
+        keep = self._asked(known, given)
         if (unknown := ~known & keep).any():
             remedy = f"write 'failed | {event}', or ask with given='finished'"
             if (unknown & ~failed).any():
@@ -137,8 +137,6 @@ class SweepResult(Answer):
 
     def mean(self, figure: str, level: float = 0.95, given: str | None = None) -> Estimate:
         """Mean of a figure with its interval; `given` as in `quantiles`, needed where runs have no value."""
-        from robot_dyn.tools.sweeps import statistics
-
         x, keep, failed = self._finite(figure, "mean", given)
         found = statistics.mean(x[keep], level, self._scrambling(keep), failed=failed)
         return self._named(found, figure, given)
@@ -148,18 +146,15 @@ class SweepResult(Answer):
 
         First-order and total Sobol' indices of design "saltelli", else rank correlations and PAWN indices.
         """
-        from robot_dyn.tools.sweeps import sensitivity
-        from robot_dyn.tools.sweeps.statistics import check_level
-
-        level = check_level(level)
+        level = statistics.check_level(level)
         x, keep, failed = self._finite(figure, "sensitivity", given)
         if self.sweep.points.name == "saltelli":
             scrambling = self.sweep.points.scrambling
-            found = sensitivity.saltelli(x, keep, self.sweep.dimensions, scrambling, level, failed=failed)
+            found = saltelli(x, keep, self.sweep.dimensions, scrambling, level, failed=failed)
         else:
             values = self.folder.columns(self.sweep.columns)
             columns = np.column_stack([values[name] for name in self.sweep.columns])
-            found = sensitivity.by_values(x[keep], columns[keep], self.sweep.columns, failed=failed)
+            found = by_values(x[keep], columns[keep], self.sweep.columns, failed=failed)
         return replace(found, figure=heading(self.sweep, figure), given=given)
 
     def worst(self, figure: str, count: int = 5, given: str | None = None) -> tuple[int, ...]:
@@ -170,9 +165,7 @@ class SweepResult(Answer):
         """
         count = integer("count", count, least=1, most=self.sweep.runs, error=SweepError)
         x = self._figure(figure)
-        keep = (
-            np.isfinite(x) if _checked(given) == "known" else np.ones(len(x), bool) if given is None else ~self._failed
-        )
+        keep = self._asked(np.isfinite(x), given)
         runs, x = np.flatnonzero(keep), x[keep]
         order = np.argsort(-np.where(np.isnan(x), np.inf, x), kind="stable")
         return tuple(runs[order[:count]].tolist())
@@ -220,7 +213,7 @@ class SweepResult(Answer):
         return save(path, lambda stream: stream.write(data), SweepError)
 
     def _reported(self, name: str) -> FigureReport:
-        """What the report shows of a figure."""
+        """Return the part of the report on a figure."""
         from robot_dyn.tools.sweeps.report import PROBABILITIES, WORST, FigureReport
 
         x = self._figure(name)
@@ -258,7 +251,12 @@ class SweepResult(Answer):
     @property
     def processors(self) -> dict[str, int]:
         """Number of chunks by processor; the last bits of rows may differ between processors of other features."""
-        return counts.processors(self.folder)
+        count = Counter[str]()
+        for chunk in np.flatnonzero(self.folder.present()).tolist():
+            footer = self.folder.footer(chunk)
+            features = sha256(str(footer.get("features")).encode()).hexdigest()[:8]
+            count[f"{footer.get('processor')} (features {features})"] += 1
+        return dict(count)
 
     @reported
     def status(self) -> dict[str, int]:
@@ -268,7 +266,7 @@ class SweepResult(Answer):
     @reported
     def specification(self) -> dict[str, Any]:
         """As the folder states it."""
-        return specification(self.sweep).data
+        return specification(self.sweep, self.folder.chunk).model_dump()
 
     @reported
     def units(self) -> dict[str, str]:
@@ -280,17 +278,25 @@ class SweepResult(Answer):
         """Number of runs by outcome; None where chunks are left to do."""
         if len(self.missing):
             return None
-        outcome = self._outcome()
+        outcome = self.folder.columns(("outcome",))["outcome"]
         return {name: int((outcome == name).sum()) for name in OUTCOMES}
 
     @reported
     def remarks(self) -> dict[str, int] | None:
         """Number of runs by remark, as of `Rollouts.remarks`, the most frequent first; None where chunks are left."""
-        return None if len(self.missing) else counts.remarks(self.folder)
+        if len(self.missing):
+            return None
+        count = Counter[str]()
+        for texts, runs in Counter(self.folder.columns(("remarks",))["remarks"].tolist()).items():
+            count.update(dict.fromkeys(filter(None, texts.split("; ")), runs))
+        return dict(count.most_common())
 
     def reasons(self) -> dict[str, int]:
         """Number of runs by reason of failure, the most frequent first; texts that differ in numbers alone are one."""
-        return counts.reasons(self.folder)
+        first, count = dict[str, str](), Counter[str]()
+        for text in self.folder.columns(("reason",))["reason"][self._failed].tolist():
+            count[first.setdefault(_NUMBER.sub("…", text), text)] += 1
+        return dict(count.most_common())
 
     @property
     def title(self) -> str:
@@ -317,10 +323,6 @@ class SweepResult(Answer):
                 " run the sweep again, which does them alone"
             )
 
-    def _outcome(self) -> np.ndarray:
-        self._check_complete()
-        return self.folder.columns(("outcome",))["outcome"]
-
     def _figure(self, name: str) -> np.ndarray:
         self._check_complete()
         known = (*self.sweep.figures, *self.sweep.columns, *NUMBERS)
@@ -329,17 +331,36 @@ class SweepResult(Answer):
     @property
     def _failed(self) -> np.ndarray:
         """Which runs diverged or raised, (N,)."""
-        return self._outcome() != FINISHED
+        return self.folder.columns(("outcome",))["outcome"] != FINISHED
 
-    def _asked(self, name: str, given: str | None) -> tuple[np.ndarray, np.ndarray, int]:
+    def _happened(self, event: str) -> Truth:
+        """Whether an event happened in each run; SweepError if it is not one, or a name is unknown."""
+        expression = Expression(event)
+        numbers, outcomes = {*self.sweep.figures, *self.sweep.columns, *NUMBERS}, {*OUTCOMES, "failed"}
+        for name in expression.names:
+            if name not in numbers | outcomes:
+                raise SweepError(f"no column {name!r}; {nearest(name, sorted(numbers | outcomes))}")
+        columns = self.folder.columns(name for name in expression.names if name in numbers)
+        if outcomes & set(expression.names):
+            outcome = self.folder.columns(("outcome",))["outcome"]
+            columns |= {name: outcome == name for name in OUTCOMES} | {"failed": outcome != FINISHED}
+        return expression.of(columns)
+
+    def _asked(self, known: np.ndarray, given: str | None) -> np.ndarray:
+        """Which runs are asked about, (N,): all, those that finished, or those whose value is known."""
+        if given is None:
+            return np.ones(len(known), bool)
+        return known if choice("given", given, _GIVEN, error=SweepError) == "known" else ~self._failed
+
+    def _values(self, name: str, given: str | None) -> tuple[np.ndarray, np.ndarray, int]:
         """A figure of all runs, which of them are asked about, and how many of these failed.
 
         Raises:
-            SweepError: If one that finished is asked for, and has no value.
+            SweepError: If one that finished is asked about, and has no value.
         """
         x, failed = self._figure(name), self._failed
         unknown = np.isnan(x)
-        keep = ~unknown if _checked(given) == "known" else np.ones(len(x), bool) if given is None else ~failed
+        keep = self._asked(~unknown, given)
         if (none := keep & unknown & ~failed).any():
             raise SweepError(
                 f"{name!r} has no value in {int(none.sum())} runs that finished, such as run {int(none.argmax())}: ask"
@@ -348,8 +369,8 @@ class SweepResult(Answer):
         return x, keep, int((failed & (keep if given is None else ~keep)).sum())
 
     def _finite(self, name: str, what: str, given: str | None) -> tuple[np.ndarray, np.ndarray, int]:
-        """As `_asked`; SweepError if a run that is asked about failed, or its value is not finite."""
-        x, keep, failed = self._asked(name, given)
+        """As `_values`; SweepError if a run that is asked about failed, or its value is not finite."""
+        x, keep, failed = self._values(name, given)
         if lost := int((keep & np.isnan(x)).sum()):
             raise SweepError(
                 f"{lost} of {len(x)} runs failed: a {what} of those that finished is given='finished', of those with a"
@@ -370,13 +391,6 @@ class SweepResult(Answer):
         """The scrambling of each run that is asked about; None of independent ones."""
         design = self.sweep.points
         return None if design.independent else design.scrambling[keep]
-
-
-def _checked(given: Any) -> str | None:
-    """What `given` may be; SweepError otherwise."""
-    if given is not None and not (isinstance(given, str) and given in _GIVEN):
-        raise SweepError(f"given must be {', '.join(map(repr, _GIVEN))} or None, got {shown(given)}")
-    return given
 
 
 def _among(given: str | None) -> str:

@@ -18,51 +18,51 @@ from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import Work, begun, opening
 from robot_dyn.tools.sweeps.folder import files
-from robot_dyn.tools.sweeps.folder.files import Files, remove_abandoned, write
+from robot_dyn.tools.sweeps.folder.files import remove_abandoned, write
 from robot_dyn.tools.sweeps.folder.folder import MOST_FILES, Folder
+from robot_dyn.tools.sweeps.folder.rows import NUMBERS, TEXTS
 from tests.tools.sweeps.swept import digest, names_in, swept
 
-CALLS = ("open", "write", "sync", "close", "rename", "sync_folder")
+CALLS = ("open", "write", "fsync", "close", "replace")
 
 
-class Failing(Files):
-    """Of the calls of a write, one fails; the write itself after half of its bytes."""
+def failing(monkeypatch: pytest.MonkeyPatch, call: str, error: BaseException) -> None:
+    """Let one call to the system of a write fail; the write itself after half of its bytes."""
 
-    def __init__(self, call: str, error: BaseException) -> None:
-        self._call, self._error = call, error
+    class Failing:
+        def __getattr__(self, name: str):
+            def fail(*arguments):
+                if name == "write":
+                    os.write(arguments[0], arguments[1][: len(arguments[1]) // 2])
+                raise error
 
-    def __getattribute__(self, name: str):
-        if name not in CALLS or name != object.__getattribute__(self, "_call"):
-            return object.__getattribute__(self, name)
+            return fail if name == call else getattr(os, name)
 
-        def fail(*arguments):
-            if name == "write":
-                Files.write(self, arguments[0], arguments[1][: len(arguments[1]) // 2])
-            raise object.__getattribute__(self, "_error")
-
-        return fail
+    monkeypatch.setattr(files, "os", Failing())
 
 
-@pytest.mark.parametrize("call", CALLS[:-1])
+@pytest.mark.parametrize("call", CALLS)
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
-def test_a_write_that_fails_leaves_no_file(tmp_path: Path, call: str, error: BaseException) -> None:
+def test_a_write_that_fails_leaves_no_file(tmp_path: Path, monkeypatch, call: str, error: BaseException) -> None:
     write(tmp_path / "there", b"old")
+    failing(monkeypatch, call, error)
     for name in ("there", "new"):
         with pytest.raises(type(error)):
-            write(tmp_path / name, b"x" * 1000, Failing(call, error))
+            write(tmp_path / name, b"x" * 1000)
     assert [path.name for path in tmp_path.iterdir()] == ["there"]
     assert (tmp_path / "there").read_bytes() == b"old"
 
 
-def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path) -> None:
+def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypatch) -> None:
     sweep = swept(tmp_path, 100)
     folder = begun(sweep, tmp_path / "out", chunk=20)
     folder.prepare()
     work = Work(sweep)
     folder.write(0, work.rows(0, 20))
-    full = replace(folder, files=Failing("write", OSError(28, "No space left on device")))
-    with pytest.raises(SweepError, match=r"chunk 3 \(runs 60 to 79\) cannot be written .* \(No space left on device\)"):
-        full.write(3, work.rows(60, 80))
+    said = r"chunk 3 \(runs 60 to 79\) cannot be written .* \(No space left on device\)"
+    with monkeypatch.context() as patch, pytest.raises(SweepError, match=said):
+        failing(patch, "write", OSError(28, "No space left on device"))
+        folder.write(3, work.rows(60, 80))
     assert folder.missing().tolist() == [1, 2, 3, 4]
     done = sw.run(sweep, tmp_path / "out")
     assert done.verify() == digest(sweep)
@@ -182,7 +182,7 @@ def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
     assert begun(sweep, tmp_path / "out", chunk=20) == begun(sweep, tmp_path / "out")
     text = (tmp_path / "out" / "sweep.json").read_text()
     with pytest.raises(FileExistsError):
-        write(tmp_path / "out" / "sweep.json", b"{}", files.Exclusive())
+        write(tmp_path / "out" / "sweep.json", b"{}", exclusive=True)
     assert (tmp_path / "out" / "sweep.json").read_text() == text
     assert names_in(tmp_path / "out") == ["design", "sweep.json"]
 
@@ -220,7 +220,8 @@ def test_a_folder_is_moved_with_its_scene(tmp_path: Path) -> None:
 
 def test_a_disk_without_room_is_said_before_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sweep = swept(tmp_path, 1000, design="random")
-    assert sweep.bytes_expected == 1000 * (8 * 9 + 4 * 3)  # 5 numbers that vary, 3 figures, the end; 3 texts
+    numbers, texts = 5 + 3 + len(NUMBERS), len(TEXTS)  # 5 numbers that vary, 3 figures
+    assert sweep.bytes_expected == 1000 * (8 * numbers + 4 * texts)
     monkeypatch.setattr(opening, "disk_usage", lambda _: SimpleNamespace(free=80_000))
     with pytest.raises(SweepError, match=r"the sweep will take .* GiB, and .* has"):
         sw.run(sweep, tmp_path / "out")

@@ -15,6 +15,7 @@ import robot_dyn as rd
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import Work
+from robot_dyn.tools.sweeps.folder.rows import FIXED
 from tests.tools.sweeps.swept import SCENE, VARY, scene, swept
 
 WEAK = """
@@ -166,9 +167,10 @@ def test_a_csv_holds_the_table_to_the_bit(done: sw.SweepResult, tmp_path: Path) 
     with open(done.export(tmp_path / "rows.csv"), newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     table = done.table()
+    fixed = [f"{column.name} [{column.unit}]" if column.unit else column.name for column in FIXED]
     assert len(rows) == 400 and list(rows[0]) == [
         *("run", "viscous_friction.damping [N m s/rad]", "q0[0] [rad]", "q0[1] [rad]", "mass_scale", "kd [N m s/rad]"),
-        *("error [rad]", "peak [rad/s]", "end [rad]", "outcome", "ended [s]", "reason", "remarks"),
+        *("error [rad]", "peak [rad/s]", "end [rad]", *fixed),
     ]
     for heading, x in zip(rows[0], table.values(), strict=True):
         if x.dtype.kind == "f":
@@ -184,6 +186,9 @@ def test_a_parquet_file_says_what_its_columns_are(done: sw.SweepResult, tmp_path
         np.testing.assert_array_equal(back[heading].to_numpy(zero_copy_only=False), x)
     of = {field.name: field.metadata or {} for field in back.schema}
     assert of["peak [rad/s]"][b"unit"] == b"rad/s" and b"peak" in of["peak [rad/s]"][b"computed by"]
+    for column in FIXED:
+        heading = f"{column.name} [{column.unit}]" if column.unit else column.name
+        assert of[heading][b"meaning"].decode() == column.meaning == done.columns[column.name]
     assert of["q0[1] [rad]"][b"distribution"] == json.dumps(VARY["q0"].to_dict()).encode()
     stated = json.loads(back.schema.metadata[b"sweep"])
     assert stated["seed"] == 3 and stated["setup"]["robot"] == "planar_2r" and stated["scene"] == "scene.toml"

@@ -13,7 +13,6 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from time import time
-from typing import final
 
 from robot_dyn.foundations import SweepError, sync_folder, why
 
@@ -22,66 +21,38 @@ _UNFINISHED = re.compile(r"\..+\.(?P<host>[\w-]+)\.(?P<process>\d+)\.[0-9a-f]{8}
 _HOST = re.sub(r"[^\w-]", "-", socket.gethostname()) or "host"
 
 
-class Files:
-    """The calls to the system that a write consists of, in their order; tests let each of them fail."""
-
-    def open(self, path: Path) -> int:
-        """A handle of a new file."""
-        return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
-
-    def write(self, handle: int, data: memoryview) -> int:
-        """Write some of the bytes; how many."""
-        return os.write(handle, data)
-
-    def sync(self, handle: int) -> None:
-        """Wait until the disk has the file."""
-        os.fsync(handle)
-
-    def close(self, handle: int) -> None:
-        """Close a handle."""
-        os.close(handle)
-
-    def rename(self, source: Path, target: Path) -> None:
-        """Give a file its name, in place of one that has it."""
-        os.replace(source, target)
-
-    def sync_folder(self, folder: Path) -> None:
-        """Wait until the disk has the names in a folder."""
-        sync_folder(folder)
-
-
-@final
-class Exclusive(Files):
-    """Files of which the first writer's stays: a later one raises FileExistsError."""
-
-    def rename(self, source: Path, target: Path) -> None:
-        os.link(source, target)  # which refuses one that exists, as os.replace does not
-        source.unlink()
-
-
-def write(path: Path, data: bytes, files: Files | None = None) -> None:
+def write(path: Path, data: bytes, exclusive: bool = False) -> None:
     """Write a file whole, or leave none.
 
+    Args:
+        path: Of the file.
+        data: Its content.
+        exclusive: Whether a file that has this path stays.
+
     Raises:
+        FileExistsError: If one has it, and stays.
         OSError: If it cannot be written.
     """
-    files = files or Files()
     beside = path.with_name(temporary_name(path.name))
     try:
-        handle = files.open(beside)
+        handle = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
         try:
             left = memoryview(data)
             while left:
-                left = left[files.write(handle, left) :]
-            files.sync(handle)
+                left = left[os.write(handle, left) :]
+            os.fsync(handle)
         finally:
-            files.close(handle)
-        files.rename(beside, path)
+            os.close(handle)
+        if exclusive:
+            os.link(beside, path)  # which refuses one that exists, as os.replace does not
+            os.unlink(beside)
+        else:
+            os.replace(beside, path)
     except BaseException:
         with suppress(OSError):
-            beside.unlink()
+            os.unlink(beside)
         raise
-    files.sync_folder(path.parent)
+    sync_folder(path.parent)
 
 
 def temporary_name(stem: str) -> str:

@@ -21,13 +21,13 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.foundations import SweepError, needs, read, reading, why
-from robot_dyn.tools.sweeps.folder.files import Exclusive, Files, make_folder, remove_abandoned, write
+from robot_dyn.tools.sweeps.folder.files import make_folder, remove_abandoned, write
 from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows, digest_of, schema, type_of
 from robot_dyn.tools.sweeps.folder.samples import SampleStore
 
 MOST_FILES = 20_000  # of a folder
 _MOST_TEXT, _MOST_TABLE = 2**26, 2**34
-_SPECIFICATION, _SAMPLES = "sweep.json", "samples"
+_SPECIFICATION = "sweep.json"
 _SUFFIX, _FOOTER = ".parquet", b"footer"
 _REMEDY = "run the sweep again, after removing this file"
 _NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
@@ -43,10 +43,9 @@ class Folder:
         runs: N.
         chunk: Runs of a chunk; the last one may have fewer.
         digest: Of the specification.
-        names: Of what varies and of figures.
+        names: Of varied parameters and of figures.
         about: What footers state beside the digest: versions and processor.
         samples: Where samples of runs are; None where none are kept.
-        files: The calls that a write consists of.
     """
 
     path: Path
@@ -56,7 +55,6 @@ class Folder:
     names: tuple[str, ...]
     about: dict[str, Any] = field(default_factory=dict)
     samples: SampleStore | None = None
-    files: Files = field(default_factory=Files, compare=False)
 
     @property
     def count(self) -> int:
@@ -113,8 +111,8 @@ class Folder:
         start, stop = self.of(chunk)
         footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": digest_of([rows])}
         try:
-            kept = {} if self.samples is None else self.samples.write(chunk, samples, self.files)
-            write(self.file(chunk), self._packed(rows, footer | {"samples": kept} | self.about), self.files)
+            kept = {} if self.samples is None else self.samples.write(chunk, samples)
+            write(self.file(chunk), self._packed(rows, footer | {"samples": kept} | self.about))
         except OSError as error:
             raise SweepError(
                 f"chunk {chunk} (runs {start} to {stop - 1}) cannot be written to {self.file(chunk)} ({why(error)});"
@@ -182,21 +180,13 @@ class Folder:
 
 @contextmanager
 def _errors_of(path: Path) -> Iterator[None]:
-    """Raise what is wrong with a file as a SweepError with its path."""
+    """Raise errors of a file as a SweepError with its path."""
     try:
         yield
     except SweepError:
         raise
     except Exception as error:  # pyarrow promises no kinds
         raise SweepError(f"{path}: is not a complete chunk ({type(error).__name__}); {_REMEDY}") from None
-
-
-def folder_of(path: Path, data: dict[str, Any], digest: str, names: tuple[str, ...], about: dict[str, Any]) -> Folder:
-    """The folder of a specification with the size of its chunks."""
-    kept = data["samples"]
-    dense = kept is not None and kept["every"] == 1 and not kept["failed"]
-    store = kept and SampleStore(path / _SAMPLES, data["runs"], data["chunk"], tuple(kept["names"]), dense)
-    return Folder(path, data["runs"], data["chunk"], digest, names, about, store)
 
 
 def has_specification(path: Path) -> bool:
@@ -219,7 +209,7 @@ def read_design(path: Path, digest: str) -> np.ndarray:
         raise SweepError(f"{file}: is not a table of numbers ({error})") from None
 
 
-def begin(path: Path, text: str, rows: np.ndarray, digest: str, files: Files | None = None) -> None:
+def begin(path: Path, text: str, rows: np.ndarray, digest: str) -> None:
     """Write the specification of a new sweep, unless another process was first.
 
     The file of a design is named after its rows, so that two sweeps that begin at one time do not mix.
@@ -235,9 +225,9 @@ def begin(path: Path, text: str, rows: np.ndarray, digest: str, files: Files | N
     try:
         stream = io.BytesIO()
         np.save(stream, rows, allow_pickle=False)
-        write(_design(path, digest), stream.getvalue(), files)
+        write(_design(path, digest), stream.getvalue())
         with suppress(FileExistsError):
-            write(path / _SPECIFICATION, text.encode(), files or Exclusive())
+            write(path / _SPECIFICATION, text.encode(), exclusive=True)
     except OSError as error:
         raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
 

@@ -54,7 +54,7 @@ FIXED = (
         lambda made: np.array(made.advice, object),
     ),
     Column(
-        "remarks", object, "", "what is noteworthy in the run, by kind, quantity and joint", "",
+        "remarks", object, "", "remarks on the run, by kind, quantity and joint", "",
         lambda made: texts_by_run(remarks_on_each(made), len(made)),
     ),
 )  # fmt: skip
@@ -64,12 +64,12 @@ NUMBERS = tuple(column.name for column in FIXED if column.type is float)
 
 
 def type_of(name: str) -> Any:
-    """Return the type of a column in memory; what varies and figures are float64."""
+    """Return the type of a column in memory; varied parameters and figures are float64."""
     return TYPES.get(name, float)
 
 
 def schema(names: Iterable[str]) -> Any:
-    """Return the schema of the files of rows; `names` are those of what varies and of figures."""
+    """Return the schema of the files of rows; `names` are those of varied parameters and of figures."""
     pa = needs("pyarrow", extra="sweeps")
     types = {name: pa.string() if name in TEXTS else pa.float64() for name in (*names, *TYPES)}
     return pa.schema({"run": pa.int64()} | types)

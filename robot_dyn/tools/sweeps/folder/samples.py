@@ -1,7 +1,8 @@
-"""Samples of runs as Zarr v3: an array over run, t and joint for each quantity, a shard for each chunk of the sweep.
+"""Samples of runs: which a sweep keeps, and their files.
 
-A shard is encoded in memory and written whole, before the rows of its chunk: a chunk with rows has its samples. The
-place of a run in an array is its number; runs that are not kept are nan, and take no room.
+These are Zarr v3: an array over run, t and joint for each quantity, a shard for each chunk of the sweep. A shard is
+encoded in memory and written whole, before the rows of its chunk: a chunk with rows has its samples. The place of a run
+in an array is its number; runs that are not kept are nan, and take no room.
 """
 
 from __future__ import annotations
@@ -15,13 +16,59 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import SweepError, needs, reading, why
+from robot_dyn.foundations import SweepError, Value, choice, integer, needs, reading, truth, why
 from robot_dyn.queries import joint_units
 from robot_dyn.simulation import SAMPLED
-from robot_dyn.tools.sweeps.folder.files import Files, make_folder, write
+from robot_dyn.tools.sweeps.folder.files import make_folder, write
+from robot_dyn.tools.sweeps.texts import called
 
+RECORDED = ("q", "v", "u")
 _INNER = 64  # runs that are read together, where all are kept
 _EXTRA, _TIMES = "sweeps", "t/c/0"
+
+
+@final
+@dataclass(frozen=True)
+class Samples(Value):
+    """Samples of runs.
+
+    Attributes:
+        names: Of "q", "v" and "u".
+        every: Of run 0, k, 2 k, ….
+        failed: Of those among them alone that diverge, up to their end.
+    """
+
+    names: tuple[str, ...]
+    every: int = 1
+    failed: bool = False
+
+    def of(self, runs: np.ndarray, diverged: np.ndarray) -> np.ndarray:
+        """Which of these runs are kept, (k,)."""
+        return (runs % self.every == 0) & (diverged | (not self.failed))
+
+
+def samples(*names: str, every: int = 1, failed: bool = False) -> Samples:
+    """Samples to keep of runs: of every k-th, or of those among them alone that diverge.
+
+    Args:
+        *names: Of "q", "v" and "u".
+        every: k.
+        failed: Whether only of runs that diverge.
+
+    Raises:
+        SweepError: If an argument is not allowed.
+    """
+    if not names:
+        raise SweepError(f"samples: of what? give some of {', '.join(RECORDED)}")
+    chosen = tuple(dict.fromkeys(choice("samples", name, RECORDED, error=SweepError) for name in names))
+    return Samples(chosen, integer("every", every, least=1, most=2**53, error=SweepError), truth("failed", failed))
+
+
+def samples_of(given: Any) -> Samples | None:
+    """What `Sweep.samples` may be: None, a name, or `samples(…)`, also as a text; SweepError otherwise."""
+    if isinstance(given, str) and given not in RECORDED:
+        return called("samples", given, {"samples": samples})
+    return given if given is None or isinstance(given, Samples) else samples(given)
 
 
 @final
@@ -33,15 +80,13 @@ class SampleStore:
         path: Of the group.
         runs: Of the sweep.
         chunk: Runs of a shard.
-        names: Of the quantities.
-        dense: Whether all runs are kept.
+        kept: Which samples are kept.
     """
 
     path: Path
     runs: int
     chunk: int
-    names: tuple[str, ...]
-    dense: bool
+    kept: Samples
 
     def create(self, t: np.ndarray, joint_names: tuple[str, ...]) -> None:
         """Write what describes the arrays, and the times of samples, (m,), unless they are there."""
@@ -50,7 +95,7 @@ class SampleStore:
         zarr = needs("zarr", extra=_EXTRA)
         memory = zarr.storage.MemoryStore()
         group = zarr.create_group(memory, zarr_format=3, attributes={"joint": list(joint_names)})
-        for name in self.names:
+        for name in self.kept.names:
             self._array(zarr, memory, name, t, joint_names)
         times = group.create_array("t", data=t, dimension_names=("t",), compressors=None)
         times.attrs["units"] = "s"
@@ -64,14 +109,14 @@ class SampleStore:
         with self._reading():
             return zarr.open_group(self.path, mode="r")["t"][:]
 
-    def write(self, chunk: int, kept: Mapping[str, np.ndarray], files: Files) -> dict[str, str]:
+    def write(self, chunk: int, samples: Mapping[str, np.ndarray]) -> dict[str, str]:
         """Write the samples (k, m, n) of the runs of a chunk, nan where they are not kept; OSError if that fails.
 
         Returns:
             SHA-256 of the file of each quantity that has some.
         """
         zarr, digests = needs("zarr", extra=_EXTRA), dict[str, str]()
-        for name, x in kept.items():
+        for name, x in samples.items():
             memory = zarr.storage.MemoryStore()
             array = self._array(zarr, memory, name, np.empty(x.shape[1]), ("",) * x.shape[2])
             start = chunk * self.chunk
@@ -81,7 +126,7 @@ class SampleStore:
             shard = memory._store_dict.get(f"{name}/c/{chunk}/0/0")
             if shard is not None:  # it has something
                 data = shard.to_bytes()
-                write(path, data, files)
+                write(path, data)
                 digests[name] = sha256(data).hexdigest()
         return digests
 
@@ -99,7 +144,7 @@ class SampleStore:
     def _reading(self) -> Iterator[None]:
         """What is wrong with the files that describe the arrays, as a SweepError; Zarr opens pipes and devices too."""
         remedy = "take it from a copy of the folder, or run the sweep into a new one"
-        for name in ("zarr.json", *(f"{each}/zarr.json" for each in ("t", *self.names)), _TIMES):
+        for name in ("zarr.json", *(f"{each}/zarr.json" for each in ("t", *self.kept.names)), _TIMES):
             with reading(self.path / name, SweepError, remedy):
                 pass
         try:
@@ -118,13 +163,14 @@ class SampleStore:
         needs("zarr", extra=_EXTRA)
         with self._reading():
             found = xarray.open_zarr(self.path, consolidated=False, chunks=None)
-            for name in self.names:
+            for name in self.kept.names:
                 found[name].attrs |= {"units": joint_units(name, joint_types), "long_name": SAMPLED[name].title}
             return found.assign_coords(run=np.arange(self.runs), joint=list(found.attrs.pop("joint")))
 
     def _array(self, zarr: Any, store: Any, name: str, t: np.ndarray, joints: tuple[str, ...]) -> Any:
         """An array of the store without numbers."""
-        inner = min(_INNER, self.chunk) if self.dense and self.chunk % _INNER == 0 else 1
+        dense = self.kept.every == 1 and not self.kept.failed
+        inner = min(_INNER, self.chunk) if dense and self.chunk % _INNER == 0 else 1
         return zarr.create_array(
             store, name=name, shape=(self.runs, len(t), len(joints)), dtype="float64",
             chunks=(inner, len(t), len(joints)), shards=(self.chunk, len(t), len(joints)), compressors=None,

@@ -2,8 +2,8 @@
 
 sweep          `Sweep`: the value that users write
 figures        numbers kept of each run; runs: what these are computed from
-samples        which samples of runs are kept
 specification  a sweep as JSON, and the first difference of two
-pilot          the size of chunks
+stated         a scene of a folder that its reader has not named
 work           runs start, …, stop − 1 as rows
+from_scene     the sweep that a scene states, and texts of the command line
 """

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import typing
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import reduce
 from typing import Any, ClassVar
@@ -19,8 +19,9 @@ from robot_dyn import Setup
 from robot_dyn.control import CartesianReference
 from robot_dyn.foundations import SweepError, Value, choice, nearest, shown
 from robot_dyn.queries import joint_types_of, joint_units
-from robot_dyn.tools.sweeps.imported import digest_of, imported, path_of
+from robot_dyn.tools.sweeps.imported import digest_of, imported, is_import_path, path_of
 from robot_dyn.tools.sweeps.plan.runs import Runs
+from robot_dyn.tools.sweeps.texts import called
 
 _ROWS = {"q": 0, "v": 1, "u": 2}  # of what is observed of a run
 _RECORDS = ("q", "v", "u", "energy", "work")
@@ -222,14 +223,20 @@ def final(of_what: str, joint: str | None = None) -> Final:
     return Final(of_what, joint)
 
 
-FIGURES: Mapping[str, Any] = {"rms_error": RmsError, "peak": Peak, "final": Final}
+FIGURES: Mapping[str, Callable[..., Figure]] = {each.__name__: each for each in (rms_error, peak, final)}
 
 
 def figure(name: str, given: Any) -> Figure:
-    """A figure as it is; of a function, or its import path, one that calls it; SweepError if it is neither."""
+    """Return a figure as it is or as a text; of a function, or its import path, one that calls it.
+
+    Raises:
+        SweepError: If it is none of them.
+    """
     if isinstance(given, Figure):
         return given
     try:
+        if isinstance(given, str) and not is_import_path(given):
+            return called("figure", given, FIGURES)
         user = UserFigure(path_of(given))
         imported(user.path)
     except SweepError as error:

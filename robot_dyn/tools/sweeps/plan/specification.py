@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Any, final
+from typing import Annotated, Any, Literal, final
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -21,15 +21,14 @@ from robot_dyn.foundations import SweepError, nearest, shorten, shown, version_o
 from robot_dyn.simulation import settings_of
 from robot_dyn.tools.sweeps import distributions
 from robot_dyn.tools.sweeps.designs import MOST_ROWS
+from robot_dyn.tools.sweeps.folder.samples import samples
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_named, digest_of
 from robot_dyn.tools.sweeps.plan import figures
 from robot_dyn.tools.sweeps.plan.figures import Figure, UserFigure
-from robot_dyn.tools.sweeps.plan.samples import samples
 from robot_dyn.tools.sweeps.plan.stated import StatedScene, stated_scene
 from robot_dyn.tools.sweeps.plan.sweep import Sweep, is_scene
 
-FORMAT = 5
-_PLACES = ("scene",)  # that may differ: where the scene lies
+_PLACE = "scene"  # where it lies may differ
 
 
 def versions() -> dict[str, str]:
@@ -43,12 +42,23 @@ def processor() -> dict[str, str]:
     return {"processor": name, "features": ",".join(each[1:] for each in features.split(",") if each.startswith("+"))}
 
 
-class Stored(BaseModel):
-    """The form of `sweep.json`."""
+class StoredSamples(BaseModel):
+    """Which samples are kept."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
-    format: int
+    names: list[str]
+    every: Annotated[int, Field(gt=0)]
+    failed: bool
+
+
+@final
+class Specification(BaseModel):
+    """What `sweep.json` holds."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    format: Literal[5]
     scene: str
     setup: dict[str, Any]
     runs: Annotated[int, Field(gt=0, le=MOST_ROWS)]
@@ -62,72 +72,15 @@ class Stored(BaseModel):
     rows_sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
     chunk: Annotated[int, Field(gt=0)]
 
-
-class StoredSamples(BaseModel):
-    """Which samples are kept."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-    names: list[str]
-    every: Annotated[int, Field(gt=0)]
-    failed: bool
-
-
-def parsed(text: str, where: str) -> Specification:
-    """The specification of a text; SweepError with the key and the value if it is not one, or of another version."""
-    try:
-        given = json.loads(text)
-        if given["format"] != FORMAT:
-            raise SweepError(f"{where}: has format {shown(given['format'])}, this version reads {FORMAT}")
-        return Specification(Stored.model_validate(given).model_dump())
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        raise SweepError(
-            f"{where}: is not the specification of a sweep: {key}{': ' * bool(key)}{first['msg']}, got"
-            f" {shown(first['input'])}; take that of a copy, or give a new folder"
-        ) from None
-    except (ValueError, TypeError, KeyError, RecursionError):
-        raise SweepError(
-            f"{where}: is not the specification of a sweep; take that of a copy, or a new folder"
-        ) from None
-
-
-@final
-@dataclass(frozen=True)
-class Specification:
-    """What `sweep.json` holds.
-
-    Attributes:
-        data: As JSON can hold it.
-    """
-
-    data: dict[str, Any]
-
     @property
     def text(self) -> str:
         """As the file has it."""
-        return json.dumps(self.data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        return json.dumps(self.model_dump(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
     @property
     def digest(self) -> str:
         """SHA-256 of all but where the scene lies."""
-        data = {key: value for key, value in self.data.items() if key not in _PLACES}
-        return sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()
-
-    @property
-    def rows_digest(self) -> str:
-        """SHA-256 of the rows of the design."""
-        return self.data["rows_sha256"]
-
-    @property
-    def chunk(self) -> int:
-        """Number of runs in a chunk."""
-        return self.data["chunk"]
-
-    def with_chunk(self, runs: int) -> Specification:
-        """The same in chunks of so many runs."""
-        return Specification(self.data | {"chunk": runs})
+        return sha256(json.dumps(self.model_dump(exclude={_PLACE}), sort_keys=True).encode()).hexdigest()
 
     def check_same(self, other: Specification, where: str, versions: bool = True) -> None:
         """Raise SweepError unless another specification has all that this one states; names the first difference.
@@ -137,18 +90,35 @@ class Specification:
             where: The file of this one, for the message.
             versions: Whether versions of packages are compared too: they matter where rows are computed.
         """
-        for name, here, there in _differences(self.data, other.data, ""):
-            if name not in _PLACES and (versions or not name.startswith("versions.")):
+        for name, here, there in _differences(self.model_dump(), other.model_dump(), ""):
+            if name != _PLACE and (versions or not name.startswith("versions.")):
                 raise SweepError(
                     f"{where}: holds another sweep: {name} is {shorten(here)} there, {shorten(there)} here; give"
                     " another folder, or the sweep that was begun"
                 )
 
 
-def specification(sweep: Sweep) -> Specification:
-    """The specification of a sweep, without the size of its chunks."""
+def parsed(text: str, where: str) -> Specification:
+    """The specification of a text; SweepError with the key and the value if it is not one, or of another version."""
+    try:
+        return Specification.model_validate(json.loads(text))
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        raise SweepError(
+            f"{where}: is not the specification of a sweep: {key}{': ' * bool(key)}{first['msg']}, got"
+            f" {shown(first['input'])}; take that of a copy, or give a new folder"
+        ) from None
+    except (ValueError, RecursionError):
+        raise SweepError(
+            f"{where}: is not the specification of a sweep; take that of a copy, or a new folder"
+        ) from None
+
+
+def specification(sweep: Sweep, chunk: int) -> Specification:
+    """The specification of a sweep in chunks of so many runs."""
     data = {
-        "format": FORMAT,
+        "format": 5,
         "scene": sweep.source,
         "setup": _stated_setup(sweep),
         "runs": int(sweep.runs),
@@ -160,19 +130,20 @@ def specification(sweep: Sweep) -> Specification:
         "samples": None if sweep.samples is None else asdict(sweep.samples),
         "versions": versions(),
         "rows_sha256": sha256(np.ascontiguousarray(sweep.points.rows).tobytes()).hexdigest(),
+        "chunk": chunk,
     }
-    return Specification(json.loads(json.dumps(data)))  # as it is read again
+    return Specification.model_validate(json.loads(json.dumps(data)))  # as it is read again
 
 
 def sweep_of(
-    data: Mapping[str, Any], rows: np.ndarray, where: str, named: Named = NOTHING, folder: Path | None = None
+    stated: Specification, rows: np.ndarray, where: str, named: Named = NOTHING, folder: Path | None = None
 ) -> Sweep:
     """Return the sweep of a specification, with its scene as it is now.
 
     Functions that the specification names are imported only if `named` has them too.
 
     Args:
-        data: The specification.
+        stated: The specification.
         rows: Of the design.
         where: Its file, for messages.
         named: What the reader of the folder names.
@@ -182,27 +153,26 @@ def sweep_of(
         SweepError: If it is not one, or is one of another version; if the file of a named function has changed.
     """
     try:
-        scene = _scene_of(data, named, folder)
-        vary = {name: distributions.from_dict(data["vary"][name]) for name in data["order"]}
-        of = {name: _figure_of(name, stated, named, folder) for name, stated in data["figures"].items()}
+        scene = _scene_of(stated, named, folder)
+        vary = {name: distributions.from_dict(stated.vary[name]) for name in stated.order}
+        of = {name: _figure_of(name, figure, named, folder) for name, figure in stated.figures.items()}
         if unknown := named.figures.keys() - {name for name, figure in of.items() if isinstance(figure, UserFigure)}:
             raise SweepError(f"{where}: no function is the figure {shown(min(unknown))}; {nearest(min(unknown), of)}")
-        named_design = data["design"] != "table"
-        design, drawn = (data["design"], rows) if named_design else (rows, None)
-        kept = data["samples"]
-        kept = kept and samples(*kept["names"], every=kept["every"], failed=kept["failed"])
-        return Sweep(scene, data["runs"], vary, of, design, data["seed"], samples=kept, drawn=drawn)
+        design, drawn = (rows, None) if stated.design == "table" else (stated.design, rows)
+        kept = stated.samples and samples(
+            *stated.samples.names, every=stated.samples.every, failed=stated.samples.failed
+        )
+        return Sweep(scene, stated.runs, vary, of, design, stated.seed, samples=kept, drawn=drawn)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise SweepError(f"{where}: is not the specification of a sweep ({error!r})") from None
 
 
-def _scene_of(data: Mapping[str, Any], named: Named, folder: Path | None) -> str | StatedScene:
+def _scene_of(stated: Specification, named: Named, folder: Path | None) -> str | StatedScene:
     """Return the scene that the reader names or the folder's file; for a function, the stored description."""
-    stored = data["scene"]
     if named.scene is None:
-        return stored if is_scene(stored) else stated_scene(stored, data["setup"])
+        return stated.scene if is_scene(stated.scene) else stated_scene(stated.scene, stated.setup)
     if not is_scene(named.scene):
-        check_named(named.scene, data["setup"].get("function_sha256"), folder)
+        check_named(named.scene, stated.setup.get("function_sha256"), folder)
     return named.scene
 
 

@@ -16,9 +16,9 @@ from robot_dyn.queries import joint_types_of, unit
 from robot_dyn.tools.sweeps.designs import Design, design, given
 from robot_dyn.tools.sweeps.distributions import Distribution, distribution
 from robot_dyn.tools.sweeps.folder.rows import FIXED, NUMBERS, OUTCOMES, TEXTS
+from robot_dyn.tools.sweeps.folder.samples import Samples, samples_of
 from robot_dyn.tools.sweeps.imported import imported, path_of
 from robot_dyn.tools.sweeps.plan.figures import Figure, figure
-from robot_dyn.tools.sweeps.plan.samples import Samples, samples_of
 from robot_dyn.tools.sweeps.plan.stated import StatedScene
 
 READER = "robot_dyn.scene.scene:read_scene"  # of scenes, a room above: it is named as users' functions are
@@ -36,9 +36,9 @@ class Sweep(Answer, Value, Caching):
             sweep that was read from a folder without naming its function: its stored description.
         runs: N.
         vary: Distributions by name: a parameter of `rollouts(params=…)`, "q0" or "v0". A frozen distribution of
-            scipy.stats is one.
+            scipy.stats is one, and a text such as "uniform(low=0, high=3)".
         figures: What to keep of each run, by name: `rms_error()`, `peak("u")`, `final("q", joint)`, or a function of a
-            `Run` by import path.
+            `Run` by import path. Texts such as "peak('u')" are figures too.
         design: "random", "sobol", "halton", "latin", "saltelli", "grid"; or rows in [0, 1), (N, d), a column for each
             number that varies.
         seed: Of the design.
