@@ -20,7 +20,6 @@ EXCEPTIONS = {
     ("proof", "robot_dyn.codegen.trace.base_parameters"): "the equation of a proof has the fewest parameters",
     ("proof", "robot_dyn.codegen.trace.condition"): "functions of users are traced on nodes with conditions",
     ("proof", "robot_dyn.codegen.trace.origins"): "the equation of a proof has the fewest terms",
-    ("sweeps", "robot_dyn.simulation.results.archive"): "a chunk of a sweep is stored as a run is",
     ("sweeps", "robot_dyn.simulation.rollouts.batch"): "a sweep records as much of a batch as its figures need",
     ("sweeps", "robot_dyn.simulation.rollouts.lock_step"): "chunks are multiples of the runs of one lock step",
     ("sweeps", "robot_dyn.simulation.rollouts.overview"): "a row holds the remarks on its run",

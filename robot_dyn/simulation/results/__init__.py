@@ -7,6 +7,5 @@
 - error_estimate: the estimated error and its verdict.
 - acting: what acts: names, wrenches on links, stops that joints bear on.
 - provenance: texts from which the robot of a run is built again.
-- run_file: files of runs and of rollouts; serialise: dataclasses as arrays and plain data; archive: named arrays in a
-  .npz file, read within bounds.
+- run_file: files of runs, as `foundations/store.py` writes them.
 """

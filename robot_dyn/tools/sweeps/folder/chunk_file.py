@@ -12,8 +12,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import SweepError, needs, reading
-from robot_dyn.simulation.results.archive import Archive, ArchiveError, write
+from robot_dyn.foundations import StoreError, SweepError, needs, read_arrays, reading
 from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows
 
 _FOOTER = "footer"
@@ -76,7 +75,7 @@ def _of(path: Path) -> Iterator[None]:
     except SweepError:
         raise
     except Exception as error:  # pyarrow, json and zipfile promise no kinds
-        what = str(error) if isinstance(error, ArchiveError) else f"{type(error).__name__}"
+        what = str(error) if isinstance(error, StoreError) else f"{type(error).__name__}"
         raise SweepError(f"{path}: is not a complete chunk ({what}); {_REMEDY}") from None
 
 
@@ -89,23 +88,20 @@ def _dictionary(column: np.ndarray) -> tuple[list[str], np.ndarray]:
 
 def _npz(rows: Rows, footer: dict[str, Any]) -> bytes:
     of = {name: _dictionary(getattr(rows, name)) for name in TEXTS}
-    columns = {f"column {name}": x for name, x in rows.columns.items()}
+    columns: dict[str, Any] = {f"column {name}": x for name, x in rows.columns.items()}
     columns |= {f"column {name}": codes for name, (_, codes) in of.items()}
     stream = io.BytesIO()
     about = json.dumps(footer | {"texts": {name: texts for name, (texts, _) in of.items()}})
-    write(stream, columns | {_FOOTER: np.array(about)}, compressed=False)
+    columns[_FOOTER] = np.array(about)
+    np.savez(stream, **columns)
     return stream.getvalue()
 
 
 def _read_npz(path: Path, names: Sequence[str] | None) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     with reading(path, SweepError, _REMEDY) as stream, _of(path):
-        archive = Archive(stream)
-        footer = json.loads(archive.text(_FOOTER))
-        if names is None:
-            found = archive.arrays()
-        else:
-            found = {f"column {name}": archive.array(f"column {name}") for name in names}
-        table = {name.removeprefix("column "): x for name, x in found.items() if name != _FOOTER}
+        found = read_arrays(stream, None if names is None else [_FOOTER, *(f"column {name}" for name in names)])
+        footer = json.loads(str(found.pop(_FOOTER)))
+        table = {name.removeprefix("column "): x for name, x in found.items()}
         for name in table.keys() & set(TEXTS):
             table[name] = np.array(footer["texts"][name], object)[table[name]]
         _check_lengths(table, footer)
