@@ -1,6 +1,6 @@
 """Files of values: the arrays of a dataclass as .npz, all else as JSON by pydantic, read within bounds.
 
-The member `about` is the JSON: a format and the fields of the value. An array is a member of its own. Its field in the
+The member `about` is the JSON: a format and the fields of the value. Each array is another member. Its field in the
 JSON contains the name of the member, which is the path of the field, for example `ledger/kinetic`.
 """
 
@@ -167,7 +167,7 @@ class StoredFormat(Generic[Stored]):
                 raise self.error(f"{path}: cannot be read as {self.kind.name}: {error}; {self.remedy}") from None
 
     def _value(self, arrays: dict[str, np.ndarray]) -> Stored:
-        """Return the checked value of arrays, of which `about` is the JSON."""
+        """Return the checked value of arrays; the array `about` contains the JSON."""
         from pydantic import ValidationError
 
         about = _about(arrays)

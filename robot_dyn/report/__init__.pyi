@@ -5,7 +5,6 @@ from robot_dyn.report.figure import Colours as Colours
 from robot_dyn.report.figure import ResultError as ResultError
 from robot_dyn.report.figure import heading_room as heading_room
 from robot_dyn.report.figure import ink as ink
-from robot_dyn.report.figure import inline as inline
 from robot_dyn.report.figure import key as key
 from robot_dyn.report.figure import legend as legend
 from robot_dyn.report.figure import lines as lines

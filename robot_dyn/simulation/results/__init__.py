@@ -1,7 +1,7 @@
 """The result of a run, and its file.
 
 - run_data: the table of quantities and the fields of a run, which all that draws, tabulates and stores runs imports.
-- trajectory: `Trajectory`; statistics: what it took; summary, table and html: its text, its columns and its page.
+- trajectory: `Trajectory`; statistics: what it took; summary and table: its text and its columns.
 - samples: what follows from states: acceleration, actuation, power, energy, tracking error; ledger: energy and work.
 - causes: the actuation of each joint by inertia, Coriolis, gravity and effect.
 - error_estimate: the estimated error and its verdict.

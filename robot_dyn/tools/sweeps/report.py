@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.foundations import FileKind, SweepError, html_of, page, save, side_by_side, table, target, text
-from robot_dyn.report import PAGE, ink, inline, styled
+from robot_dyn.foundations import FileKind, SweepError, html_of, inline, page, save, side_by_side, table, target, text
+from robot_dyn.report import PAGE, ink, styled
 from robot_dyn.tools.sweeps.export import inputs_of
 from robot_dyn.tools.sweeps.plan.sweep import OUTCOMES, heading, is_scene
 from robot_dyn.tools.sweeps.sensitivity import bins
