@@ -98,7 +98,8 @@ def test_a_checkup_has_a_row_for_each_finding() -> None:
 def test_marks_on_a_logarithmic_axis_stand_where_the_logarithm_says() -> None:
     shares = {each.quantity: each.share for each in made("compare").agreements if each.share > 0}
     tree = html.fragment_fromstring(made("compare")._repr_html_())
-    at = [float(mark.get("cx")) for mark in tree.iter("circle")]
+    (levels,) = (each for each in tree.iter("g") if each.get("id") == "levels")
+    at = [float(mark.get("x")) for mark in levels.iter("use")]
     assert np.corrcoef(at, np.log10(list(shares.values())))[0, 1] == pytest.approx(1.0, abs=1e-5)
 
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_dyn.accuracy.run_difference import RunDifference
+from robot_dyn.foundations.display import drawable
 from robot_dyn.queries.units import unit
 from robot_dyn.report.figure import Colours, ResultError, key, legend, sheet, styled
 from robot_dyn.simulation.results.provenance import joint_types
-from robot_dyn.view.plots.figure import drawable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -4,7 +4,7 @@ arithmetic, linear_algebra, spatial   numbers of any arithmetic; small dense sys
 convex, saturation, threshold         the convex problem of dry friction and stops; limits; levels at which laws switch
 coefficients, validate, signatures    declared coefficients; checks of arguments; signatures of options
 values, result, answer, display       value objects; results as data, as lines and tables, as HTML
-errors, files, extras, public         errors; safe reading and writing; installed packages; public names of a room
+errors, files, store, extras, public  errors; safe reading and writing; files of values; packages; public names
 """
 
 from robot_dyn.foundations.public import public_names

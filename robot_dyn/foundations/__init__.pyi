@@ -17,6 +17,8 @@ from robot_dyn.foundations.coefficients import check_coefficients as check_coeff
 from robot_dyn.foundations.coefficients import coefficient as coefficient
 from robot_dyn.foundations.coefficients import declared as declared
 from robot_dyn.foundations.coefficients import with_values as with_values
+from robot_dyn.foundations.display import drawable as drawable
+from robot_dyn.foundations.display import inline as inline
 from robot_dyn.foundations.display import legend as legend
 from robot_dyn.foundations.display import levels as levels
 from robot_dyn.foundations.display import page as page
@@ -79,6 +81,8 @@ from robot_dyn.foundations.spatial import rotation as rotation
 from robot_dyn.foundations.spatial import rotation_rpy as rotation_rpy
 from robot_dyn.foundations.spatial import rpy_of as rpy_of
 from robot_dyn.foundations.spatial import spatial_inertia as spatial_inertia
+from robot_dyn.foundations.store import StoreError as StoreError
+from robot_dyn.foundations.store import read_arrays as read_arrays
 from robot_dyn.foundations.validate import choice as choice
 from robot_dyn.foundations.validate import duration as duration
 from robot_dyn.foundations.validate import float64 as float64

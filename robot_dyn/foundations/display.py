@@ -1,22 +1,30 @@
-"""HTML of values for notebooks: tables and line plots as plain HTML and SVG, without scripts.
+"""HTML of values for notebooks: tables as HTML and figures of Matplotlib as SVG, without scripts.
 
-Text, axes and rules take the colour of the page (`currentColor`), so that they stand on light and on dark ones.
+Text and axes take the colour of the page (`currentColor`), so that they stand on light and on dark ones.
 """
 
 from __future__ import annotations
 
+import io
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from html import escape
-from math import floor, isfinite, log10
-from typing import Any
+from math import isfinite
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+INK = "#010203"  # in a figure: the colour of the text of a page
+GRID = "#80808055"
+MOST_JOINTS = 8  # whose curves are drawn
 MOST_POINTS = 200  # of a curve: its least and largest values in each of half as many parts
 _COLOURS = ("#4c8bf5", "#e8710a", "#1e9e55", "#d93a8f", "#9a6af0", "#b58900", "#00a3b4", "#8d6e63")
-_WIDTH, _HEIGHT, _LEFT, _BELOW, _ABOVE = 370, 150, 58, 30, 8  # of a plot, in pixels: two stand side by side
-_BAR, _LONGEST = 18, 32  # height of a bar in pixels, and letters of its name
-_MOST_TICKS = 6  # of a logarithmic axis
+_WIDE, _HIGH, _BAR = 3.9, 1.6, 0.2  # sizes of a plot, and height of a bar, in [inch]; two plots stand side by side
+_LONGEST = 32  # letters of the name of a bar
+_LARGEST, _LEAST = 1e300, 1e-99  # on an axis, and on one of logarithms: Matplotlib computes beyond its ends
 _MOST_ROWS = 40  # of a table; a longer one scrolls
 # more specific than the styles of notebooks, which align all cells at the right
 _STYLE = (
@@ -75,46 +83,6 @@ def side_by_side(parts: Iterable[str]) -> str:
     return f'<div class="s">{"".join(parts)}</div>'
 
 
-def plot(label: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> str:
-    """Curves over time as SVG.
-
-    Args:
-        label: What they are, with the unit.
-        t: Times, (m,), in [s].
-        columns: Curves (m,) by name; what is not finite is left out.
-    """
-    finite = [x[np.isfinite(x)] for x in columns.values()]
-    if not len(t) or not any(map(len, finite)):
-        return ""
-    low, high = min(x.min() for x in finite if len(x)), max(x.max() for x in finite if len(x))
-    low, high = (low - 0.5, high + 0.5) if low == high else (low, high)
-    ticks, times = _ticks(low, high), _ticks(float(t[0]), float(t[-1]))
-    wide, high_px = _WIDTH - _LEFT - 8, _HEIGHT - _BELOW - _ABOVE
-
-    def x(at: float) -> float:
-        return _LEFT + wide * (at - t[0]) / ((t[-1] - t[0]) or 1.0)
-
-    def y(at: float) -> float:
-        return _ABOVE + high_px * (high - at) / (high - low)
-
-    grid = "".join(
-        f'<path d="M{_LEFT} {y(at):.1f}H{_WIDTH - 8}" stroke="currentColor" stroke-opacity=".18"/>'
-        f'<text x="{_LEFT - 5}" y="{y(at) + 4:.1f}" text-anchor="end">{number_text(at)}</text>'
-        for at in ticks
-    )
-    below = "".join(
-        f'<text x="{x(at):.1f}" y="{_HEIGHT - _BELOW + 14}" text-anchor="middle">{number_text(at)}</text>'
-        for at in times
-    )
-    curves = "".join(
-        f'<polyline points="{_points(t, each, x, y)}" fill="none" stroke="{_COLOURS[k % len(_COLOURS)]}"'
-        f' stroke-width="1.4"><title>{escape(name)}</title></polyline>'
-        for k, (name, each) in enumerate(columns.items())
-    )
-    caption = f'<text x="{_LEFT}" y="{_HEIGHT - 2}">{escape(label)} over t [s]</text>'
-    return _svg(_WIDTH, _HEIGHT, grid + below + curves + caption, label)
-
-
 def legend(names: Iterable[str]) -> str:
     """The names of curves in their colours."""
     return side_by_side(
@@ -123,107 +91,119 @@ def legend(names: Iterable[str]) -> str:
     )
 
 
-def _points(t: np.ndarray, values: np.ndarray, x: Any, y: Any) -> str:
-    """Points of a curve; of many samples the least and the largest of each part."""
-    keep = np.flatnonzero(np.isfinite(values))
-    if len(keep) > MOST_POINTS:
-        parts = np.array_split(keep, MOST_POINTS // 2)
-        keep = np.unique([part[at(values[part])] for part in parts for at in (np.argmin, np.argmax)])
-    return " ".join(f"{x(t[k]):.1f},{y(values[k]):.1f}" for k in keep)
+def curves(title: str, summary: str, names: Iterable[str], plots: Sequence[str], more: int) -> str:
+    """Return a block with a summary and plots of curves, and the number of joints that are not drawn."""
+    note = text(f"{more} more joints are not drawn") if more else ""
+    return page(title, text(summary), legend(names), side_by_side(plots), note)
 
 
-def _ticks(low: float, high: float) -> list[float]:
-    """At most six round numbers between two."""
-    raw = (high - low) / 4 or 1.0
-    size = 10.0 ** floor(log10(raw))
-    step = next(size * factor for factor in (1, 2, 5, 10) if size * factor >= raw)
-    return [k * step for k in range(int(np.ceil(low / step)), int(np.floor(high / step)) + 1)]
+def inline(figure: Figure, label: str = "") -> str:
+    """Return a figure as SVG within a page of HTML; the colour INK becomes that of the page.
+
+    Args:
+        figure: The figure.
+        label: Its description for readers who do not see it.
+    """
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg", bbox_inches="tight", pad_inches=0.05, metadata={"Date": None})
+    svg = stream.getvalue()
+    dropped = r'<!--.*?-->|<metadata>.*?</metadata>| xmlns:xlink="[^"]*"|xlink:(?=href)'
+    svg = re.sub(dropped, "", svg[svg.index("<svg") + 4 :], flags=re.DOTALL)
+    svg = f'<svg role="img" aria-label="{escape(label)}"{svg}' if label else f"<svg{svg}"
+    svg = re.sub(r'translate\([^)]*\)| (?:d|x|y)="[^"]*"', lambda at: re.sub(r"(\.\d\d)\d+", r"\1", at[0]), svg)
+    return re.sub(r"\s*\n\s*", "\n", svg.replace(INK, "currentColor").replace("*{", ".robot-dyn svg *{"))
 
 
-def _svg(width: float, height: float, drawn: str, label: str) -> str:
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(label)}" width="{width}"'
-        f' height="{height}" viewBox="0 0 {width} {height}" font-size="11" fill="currentColor">{drawn}</svg>'
-    )
+def drawable(name: str) -> str:
+    """Return a text in which letters that the font of figures lacks are spelled by their code points; lines stay."""
+    from matplotlib.font_manager import FontProperties, findfont, get_font
+
+    font = get_font(findfont(FontProperties()))
+    return "".join(c if c == "\n" or font.get_char_index(ord(c)) else f"\\u{ord(c):04x}" for c in name)
+
+
+def _axes(label: str, height: float, names: Iterable[str] = ()) -> Any:
+    """Return axes whose lower one has a label; names of rows stand at the left."""
+    from matplotlib.figure import Figure
+
+    axes = Figure(figsize=(_WIDE, height), facecolor="none").add_subplot(facecolor="none")
+    axes.set_xlabel(drawable(label), fontsize=8, color=INK, parse_math=False)
+    axes.tick_params(labelsize=8, length=0, colors=INK)
+    axes.grid(color=GRID)
+    axes.spines[:].set_visible(False)
+    if names:
+        texts = [name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…" for name in map(drawable, names)]
+        axes.set_yticks(range(len(texts)), texts, parse_math=False)
+        axes.set_ylim(len(texts) - 0.5, -0.5)
+    return axes
+
+
+def plot(label: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> str:
+    """Draw curves over time.
+
+    Args:
+        label: What they are, with the unit.
+        t: Times, (m,), in [s].
+        columns: Curves (m,) by name; what is not finite is left out.
+    """
+    if not any(np.isfinite(x).any() for x in columns.values()):
+        return ""
+    axes = _axes(f"{label} over t [s]", _HIGH)
+    for k, x in enumerate(columns.values()):
+        at = _extremes(x)
+        y = np.clip(x[at], -_LARGEST, _LARGEST)
+        axes.plot(t[at], y, color=_COLOURS[k % len(_COLOURS)], linewidth=1.2, gid=f"curve {k}")
+    return inline(axes.figure, label)
+
+
+def _extremes(values: np.ndarray) -> np.ndarray:
+    """Return places of finite values: of many samples the least and the largest of each part."""
+    at = np.flatnonzero(np.isfinite(values))
+    if len(at) <= MOST_POINTS:
+        return at
+    parts = np.array_split(at, MOST_POINTS // 2)
+    return np.unique([part[which(values[part])] for part in parts for which in (np.argmin, np.argmax)])
 
 
 def bars(label: str, rows: Mapping[str, Mapping[str, float]], causes: Sequence[str]) -> str:
-    """Horizontal bars as SVG, one a row, each stacked from 0: what is positive to the right, the rest to the left.
+    """Draw horizontal bars, one a row, each stacked from 0: positive parts to the right, the others to the left.
 
     Args:
         label: What they are, with the unit.
         rows: Parts of each bar by cause, by the name of the bar; what is not finite is left out.
         causes: In the order of colours, of which the legend names those that occur.
     """
-    parts = {name: {each: x for each, x in row.items() if x and isfinite(x)} for name, row in rows.items()}
-    used = [each for each in causes if any(each in row for row in parts.values())]
-    if not used:
+    parts = np.array([[row.get(cause, 0.0) for cause in causes] for row in rows.values()]).reshape(len(rows), -1)
+    parts = np.where(np.isfinite(parts), parts, 0.0)
+    used = np.flatnonzero(parts.any(axis=0))
+    if not len(used):
         return ""
-    low = min(sum(x for x in row.values() if x < 0) for row in parts.values())
-    high = max(sum(x for x in row.values() if x > 0) for row in parts.values())
-    left, wide = 7 * min(max(map(len, parts)), _LONGEST) + 8, _WIDTH - _LEFT
-    colour = {each: _COLOURS[k % len(_COLOURS)] for k, each in enumerate(used)}
-
-    def x(at: float) -> float:
-        return left + wide * (at - low) / ((high - low) or 1.0)
-
-    drawn = []
-    for k, (name, row) in enumerate(parts.items()):
-        ends = {True: 0.0, False: 0.0}
-        drawn.append(f'<text x="{left - 6}" y="{_BAR * k + 12}" text-anchor="end">{escape(_short(name))}</text>')
-        for cause in (each for each in used if each in row):
-            start = ends[row[cause] > 0]
-            ends[row[cause] > 0] = end = start + row[cause]
-            drawn.append(
-                f'<rect x="{min(x(start), x(end)):.1f}" y="{_BAR * k + 3}" width="{abs(x(end) - x(start)):.1f}"'
-                f' height="{_BAR - 6}" fill="{colour[cause]}"><title>{escape(f"{name}, {cause}")}:'
-                f" {number_text(row[cause])}</title></rect>"
-            )
-    below = _BAR * len(parts)
-    drawn += [
-        f'<path d="M{x(at):.1f} 0V{below}" stroke="currentColor" stroke-opacity="{0.7 if at == 0 else 0.18}"/>'
-        f'<text x="{x(at):.1f}" y="{below + 13}" text-anchor="middle">{number_text(at)}</text>'
-        for at in _ticks(low, high)
-    ]
-    drawn.append(f'<text x="{left}" y="{below + 28}">{escape(label)}</text>')
-    return legend(used) + _svg(left + wide + 20, below + 32, "".join(drawn), label)
+    axes = _axes(label, _BAR * (len(rows) + 2), rows)
+    ends = {True: np.zeros(len(rows)), False: np.zeros(len(rows))}
+    for colour, k in zip(_COLOURS, used, strict=False):
+        for positive, end in ends.items():
+            part = np.where((parts[:, k] > 0) == positive, parts[:, k], 0.0)
+            some = np.flatnonzero(part)
+            axes.barh(some, part[some], 0.7, end[some], color=colour, gid="bar")
+            end += part
+    axes.axvline(0.0, color=INK, linewidth=0.8)
+    return legend(causes[int(k)] for k in used) + inline(axes.figure, label)
 
 
 def levels(label: str, values: Mapping[str, float], limit: float) -> str:
-    """Marks on a logarithmic axis as SVG, one a row, beside a limit, which is a dashed line.
+    """Draw marks on a logarithmic axis, one a row, and a limit as a dashed line.
 
     Args:
         label: What they are, with the unit.
         values: By the names of the rows; what is not finite and positive is left out.
-        limit: Likewise.
+        limit: In the unit of the values; what is not finite and positive is left out.
     """
-    known = {name: log10(x) for name, x in values.items() if isfinite(x) and x > 0}
-    edges = [*known.values(), *([log10(limit)] if isfinite(limit) and limit > 0 else [])]
+    known = {name: min(max(x, _LEAST), 1 / _LEAST) for name, x in values.items() if isfinite(x) and x > 0}
     if not known:
         return ""
-    low, high = floor(min(edges)), max(floor(min(edges)) + 1, -floor(-max(edges)))
-    left, wide, below = 7 * min(max(map(len, known)), _LONGEST) + 8, _WIDTH - _LEFT, _BAR * len(known)
-
-    def x(at: float) -> float:
-        return left + wide * (at - low) / (high - low)
-
-    drawn = [
-        f'<path d="M{x(at):.1f} 0V{below}" stroke="currentColor" stroke-opacity=".18"/>'
-        f'<text x="{x(at):.1f}" y="{below + 13}" text-anchor="middle">{number_text(10.0**at)}</text>'
-        for at in range(low, high + 1, -(-(high - low) // _MOST_TICKS))
-    ]
-    for k, (name, at) in enumerate(known.items()):
-        drawn.append(
-            f'<text x="{left - 6}" y="{_BAR * k + 13}" text-anchor="end">{escape(_short(name))}</text>'
-            f'<path d="M{left} {_BAR * k + 9}H{x(at):.1f}" stroke="currentColor" stroke-opacity=".35"/>'
-            f'<circle cx="{x(at):.1f}" cy="{_BAR * k + 9}" r="4" fill="{_COLOURS[0]}"><title>{escape(name)}:'
-            f" {number_text(10.0**at)}</title></circle>"
-        )
-    if len(edges) > len(known):
-        drawn.append(f'<path d="M{x(edges[-1]):.1f} 0V{below}" stroke="{_COLOURS[1]}" stroke-dasharray="4 2"/>')
-    drawn.append(f'<text x="{left}" y="{below + 28}">{escape(label)}</text>')
-    return _svg(left + wide + 24, below + 32, "".join(drawn), label)
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
+    axes = _axes(label, _BAR * (len(known) + 2), known)
+    axes.set_xscale("log")
+    axes.plot([*known.values()], range(len(known)), "o", color=_COLOURS[0], markersize=5, gid="levels")
+    if isfinite(limit) and limit > 0:
+        axes.axvline(limit, color=_COLOURS[1], linestyle="--")
+    return inline(axes.figure, label)

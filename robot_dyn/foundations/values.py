@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import fields
 from functools import cached_property
 from math import prod
 from threading import RLock
@@ -18,27 +18,6 @@ Result = TypeVar("Result")
 Late = TypeVar("Late", bound="Derived")
 
 _MOST = 64  # values that a cache by identity holds
-
-NOT_STORED: Mapping[str, bool] = {"stored": False}
-"""Metadata of a field that files leave out."""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """How a file stores an array, stated in the type of its field: `Annotated[np.ndarray, Layout(("m", "n"))]`.
-
-    Attributes:
-        shape: A number; a letter, which stands for the same length in all arrays of a file; None for any length; or
-            several of these, each of which is allowed.
-        dtype: Of its entries.
-        finite: Whether nan and inf are refused unless the run diverged.
-        absent: Whether all of it may be nan: what a run of rollouts did not record.
-    """
-
-    shape: tuple[Any, ...]
-    dtype: str = "float64"
-    finite: bool = True
-    absent: bool = False
 
 
 class Value:

@@ -4,7 +4,6 @@ from robot_dyn.report.figure import PAGE as PAGE
 from robot_dyn.report.figure import Colours as Colours
 from robot_dyn.report.figure import ResultError as ResultError
 from robot_dyn.report.figure import ink as ink
-from robot_dyn.report.figure import inline as inline
 from robot_dyn.report.figure import key as key
 from robot_dyn.report.figure import legend as legend
 from robot_dyn.report.figure import sheet as sheet

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from robot_dyn.foundations.display import GRID, INK
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.view.plots.figure import THEMES, framed
 from robot_dyn.view.plots.sheet import headed
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import SubFigure
 
 _PART = 0.75  # of the width, on a page, which is narrower than paper
 _PAD = 0.08  # [inch] around axes and texts
 
 Colours = Mapping[str, Any]
 
-_INK = "#010203"  # stands for the colour of the text of a page
-PAGE: Colours = {"paper": "none", "ink": _INK, "grid": "#80808055", "veil": "#80808022"} | {
-    "lines": tuple(_INK if each == "#000000" else each for each in THEMES["light"]["lines"])
+PAGE: Colours = {"paper": "none", "ink": INK, "grid": GRID, "veil": "#80808022"} | {
+    "lines": tuple(INK if each == "#000000" else each for each in THEMES["light"]["lines"])
 }
 """Colours for light and dark pages, without paper."""
 
@@ -47,16 +45,6 @@ def sheet(width: float, height: float, sentence: str, caption: str, theme: str) 
         headed(figure, sentence, colours, fontsize=12, weight="bold")
         headed(body, caption, colours, fontsize=8.5)
     return body, colours
-
-
-def inline(figure: Figure) -> str:
-    """Return a figure in the colours of `PAGE` as SVG within a page of HTML, without the room around it."""
-    stream = io.StringIO()
-    figure.savefig(stream, format="svg", bbox_inches="tight", pad_inches=0.05, metadata={"Date": None})
-    svg = stream.getvalue()
-    svg = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
-    svg = re.sub(r'translate\([^)]*\)| (?:d|x|y)="[^"]*"', lambda at: re.sub(r"(\.\d\d)\d+", r"\1", at[0]), svg)
-    return re.sub(r"\s*\n\s*", "\n", svg.replace(_INK, "currentColor").replace("*{", ".robot-dyn svg *{"))
 
 
 def programs(environment: Mapping[str, str], *names: str) -> str:

@@ -53,7 +53,7 @@ class Result(Answer):
 
     @property
     def drawing(self) -> str:
-        from robot_dyn.report.figure import inline
+        from robot_dyn.foundations.display import inline
 
         try:
             return inline(drawn(self, "page")) if self.diagram else ""

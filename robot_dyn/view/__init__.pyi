@@ -6,7 +6,6 @@ from robot_dyn.view.geometry.visuals import drawing as drawing
 from robot_dyn.view.geometry.visuals import solids as solids
 from robot_dyn.view.page import Page as Page
 from robot_dyn.view.plots.figure import NEAR as NEAR
-from robot_dyn.view.plots.figure import drawable as drawable
 from robot_dyn.view.plots.figure import shortened as shortened
 from robot_dyn.view.plots.parts import PLOTS as PLOTS
 from robot_dyn.view.plots.parts import PlotError as PlotError

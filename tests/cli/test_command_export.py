@@ -47,7 +47,7 @@ def test_the_suffix_says_the_format(files: Path, suffix: str, package: str) -> N
         (["run.npz", "-o", "old.csv"], "old.csv: exists; add --force"),
         (["runs.npz", "-o", "x.mcap"], "end the name with .csv, .parquet, .nc"),
         (["none.npz", "-o", "x.csv"], "none.npz: there is no such file"),
-        (["old.csv", "-o", "x.csv"], "old.csv: is not a complete run file"),
+        (["old.csv", "-o", "x.csv"], "old.csv: cannot be read as a run file"),
         (["run.npz", "-o", "link.csv", "--force"], "is the same file as run.npz, which would be lost"),
     ],
 )

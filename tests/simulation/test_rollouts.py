@@ -286,7 +286,7 @@ def test_commands_say_what_a_file_of_rollouts_is(command: tuple[str, ...], tmp_p
     assert "is a file of rollouts" in text and "simulate again" not in text
     rd.save_run(rd.load_rollouts("runs.npz")[0], "run.npz")
     assert "written: " in said(command[0], "run.npz", *command[1:])
-    with pytest.raises(rd.RobotDynError, match=r"is a file of one run, not of rollouts; rd.load_run reads it"):
+    with pytest.raises(rd.RobotDynError, match=r"is a file of one run, not of rollouts: rd.load_run reads it"):
         rd.load_rollouts("run.npz")
 
 
@@ -303,11 +303,11 @@ def test_rollouts_are_saved_and_read(record: tuple[str, ...], tmp_path: Path) ->
     assert back.setup is None and [back.outcome(i) for i in range(4)] == [runs.outcome(i) for i in range(4)]
     assert back.about["urdf"] == runs.about["urdf"] and back.params["kp"][3, 0] == 3.0
     with pytest.raises(
-        rd.RobotDynError, match=r"is a file of rollouts, which are many runs; rd.load_rollouts reads it"
+        rd.RobotDynError, match=r"is a file of rollouts, which are many runs: rd.load_rollouts reads it"
     ):
         rd.load_run(path)
     path.write_bytes(path.read_bytes()[:-100])
-    with pytest.raises(rd.RobotDynError, match="is not a complete run file"):
+    with pytest.raises(rd.RobotDynError, match="cannot be read as a run file"):
         rd.load_rollouts(path)
     with pytest.raises(rd.RobotDynError, match=r"there is no such file; write one with rd\.save_rollouts"):
         rd.load_rollouts(tmp_path / "none.npz")

@@ -121,7 +121,7 @@ def test_bad_input_is_told_in_one_line(swing, tmp_path) -> None:
     half = tmp_path / "half.npz"
     half.write_bytes(file.read_bytes()[:2000])
     cases = {
-        (str(half),): "not a complete run file",
+        (str(half),): "cannot be read as a run file",
         (str(tmp_path / "none.npz"),): "there is no such file",
         (str(file), "--html", str(tmp_path / "no" / "out.html")): "there is no folder",
         (str(file), "--html", str(tmp_path)): "is a folder",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from robot_dyn.accuracy.certificate.certificate import DECIMALS, Certificate, Held
+from robot_dyn.foundations.display import drawable
 from robot_dyn.report.figure import Colours, ResultError, key, legend, sheet, styled
-from robot_dyn.view.plots.figure import drawable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 from robot_dyn.accuracy.costs.ab_comparison import ABComparison
 from robot_dyn.accuracy.costs.cost import Cost
 from robot_dyn.accuracy.costs.step_cost import EVERYTHING
+from robot_dyn.foundations.display import drawable
 from robot_dyn.queries.units import format_duration
 from robot_dyn.report.figure import Colours, ResultError, ink, programs, sheet, styled
-from robot_dyn.view.plots.figure import drawable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,7 +14,8 @@ from typing import Annotated, NamedTuple, final
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.foundations.values import Layout, Value, aligned, read_only
+from robot_dyn.foundations.store import Layout
+from robot_dyn.foundations.values import Value, aligned, read_only
 from robot_dyn.integrate.primitives import enclose
 from robot_dyn.simulation.observation.chatter import Chatter, Episode, chatters_of, close_all, tick
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level

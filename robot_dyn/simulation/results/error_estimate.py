@@ -10,8 +10,9 @@ from typing import Annotated, Any, final, overload
 
 import numpy as np
 
+from robot_dyn.foundations.store import Layout
 from robot_dyn.foundations.validate import times
-from robot_dyn.foundations.values import Layout, Value, read_only
+from robot_dyn.foundations.values import Value, read_only
 
 _SAME = 8 * np.finfo(float).eps  # of a time: samples of one time, computed in two ways
 

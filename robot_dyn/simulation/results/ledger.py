@@ -11,7 +11,8 @@ from typing import Annotated, final
 
 import numpy as np
 
-from robot_dyn.foundations.values import Layout, Value, read_only
+from robot_dyn.foundations.store import Layout
+from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 
 _OPEN = 1e-3  # a residual, as a part of the energy exchanged

@@ -13,7 +13,8 @@ from typing import Annotated, Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.values import Derived, Layout, read_only
+from robot_dyn.foundations.store import Layout
+from robot_dyn.foundations.values import Derived, read_only
 from robot_dyn.simulation.columns import Column, Variable, by_heading, data_frame, data_set
 from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.observation.remarks import Remark

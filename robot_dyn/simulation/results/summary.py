@@ -1,10 +1,9 @@
-"""A run as text and in a notebook: outcome, what acted, energy ledger, error, remarks, tracking, cost."""
+"""The summary of a run: outcome, what acted, energy ledger, error, remarks, tracking, cost."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.foundations.display import legend, page, plot, side_by_side, text
 from robot_dyn.foundations.errors import escaped
 from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.dynamics.event import Occurrence
@@ -15,7 +14,6 @@ from robot_dyn.simulation.results.run_data import RunData, TrajectoryData
 from robot_dyn.simulation.run.outcome import Ending
 
 _LISTED = 3  # events in a summary
-_MOST_JOINTS = 8  # of which curves are drawn
 _NOTICED = 0.01  # [s]: shorter times are left out
 
 
@@ -56,21 +54,6 @@ def summary(run: TrajectoryData) -> str:
         "time: " + ", ".join(f"{name} {spent:.2g} s" for name, spent in parts if spent >= _NOTICED or name == "run")
     )
     return "\n".join(map(escaped, lines))
-
-
-def trajectory_html(run: TrajectoryData) -> str:
-    """The summary and plots over time."""
-    joints = run.joint_names[:_MOST_JOINTS]
-    types = joint_types(run)
-    plots = [
-        plot(f"{name} [{joint_units(name, types)}]", run.t, dict(zip(joints, getattr(run, name).T, strict=False)))
-        for name in ("q", "v")
-    ]
-    if np.any(run.u):
-        plots.append(plot(f"u [{joint_units('tau', types)}]", run.t, dict(zip(joints, run.u.T, strict=False))))
-    more = len(run.joint_names) - len(joints)
-    note = f"curves of the first {len(joints)} joints; {more} more are not drawn" if more else ""
-    return page("Trajectory", text(run.summary), legend(joints), side_by_side(plots), text(note) if note else "")
 
 
 def of_tracking(run: RunData, of_frame: bool) -> str:

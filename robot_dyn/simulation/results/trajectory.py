@@ -8,11 +8,14 @@ from typing import Any, Protocol, final, runtime_checkable
 import numpy as np
 
 from robot_dyn.effects.causes import Causes
+from robot_dyn.foundations.display import MOST_JOINTS, curves, plot
 from robot_dyn.foundations.errors import QueryError, shown
+from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.columns import Column
 from robot_dyn.simulation.results.causes import causes_of
+from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.run_data import TrajectoryData
-from robot_dyn.simulation.results.summary import summary, trajectory_html
+from robot_dyn.simulation.results.summary import summary
 from robot_dyn.simulation.results.table import columns
 
 
@@ -106,4 +109,10 @@ class Trajectory(TrajectoryData):
         return columns(self)
 
     def _repr_html_(self) -> str:
-        return trajectory_html(self)
+        joints, types = self.joint_names[:MOST_JOINTS], joint_types(self)
+        quantities = {"q": "q", "v": "v"} | ({"u": "tau"} if np.any(self.u) else {})
+        plots = [
+            plot(f"{name} [{joint_units(of, types)}]", self.t, dict(zip(joints, getattr(self, name).T, strict=False)))
+            for name, of in quantities.items()
+        ]
+        return curves("Trajectory", self.summary, joints, plots, len(self.joint_names) - len(joints))

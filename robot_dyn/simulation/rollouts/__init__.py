@@ -4,6 +4,6 @@
 - batch: starts and values that differ from run to run; lock_step: 64 runs per tile in machine code; thresholds: where
   such runs would need cut steps; one_by_one: runs one after the other on each thread; pool: the threads.
 - rollouts_data: the fields of `Rollouts`; result: `Rollouts`; run: one of its runs as a `Trajectory`; overview:
-  remarks, tracking errors, causes of divergence; table, html: its table and its page.
+  remarks, tracking errors, causes of divergence; table: its table.
 - sweepable: the parameters that may differ from run to run; file: files of rollouts.
 """

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from robot_dyn.simulation.results.archive import ArchiveError
-from robot_dyn.simulation.results.run_file import MAX_BYTES, ROLLOUTS_FORMAT, Format, RunFileError, are_times
+from robot_dyn.foundations.files import file_path
+from robot_dyn.foundations.store import Found, StoredFormat, StoreError
+from robot_dyn.simulation.results.provenance import packed, unpacked
+from robot_dyn.simulation.results.run_file import ROLLOUTS_FORMAT, RUN, RunFileError, are_times, reader_of
 from robot_dyn.simulation.rollouts.result import Rollouts
 
 
@@ -22,44 +24,46 @@ def save_rollouts(runs: Rollouts, path: str | Path) -> Path:
     """
     if not isinstance(runs, Rollouts):
         raise RunFileError(f"save_rollouts takes the Rollouts of rd.rollouts, got {type(runs).__name__}")
-    return _ROLLOUTS.write(replace(runs, saved=runs.overview), path)
+    about = packed(runs.about, file_path(path, RunFileError).parent)
+    return _ROLLOUTS.save(replace(runs, about=about, saved=runs.overview), path)
 
 
-def load_rollouts(path: str | Path, *, max_bytes: int = MAX_BYTES) -> Rollouts:
-    """The rollouts of a file; `setup` is None.
-
-    Args:
-        path: Of the file.
-        max_bytes: The largest size of its arrays that is read.
+def load_rollouts(path: str | Path) -> Rollouts:
+    """Return the rollouts of a file; `setup` is None.
 
     Raises:
-        RunFileError: If it is missing, damaged, cut short, larger, of another format, or was changed.
+        RunFileError: If it is missing, damaged, cut short or of another format.
     """
-    return _ROLLOUTS.read(path, max_bytes)
+    runs = _ROLLOUTS.load(path)
+    return replace(runs, about=unpacked(runs.about, Path(path)))
 
 
-def _check(runs: Rollouts) -> None:
-    """That the arrays of rollouts fit together, and their numbers can be those of runs."""
+def _check(runs: Rollouts, found: Found) -> None:
+    """Raise a StoreError if the arrays of rollouts do not fit together, or cannot be those of runs."""
+    if found.lengths.get("n", len(runs.joint_names)) != len(runs.joint_names):
+        raise StoreError(f"arrays are of {found.lengths['n']} joints, 'joint_names' of {len(runs.joint_names)}")
     if not are_times(runs.t) or not len(runs.t):
-        raise ArchiveError("the times of member 't' are not finite, or do not grow")
+        raise StoreError("the times of member 't' are not finite, or do not grow")
     if not all(map(are_times, runs.ended[:, None])) or (runs.diverged & runs.stopped).any():
-        raise ArchiveError("members 'ended', 'diverged' and 'stopped' are not those of runs")
+        raise StoreError("members 'ended', 'diverged' and 'stopped' are not those of runs")
     numbered = (number for each in (() if runs.saved is None else runs.saved.remarks) for number in each.runs)
     if runs.observed is not None and len(runs.observed.levels) != runs.observed.limits.shape[1]:
-        raise ArchiveError("'observed/levels' are not those of member 'observed/limits'")
+        raise StoreError("'observed/levels' are not those of member 'observed/limits'")
     if not all(0 <= number < len(runs) for number in (*numbered, 0 if runs.saved is None else runs.saved.worst)):
-        raise ArchiveError(f"'saved' is about a run that is not one of the {len(runs)}")
+        raise StoreError(f"'saved' is about a run that is not one of the {len(runs)}")
     if len(runs.advice) != len(runs):
-        raise ArchiveError(f"'advice' is of {len(runs.advice)} runs, not of {len(runs)}")
+        raise StoreError(f"'advice' is of {len(runs.advice)} runs, not of {len(runs)}")
     if runs.work is not None and set(runs.work) != set(runs.sources):
-        raise ArchiveError("members 'work/…' and 'sources' have different names")
+        raise StoreError("members 'work/…' and 'sources' have different names")
     whole = ~(runs.diverged | runs.stopped)[:, None] & (
         (runs.t < runs.ended[:, None]) | (runs.ended >= runs.t[-1])[:, None]
     )
     for name in ("q", "v", "u", "kinetic", "potential"):
         array = getattr(runs, name)
         if array is not None and not np.isfinite(array[whole]).all():
-            raise ArchiveError(f"member {name!r} of a run that did not diverge holds nan or inf")
+            raise StoreError(f"member {name!r} of a run that did not diverge holds nan or inf")
 
 
-_ROLLOUTS = Format(ROLLOUTS_FORMAT, Rollouts, _check)
+_ROLLOUTS = StoredFormat(
+    ROLLOUTS_FORMAT, Rollouts, RUN, RunFileError, "write one with rd.save_rollouts", _check, reader_of
+)

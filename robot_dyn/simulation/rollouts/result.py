@@ -10,21 +10,24 @@ from typing import final, overload
 
 import numpy as np
 
+from robot_dyn.foundations.display import MOST_JOINTS, curves, page, plot, text
 from robot_dyn.foundations.errors import QueryError, escaped
+from robot_dyn.queries.units import unit
 from robot_dyn.simulation.columns import Column, Variable
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.observation.remarks import remark_lines as lines_of
-from robot_dyn.simulation.results.provenance import about_the_robot
+from robot_dyn.simulation.results.provenance import about_the_robot, joint_types
 from robot_dyn.simulation.results.run_data import taken
 from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.rollouts.html import rollouts_html
 from robot_dyn.simulation.rollouts.overview import of_some, overview
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 from robot_dyn.simulation.rollouts.run import trajectory
 from robot_dyn.simulation.rollouts.table import columns, samples
 
 _SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved", "numbers")  # by all runs
+_MOST_DRAWN = 2000  # runs whose quantiles a notebook shows
+_QUANTILES = {"least": 0.0, "median": 0.5, "largest": 1.0}
 
 
 @final
@@ -136,7 +139,18 @@ class Rollouts(RolloutsData):
         return samples(self)
 
     def _repr_html_(self) -> str:
-        return rollouts_html(self)
+        joints = self.joint_names[:MOST_JOINTS]
+        if self.q is None or not len(self):
+            return page("Rollouts", text(self.summary))
+        some = self.q[np.linspace(0, len(self) - 1, min(len(self), _MOST_DRAWN)).astype(int)]
+        plots = []
+        for i, (name, joint_type) in enumerate(zip(joints, joint_types(self), strict=False)):
+            with np.errstate(all="ignore"):
+                over_runs = np.nanquantile(some[:, :, i], list(_QUANTILES.values()), axis=0)
+            plots.append(
+                plot(f"{name} [{unit('q', joint_type)}]", self.t, dict(zip(_QUANTILES, over_runs, strict=True)))
+            )
+        return curves("Rollouts", self.summary, _QUANTILES, plots, len(self.joint_names) - len(joints))
 
     @property
     def summary(self) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Annotated, final
 
 import numpy as np
@@ -10,8 +10,9 @@ import numpy as np
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.store import NOT_STORED, Layout
 from robot_dyn.foundations.validate import integer
-from robot_dyn.foundations.values import NOT_STORED, Layout, Value, read_only
+from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.run_data import SAMPLED, RunData
@@ -55,13 +56,13 @@ class RolloutsData(RunData):
     evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
     sources: tuple[str, ...]
     params: dict[str, Annotated[np.ndarray, Layout(("B", None))]]
-    setup: Setup | None = field(default=None, metadata=NOT_STORED)
+    setup: Annotated[Setup | None, NOT_STORED] = None
     uncut: tuple[str, ...] = ()
     q0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
     v0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
     observed: Observed | None = None
     saved: Overview | None = None
-    numbers: np.ndarray | None = field(default=None, metadata=NOT_STORED)
+    numbers: Annotated[np.ndarray | None, NOT_STORED] = None
 
     def __len__(self) -> int:
         return len(self.ended)

@@ -9,9 +9,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import Answer, FileKind, html_of, page, side_by_side, text
+from robot_dyn.foundations import Answer, FileKind, html_of, inline, page, side_by_side, text
 from robot_dyn.foundations import table as html_table
-from robot_dyn.report import PAGE, ink, inline, styled
+from robot_dyn.report import PAGE, ink, styled
 from robot_dyn.tools.sweeps.estimate import Estimate
 from robot_dyn.tools.sweeps.folder.rows import FINISHED
 from robot_dyn.tools.sweeps.sensitivity import Sensitivity, bins

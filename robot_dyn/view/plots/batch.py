@@ -12,13 +12,14 @@ from typing import Any, final
 
 import numpy as np
 
+from robot_dyn.foundations.display import drawable
 from robot_dyn.foundations.errors import QueryError, nearest, shown
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import tracking_of
 from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.view.plots.figure import Style, drawable, named, scale
+from robot_dyn.view.plots.figure import Style, named, scale
 from robot_dyn.view.plots.parts import PlotError
 from robot_dyn.view.plots.sheet import Panel
 

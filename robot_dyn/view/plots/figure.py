@@ -11,6 +11,7 @@ from typing import Any, Protocol, final
 
 import numpy as np
 
+from robot_dyn.foundations.display import drawable
 from robot_dyn.view.rests import Rest
 from robot_dyn.view.series import extremes
 
@@ -251,14 +252,3 @@ def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def shortened(name: str, most: int) -> str:
     """A name cut in its middle: those of one robot differ at their ends."""
     return name if len(name) <= most else f"{name[: most // 2]}…{name[len(name) - (most - 1) // 2 :]}"
-
-
-def drawable(name: str) -> str:
-    """The text, of one or several lines, with what the font lacks spelled by its code point.
-
-    Otherwise all of it would be the same empty box.
-    """
-    from matplotlib.font_manager import FontProperties, findfont, get_font
-
-    font = get_font(findfont(FontProperties()))
-    return "".join(c if c == "\n" or font.get_char_index(ord(c)) else f"\\u{ord(c):04x}" for c in name)

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, final
 
-from robot_dyn.view.plots.figure import Axes, Style, drawable, shortened
+from robot_dyn.foundations.display import drawable
+from robot_dyn.view.plots.figure import Axes, Style, shortened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from robot_dyn.foundations import drawable
 from robot_dyn.queries import of_joint
 from robot_dyn.report import Colours, ResultError, ink, key, legend, sheet, styled
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget
-from robot_dyn.view import NEAR, drawable, shortened
+from robot_dyn.view import NEAR, shortened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

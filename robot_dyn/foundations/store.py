@@ -1,0 +1,264 @@
+"""Files of values: the arrays of a dataclass as .npz, all else as JSON by pydantic, read within bounds.
+
+The member `about` is the JSON: a format and the fields of the value. Each array is another member. Its field in the
+JSON contains the name of the member, which is the path of the field, for example `ledger/kinetic`.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import prod
+from os import SEEK_END
+from pathlib import Path
+from typing import Any, BinaryIO, Generic, TypeVar, final
+
+import numpy as np
+
+from robot_dyn.foundations.errors import RobotDynError, shorten
+from robot_dyn.foundations.files import FileKind, reading, save, target
+
+ABOUT = "about"
+_MOST = 20  # bytes of arrays for each byte of the file: zeros take 1000
+_COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+
+Stored = TypeVar("Stored")
+
+
+class StoreError(RobotDynError):
+    """A file that does not hold the arrays or the value that it should."""
+
+
+@final
+@dataclass
+class Found:
+    """What the fields of a value take from a file.
+
+    Attributes:
+        arrays: The arrays that no field has taken yet, by name.
+        lengths: Lengths of axes, by letter.
+        not_finite: Names of arrays that should be finite and hold nan or inf.
+    """
+
+    arrays: dict[str, np.ndarray]
+    lengths: dict[str, int] = field(default_factory=dict)
+    not_finite: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a file stores an array, stated in the type of its field: `Annotated[np.ndarray, Layout(("m", "n"))]`.
+
+    Attributes:
+        shape: A number; a letter, which stands for the same length in all arrays of a file; None for any length; or
+            several of these, each of which is allowed.
+        dtype: Of its entries.
+        finite: Whether nan and inf are refused unless the run diverged.
+        absent: Whether all of it may be nan: what a run of rollouts did not record.
+    """
+
+    shape: tuple[Any, ...]
+    dtype: str = "float64"
+    finite: bool = True
+    absent: bool = False
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        from pydantic_core.core_schema import with_info_plain_validator_function
+
+        return with_info_plain_validator_function(lambda name, info: self._taken(name, info.context))
+
+    def _taken(self, name: Any, found: Found) -> np.ndarray:
+        """Return the array of a name; ValueError if the file lacks it, or if it does not have this layout."""
+        if not isinstance(name, str) or name not in found.arrays:
+            raise ValueError("its array is missing")
+        x, lengths = found.arrays.pop(name), found.lengths
+        fits = x.ndim == len(self.shape) and x.dtype == self.dtype
+        if not fits or not all(_fits(*pair, lengths) for pair in zip(x.shape, self.shape, strict=True)):
+            shape = ", ".join(f"{each} = {lengths[each]}" if each in lengths else str(each) for each in self.shape)
+            raise ValueError(f"holds {x.dtype.name} {x.shape}, not {self.dtype} ({shape})")
+        if x.dtype == np.bool_ and x.view(np.uint8).max(initial=0) > 1:
+            raise ValueError("holds bytes that are not truth values")
+        if self.finite and not np.isfinite(x).all() and not (self.absent and np.isnan(x).all()):
+            found.not_finite.append(name)
+        return x
+
+
+def _fits(length: int, allowed: Any, lengths: dict[str, int]) -> bool:
+    if isinstance(allowed, tuple):
+        return any(_fits(length, each, lengths) for each in allowed)
+    if isinstance(allowed, str):
+        return lengths.setdefault(allowed, length) == length
+    return allowed in (None, length)
+
+
+@final
+class _NotStored:
+    """The mark of a field that files leave out, which has a default."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        from pydantic_core import core_schema
+
+        return core_schema.none_schema(serialization=core_schema.plain_serializer_function_ser_schema(lambda _: None))
+
+
+NOT_STORED = _NotStored()
+"""Metadata of the type of a field that is None in files: `Annotated[Setup | None, NOT_STORED]`."""
+
+
+@final
+@dataclass(frozen=True)
+class StoredFormat(Generic[Stored]):
+    """A format of files of values.
+
+    Attributes:
+        name: Name or number of the format, which changes with its form.
+        of: Type of the values, a dataclass whose arrays have a `Layout`.
+        kind: Kind of the files.
+        error: Type of the errors.
+        remedy: What to do where a file cannot be read.
+        check: Raises a StoreError if the parts of a value do not fit together.
+        other: Returns what reads a file of another format, from its JSON.
+    """
+
+    name: int | str
+    of: type[Stored]
+    kind: FileKind
+    error: type[RobotDynError]
+    remedy: str
+    check: Callable[[Stored, Found], None]
+    other: Callable[[Mapping[str, Any]], str]
+
+    @cached_property
+    def _adapter(self) -> Any:
+        from pydantic import ConfigDict, TypeAdapter
+
+        config = ConfigDict(strict=True, extra="forbid")
+        return TypeAdapter(list[self.of], config=config)  # pyright: ignore[reportInvalidTypeForm]
+
+    def save(self, value: Stored, path: str | Path) -> Path:
+        """Write a value, whole or not at all, after the checks of a reader.
+
+        Raises:
+            RobotDynError: Of type `error`, if it cannot be written.
+        """
+        path = target(path, self.kind, self.error)
+        arrays: dict[str, np.ndarray] = {}
+        try:
+            plain = _without_arrays(self._adapter.dump_python([value], warnings=False)[0], "", arrays)
+            arrays[ABOUT] = np.array(json.dumps({"format": self.name, "value": plain}))
+            self._value(dict(arrays))
+            return save(path, lambda stream: write_arrays(stream, arrays), self.error)
+        except (StoreError, TypeError, ValueError) as error:
+            raise self.error(f"{path}: cannot be written: {error}; {self.remedy}") from None
+
+    def load(self, path: str | Path) -> Stored:
+        """Return the value of a file.
+
+        Raises:
+            RobotDynError: Of type `error`, if the file is missing, damaged, cut short or of another format.
+        """
+        with reading(path, self.error, self.remedy) as stream:
+            try:
+                return self._value(read_arrays(stream))
+            except StoreError as error:
+                raise self.error(f"{path}: cannot be read as {self.kind.name}: {error}; {self.remedy}") from None
+
+    def _value(self, arrays: dict[str, np.ndarray]) -> Stored:
+        """Return the checked value of arrays; the array `about` contains the JSON."""
+        from pydantic import ValidationError
+
+        about = _about(arrays)
+        if about["format"] != self.name:
+            form = shorten(repr(about["format"]))
+            raise StoreError(f"it has format {form}, this version reads {self.name!r}; {self.other(about)}")
+        found = Found(arrays)
+        try:
+            value = self._adapter.validate_json(json.dumps([about.get("value")]), context=found)[0]
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            given = f"{first['msg']}, got {shorten(repr(first['input']))}"
+            cause = first.get("ctx", {}).get("error", given)  # a Layout states what its array holds
+            raise StoreError(f"{shorten('/'.join(map(str, first['loc'][1:])))!r}: {cause}") from None
+        if arrays:
+            raise StoreError(f"member {shorten(min(arrays))!r} is not known to this version")
+        self.check(value, found)
+        return value
+
+
+def _about(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Take the JSON of a file out of its arrays."""
+    from pydantic_core import from_json
+
+    text = arrays.pop(ABOUT, None)
+    if text is None or text.dtype.kind != "U" or text.shape:
+        raise StoreError(f"it has no text {ABOUT!r}")
+    try:
+        about = from_json(str(text))
+    except ValueError as error:
+        raise StoreError(f"{ABOUT!r} is not JSON ({error})") from None
+    if not isinstance(about, dict) or "format" not in about:
+        raise StoreError(f"{ABOUT!r} has no format")
+    return about
+
+
+def _without_arrays(value: Any, path: str, arrays: dict[str, np.ndarray]) -> Any:
+    """Return plain data for JSON, with the names of arrays in their place; put the arrays into `arrays`."""
+    if isinstance(value, np.ndarray):
+        arrays[path] = value
+        return path
+    if isinstance(value, dict):
+        return {key: _without_arrays(x, f"{path}/{key}" if path else str(key), arrays) for key, x in value.items()}
+    if isinstance(value, tuple | list):
+        return [_without_arrays(x, f"{path}/{k}", arrays) for k, x in enumerate(value)]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def write_arrays(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write arrays as .npz: compressed, unless a reader would take them for a bomb.
+
+    Raises:
+        StoreError: If a name cannot be that of a member.
+    """
+    if any("\0" in name for name in arrays):
+        raise StoreError("a name has a NUL; rename it")
+    ordered: dict[str, Any] = {name: np.asarray(x, order="C") for name, x in arrays.items()}
+    np.savez_compressed(stream, **ordered)
+    if sum(x.nbytes for x in ordered.values()) > _MOST / 2 * stream.tell():
+        stream.seek(0)
+        stream.truncate()
+        np.savez(stream, **ordered)
+
+
+def read_arrays(stream: BinaryIO, names: Iterable[str] | None = None) -> dict[str, np.ndarray]:
+    """Return arrays of a .npz file, all or those of some names; nothing is unpickled.
+
+    Raises:
+        StoreError: If the file is damaged, cut short, or holds anything else or far more than its size allows.
+    """
+    try:
+        most = _MOST * stream.seek(0, SEEK_END)
+        with zipfile.ZipFile(stream) as file:
+            members = {each.filename.removesuffix(".npy"): each for each in file.infolist()}
+            if (size := sum(each.file_size for each in members.values())) > most:
+                raise StoreError(f"it unpacks to {size / 2**20:.3g} MiB, more than {_MOST} times its size")
+            return {name: _array(file, name, members[name]) for name in names or members}
+    except StoreError:
+        raise
+    except MemoryError:
+        raise StoreError("it does not fit into memory") from None
+    except Exception as error:  # zipfile and zlib promise no types
+        raise StoreError(f"it is damaged or cut short ({type(error).__name__})") from None
+
+
+def _array(file: zipfile.ZipFile, name: str, member: zipfile.ZipInfo) -> np.ndarray:
+    """Return the array of a member, whose header and size must agree before anything is allocated."""
+    with file.open(member) as stream:
+        supported = member.compress_type in _COMPRESSIONS and np.lib.format.read_magic(stream) == (1, 0)
+        shape, _, dtype = np.lib.format.read_array_header_1_0(stream) if supported else ((), False, np.dtype(object))
+        if dtype.hasobject or stream.tell() + prod(shape) * dtype.itemsize != member.file_size:
+            raise StoreError(f"member {shorten(name)!r} is not an array of numbers or a text")
+    with file.open(member) as stream:
+        return np.lib.format.read_array(stream, allow_pickle=False)
