@@ -10,6 +10,7 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -61,9 +62,13 @@ def frames(program: Path | None, text: str, times: np.ndarray, size: tuple[int, 
     Raises:
         VideoError: If the browser does not start or show the page, or shows another time.
     """
-    api = playwright()
+    api, temporary = playwright(), TemporaryDirectory(prefix="robot_dyn-", ignore_cleanup_errors=True)
     try:
-        with api.sync_playwright() as driver, _launched(driver.chromium, program, api.Error) as browser:
+        with (
+            temporary as folder,
+            api.sync_playwright() as driver,
+            _launched(driver.chromium, program, folder, api.Error) as browser,
+        ):
             width, height = size
             scheme = "dark" if dark else "light"
             page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme, offline=True)
@@ -81,10 +86,11 @@ def frames(program: Path | None, text: str, times: np.ndarray, size: tuple[int, 
         raise VideoError(f"{program or 'the browser'}: {shorten(first)}; {told}") from None
 
 
-def _launched(chromium: Any, program: Path | None, error: type[Exception]) -> Any:
-    """The browser, at work."""
+def _launched(chromium: Any, program: Path | None, folder: str, error: type[Exception]) -> Any:
+    """The browser, at work, with a folder for its temporary files."""
     sandbox = not hasattr(os, "geteuid") or os.geteuid() != 0  # with one, browsers do not start for root
-    options = {"args": _FLAGS, "chromium_sandbox": sandbox, "timeout": _PATIENCE_MS}
+    environment = os.environ | {"TMPDIR": folder}
+    options = {"args": _FLAGS, "chromium_sandbox": sandbox, "timeout": _PATIENCE_MS, "env": environment}
     if program is not None:
         return chromium.launch(executable_path=program, **options)
     for channel in _CHANNELS:
