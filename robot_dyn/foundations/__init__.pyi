@@ -20,7 +20,6 @@ from robot_dyn.foundations.coefficients import with_values as with_values
 from robot_dyn.foundations.display import drawable as drawable
 from robot_dyn.foundations.display import inline as inline
 from robot_dyn.foundations.display import legend as legend
-from robot_dyn.foundations.display import levels as levels
 from robot_dyn.foundations.display import page as page
 from robot_dyn.foundations.display import plot as plot
 from robot_dyn.foundations.display import side_by_side as side_by_side

@@ -91,7 +91,7 @@ class Page:
 
         An installed Chrome, Chromium or Edge draws it, without a window, a network or an open port; WebGL runs on the
         processor. Number, times and states of the frames are those of the page; pixels depend on the browser. An
-        existing video of that name is replaced. An .mp4 needs `pip install 'robot-dyn[video]'`.
+        existing video of that name is replaced. It needs `pip install 'robot-dyn[video]'`.
 
         Args:
             path: The file.
@@ -99,12 +99,12 @@ class Page:
             size: Width and height in pixels, even numbers from 160 to 3840.
             dark: Whether it is drawn for dark screens.
             browser: Path of the browser; the first of this machine if not given.
-            on_progress: Called with the part that is done, from 0 to 1, and with what is being done.
+            on_progress: Called with the part that is done, from 0 to 1, and with what is being done, in another thread.
 
         Raises:
             VideoError: If the page has no run, the video is too long, no browser is installed or shows the page, or
                 the file cannot be written.
-            MissingExtraError: If imageio-ffmpeg is not installed.
+            MissingExtraError: If playwright or imageio-ffmpeg is not installed.
         """
         from robot_dyn.view.video.video import save_video  # starts no browser
 

@@ -18,7 +18,7 @@ from PIL import Image
 import robot_dyn as rd
 from robot_dyn.foundations import VideoError
 from robot_dyn.view.video import encoders
-from robot_dyn.view.video.frames import frame_times
+from robot_dyn.view.video.video import frame_times
 from tests.browser import chromium, opened
 from tests.command import run, said
 from tests.long import long
@@ -71,6 +71,7 @@ def _assert_the_same(frames: list[np.ndarray], seen: list[np.ndarray]) -> None:
 def test_each_frame_of_an_mp4_is_the_page_at_its_time(
     motion: rd.Trajectory, seen: list[np.ndarray], tmp_path: Path
 ) -> None:
+    """From a thread with a running event loop, that of `seen`, as in a notebook."""
     import imageio_ffmpeg
 
     parts = []
@@ -118,9 +119,9 @@ def test_no_error_adds_up_in_the_times_of_a_gif(tmp_path: Path, fps: int) -> Non
     pictures = []
     for k in range(60):
         stream = io.BytesIO()
-        Image.new("RGB", (8, 6), "black" if k % 2 else "white").save(stream, "PNG")
+        Image.new("RGB", (16, 12), "black" if k % 2 else "white").save(stream, "PNG")
         pictures.append(stream.getvalue())
-    encoders.gif(pictures, tmp_path / "x.gif", fps)
+    encoders.encode(pictures, tmp_path / "x.gif", (16, 12), fps)
     with Image.open(tmp_path / "x.gif") as shown:
         begins = [0.0]
         for k in range(frames_of(shown)):

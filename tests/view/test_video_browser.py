@@ -6,32 +6,35 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
 import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import VideoError
-from robot_dyn.view.video import browser as driven
-from robot_dyn.view.video import installed
+from robot_dyn.view.video import browser
 from tests.browser import chromium
 from tests.command import AT_WORK, interrupted_at_work, started
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="processes are read from /proc")
 
-# Says that it is at work when two frames are drawn, and draws no more until it is ended.
+# Says that it is at work when two frames are drawn; the third is drawn again and again until it is ended.
 WATCHED = """
 import time
 from robot_dyn.view.video import video
 whole = video.frames
-def frames(tab, times):
-    for k, picture in enumerate(whole(tab, times)):
+def frames(*given):
+    for k, picture in enumerate(whole(*given)):
+        yield picture
         if k == 2:
             tell()
-            time.sleep(60)
-        yield picture
+            for _ in range(600):
+                time.sleep(0.1)
+                yield picture
 video.frames = frames
 """
 
@@ -99,31 +102,31 @@ def test_the_browser_listens_nowhere_and_ends_with_a_program_that_is_killed(run_
         assert gone(temporary)
 
 
+def filmed(program: Path | None) -> None:
+    """A page without a run."""
+    list(browser.frames(program, "<p>", np.zeros(1), (320, 240), False))
+
+
 def test_without_a_browser_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(installed, "_APPLICATIONS", ())
-    with pytest.raises(VideoError, match=r"Chrome, Chromium or Edge, and none is installed: .* install .*chrom"):
-        installed.installed()
+    monkeypatch.setattr(browser, "_CHANNELS", ())
+    with ThreadPoolExecutor(1) as pool, pytest.raises(VideoError, match=r"and none is installed: .* install .*chrom"):
+        pool.submit(filmed, browser.installed()).result()
 
 
 @pytest.mark.parametrize(
-    ("script", "patience", "message"),
-    [
-        ("echo no display >&2; exit 1", 20.0, "the browser has ended; it said: no display"),
-        ("sleep 60", 0.5, "the browser has not answered for 0.5 s"),
-        (r"""printf '{"id": 1, "error": {"message": "too old"}}\0' >&4; sleep 60""", 20.0, "refuses Target.*: too old"),
-    ],
+    ("script", "patience_ms", "message"),
+    [("echo no display >&2; exit 1", 20e3, "has been closed; it said: no display"), ("sleep 60", 500.0, "500ms")],
 )
 def test_a_program_that_is_no_browser_is_named_and_ended(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, script: str, patience: float, message: str
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, script: str, patience_ms: float, message: str
 ) -> None:
     program = tmp_path / "chrome"
     program.write_text(f"#!/bin/sh\n{script}\n")
     program.chmod(0o700)
-    monkeypatch.setattr(driven, "_PATIENCE_S", patience)
-    monkeypatch.setattr(driven, "_END_S", 0.2)
-    with pytest.raises(VideoError, match=f"{program}: .*{message}"), driven.browser(program):
-        pass
+    monkeypatch.setattr(browser, "_PATIENCE_MS", patience_ms)
+    with ThreadPoolExecutor(1) as pool, pytest.raises(VideoError, match=f"{program}: .*{message}"):
+        pool.submit(filmed, program).result()
     with suppress(FileNotFoundError):
         assert not [each for each in Path("/proc").glob("[0-9]*") if str(program).encode() in _command(each)]
 

@@ -19,9 +19,9 @@ from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import tracking_of
 from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.view.plots.figure import Style, named, scale
+from robot_dyn.view.plots.figure import Axes, Style, named, scale
 from robot_dyn.view.plots.parts import PlotError
-from robot_dyn.view.plots.sheet import Panel
+from robot_dyn.view.plots.sheet import Panel, in_rows
 
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 _MOST_LINES = 100  # of runs that diverged
@@ -48,16 +48,12 @@ class BatchView:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Fan:
+class Fan(Axes):
     """Quantiles `bands` (levels, m) over t (m,), and `lost` (k, m), runs that diverged: lines up to a cross."""
 
-    title: str
-    y: str
     t: np.ndarray
     bands: np.ndarray
     lost: np.ndarray
-    x: str = "t [s]"
-    note: str = ""
 
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """Draw them; what diverged leaves the scale of the others."""
@@ -82,21 +78,17 @@ class Fan:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Bars:
+class Bars(Axes):
     """Counts between `edges`; `lost` of what diverged, beside them. Without edges each count has a name."""
 
-    title: str
-    x: str
     counts: np.ndarray
     edges: np.ndarray | None = None
     names: tuple[str, ...] = ()
     lost: int = 0
-    y: str = "runs [1]"
-    note: str = ""
 
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """Draw bars, with the count where they have names, and of what diverged."""
-        colours = style.colours["lines"]
+        colours, paper = style.colours["lines"], style.colours["paper"]
         named(axes, self, style)
         if self.edges is None:
             at, wide = np.arange(len(self.counts)), np.full(len(self.counts), 0.6)
@@ -105,35 +97,25 @@ class Bars:
         else:
             at, wide = (self.edges[1:] + self.edges[:-1]) / 2, np.diff(self.edges)
         hues = [colours[_LOST if name == Ending.DIVERGED.value else 0] for name in self.names] or colours[0]
-        axes.bar(at, self.counts, wide, color=hues, edgecolor=style.colours["paper"], linewidth=0.5, label="_counts")
-        told = list(zip(at, self.counts, strict=True)) if self.edges is None else []
-        if self.lost and self.edges is not None:
+        bars = axes.bar(at, self.counts, wide, color=hues, edgecolor=paper, linewidth=0.5, label="_counts")
+        if self.edges is None:
+            axes.bar_label(bars, padding=1, fontsize=style.small - 0.5, **style.ink)
+        elif self.lost:
             width = self.edges[-1] - self.edges[0]
-            beyond = self.edges[-1] + 0.12 * width
-            bar = {"color": colours[_LOST], "hatch": "///", "edgecolor": style.colours["paper"]}
-            axes.bar([beyond], [self.lost], 0.08 * width, label="_diverged", **bar)
-            told.append((beyond, self.lost))
-        for place, count in told:
-            words = f"{count}" if self.edges is None else f"{count} diverged"
-            axes.annotate(
-                words, (place, count), (0, 1), textcoords="offset points", ha="center", va="bottom",
-                fontsize=style.small - 0.5, **style.ink,
-            )  # fmt: skip
+            look = {"color": colours[_LOST], "hatch": "///", "edgecolor": paper, "label": "_diverged"}
+            beyond = axes.bar([self.edges[-1] + 0.12 * width], [self.lost], 0.08 * width, **look)
+            axes.bar_label(beyond, [f"{self.lost} diverged"], padding=1, fontsize=style.small - 0.5, **style.ink)
         axes.set_ylim(0, 1.18 * max(1, *self.counts, self.lost))
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Points:
+class Points(Axes):
     """y over x of each run; those that diverged are crosses at the upper edge, whatever their y."""
 
-    title: str
-    x: str
-    y: str
     at: np.ndarray
     values: np.ndarray
     lost: np.ndarray
-    note: str = ""
 
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """Draw them."""
@@ -195,7 +177,13 @@ def outcomes(view: BatchView) -> list[Panel]:
         ("stopped", runs.stopped),
     )
     counts = {name: int(some.sum()) for name, some in kinds if some.any()}
-    return [Panel("Outcomes", ((Bars("", "outcome", np.array(list(counts.values())), names=tuple(counts)),),), 30.0)]
+    return [
+        Panel(
+            "Outcomes",
+            ((Bars("", "outcome", "runs [1]", np.array(list(counts.values())), names=tuple(counts)),),),
+            30.0,
+        )
+    ]
 
 
 def histogram(view: BatchView) -> list[Panel]:
@@ -205,7 +193,7 @@ def histogram(view: BatchView) -> list[Panel]:
     if not some.any():
         raise PlotError(f"no run that did not diverge has a {name}")
     counts, edges = np.histogram(values[some], bins=min(30, max(5, int(np.sqrt(some.sum()) * 1.5))))
-    bars = Bars(_title(view, some), name, counts, edges, lost=int(view.runs.diverged.sum()))
+    bars = Bars(_title(view, some), name, "runs [1]", counts, edges, lost=int(view.runs.diverged.sum()))
     return [Panel(f"Histogram of {name}", ((bars,),), 34.0)]
 
 
@@ -239,9 +227,8 @@ def _fans(view: BatchView, what: str, names: list[tuple[str, str]], values: np.n
         bands = np.full((len(LEVELS), values.shape[1]), np.nan)
         if known.any():
             bands[:, known] = np.nanquantile(held[:, known], LEVELS, axis=0)
-        cells.append(Fan(name, y, view.runs.t, bands, values[gone, :, k]))
-    across = min(len(cells), int(view.width / _CELL_MM))
-    rows = tuple(tuple(cells[k : k + across]) for k in range(0, len(cells), across))
+        cells.append(Fan(name, "t [s]", y, view.runs.t, bands, values[gone, :, k]))
+    rows = in_rows(cells, int(view.width / _CELL_MM))
     early = int(((view.runs.ended < view.runs.t[-1]) & ~gone).sum())
     counted = f"; {early} ended early, bands are of those still running" if early else ""
     many = f", {_MOST_LINES} of them drawn" if gone.sum() > _MOST_LINES else ""

@@ -6,14 +6,14 @@ Nothing global is set: no pyplot, no rcParams, so that figures can be drawn in a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Protocol, final
+from dataclasses import dataclass, field, replace
+from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.foundations.display import drawable
 from robot_dyn.view.rests import Rest
-from robot_dyn.view.series import extremes
+from robot_dyn.view.series import thinned
 
 _WILD = 1e3  # times its usual size: what grew beyond it while a run diverged needs a logarithm
 NEAR = 0.2  # of its effort limit: a torque that stays below is drawn without it
@@ -74,57 +74,75 @@ class Curve:
     style: tuple[int, int] = (0, 0)
 
 
-class Axes(Protocol):
-    """What stands on one pair of axes."""
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """What stands on one pair of axes.
 
-    @property
-    def title(self) -> str:
-        """Text above them."""
-        ...
-
-    @property
-    def note(self) -> str:
-        """Small text beside the title."""
-        ...
-
-    @property
-    def x(self) -> str:
-        """Name of the horizontal axis, with its unit."""
-        ...
-
-    @property
-    def y(self) -> str:
-        """Name of the vertical axis, with its unit."""
-        ...
-
-    def fill(self, axes: Any, style: Style, diverged: bool) -> None:
-        """Draw on axes of Matplotlib; `diverged` says that values may have grown without bound."""
-
-
-@final
-@dataclass(frozen=True)
-class Cell:
-    """One pair of axes; `limit` is drawn at ±limit, `marks` as dotted lines, what lies after `until` is veiled.
-
-    `rests` are shaded, those at a stop in colour.
-
-    Without `x` it is that of the row below.
+    Attributes:
+        title: Text above them.
+        x, y: Names of the axes, with their units; without `x` it is that of the row below.
+        note: Small text beside the title.
     """
 
     title: str
     x: str
     y: str
+    note: str = field(default="", kw_only=True)
+
+    def fill(self, axes: Any, style: Style, diverged: bool) -> None:
+        """Draw on axes of Matplotlib; `diverged` says that values may have grown without bound."""
+        raise NotImplementedError
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Cell(Axes):
+    """Curves; `limit` is drawn at ±limit, `marks` as dotted lines, what lies after `until` is veiled.
+
+    `rests` are shaded, those at a stop in colour.
+    """
+
     curves: tuple[Curve, ...]
     log: bool = False
     limit: float = np.inf
     until: float = np.inf
-    note: str = ""
     marks: tuple[float, ...] = ()
     rests: tuple[Rest, ...] = ()
 
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """The curves, limits and scales."""
-        _fill(axes, self, style, diverged)
+        theme, colours = style.colours, style.colours["lines"]
+        named(axes, self, style)
+        curves = [replace(curve, x=_shown(curve.x), y=_shown(curve.y)) for curve in self.curves]
+        log = self.log and any(np.any(curve.y > 0) for curve in curves)  # of zeros alone there is no logarithm
+        for curve in curves:
+            x, y = curve.x, np.where(curve.y > 0, curve.y, np.nan) if log else curve.y
+            at, (hue, dash) = _thinned(x, y), curve.style
+            shape = (
+                {"marker": "o", "markersize": 3.5}
+                if np.isfinite(y).sum() == 1
+                else {"linestyle": _DASHES[dash % len(_DASHES)]}
+            )
+            drawn = {"color": colours[hue % len(colours)], "linewidth": style.line, "rasterized": len(at) > 20_000}
+            axes.plot(x[at], y[at], label=drawable(shortened(curve.label, 30)), **drawn | shape)
+        for level in (-self.limit, self.limit) if np.isfinite(self.limit) else ():
+            axes.axhline(level, label="_limit", color=theme["ink"], alpha=0.7, linestyle=_DASHES[3], linewidth=0.6)
+        axes.vlines(
+            self.marks[:_MOST_MARKS], 0, 1, transform=axes.get_xaxis_transform(), color=theme["ink"], linewidth=0.6,
+            linestyle=":", label="_events",
+        )  # fmt: skip
+        for each in self.rests:
+            shade = {"color": colours[_STOP], "alpha": 0.25} if each.at_stop else {"color": theme["grid"]}
+            axes.axvspan(each.start, each.end, linewidth=0, zorder=0.5, label="_rest", **shade)
+        if np.isfinite(self.until):
+            axes.axvspan(self.until, curves[0].x[-1], color=theme["veil"], zorder=0.5, label="_not resolved")
+        scale(axes, "y", np.concatenate([curve.y for curve in curves]), self.limit, diverged, log)
+        begin, end = curves[0].x[[0, -1]]
+        if self.x.startswith("q"):
+            scale(axes, "x", curves[0].x, np.inf, diverged, False)
+        else:
+            scale(axes, "x", np.array([begin, end]), np.inf, False, False)
+            axes.set_xlim(begin, end if end > begin else begin + 1)
 
 
 def named(axes: Any, cell: Axes, style: Style) -> None:
@@ -133,41 +151,6 @@ def named(axes: Any, cell: Axes, style: Style) -> None:
     axes.tick_params(labelbottom=bool(cell.x), length=2, pad=2)
     axes.set_xlabel(drawable(cell.x), labelpad=1, fontsize=style.small, **style.ink)
     axes.set_ylabel(drawable(cell.y), fontsize=style.small, **style.ink)
-
-
-def _fill(axes: Any, cell: Cell, style: Style, diverged: bool) -> None:
-    theme, colours = style.colours, style.colours["lines"]
-    named(axes, cell, style)
-    curves = [replace(curve, x=_shown(curve.x), y=_shown(curve.y)) for curve in cell.curves]
-    log = cell.log and any(np.any(curve.y > 0) for curve in curves)  # of zeros alone there is no logarithm
-    for curve in curves:
-        x, y = curve.x, np.where(curve.y > 0, curve.y, np.nan) if log else curve.y
-        at, (hue, dash) = _thinned(x, y), curve.style
-        shape = (
-            {"marker": "o", "markersize": 3.5}
-            if np.isfinite(y).sum() == 1
-            else {"linestyle": _DASHES[dash % len(_DASHES)]}
-        )
-        drawn = {"color": colours[hue % len(colours)], "linewidth": style.line, "rasterized": len(at) > 20_000}
-        axes.plot(x[at], y[at], label=drawable(shortened(curve.label, 30)), **drawn | shape)
-    for level in (-cell.limit, cell.limit) if np.isfinite(cell.limit) else ():
-        axes.axhline(level, label="_limit", color=theme["ink"], alpha=0.7, linestyle=_DASHES[3], linewidth=0.6)
-    axes.vlines(
-        cell.marks[:_MOST_MARKS], 0, 1, transform=axes.get_xaxis_transform(), color=theme["ink"], linewidth=0.6,
-        linestyle=":", label="_events",
-    )  # fmt: skip
-    for each in cell.rests:
-        shade = {"color": colours[_STOP], "alpha": 0.25} if each.at_stop else {"color": theme["grid"]}
-        axes.axvspan(each.start, each.end, linewidth=0, zorder=0.5, label="_rest", **shade)
-    if np.isfinite(cell.until):
-        axes.axvspan(cell.until, curves[0].x[-1], color=theme["veil"], zorder=0.5, label="_not resolved")
-    scale(axes, "y", np.concatenate([curve.y for curve in curves]), cell.limit, diverged, log)
-    begin, end = curves[0].x[[0, -1]]
-    if cell.x.startswith("q"):
-        scale(axes, "x", curves[0].x, np.inf, diverged, False)
-    else:
-        scale(axes, "x", np.array([begin, end]), np.inf, False, False)
-        axes.set_xlim(begin, end if end > begin else begin + 1)
 
 
 def framed(axes: Any, theme: Mapping[str, Any], size: float) -> None:
@@ -233,12 +216,8 @@ def _tick(x: float, small: bool) -> str:
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Which samples to draw of a long run: of each pixel's the least and the largest, so no peak is lost."""
-    every = np.arange(len(y))
-    if len(y) <= 4 * _PIXELS:
-        return every
-    if np.all(x[1:] >= x[:-1]):
-        column = ((x - x[0]) * (_PIXELS / (x[-1] - x[0] or 1.0))).astype(int)
-        return extremes(y[:, None], np.flatnonzero(np.diff(column, prepend=-1, append=-1)))
+    if len(y) <= 4 * _PIXELS or np.all(x[1:] >= x[:-1]):
+        return thinned(y[:, None], _PIXELS)
     moved = np.zeros(len(y), dtype=bool)
     for z in (x, y):
         size = np.abs(z[np.isfinite(z) & (z != 0)])
@@ -246,7 +225,7 @@ def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
             pixel = min(size.max(), _WILD * np.quantile(size, 0.25, method="lower")) / _PIXELS
             moved |= np.diff(np.round(z / pixel), prepend=np.nan) != 0
     moved[[0, -1]] = True
-    return every[moved]
+    return np.flatnonzero(moved)
 
 
 def shortened(name: str, most: int) -> str:

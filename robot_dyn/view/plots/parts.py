@@ -17,7 +17,7 @@ from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.run_data import TrajectoryData
 from robot_dyn.view.plots.figure import DESIRED, NEAR, Cell, Curve
-from robot_dyn.view.plots.sheet import Panel
+from robot_dyn.view.plots.sheet import Panel, in_rows
 from robot_dyn.view.rests import Rest, rests
 
 _CELL_MM, _WIDE_MM = 36.0, 60.0  # the least width of a cell, and of one with a legend
@@ -88,8 +88,7 @@ def overview(view: View) -> list[Panel]:
     lower += [_growth(view, run.error)] if run.error is not None and len(run.error.t) > 1 else []
     lower = [replace(cell, x="t [s]", y=cell.y[cell.y.index("[") :]) for cell in lower]  # titles name the quantity
     across = max(1, min(2, int(view.width / _WIDE_MM)))
-    grid = tuple(tuple(lower[k : k + across]) for k in range(0, len(lower), across))
-    return [*panels, Panel("", grid, _LOW_MM)] if grid else panels
+    return [*panels, Panel("", in_rows(lower, across), _LOW_MM)] if lower else panels
 
 
 def joints(view: View) -> list[Panel]:
@@ -97,7 +96,7 @@ def joints(view: View) -> list[Panel]:
     held = rests(view.run)
     q = [_position(view, i, "", held[i]) for i in view.joints]
     v = [_velocity(view, i, "t [s]", held[i]) for i in view.joints]
-    pairs = zip(_grid(view, q), _grid(view, v), strict=True)
+    pairs = zip(in_rows(q, view.columns), in_rows(v, view.columns), strict=True)
     heading = f"Joint positions and velocities{_legend(view, held)}{_limits(view, v=view.speeds)}"
     return [Panel(heading, tuple(row for pair in pairs for row in pair), _HIGH_MM, shared=True)]
 
@@ -111,7 +110,7 @@ def torques(view: View) -> list[Panel]:
     if np.isnan(view.run.u).all():
         raise PlotError("the torques of the run were not recorded; add u to record of rollouts")
     cells = [replace(_torque(view, i, "t [s]"), title=view.run.joint_names[i]) for i in view.joints]
-    return [Panel(f"Actuation{_limits(view, u=view.efforts)}", _grid(view, cells), _HIGH_MM)]
+    return [Panel(f"Actuation{_limits(view, u=view.efforts)}", in_rows(cells, view.columns), _HIGH_MM)]
 
 
 def energy(view: View) -> list[Panel]:
@@ -150,7 +149,7 @@ def tracking(view: View) -> list[Panel]:
     off = run.deviation[:, columns]
     rms = {unit: _rms(off[:, [each == unit for each in units]]) for unit in dict.fromkeys(units)}
     heading = "Tracking error, rms " + ", ".join(f"{x:.2e} {unit}" for unit, x in rms.items())
-    return [Panel(heading, _grid(view, cells), _HIGH_MM)]
+    return [Panel(heading, in_rows(cells, view.columns), _HIGH_MM)]
 
 
 def phase(view: View) -> list[Panel]:
@@ -160,7 +159,7 @@ def phase(view: View) -> list[Panel]:
         path = Curve("path", run.q[:, i], run.v[:, i])
         start = Curve("start", run.q[:1, i], run.v[:1, i], (1, 0))
         cells.append(Cell(name, f"q [{view.unit('q', i)}]", f"v [{view.unit('v', i)}]", (path, start)))
-    return [Panel("Phase portrait", _grid(view, cells), 40.0, shared=True)]
+    return [Panel("Phase portrait", in_rows(cells, view.columns), 40.0, shared=True)]
 
 
 def error_growth(view: View) -> list[Panel]:
@@ -260,9 +259,3 @@ def _limits(view: View, **limits: np.ndarray) -> str:
 def _rms(z: np.ndarray) -> float:
     known = z[np.isfinite(z)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
-
-
-def _grid(view: View, cells: list[Cell]) -> tuple[tuple[Cell, ...], ...]:
-    n, most = len(cells), view.columns
-    wide = n if n <= most else -(-n // -(-n // most))
-    return tuple(tuple(cells[i : i + wide]) for i in range(0, n, wide))

@@ -43,6 +43,12 @@ class Panel:
         return _HEADING + sum(_TITLE + height + _NUMBERS * bool(row[0].x) for row in self.rows)
 
 
+def in_rows(cells: Sequence[Axes], most: int) -> tuple[tuple[Axes, ...], ...]:
+    """The cells in rows of the same length, but the last, of so many at most."""
+    across = -(-len(cells) // -(-len(cells) // most))
+    return tuple(tuple(cells[k : k + across]) for k in range(0, len(cells), across))
+
+
 def draw(
     panels: list[Panel], opening: str, remarks: Sequence[str], style: Style, width: float, diverged: bool
 ) -> Figure:

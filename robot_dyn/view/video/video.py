@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from math import floor
 from pathlib import Path
 from shutil import copyfileobj
 from tempfile import TemporaryDirectory
+from threading import Event
 
 import numpy as np
 
@@ -13,14 +17,13 @@ from robot_dyn.foundations.errors import VideoError
 from robot_dyn.foundations.files import FileKind, save, target
 from robot_dyn.foundations.validate import function, integer, truth
 from robot_dyn.view.video import encoders
-from robot_dyn.view.video.browser import browser
-from robot_dyn.view.video.frames import frame_times, frames, load
-from robot_dyn.view.video.installed import installed
+from robot_dyn.view.video.browser import frames, installed, playwright
 
 KINDS = FileKind("an MP4 video", ".mp4", b"\0\0\0"), FileKind("a GIF", ".gif", b"GIF8")
 _FPS, _MOST_FPS = {".mp4": 60, ".gif": 25}, {".mp4": 240, ".gif": 50}  # browsers slow down GIFs of more
 _MOST_FRAMES = 20_000
-_MOST_PIXELS = 5 * 10**8  # of a GIF, whose frames are held in memory
+_ROUNDING = 1e-9  # of a frame: T fps is a whole number up to this
+_MOST_PIXELS = 5 * 10**8  # of a GIF, whose frames are held in memory, with 4.5 bytes for each
 _LEAST_SIZE, _MOST_SIZE = 160, 3840
 
 
@@ -41,19 +44,28 @@ def save_video(
     size, dark = _checked_size(size), truth("dark", dark, error=VideoError)
     function("on_progress", on_progress, "a part and a text", error=VideoError)
     times = _checked_times(duration_s, rate, kind, size)
-    if kind == ".mp4":
-        encoders.ffmpeg()  # raises before the work
+    found, stop = installed(program), Event()
+    playwright(), encoders.ffmpeg()  # raise before the work
     with TemporaryDirectory(prefix="robot_dyn-") as folder:
         video = Path(folder) / f"video{kind}"
-        with browser(installed(program)) as tab:
-            load(tab, text, size, dark)
-            pictures = _reported(frames(tab, times), len(times), on_progress)
-            if kind == ".mp4":
-                encoders.mp4(pictures, video, size, rate)
-            else:
-                encoders.gif(pictures, video, rate)
+
+        def film() -> None:
+            with closing(frames(found, text, times, size, dark)) as pictures:
+                encoders.encode(_reported(pictures, len(times), on_progress, stop), video, size, rate)
+
+        with ThreadPoolExecutor(1) as pool:  # Playwright refuses threads with a running event loop, as notebooks have
+            try:
+                pool.submit(film).result()
+            finally:
+                stop.set()  # Ctrl-C comes to this thread
         with video.open("rb") as content:
             return save(file, lambda stream: copyfileobj(content, stream), VideoError)
+
+
+def frame_times(duration_s: float, fps: int) -> np.ndarray:
+    """Times of the frames, in [s]; the last is at most the duration."""
+    count = floor(duration_s * fps + _ROUNDING) + 1
+    return np.minimum(np.arange(count) / fps, duration_s)
 
 
 def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
@@ -88,9 +100,11 @@ def _checked_times(duration_s: float, fps: int, kind: str, size: tuple[int, int]
 
 
 def _reported(
-    pictures: Iterable[bytes], count: int, on_progress: Callable[[float, str], object] | None
+    pictures: Iterable[bytes], count: int, on_progress: Callable[[float, str], object] | None, stop: Event
 ) -> Iterator[bytes]:
     for k, picture in enumerate(pictures):
+        if stop.is_set():
+            return
         yield picture
         if on_progress is not None:
             on_progress((k + 1) / count, "drawing frames")
