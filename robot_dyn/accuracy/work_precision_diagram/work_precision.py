@@ -239,9 +239,9 @@ def work_precision(
         others, refused = found(setup) if peers else ([], [])
     place = len(integrators)  # programs in machine code come before what is interpreted, which takes longest
     candidates[place:place] = others
-    step_log, interrupted = measure(candidates, exact, budget, repeats)
-    ladders = tuple(each.ladder(exact.error) for each in step_log if each.rungs)
-    left_out += unable + refused + [f"{each.name}: {each.ended}" for each in step_log if not each.rungs]
+    walks, interrupted = measure(candidates, exact, budget, repeats)
+    ladders = tuple(walk.ladder(exact.error) for walk in walks if walk.rungs)
+    left_out += unable + refused + [f"{walk.method.name}: {walk.ended}" for walk in walks if not walk.rungs]
     left_out += ["what was to come when it was interrupted"] * interrupted
     cut = exact.parted_s is not None and not interrupted
     later = past_horizon(everything, exact.horizon_s, ladders, {x.name: x for x in integrators}, budget) if cut else ()
