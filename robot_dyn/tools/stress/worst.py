@@ -133,7 +133,7 @@ def shrunk(state: np.ndarray, fails: Callable[[np.ndarray], bool], most: int = 4
         return best
     best = _zeroed(best, holds)
     entries = np.flatnonzero(best)
-    for part in (entries, *entries[:, None]):  # all of them first, then each by itself
+    for part in (entries, *entries[:, None]):  # all of them first, then each alone
         best = _rounded(best, part, holds)
     return _zeroed(best, holds)
 
