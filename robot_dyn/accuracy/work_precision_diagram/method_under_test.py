@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
-from math import ceil, gcd, inf
+from math import ceil, gcd, inf, lcm
 from time import perf_counter
 from typing import Any, final
 
@@ -106,11 +106,10 @@ def _record_period(setup: Setup, duration_s: float) -> float:
     if tick and RECORDS * tick <= duration_s:
         return tick * round(duration_s / tick / RECORDS)
     knots = {t for effect in setup.plant.effects for t in effect.switches} | set(controller.knots if controller else ())
-    parts = Fraction(str(tick or duration_s))
-    for t in () if tick else (t for t in knots if 0.0 < t < duration_s):
-        other = Fraction(str(t))
-        shared = parts.denominator * other.denominator
-        parts = Fraction(gcd(int(parts * shared), int(other * shared)), shared)
+    inside = [] if tick else [t for t in knots if 0.0 < t < duration_s]
+    times = [Fraction(str(t)) for t in (tick or duration_s, *inside)]
+    unit = lcm(*(t.denominator for t in times))
+    parts = Fraction(gcd(*(int(t * unit) for t in times)), unit)  # the longest time that divides all
     if duration_s > _MOST_RECORDS * parts:
         parts = Fraction(str(duration_s))  # only records that happen to be ends of steps count
     return float(parts) / ceil(RECORDS * float(parts) / duration_s)
