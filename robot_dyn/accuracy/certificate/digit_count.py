@@ -62,7 +62,7 @@ class DigitCount:
             check()
             return self._errors(implementation, quantity, states)
 
-        states, sizes = self.states, {}
+        states, sizes = self.states, dict[str, int]()
         if implementation.fine is None:
             states = {name: x[: max(len(x) // FEWER, 8)] for name, x in states.items()}
             sizes = {"parents": 4, "children": 4, "generations": 3}

@@ -105,7 +105,8 @@ class ToleranceLadder(Method):
     ended: str
     floor: float = field(metadata=UNREPORTED)
 
-    name = Method.name  # plain data hold properties of the class itself
+    # plain data hold properties of the class itself
+    name = Method.name  # pyright: ignore[reportIncompatibleMethodOverride]
 
     @reported
     def measured_order(self) -> float | None:
