@@ -26,8 +26,8 @@ from robot_dyn.accuracy.certificate.implementation import Implementation as Impl
 from robot_dyn.accuracy.certificate.implementation import evaluate as evaluate
 from robot_dyn.accuracy.certificate.implementation import implementations as implementations
 from robot_dyn.accuracy.certificate.worst_case_search import Batch as Batch
-from robot_dyn.accuracy.certificate.worst_case_search import Search as Search
 from robot_dyn.accuracy.certificate.worst_case_search import random_states as random_states
+from robot_dyn.accuracy.certificate.worst_case_search import worst_state as worst_state
 from robot_dyn.accuracy.correct_digits import digits_of as digits_of
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion as ArmMotion
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import PeerError as PeerError

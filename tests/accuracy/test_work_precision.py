@@ -361,6 +361,7 @@ def test_json_and_csv_hold_the_runs(tmp_path) -> None:
     read = json.loads(json_text(result))
     kept = [Point(**{key: x for key, x in row.items() if key in Point.__annotations__}) for row in read["rows"]]
     assert kept == [p for each in result.ladders for p in each.points]
+    assert {p.repeats for p in kept} == {1}
     assert read["sentence"] == result.sentence and read["reference"]["error"] == result.reference.error
     with open(rd.accuracy.save_result(result, tmp_path / "runs.csv"), encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

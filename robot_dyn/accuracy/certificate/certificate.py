@@ -120,16 +120,8 @@ class Certificate(Result):
         yield f"dynamics to the largest entry in the units √M_ii of the joints, {own};"
         yield "of forward dynamics to M⁻¹τ, M⁻¹C v and M⁻¹N, in the norm of M"
         given = any(each.given is not None for each in self.digits)
-        headings = (
-            "quantity",
-            "implementation",
-            *["given"] * given,
-            "typical",
-            "worst of",
-            "random",
-            "searched",
-            "time",
-        )
+        counts = ("typical", "worst of", "random", "searched", "time")
+        headings = ("quantity", "implementation", *["given"] * given, *counts)
         yield Table(headings, tuple(map(tuple, _digit_rows(self, given))), right=headings[2:])
         of = self.condition
         lose = f": up to {of.digits:.1f} digits for forward dynamics to lose" if isfinite(of.digits) else ""

@@ -19,7 +19,7 @@ import numpy as np
 from robot_dyn.accuracy.certificate.certificate import Certificate, Condition, Held
 from robot_dyn.accuracy.certificate.digit_count import DigitCount
 from robot_dyn.accuracy.certificate.implementation import Implementation, evaluate, implementations
-from robot_dyn.accuracy.certificate.worst_case_search import Batch, Search, random_states, row
+from robot_dyn.accuracy.certificate.worst_case_search import Batch, random_states, row, worst_state
 from robot_dyn.accuracy.correct_digits import QUANTITIES, warn_below
 from robot_dyn.foundations.arithmetic import Ball
 from robot_dyn.foundations.errors import QueryError
@@ -147,6 +147,6 @@ def _condition(robot: Robot, states: Batch, given: dict[str, np.ndarray] | None,
     if robot.joint_without_inertia is not None:
         return Condition(None if given is None else inf, inf, inf, inf, ())
     known = conditions(states)
-    worst, most = Search(states, rng).worst(conditions, known, ("q",))
+    worst, most = worst_state(states, rng, conditions, known, ("q",))
     own = None if given is None else float(conditions({"q": given["q"][None]})[0])
     return Condition(own, float(np.median(known)), float(known.max()), most, tuple(worst["q"][0].tolist()))

@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_dyn.accuracy.certificate.certificate import Held
 from robot_dyn.accuracy.certificate.implementation import Implementation, evaluate
-from robot_dyn.accuracy.certificate.worst_case_search import Batch, Search, row
+from robot_dyn.accuracy.certificate.worst_case_search import Batch, row, worst_state
 from robot_dyn.accuracy.correct_digits import digits_of
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.lagrange.exact import NOTHING, Exact, Scale, Truth, entry_units, in_joint_units
@@ -62,16 +62,15 @@ class DigitCount:
             check()
             return self._errors(implementation, quantity, states)
 
-        states = self.states
-        search = Search(states, self._rng)
+        states, sizes = self.states, dict[str, int]()
         if implementation.fine is None:
             states = {name: x[: max(len(x) // FEWER, 8)] for name, x in states.items()}
-            search = Search(states, self._rng, parents=4, children=4, generations=3)
+            sizes = {"parents": 4, "children": 4, "generations": 3}
         known = errors(states)
         if np.isnan(known).all():
             raise QueryError(f"{quantity.name} by {implementation.name}: no random state has a finite answer")
         at = row(states, int(np.nanargmax(known)))
-        worst, _ = search.worst(errors, known, quantity.arguments)
+        worst, _ = worst_state(states, self._rng, errors, known, quantity.arguments, **sizes)
         check()
         judged = [(self.judged(implementation, quantity, state), state) for state in (at, row(worst, 0))]
         searched, state = max(judged, key=lambda each: each[0])

@@ -10,7 +10,6 @@ strategies, Natural Computing 1, 2002]
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import final
 
 import numpy as np
 
@@ -34,60 +33,55 @@ def row(states: Batch, k: int) -> dict[str, np.ndarray]:
     return {name: x[k] for name, x in states.items()}
 
 
-@final
-class Search:
-    """A search among states.
+def worst_state(
+    among: Batch,
+    rng: np.random.Generator,
+    errors: Errors,
+    known: np.ndarray,
+    arguments: tuple[str, ...],
+    parents: int = 8,
+    children: int = 12,
+    generations: int = 8,
+) -> tuple[Batch, float]:
+    """The worst state that was found, (1, n) each, and its error.
 
     Args:
         among: The random states.
         rng: Of the steps.
-        parents, children: Number of states that survive a generation, and of children of each.
+        errors: What is made large.
+        known: Errors of the random states.
+        arguments: Names of those coordinates that matter.
+        parents: Number of states that survive a generation.
+        children: Number of children of each.
         generations: How many there are; five times as many while nothing worse than the random states is found.
     """
+    least, most = ({name: end(x, axis=0) for name, x in among.items()} for end in (np.min, np.max))
 
-    def __init__(
-        self, among: Batch, rng: np.random.Generator, parents: int = 8, children: int = 12, generations: int = 8
-    ) -> None:
-        self.among, self._rng = among, rng
-        self._parents, self._children, self._generations = parents, children, generations
-        self._least = {name: x.min(axis=0) for name, x in among.items()}
-        self._most = {name: x.max(axis=0) for name, x in among.items()}
-
-    def worst(self, errors: Errors, known: np.ndarray, arguments: tuple[str, ...]) -> tuple[Batch, float]:
-        """The worst state that was found, (1, n) each, and its error.
-
-        Args:
-            errors: What is made large.
-            known: Of the random states.
-            arguments: Names of those coordinates that matter.
-        """
-        known = np.where(np.isfinite(known), known, -np.inf)
-        order = np.argsort(known)[::-1][: self._parents]
-        best, size = {name: x[order] for name, x in self.among.items()}, known[order]
-        for generation in range(5 * self._generations):
-            if generation >= self._generations and size[0] > known[order[0]]:
-                break
-            young = self._born(best, arguments)
-            found = errors(young)
-            size = np.concatenate([size, np.where(np.isfinite(found), found, -np.inf)])
-            best_of_all = np.argsort(-size, kind="stable")[: self._parents]
-            best = {name: np.concatenate([x, young[name]])[best_of_all] for name, x in best.items()}
-            size = size[best_of_all]
-        return {name: x[:1] for name, x in best.items()}, float(size[0])
-
-    def _born(self, parents: Batch, arguments: tuple[str, ...]) -> Batch:
+    def born(best: Batch) -> Batch:
         """The children of a generation."""
-        count = self._children * len(parents["q"])
-        steps = np.exp(self._rng.uniform(*np.log(_STEPS), size=(count, 1)))
-        young = {}
-        for name, x in parents.items():
-            x = np.repeat(x, self._children, axis=0)
-            if name in arguments:
-                moves = self._rng.random(x.shape) < 0.5
-                wide = self._most[name] - self._least[name]
-                x = x + moves * steps * wide * self._rng.normal(size=x.shape)
-            young[name] = _in_float32(np.clip(x, self._least[name], self._most[name]))
+        count = children * len(best["q"])
+        steps = np.exp(rng.uniform(*np.log(_STEPS), size=(count, 1)))
+        young = {name: np.repeat(x, children, axis=0) for name, x in best.items()}
+        for name in [name for name in young if name in arguments]:
+            x = young[name]
+            moves, wide = rng.random(x.shape) < 0.5, most[name] - least[name]
+            moved = x + moves * steps * wide * rng.normal(size=x.shape)
+            young[name] = _in_float32(np.clip(moved, least[name], most[name]))
         return young
+
+    known = np.where(np.isfinite(known), known, -np.inf)
+    order = np.argsort(known)[::-1][:parents]
+    best, size = {name: x[order] for name, x in among.items()}, known[order]
+    for generation in range(5 * generations):
+        if generation >= generations and size[0] > known[order[0]]:
+            break
+        young = born(best)
+        found = errors(young)
+        size = np.concatenate([size, np.where(np.isfinite(found), found, -np.inf)])
+        survivors = np.argsort(-size, kind="stable")[:parents]
+        best = {name: np.concatenate([x, young[name]])[survivors] for name, x in best.items()}
+        size = size[survivors]
+    return {name: x[:1] for name, x in best.items()}, float(size[0])
 
 
 def _in_float32(x: np.ndarray) -> np.ndarray:

@@ -77,7 +77,7 @@ class ABComparison:
 
 
 @final
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Way:
     """A version that can be run.
 
@@ -85,6 +85,7 @@ class Way:
         name: As of `Version`, as are instructions.
         run: Gives the time it takes, in [s]; RobotDynError if it cannot be run.
         factor: How many of these make what is compared.
+        times: Of the turns, in [s]; ways that differ in name and factor alone share them.
     """
 
     name: str
@@ -94,20 +95,14 @@ class Way:
     times: list[float] = field(default_factory=list)
 
     @property
-    def times_s(self) -> np.ndarray:
-        """Its times, in [s]."""
-        return self.factor * np.array(self.times)
-
     def version(self) -> Version:
         """What was found."""
-        times = self.times_s.tolist()
-        return Version(
-            self.name, self.factor * self.instructions, min(times, default=None), len(times), repeatable(times)
-        )
+        least = self.factor * min(self.times) if self.times else None
+        return Version(self.name, self.factor * self.instructions, least, len(self.times), repeatable(self.times))
 
     def named(self, name: str, factor: int = 1) -> Way:
-        """The same under another name, and so many of it; its times are shared."""
-        return Way(name, self.instructions, self.run, factor, self.times)
+        """The same under another name, and so many of it."""
+        return replace(self, name=name, factor=factor)
 
 
 @final
@@ -123,11 +118,11 @@ class Pair:
 
     def alternative(self) -> ABComparison:
         """What was found."""
+        found = ABComparison(self.group, self.what, self.per, self.first.version, self.second.version)
         turns = min(len(self.first.times), len(self.second.times))
-        first, second = self.first.times_s[:turns], self.second.times_s[:turns]
-        found = ABComparison(self.group, self.what, self.per, self.first.version(), self.second.version())
         if not turns:
             return found
+        first, second = (way.factor * np.array(way.times[:turns]) for way in (self.first, self.second))
         low, high = np.percentile(first - second, _QUARTILES)
         narrow, wide = np.percentile(first / second, _QUARTILES)
         between = float(first.min() - second.min())

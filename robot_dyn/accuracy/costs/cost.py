@@ -87,30 +87,35 @@ class Cost(Result):
     @reported
     def parts(self) -> dict[str, int]:
         """Instructions in a step that each part of the setup adds to the others, by name."""
-        parts = [each for each in self.alternatives if each.group == "parts" and each.what != step_cost.EVERYTHING]
-        return {each.what: each.first.instructions - each.second.instructions for each in parts}
+        added = {each.what: _added(each) for each in self.alternatives if each.group == "parts"}
+        return {what: count for what, count in added.items() if what != step_cost.EVERYTHING}
+
+    @property
+    def _everything(self) -> ABComparison | None:
+        return next((each for each in self.alternatives if each.what == step_cost.EVERYTHING), None)
 
     @reported
     def shared(self) -> int:
         """Instructions in a step of all parts, less the sum of `parts`: negative where several count the same ones."""
-        whole = [each for each in self.alternatives if each.what == step_cost.EVERYTHING]
-        return sum(each.first.instructions - each.second.instructions for each in whole) - sum(self.parts.values())
+        return (_added(self._everything) if self._everything else 0) - sum(self.parts.values())
 
     @reported
     def sentence(self) -> str:
         """What a step costs and what of it the parts are, in a sentence."""
-        whole = next((each for each in self.alternatives if each.what == step_cost.EVERYTHING), None)
-        if whole is None:
+        if self._everything is None:
             return "no step was counted"
-        on, off = whole.first, whole.second
+        on, off = self._everything.first, self._everything.second
         time = "" if on.time_s is None else f", {format_duration(on.time_s)}"
-        terms = [
-            f"rigid bodies {off.instructions}",
-            *(f"{name} {count}".replace(" -", " −") for name, count in self.parts.items()),
-        ]
+        counts = {"rigid bodies": off.instructions, **self.parts}
+        terms = [f"{name} {count}".replace(" -", " −") for name, count in counts.items()]
         terms += [f"several of these together {self.shared}"] * (self.shared > 0)
         terms += [f"less {-self.shared} that several of these count"] * (self.shared < 0)
         return f"a step of RK4 takes {on.instructions} instructions{time}: {', '.join(terms)}"
+
+
+def _added(part: ABComparison) -> int:
+    """Instructions that a part adds."""
+    return part.first.instructions - part.second.instructions
 
 
 def cost(

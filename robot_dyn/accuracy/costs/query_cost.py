@@ -60,66 +60,55 @@ class QueryCost:
         programs = [(each, program_of(each)) for each in self._forward.values()]
         return min(programs, key=lambda each: len(each[1]))
 
-    @property
-    def _least(self) -> Program:
-        return self._best[1]
-
     def pairs(self) -> Iterator[tuple[str, Callable[[], Pair]]]:
         """What is compared, by name, each made when it is called; QueryError if it cannot be on this arm."""
-        yield "Coriolis matrix", self._coriolis_matrix
-        yield "forward dynamics", self._forward_dynamics
-        yield "C(q, v) v in forward dynamics", self._coriolis_torque
-        yield "derivatives of forward dynamics", self._derivatives
-        yield "right angles of the file", self._right_angles
-        yield "numbers of forward dynamics", self._floats
+        for group, what, ways in (
+            ("algorithms", "Coriolis matrix", self._coriolis_matrix),
+            ("algorithms", "forward dynamics", self._forward_dynamics),
+            ("algorithms", "C(q, v) v in forward dynamics", self._coriolis_torque),
+            ("algorithms", "derivatives of forward dynamics", self._derivatives),
+            ("machine code", "right angles of the file", self._right_angles),
+            ("machine code", "numbers of forward dynamics", self._floats),
+        ):
+            yield what, lambda group=group, what=what, ways=ways: Pair(group, what, PER_STATE, *ways())
 
-    def _coriolis_matrix(self) -> Pair:
+    def _coriolis_matrix(self) -> tuple[Way, Way]:
         full, alone = (self._quantity(name) for name in ("C", "coriolis_torque"))
-        return self._pair("algorithms", "Coriolis matrix", self._way("full C", full), self._way("C v alone", alone))
+        return self._way("full C", full), self._way("C v alone", alone)
 
-    def _forward_dynamics(self) -> Pair:
-        needed = {"recursion": "M, Cholesky", "articulated body": "articulated body"}
-        for name in needed:
+    def _forward_dynamics(self) -> tuple[Way, Way]:
+        for name, why in _WITHOUT.items():
             if name not in self._forward:
-                raise QueryError(_WITHOUT[name])
-        ways = [self._way(words, program_of(self._forward[name])) for name, words in needed.items()]
-        return self._pair("algorithms", "forward dynamics", *ways)
+                raise QueryError(why)
+        recursion, articulated = (program_of(self._forward[name]) for name in _WITHOUT)
+        return self._way("M, Cholesky", recursion), self._way("articulated body", articulated)
 
     @property
     def at_rest(self) -> ca.Function:
         """Forward dynamics of (q, v, τ) without C(q, v) v: that of v = 0."""
         q, v, tau = (self._trace.symbols[name][0] for name in ("q", "v", "tau"))
-        return ca.Function("f", [q, v, tau], [ca.cse(ca.densify(self._best[0](q, ca.DM.zeros(len(self)), tau)))])
+        function, zero = self._best[0], ca.DM.zeros(self.given.n)
+        return ca.Function("f", [q, v, tau], [ca.cse(ca.densify(function(q, zero, tau)))])
 
-    def _coriolis_torque(self) -> Pair:
-        ways = self._way("on", self._least), self._way("off", program_of(self.at_rest))
-        return self._pair("algorithms", "C(q, v) v in forward dynamics", *ways)
+    def _coriolis_torque(self) -> tuple[Way, Way]:
+        return self._way("on", self._best[1]), self._way("off", program_of(self.at_rest))
 
-    def _derivatives(self) -> Pair:
-        exact = self._way("exact", self._quantity(_DERIVATIVES), (3, len(self), len(self)))
-        evaluations = 6 * len(self)
-        differences = self._way("", self._least).named(f"differences, {evaluations} evaluations", evaluations)
-        return self._pair("algorithms", "derivatives of forward dynamics", differences, exact)
+    def _derivatives(self) -> tuple[Way, Way]:
+        n, evaluations = self.given.n, 6 * self.given.n
+        differences = self._way("", self._best[1]).named(f"differences, {evaluations} evaluations", evaluations)
+        return differences, self._way("exact", self._quantity(_DERIVATIVES), (3, n, n))
 
-    def _right_angles(self) -> Pair:
+    def _right_angles(self) -> tuple[Way, Way]:
         if not completed(self.given)[1]:
             raise QueryError("the file states none with too few digits, so nothing is written out")
         stated = program_of(Trace(self.given).quantity(_FORWARD).function)
-        ways = self._way("as stated", stated), self._way("written out", self._least)
-        return self._pair("machine code", "right angles of the file", *ways)
+        return self._way("as stated", stated), self._way("written out", self._best[1])
 
-    def _floats(self) -> Pair:
-        ways = (self._way(dtype, self._least, dtype=dtype) for dtype in ("float64", "float32"))
-        return self._pair("machine code", "numbers of forward dynamics", *ways)
-
-    def __len__(self) -> int:
-        return self.given.n
+    def _floats(self) -> tuple[Way, Way]:
+        return self._way("float64", self._best[1]), self._way("float32", self._best[1], dtype="float32")
 
     def _quantity(self, name: str) -> Program:
         return program_of(self._trace.quantity(name).function)
-
-    def _pair(self, group: str, what: str, first: Way, second: Way) -> Pair:
-        return Pair(group, what, PER_STATE, first, second)
 
     def _way(self, name: str, program: Program, shape: tuple[int, ...] = (), dtype: str = "float64") -> Way:
         """The time per state of a program."""
@@ -139,7 +128,7 @@ class QueryCost:
         return Way(name, len(program), run)
 
 
-_WITHOUT = {
+_WITHOUT = {  # formulations of forward dynamics, with why an arm has none
     "recursion": "more than 8 joints stand one after the other: to solve with M outnumbers articulated bodies, and is"
     " not traced",
     "articulated body": "joints are coupled: articulated bodies take those that are free, so M is solved with",

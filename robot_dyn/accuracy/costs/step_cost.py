@@ -7,7 +7,7 @@ A step is so short that the motion stays at its start, whatever acts, and a samp
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from time import process_time
@@ -99,8 +99,7 @@ def pairs_of_parts(setup: Setup) -> Iterator[Pair]:
 
 def numbers(setup: Setup) -> Pair:
     """Numbers as inputs of machine code, and as constants."""
-    short = _short(setup, _STEPS)
-    constants = _alone(short, machine_code_of_constants(_equation(short), short.integrator))
+    constants = one_run(setup, machine_code_of_constants)
     return Pair("machine code", NUMBERS, PER_STEP, one_run(setup).named("inputs"), constants.named("constants"))
 
 
@@ -120,19 +119,11 @@ def side_by_side(setup: Setup) -> Pair:
     return Pair("machine code", SIDE_BY_SIDE, PER_RUN, one_run(setup).named("one"), several)
 
 
-def one_run(setup: Setup) -> Way:
+def one_run(setup: Setup, translate: Callable[..., MachineCode] = machine_code) -> Way:
     """A step of one run."""
     short = _short(setup, _STEPS)
-    return _alone(short, machine_code(_equation(short), short.integrator))
+    made = translate(_equation(short), short.integrator)
 
-
-def instructions(made: MachineCode) -> int:
-    """Of a step, what the method itself adds apart."""
-    programs = made.code.programs
-    return _EVALUATIONS * len(programs["rate"]) + (len(programs["tick"]) if "tick" in programs else 0)
-
-
-def _alone(short: Setup, made: MachineCode) -> Way:
     def run() -> float:
         watch, transfers = Watch(short, made.compiled_form), PayloadEvents(made.compiled_form)
         steps = FixedStep(watch, transfers, made, Fraction(1))
@@ -146,6 +137,12 @@ def _alone(short: Setup, made: MachineCode) -> Way:
         return spent / short.steps
 
     return Way("", instructions(made), run)
+
+
+def instructions(made: MachineCode) -> int:
+    """Of a step, what the method itself adds apart."""
+    programs = made.code.programs
+    return _EVALUATIONS * len(programs["rate"]) + (len(programs["tick"]) if "tick" in programs else 0)
 
 
 def _equation(setup: Setup) -> StateEquation:

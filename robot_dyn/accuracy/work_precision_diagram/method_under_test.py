@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
-from math import ceil, gcd, inf
+from math import ceil, gcd, inf, lcm
 from time import perf_counter
 from typing import Any, final
 
@@ -106,11 +106,10 @@ def _record_period(setup: Setup, duration_s: float) -> float:
     if tick and RECORDS * tick <= duration_s:
         return tick * round(duration_s / tick / RECORDS)
     knots = {t for effect in setup.plant.effects for t in effect.switches} | set(controller.knots if controller else ())
-    parts = Fraction(str(tick or duration_s))
-    for t in () if tick else (t for t in knots if 0.0 < t < duration_s):
-        other = Fraction(str(t))
-        shared = parts.denominator * other.denominator
-        parts = Fraction(gcd(int(parts * shared), int(other * shared)), shared)
+    inside = [] if tick else [t for t in knots if 0.0 < t < duration_s]
+    times = [Fraction(str(t)) for t in (tick or duration_s, *inside)]
+    unit = lcm(*(t.denominator for t in times))
+    parts = Fraction(gcd(*(int(t * unit) for t in times)), unit)  # the longest time that divides all
     if duration_s > _MOST_RECORDS * parts:
         parts = Fraction(str(duration_s))  # only records that happen to be ends of steps count
     return float(parts) / ceil(RECORDS * float(parts) / duration_s)
@@ -136,31 +135,29 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnde
         engine: "compiled" or "interpreted".
         events: Whether steps end at the thresholds of the effects.
     """
-    setup = replace(setup, engine=engine)
+    setup = replace(setup, integrator=made, engine=engine)
 
     def run(setting: float, limit: Limit) -> Run:
-        return timed(at_setting(setup, made, setting), limit, events)
+        return timed(at_setting(setup, setting), limit, events)
 
     order, by, settings = ORDERS.get(made.name), "tolerance", tolerances
     if not made.controls_error:
-        order, by, settings = made.order, "step", partial(_steps, setup, made, events)
-    return MethodUnderTest(
-        made.name, engine, events, order, by, settings, run, lambda: warmed(replace(setup, integrator=made))
-    )
+        order, by, settings = made.order, "step", partial(_steps, setup, events)
+    return MethodUnderTest(made.name, engine, events, order, by, settings, run, lambda: warmed(setup))
 
 
-def at_setting(setup: Setup, made: Any, setting: float) -> Setup:
-    """The setup with a method at a step, in [s], or a relative tolerance."""
-    if made.controls_error:
-        return replace(setup, integrator=replace(made, rtol=setting, atol=ATOL * setting))
-    return replace(setup, integrator=made, step_s=setting)
+def at_setting(setup: Setup, setting: float) -> Setup:
+    """The setup with its method at a step, in [s], or a relative tolerance."""
+    if setup.integrator.controls_error:
+        return replace(setup, integrator=replace(setup.integrator, rtol=setting, atol=ATOL * setting))
+    return replace(setup, step_s=setting)
 
 
-def _steps(setup: Setup, made: Any, events: bool) -> Iterator[float]:
+def _steps(setup: Setup, events: bool) -> Iterator[float]:
     """Steps from the record period on, up to the number that a run may take."""
     before, most = 0, MOST_CUT if events and switches(setup) else _MOST_STEPS  # of more steps none ends at an event
-    for step in step_ladder(setup.record_period_s, made.order):
-        count = at_setting(setup, made, step).steps
+    for step in step_ladder(setup.record_period_s, setup.integrator.order):
+        count = at_setting(setup, step).steps
         if count > most:
             return
         if count > before:  # a step longer than a tick or segment is cut to its length

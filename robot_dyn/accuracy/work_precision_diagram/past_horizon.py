@@ -70,8 +70,10 @@ def past_horizon(
         budget.report(f"beyond the horizon: {ladder.name}")
         with suppress(OvertimeError, RobotDynError):
             setting = in_time[-1].setting
-            finest = at_setting(replace(setup, engine=ladder.engine), integrators[ladder.method], setting)
-            found[ladder.method] = PastHorizon(ladder.method, setting, *_there_and_back(finest, longest))
+            finest = replace(setup, integrator=integrators[ladder.method], engine=ladder.engine)
+            found[ladder.method] = PastHorizon(
+                ladder.method, setting, *_there_and_back(at_setting(finest, setting), longest)
+            )
     return tuple(found.values())
 
 

@@ -214,7 +214,5 @@ def _passes(t: np.ndarray, distance: np.ndarray, level: float) -> float | None:
     above = np.flatnonzero(distance > level)
     if not len(above):
         return None
-    i = int(above[0])
-    low, high = np.log(np.maximum(distance[[i - 1, i]], 1e-17))
-    part = (np.log(level) - low) / (high - low)
-    return float(t[i - 1] + np.clip(part, 0.0, 1.0) * (t[i] - t[i - 1]))
+    both = [int(above[0]) - 1, int(above[0])]
+    return float(np.interp(np.log(level), np.log(np.maximum(distance[both], 1e-17)), t[both]))

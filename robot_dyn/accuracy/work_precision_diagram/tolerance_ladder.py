@@ -54,7 +54,7 @@ class Point:
 @final
 @dataclass(frozen=True)
 class Price:
-    """Cost of reaching an error, as a time in [s] or a number of evaluations, and whether it is extrapolated."""
+    """Time to reach an error, in [s], and whether it is extrapolated."""
 
     value: float
     extrapolated: bool
@@ -105,7 +105,8 @@ class ToleranceLadder(Method):
     ended: str
     floor: float = field(metadata=UNREPORTED)
 
-    name = Method.name  # plain data hold properties of the class itself
+    # plain data hold properties of the class itself
+    name = Method.name  # pyright: ignore[reportIncompatibleMethodOverride]
 
     @reported
     def measured_order(self) -> float | None:
@@ -121,27 +122,27 @@ class ToleranceLadder(Method):
         ]
         return median(slopes) if len(slopes) > 1 else None
 
-    def price(self, error: float, of: str = "time_s") -> Price | None:
-        """Cost of reaching an error, in `time_s` or `evaluations`; None if it cannot be estimated.
+    def price(self, error: float) -> Price | None:
+        """Time to reach an error; None if it cannot be estimated.
 
-        Between two runs the cost is interpolated logarithmically; an error that a finer run exceeds does not count as
+        Between two runs the time is interpolated logarithmically; an error that a finer run exceeds does not count as
         reached. Beyond the finest run it is extrapolated with the stated or the measured order, whichever is lower.
         """
-        known = [p for p in self.points if isfinite(p.error) and getattr(p, of)]
+        known = [p for p in self.points if isfinite(p.error)]
         if error < self.floor or not known:
             return None
         errors = np.maximum([p.error for p in known], self.floor)
         errors = np.maximum.accumulate(errors[::-1])[::-1]
-        costs = np.array([getattr(p, of) for p in known], dtype=float)
-        costs = np.minimum.accumulate(costs[::-1])[::-1]  # a finer run that cost less serves as well
+        times = np.array([p.time_s for p in known])
+        times = np.minimum.accumulate(times[::-1])[::-1]  # a finer run that took less serves as well
         reached = np.flatnonzero(errors <= error)
         if len(reached):
             i = int(reached[0])
-            if i == 0 or errors[i - 1] == errors[i]:
-                return Price(float(costs[i]), False)
+            if i == 0:
+                return Price(float(times[i]), False)
             part = np.log(errors[i - 1] / error) / np.log(errors[i - 1] / errors[i])
-            return Price(float(costs[i - 1] * (costs[i] / costs[i - 1]) ** part), False)
+            return Price(float(times[i - 1] * (times[i] / times[i - 1]) ** part), False)
         orders = [p for p in (self.order, self.measured_order) if p is not None and p > 0]
         if errors[-1] > _RESOLVED or not orders:
             return None
-        return Price(float(costs[-1] * (errors[-1] / error) ** (1 / min(orders))), True)
+        return Price(float(times[-1] * (errors[-1] / error) ** (1 / min(orders))), True)

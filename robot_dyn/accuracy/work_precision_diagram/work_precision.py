@@ -114,10 +114,10 @@ class WorkPrecision(Result):
 
         Those below the error of the reference do not take part.
         """
-        found = [(p.time_s, p.error, ladder, p) for ladder in self.ladders for p in ladder.points if p.believed]
+        believed = [(ladder, p) for ladder in self.ladders for p in ladder.points if p.believed and isfinite(p.error)]
         front: list[tuple[ToleranceLadder, Point]] = []
-        for _, error, ladder, point in sorted(found, key=lambda each: each[:2]):
-            if isfinite(error) and (not front or error < front[-1][1].error):
+        for ladder, point in sorted(believed, key=lambda run: (run[1].time_s, run[1].error)):
+            if not front or point.error < front[-1][1].error:
                 front.append((ladder, point))
         return tuple(front)
 
@@ -157,28 +157,25 @@ class WorkPrecision(Result):
             QueryError: If it is not a whole number from 0 to 20.
         """
         digits = integer("digits", digits, most=_MOST_DIGITS)
-        prices = self.digits(10.0**-digits)
-        measure = [each for each in prices if not each[1].extrapolated]
         if not self.ladders:
             return "no method was measured: see what was left out"
-        if not measure:
+        prices = self.digits(10.0**-digits)
+        measured = [ladder for ladder, price in prices if not price.extrapolated]
+        if not measured:
             return f"{digits} digits of q were reached by no run"
-        chosen, programs = [], set[str]()
-        own = [ladder for ladder, _ in measure if not ladder.peer]
-        best = [measure[0][0], *own[:1], *[ladder for ladder in own if ladder.events][:1]]
+        ours = [ladder for ladder in measured if not ladder.peer]
+        best = [measured[0], *ours[:1], *[ladder for ladder in ours if ladder.events][:1]]
+        named: dict[str, tuple[str, Price]] = {}  # of each program its best method
         for ladder, price in prices:
-            program = ladder.method.split(" ")[0] if ladder.peer else ladder.name
-            named = ladder.peer or ladder.name in _ALWAYS_NAMED or ladder in best
-            if program not in programs and named:  # of each program its best method
-                chosen.append((ladder, price))
-                programs.add(program)
-        if sum(not price.extrapolated for _, price in chosen) >= _ENOUGH:
-            chosen = [each for each in chosen if not each[1].extrapolated]
+            if ladder.peer or ladder.name in _ALWAYS_NAMED or ladder in best:
+                named.setdefault(program_of(ladder) if ladder.peer else ladder.name, (ladder.name, price))
+        enough = sum(not price.extrapolated for _, price in named.values()) >= _ENOUGH
         parts = [
-            f"{ladder.name} would take {format_duration(price.value)} (extrapolated)"
+            f"{name} would take {format_duration(price.value)} (extrapolated)"
             if price.extrapolated
-            else f"{ladder.name} {format_duration(price.value)}"
-            for ladder, price in chosen
+            else f"{name} {format_duration(price.value)}"
+            for name, price in named.values()
+            if not (enough and price.extrapolated)
         ]
         return f"{digits} digits of q over {self.reference.horizon_s:g} s: {'; '.join(parts)}"
 
@@ -239,9 +236,9 @@ def work_precision(
         others, refused = found(setup) if peers else ([], [])
     place = len(integrators)  # programs in machine code come before what is interpreted, which takes longest
     candidates[place:place] = others
-    step_log, interrupted = measure(candidates, exact, budget, repeats)
-    ladders = tuple(each.ladder(exact.error) for each in step_log if each.rungs)
-    left_out += unable + refused + [f"{each.name}: {each.ended}" for each in step_log if not each.rungs]
+    walks, interrupted = measure(candidates, exact, budget, repeats)
+    ladders = tuple(walk.ladder(exact.error) for walk in walks if walk.rungs)
+    left_out += unable + refused + [f"{walk.method.name}: {walk.ended}" for walk in walks if not walk.rungs]
     left_out += ["what was to come when it was interrupted"] * interrupted
     cut = exact.parted_s is not None and not interrupted
     later = past_horizon(everything, exact.horizon_s, ladders, {x.name: x for x in integrators}, budget) if cut else ()

@@ -58,12 +58,14 @@ def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, work: Wor
     if found is None:
         return
     what = "Coriolis torque passes an effort limit, at a multiple of the velocity limits"
-    limit, largest = Limit("speed", what, "", np.inf, "times", _NO_TORQUE), found[0]["minimal"]
-    if largest > _NOTHING:
-        state = {"q": found[1]["q"], "v": direction(found[1]["v"])}
-        limit = work.do("speed, judged", lambda _: _judged_speed(robot, state, replace(limit, value=largest**-0.5)))
-    if limit is not None:
-        yield limit
+    largest, state = found[0]["minimal"], {"q": found[1]["q"], "v": direction(found[1]["v"])}
+    if not largest > _NOTHING:
+        yield Limit("speed", what, "", np.inf, "times", _NO_TORQUE)
+        return
+    limit = Limit("speed", what, "", largest**-0.5, "times")
+    judged = work.do("speed, judged", lambda _: _judged_speed(robot, state, limit))
+    if judged is not None:
+        yield judged
 
 
 def _judged_speed(robot: Robot, state: State, limit: Limit) -> Limit:
@@ -106,17 +108,18 @@ def payload_limit(
     found = worst(states, rng, ("q",), lambda batch: inverse_masses(batch).max(axis=1), work, "payload")
     if found is None:
         return
-    largest, state = found[0]["minimal"], found[1]
-    limit = Limit("payload", f"gravity torque of a payload at {frame}", "", np.inf, "kg", _NO_TORQUE)
-    if largest > _NOTHING:
-        joint = robot.joint_names[int(np.argmax(inverse_masses({"q": state["q"][None]})[0]))]
-        limit = replace(limit, joint=joint, value=1 / largest, state=listed(state))
-        if largest > 1e250:
-            limit = replace(limit, value=0.0, within="gravity alone passes its effort limit")
-        else:
-            limit = work.do("payload, judged", lambda until: _judged_payload(robot, frame, limit, gains, until))
-    if limit is not None:
-        yield limit
+    largest, state, what = found[0]["minimal"], found[1], f"gravity torque of a payload at {frame}"
+    if not largest > _NOTHING:
+        yield Limit("payload", what, "", np.inf, "kg", _NO_TORQUE)
+        return
+    joint = robot.joint_names[int(np.argmax(inverse_masses({"q": state["q"][None]})[0]))]
+    limit = Limit("payload", what, joint, 1 / largest, "kg", state=listed(state))
+    if largest > 1e250:
+        yield replace(limit, value=0.0, within="gravity alone passes its effort limit")
+        return
+    judged = work.do("payload, judged", lambda until: _judged_payload(robot, frame, limit, gains, until))
+    if judged is not None:
+        yield judged
 
 
 def _judged_payload(robot: Robot, frame: str, limit: Limit, gains: Gains | None, budget: Budget) -> Limit:

@@ -122,14 +122,14 @@ def gain_limit(setup: Setup, seed: int, work: Work) -> Iterator[Limit]:
     if omega is None:
         return
     limit = Limit("gain", _WHAT, "", omega, "rad/s")
-    if 0 < omega < inf:
-        limit = work.do("largest gain, judged", lambda budget: _judged_gain(setup, limit, seed, budget))
-    elif omega:
-        limit = replace(limit, within=f"stable up to ω = {_RANGE[1]:g} rad/s")
+    if not omega:
+        yield replace(limit, within=f"unstable from ω = {_RANGE[0]:g} rad/s on")
+    elif omega == inf:
+        yield replace(limit, within=f"stable up to ω = {_RANGE[1]:g} rad/s")
     else:
-        limit = replace(limit, within=f"unstable from ω = {_RANGE[0]:g} rad/s on")
-    if limit is not None:
-        yield limit
+        judged = work.do("largest gain, judged", lambda budget: _judged_gain(setup, limit, seed, budget))
+        if judged is not None:
+            yield judged
 
 
 def _sampled(setup: Setup, omega: float) -> Setup:

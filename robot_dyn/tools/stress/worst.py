@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from robot_dyn import Plant, Robot
-from robot_dyn.accuracy import Batch, Search, evaluate
+from robot_dyn.accuracy import Batch, evaluate, worst_state
 from robot_dyn.control import gains_from
 from robot_dyn.foundations import OverflowedError
 from robot_dyn.lagrange import unit_diagonal_conditions
@@ -69,28 +69,23 @@ def _searched(
     states: Batch, rng: np.random.Generator, arguments: tuple[str, ...], measure: Measure, budget: Budget
 ) -> tuple[Sizes, State]:
     """Typical, random and searched size of a measure, and the state."""
+
+    def timed(batch: Batch) -> np.ndarray:
+        budget.check()
+        return measure(batch)
+
     known = measure(states)
     if np.isnan(known).all():
         raise OverflowedError("it has a finite value at none of the random states")
     random, found, best = float(np.nanmax(known)), -np.inf, states
     for _ in range(_ROUNDS):
-        at, size = Search(states, rng).worst(_timed(measure, budget), known, arguments)
+        at, size = worst_state(states, rng, timed, known, arguments)
         if size > found:
             best, found = at, size
         if found > random:
             break
     sizes = {"typical": float(np.nanmedian(known)), "random": random, "searched": found}
     return sizes, {name: best[name][0] for name in arguments}
-
-
-def _timed(measure: Measure, budget: Budget) -> Measure:
-    """A measure that checks first whether there is time."""
-
-    def checked(batch: Batch) -> np.ndarray:
-        budget.check()
-        return measure(batch)
-
-    return checked
 
 
 def shrunk_state(
@@ -138,7 +133,7 @@ def shrunk(state: np.ndarray, fails: Callable[[np.ndarray], bool], most: int = 4
         return best
     best = _zeroed(best, holds)
     entries = np.flatnonzero(best)
-    for part in (entries, *entries[:, None]):  # all of them first, then each by itself
+    for part in (entries, *entries[:, None]):  # all of them first, then each alone
         best = _rounded(best, part, holds)
     return _zeroed(best, holds)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -87,7 +88,7 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
             lost = any(warning.number for warning in data.warning)
             return motion.run(q * np.nan if lost else q, v, count * records, evaluations * count * records, spent)
 
-        steps = lambda: step_ladder(period, order)  # noqa: E731
+        steps = partial(step_ladder, period, order)
         return MethodUnderTest(f"MuJoCo {name}", "", motion.events, order, "step", steps, run)
 
     return [method(name, *details) for name, details in _METHODS.items()]
