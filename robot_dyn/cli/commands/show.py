@@ -10,11 +10,11 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments
-from robot_dyn.cli.application import Dark, Force, Name, PackageDir, app, bar
-from robot_dyn.cli.arguments import output as checked_output
-from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
-from robot_dyn.cli.terminal import say, size_of
+from robot_dyn.cli.application import LOOK, bar, command
+from robot_dyn.cli.options import AS_STATED, Dark, Force, Name, PackageDir, Positions, RobotOptions
+from robot_dyn.cli.terminal import say, say_written
 from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.files import target
 
 if TYPE_CHECKING:
     from robot_dyn.view.live.server import Server
@@ -30,13 +30,10 @@ Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Where to liste
 Browse = Annotated[bool, typer.Option("--open", help="Open the page in your browser.")]
 
 
-@app.command("show")
-@takes_robot
+@command(LOOK, "show")
 def show_(
     robot: Name,
-    q: Annotated[
-        str | None, typer.Option(help="Positions in rad or m: 0.1,-0.2,… or joint=0.1,…; 0 by default.")
-    ] = None,
+    q: Positions = None,
     html: Html = None,
     inertia: Inertia = False,
     meshes: Meshes = "full",
@@ -45,7 +42,10 @@ def show_(
     force: Force = False,
     options: RobotOptions = AS_STATED,
 ) -> None:
-    """Show a robot in the browser, live on this machine until Ctrl-C, or as one HTML file."""
+    """Show a robot in the browser, or as one HTML file.
+
+    The browser has it live on this machine until Ctrl-C.
+    """
     page = _page(html, port, [robot], force)
     loaded = options.load(robot)
     at = arguments.vector("--q", q, loaded.joint_names)
@@ -59,7 +59,7 @@ def show_(
         _serve(shown.serve(port), "robot", browse)
 
 
-@app.command()
+@command(LOOK)
 def replay(
     runs: Annotated[
         list[str], typer.Argument(metavar="RUN.npz...", help="Run files; those after the first are drawn transparent.")
@@ -81,7 +81,10 @@ def replay(
     force: Force = False,
     package_dir: PackageDir = None,
 ) -> None:
-    """Replay runs in the browser, live on this machine until Ctrl-C, or as one HTML file or a video."""
+    """Replay runs in the browser, or as one HTML file or a video.
+
+    The browser has them live on this machine until Ctrl-C.
+    """
     page = _page(html, port, runs, force)
     film = _film(video, html, port, runs, force, size)
     trajectories = [rd.load_run(path) for path in runs]
@@ -100,7 +103,7 @@ def replay(
         _serve(rd.replay(*trajectories, **options).serve(port), "run", browse)
 
 
-@app.command()
+@command(LOOK)
 def plot(
     run: Annotated[str, typer.Argument(metavar="RUN.npz", help="A run file, as `robot-dyn simulate … -o` writes.")],
     output: Annotated[
@@ -121,10 +124,10 @@ def plot(
     dark: Dark = False,
     force: Force = False,
 ) -> None:
-    """Draw a run on one page, or parts of it: joints, torques against limits, energy, tracking, phase, error."""
+    """Draw a run: joints, torques, energy, tracking, phase, error."""
     from robot_dyn.view.plots.plots import PICTURES, PlotError
 
-    path = checked_output(output or Path(run).with_suffix(".png"), PICTURES, PlotError, [run], force)
+    path = target(output or Path(run).with_suffix(".png"), PICTURES, PlotError, [run], force)
     look = {"theme": "dark" if dark else "light", "style": "paper" if paper else "screen", "width_mm": width_mm}
     with bar(what="drawing"):
         file = rd.save_plot(rd.load_run(run), path, only=only or (), joints=joint or None, **look)
@@ -137,7 +140,7 @@ def _page(html: str | None, port: int | None, inputs: list[str], force: bool) ->
 
     if html is not None and port is not None:
         raise QueryError("give --html or --port, not both: a file needs no server")
-    return None if html is None else checked_output(html, PAGE, ReplayError, inputs, force)
+    return None if html is None else target(html, PAGE, ReplayError, inputs, force)
 
 
 def _film(
@@ -154,7 +157,7 @@ def _film(
     width, cross, height = size.partition("x")
     if not (cross and width.isascii() and width.isdecimal() and height.isascii() and height.isdecimal()):
         raise QueryError(f"--size must be WIDTHxHEIGHT in pixels, such as 1280x720, got {size!r}")
-    return checked_output(video, KINDS, VideoError, inputs, force), (int(width), int(height))
+    return target(video, KINDS, VideoError, inputs, force), (int(width), int(height))
 
 
 def _serve(server: Server, what: str, browse: bool) -> None:
@@ -166,7 +169,7 @@ def _serve(server: Server, what: str, browse: bool) -> None:
 
 
 def _written(file: Path, browse: bool) -> None:
-    say(f"written: {file} ({size_of(file)})")
+    say_written(file)
     _open(file.absolute().as_uri(), browse)
 
 

@@ -11,9 +11,9 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError
-from robot_dyn.cli import Force, Json, PackageDir, Xacro, app, arguments, completion, progress, say, say_json, to_stderr
+from robot_dyn.cli import Force, Json, PackageDir, Xacro, arguments, command, completion, progress, show, to_stderr
 from robot_dyn.description import package_folders
-from robot_dyn.foundations import FileKind, QueryError, save
+from robot_dyn.foundations import FileKind, QueryError, save, target
 
 if TYPE_CHECKING:
     from robot_dyn.tools.doctor.checkup import Checkup
@@ -26,7 +26,7 @@ class RepairError(RobotDynError):
     """A repaired file that cannot be written."""
 
 
-@app.command(rich_help_panel="Files", short_help="Check URDF files, and repair what can be repaired.")
+@command("Files")
 def check(
     files: Annotated[
         list[str],
@@ -62,7 +62,10 @@ def check(
     xacro: Xacro = None,
     as_json: Json = False,
 ) -> None:
-    """Check URDF files: inertias, units, limits, names, shapes; exit code 1 if errors are left."""
+    """Check URDF files, and repair what can be repaired.
+
+    Inertias, units, limits, names and shapes are checked. The exit code is 1 if errors are left.
+    """
     from robot_dyn.foundations import plain
     from robot_dyn.tools.doctor.finding import Severity
 
@@ -94,10 +97,8 @@ def check(
             text, to = each.repaired, targets[file]
             written[file] = str(save(to, lambda stream, text=text: stream.write(text), RepairError))
     checked = [(file, each, written.get(file)) for file, each in zip(files, checkups, strict=True)]
-    if as_json:
-        say_json({"files": [{"file": file, "written": to} | plain(each) for file, each, to in checked]})
-    else:
-        say(*(line for each in checked for line in _lines(*each, every)))
+    document = {"files": [{"file": file, "written": to} | plain(each) for file, each, to in checked]}
+    show([line for each in checked for line in _lines(*each, every)], as_json=as_json, document=document)
     if fix and not as_json:
         for file in files:
             if file not in written:
@@ -109,7 +110,7 @@ def check(
 
 def _target(file: str, force: bool) -> Path:
     stem = Path(file).name.removesuffix(".xacro").removesuffix(".urdf")
-    return arguments.output(f"{stem}.fixed.urdf", _URDF, RepairError, [file] if Path(file).is_file() else [], force)
+    return target(f"{stem}.fixed.urdf", _URDF, RepairError, [file] if Path(file).is_file() else [], force)
 
 
 def _lines(file: str, checkup: Checkup, written: str | None, every: bool) -> Iterator[str]:
