@@ -35,16 +35,6 @@ Name = Annotated[
         autocompletion=completion.robots,
     ),
 ]
-PackageDir = Annotated[
-    list[str] | None, typer.Option(help="Folder in which ROS packages are searched; may be repeated.")
-]
-Xacro = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="NAME=VALUE",
-        help="Expand a xacro file, which runs its expressions; may be repeated; '' for no argument.",
-    ),
-]
 Dark = Annotated[bool, typer.Option("--dark", help="Draw for dark screens.")]
 Budget = Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, compiling not counted.")]
 Repeats = Annotated[int, typer.Option(min=1, help="How often each is timed at most, while the budget lasts.")]
@@ -61,24 +51,23 @@ Payloads = Annotated[
 ]
 
 
-@final
 @dataclass(frozen=True)
-class RobotOptions:
-    """How the robot of a command is read, each None unless given.
+class FileOptions:
+    """How a URDF or MJCF file is read, each None unless given.
 
     With a mass, a total mass or a density, links without inertia get that of their shape.
     """
 
-    lock: Annotated[
+    package_dir: Annotated[
+        list[str] | None, typer.Option(help="Folder in which ROS packages are searched; may be repeated.")
+    ] = None
+    xacro: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="JOINT=VALUE",
-            help="Lock a joint at a value in rad or m; may be repeated.",
-            autocompletion=completion.locks,
+            metavar="NAME=VALUE",
+            help="Expand a xacro file, which runs its expressions; may be repeated; '' for no argument.",
         ),
     ] = None
-    package_dir: PackageDir = None
-    xacro: Xacro = None
     mass: Annotated[
         list[str] | None,
         typer.Option(metavar="LINK=KG", help="Mass of a link without inertia, which its shape gives; may be repeated."),
@@ -94,35 +83,55 @@ class RobotOptions:
         bool | None,
         typer.Option("--allow-overlap", help="Count what closed parts of a mesh share as often as they fill it."),
     ] = None
+
+    @property
+    def stated(self) -> dict[str, object]:
+        """Value by option, of those that are given."""
+        values = {f"--{field.name.replace('_', '-')}": getattr(self, field.name) for field in fields(self)}
+        return {option: value for option, value in values.items() if value is not None and value != []}
+
+    @property
+    def reading(self) -> dict[str, Any]:
+        """Arguments of the functions that read a file."""
+        return {
+            "package_dirs": self.package_dir or (),
+            "xacro": None if self.xacro is None else arguments.expansion(self.xacro),
+            "mass": arguments.assignments("--mass", self.mass, "link") if self.mass else None,
+            "total_mass": self.total_mass,
+            "density": self.density,
+            "allow_overlap": self.allow_overlap or False,
+        }
+
+
+@final
+@dataclass(frozen=True)
+class RobotOptions(FileOptions):
+    """How the robot of a command is read, each None unless given."""
+
+    lock: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="JOINT=VALUE",
+            help="Lock a joint at a value in rad or m; may be repeated.",
+            autocompletion=completion.locks,
+        ),
+    ] = None
     without: Annotated[
         str | None,
         typer.Option(metavar="WHAT,…", help="What is left out of MJCF: tendon, equality, free, ball."),
     ] = None
 
-    @property
-    def given(self) -> dict[str, object]:
-        """Value by option."""
-        return {f"--{each.name.replace('_', '-')}": getattr(self, each.name) for each in fields(self)}
-
     def load(self, name: str, *, quiet: bool = False) -> Robot:
         """Return the robot of a name or path; `quiet` suppresses its warnings."""
         import robot_dyn as rd
 
-        estimated = any(each is not None for each in (self.mass or None, self.total_mass, self.density))
+        estimated = {"--mass", "--total-mass", "--density"} & self.stated.keys()
+        without = {part.strip() for part in (self.without or "").split(",") if part.strip()}
         with warnings.catch_warnings():
             if quiet:
                 warnings.simplefilter("ignore", ModelWarning)
-            robot = rd.load(
-                name,
-                package_dirs=self.package_dir or (),
-                xacro=None if self.xacro is None else arguments.expansion(self.xacro),
-                inertia="from_shapes" if estimated else "stated",
-                mass=arguments.assignments("--mass", self.mass, "link") if self.mass else None,
-                total_mass=self.total_mass,
-                density=self.density,
-                allow_overlap=self.allow_overlap or False,
-                without={each.strip() for each in (self.without or "").split(",") if each.strip()},
-            )
+            inertia = "from_shapes" if estimated else "stated"
+            robot = rd.load(name, inertia=inertia, without=without, **self.reading)
         return robot.with_(lock=arguments.assignments("--lock", self.lock)) if self.lock else robot
 
 
@@ -160,7 +169,7 @@ class Results:
         show(result, as_json=self.as_json, more=more, writes=writes)
 
 
-AS_STATED = RobotOptions()  # defaults of the parameters of commands
+FILE_AS_STATED, AS_STATED = FileOptions(), RobotOptions()  # defaults of the parameters of commands
 PRINTED = Results()
 
 

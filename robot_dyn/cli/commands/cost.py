@@ -112,7 +112,7 @@ def advise(scene: Scene, as_json: Json = False) -> None:
 
 def _setup(what: str, q: str | None, v: str | None, duration: float | None, options: RobotOptions) -> rd.Setup:
     """The setup of a scene file, or of the free swing of a robot."""
-    if setup := arguments.scene(what, {"--q": q, "--v": v, "--duration": duration} | options.given):
+    if setup := arguments.scene(what, {"--q": q, "--v": v, "--duration": duration} | options.stated):
         return setup
     import numpy as np
 

@@ -94,7 +94,7 @@ def query(
 
     if a is not None and tau is not None:
         raise QueryError("give --a or --tau, not both: one follows from the other")
-    setup = arguments.scene(what, {"--effects": effects, "--payload": payload} | options.given)
+    setup = arguments.scene(what, {"--effects": effects, "--payload": payload} | options.stated)
     if setup is None:
         robot = options.load(what)
         robot = robot.with_(payload=[arguments.payload(each) for each in payload]) if payload else robot

@@ -13,7 +13,7 @@ import typer
 import robot_dyn as rd
 from robot_dyn.cli import arguments
 from robot_dyn.cli.application import LOOK, bar, command
-from robot_dyn.cli.options import AS_STATED, Dark, Force, Name, PackageDir, Positions, RobotOptions
+from robot_dyn.cli.options import AS_STATED, Dark, Force, Name, Positions, RobotOptions
 from robot_dyn.cli.terminal import say, say_written
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.files import target
@@ -108,7 +108,9 @@ def replay(
         str | None, typer.Option(metavar="LINK", help="Link whose path is drawn; the tip by default.")
     ] = None,
     view: PageOptions = SERVED,
-    package_dir: PackageDir = None,
+    package_dir: Annotated[
+        list[str] | None, typer.Option(help="Folder in which ROS packages are searched; may be repeated.")
+    ] = None,
 ) -> None:
     """Replay runs in the browser, or as one HTML file or a video.
 

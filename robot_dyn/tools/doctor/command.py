@@ -11,7 +11,7 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError
-from robot_dyn.cli import Force, Json, PackageDir, Xacro, arguments, command, completion, progress, show, to_stderr
+from robot_dyn.cli import FILE_AS_STATED, FileOptions, Force, Json, command, completion, progress, show, to_stderr
 from robot_dyn.description import package_folders
 from robot_dyn.foundations import FileKind, QueryError, save, target
 
@@ -35,62 +35,29 @@ def check(
     fix: Annotated[
         bool, typer.Option("--fix", help="Write NAME.fixed.urdf here, with every change in a comment.")
     ] = False,
-    mass: Annotated[
-        list[str] | None,
-        typer.Option(metavar="LINK=KG", help="With --fix: mass of a link without inertia, which its shape gives."),
-    ] = None,
-    total_mass: Annotated[
-        float | None,
-        typer.Option(metavar="KG", help="With --fix: mass of the robot, shared by links without inertia, from shapes."),
-    ] = None,
-    density: Annotated[
-        float | None,
-        typer.Option(metavar="KG/M³", help="With --fix: inertias of this density for links without any, from shapes."),
-    ] = None,
-    allow_overlap: Annotated[
-        bool,
-        typer.Option(
-            "--allow-overlap", help="With --density: count what parts of a mesh share as often as they fill it."
-        ),
-    ] = False,
     units: Annotated[
         bool, typer.Option("--units", help="With --fix: convert what seems to be in another unit, such as kg mm².")
     ] = False,
     every: Annotated[bool, typer.Option("--all", help="Print each finding, not one line for each kind.")] = False,
     force: Force = False,
-    package_dir: PackageDir = None,
-    xacro: Xacro = None,
+    options: FileOptions = FILE_AS_STATED,
     as_json: Json = False,
 ) -> None:
     """Check URDF files, and repair what can be repaired.
 
-    Inertias, units, limits, names and shapes are checked. The exit code is 1 if errors are left.
+    Inertias, units, limits, names and shapes are checked. The exit code is 1 if errors are left. Masses, densities and
+    --units need --fix.
     """
     from robot_dyn.foundations import plain
     from robot_dyn.tools.doctor.finding import Severity
 
-    estimated = {"--mass": mass or None, "--total-mass": total_mass, "--density": density}
-    for option, value in (estimated | {"--allow-overlap": allow_overlap or None, "--units": units or None}).items():
-        if value is not None and not fix:
+    for option in [*options.stated, *(["--units"] if units else [])]:
+        if option not in ("--package-dir", "--xacro") and not fix:
             raise QueryError(f"{option} is for --fix, which writes the changes; add it, or leave {option} out")
     targets = {file: _target(file, force) for file in files} if fix else {}
     if len({*targets.values()}) < len(targets):
         raise QueryError("--fix: two of the files would be written under one name; repair them one by one")
-    masses = arguments.assignments("--mass", mass, "link") if mass else None
-    expansion = None if xacro is None else arguments.expansion(xacro)
-    checkups = [
-        rd.tools.doctor.check(
-            file,
-            package_dirs=package_dir or (),
-            mass=masses,
-            total_mass=total_mass,
-            density=density,
-            allow_overlap=allow_overlap,
-            units=units,
-            xacro=expansion,
-        )
-        for file in progress(files, "checking")
-    ]
+    checkups = [rd.tools.doctor.check(file, units=units, **options.reading) for file in progress(files, "checking")]
     written = {}
     for file, each in zip(files, checkups, strict=True):
         if fix and each.repaired is not None:

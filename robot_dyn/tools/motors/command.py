@@ -100,7 +100,7 @@ def budget(
         "PLAN.csv": plan, "--payload": payload, "--effects": effects, "--max-payload": max_payload,
         "--fastest": fastest, "--unit": unit, "--period": period, "--time": time, "--joint": joint,
         "--ends": ends,
-        **options.given,
+        **options.stated,
     }  # fmt: skip
     if what.lower().endswith(_RUNS):
         if given := [name for name, value in of_robots.items() if value]:
