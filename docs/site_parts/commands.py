@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import pkgutil
 import re
-from importlib import import_module
 from typing import Any
 
-from typer.main import get_command
-
-from robot_dyn.cli import commands as topics
-from robot_dyn.cli.application import app
-from robot_dyn.cli.groups import GROUPS
+from robot_dyn.cli import GROUPS, program
 
 TAG = re.compile(r"\[/?[a-z][a-z ]*\]")  # of rich
 OPTION = re.compile(r"(?<![\w`-])(--?[a-z][a-z-]*)(?![\w`])")
@@ -19,12 +13,11 @@ OPTION = re.compile(r"(?<![\w`-])(--?[a-z][a-z-]*)(?![\w`])")
 
 def page(_: str) -> str:
     """A section for each command, in the groups of `robot-dyn --help`."""
-    for topic in pkgutil.iter_modules(topics.__path__):
-        import_module(f"{topics.__name__}.{topic.name}")
-    known: Any = get_command(app)
+    commands: dict[str, Any] = program().commands
     parts = []
-    for group, names in GROUPS.items():
-        parts += [f"## {group}", *(_section(name, known.commands[name]) for name in names)]
+    for group in GROUPS:
+        parts.append(f"## {group}")
+        parts += [_section(name, each) for name, each in commands.items() if each.rich_help_panel == group]
     return "\n\n".join(parts)
 
 

@@ -3,12 +3,10 @@
 Ctrl-C ends any command with exit code 130; its handler is installed before anything else is imported.
 
 commands/        the commands, by topic; those of tools are entry points `robot_dyn.commands`
-groups.py        the commands as --help lists them
-application.py   the application, options that commands share, progress bars; completion.py and interrupts.py
-robots.py        how the file of a robot is read: options that commands with a robot share
-arguments.py     values of arguments; terminal.py: output, escaped
+application.py   the application, its groups of commands, progress bars; completion.py and interrupts.py
+options.py       options that commands share: of a robot, and of a result with its figure and table
+arguments.py     values of arguments; terminal.py: the printer of answers as text or JSON, escaped
 report.py        documents and tables of comparisons and runs
-outcome.py       what studies print and write
 """
 
 from __future__ import annotations
@@ -20,8 +18,6 @@ import sys
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
-
-_TOPICS = "query", "simulate", "show", "cost", "diff", "demo", "cache", "export"
 
 
 def _end(*_: object) -> None:
@@ -62,29 +58,19 @@ def main() -> None:
 def _run() -> Any:
     """The exit code of the command."""
     import warnings
-    from importlib import import_module
-    from importlib.metadata import entry_points
 
-    from typer.main import get_command
-
-    from robot_dyn.cli.application import app
-    from robot_dyn.cli.groups import group, without_types_of_flags
+    from robot_dyn.cli.application import program
     from robot_dyn.cli.terminal import failed, finish, open_streams, to_stderr
     from robot_dyn.foundations.errors import RobotDynError, RobotDynWarning
 
-    for topic in _TOPICS:
-        import_module(f"robot_dyn.cli.commands.{topic}")
-    for command in entry_points(group="robot_dyn.commands"):  # of tools
-        command.load()
-    group(app)
-    program = without_types_of_flags(get_command(app))
+    run = program()
     open_streams()
     with warnings.catch_warnings():
         warnings.simplefilter("always", RobotDynWarning)
         warnings.showwarning = lambda message, *_, **__: to_stderr(f"robot-dyn: warning: {message}")
         try:
             try:
-                program(prog_name="robot-dyn")
+                run(prog_name="robot-dyn")
             except SystemExit as end:
                 finish()
                 return end.code

@@ -1,15 +1,18 @@
-"""The typer application, the options that commands share, and progress bars."""
+"""The typer application: commands by group, and progress bars."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Annotated
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Annotated, Any
 
 import typer
+from typer.main import get_command
 
-from robot_dyn.cli import completion
+from robot_dyn.cli.options import with_fields
 from robot_dyn.cli.terminal import put
 from robot_dyn.foundations.errors import escaped
 
@@ -22,34 +25,37 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-Name = Annotated[
-    str,
-    typer.Argument(
-        metavar="ROBOT",
-        help="A name of `robot-dyn list`, or the path of a URDF or MJCF file.",
-        autocompletion=completion.robots,
-    ),
-]
-PackageDir = Annotated[
-    list[str] | None, typer.Option(help="Folder in which ROS packages are searched; may be repeated.")
-]
-Xacro = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="NAME=VALUE",
-        help="Expand a xacro file, which runs its expressions; may be repeated; '' for no argument.",
-    ),
-]
-Plot = Annotated[
-    str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="Draw it, as a .png, .svg or .pdf.")
-]
-Csv = Annotated[str | None, typer.Option("--csv", metavar="TABLE.csv", help="Write its rows as a table.")]
-Dark = Annotated[bool, typer.Option("--dark", help="Draw for dark screens.")]
-Budget = Annotated[float, typer.Option(metavar="SECONDS", help="Time to spend, compiling not counted.")]
-Repeats = Annotated[int, typer.Option(min=1, help="How often each is timed at most, while the budget lasts.")]
-Scene = Annotated[str, typer.Argument(metavar="SCENE.toml", help="A scene file; `robot-dyn scene` prints some.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, as documented in docs/reference/json.md.")]
+GROUPS = "Look at a robot or a run", "Ask for its dynamics", "Run it", "Trust it", "Files"
+"""Groups of commands, in the order of --help."""
+LOOK, ASK, RUN, TRUST, FILES = GROUPS
+_TOPICS = "demo", "query", "show", "diff", "simulate", "cost", "export", "cache"
+
+
+def command(group: str, name: str | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Register a function as a command of a group; --help lists it with the first paragraph of its docstring."""
+
+    def register(function: Callable[..., Any]) -> Callable[..., Any]:
+        return app.command(name, rich_help_panel=group)(with_fields(function))
+
+    return register
+
+
+def program() -> Any:
+    """Return the program: all commands by group, those of tools after those of the core."""
+    for topic in _TOPICS:
+        import_module(f"robot_dyn.cli.commands.{topic}")
+    for entry in entry_points(group="robot_dyn.commands"):  # of tools
+        entry.load()
+    app.registered_commands.sort(key=lambda each: GROUPS.index(str(each.rich_help_panel)))
+    whole = get_command(app)
+    context = whole.context_class(whole, **whole.context_settings)
+    options = [*whole.get_params(context)]
+    for each in whole.commands.values():  # pyright: ignore[reportAttributeAccessIssue]
+        options += each.get_params(each.context_class(each, parent=context, **each.context_settings))
+    for option in options:
+        if getattr(option, "is_flag", False):  # takes no value: --help has no type for it
+            option.metavar = ""  # pyright: ignore[reportAttributeAccessIssue]
+    return whole
 
 
 def _version(asked: bool) -> None:

@@ -1,13 +1,11 @@
-"""Values of arguments: scenes, numbers by joint, assignments, files to write."""
+"""Values of arguments: scenes, numbers by joint, assignments."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from robot_dyn.foundations.errors import QueryError, RobotDynError, nearest
-from robot_dyn.foundations.files import FileKind, target
+from robot_dyn.foundations.errors import QueryError, nearest
 
 if TYPE_CHECKING:
     import numpy as np
@@ -105,14 +103,3 @@ def vector(option: str, text: str | None, joint_names: tuple[str, ...]) -> np.nd
     if len(words) != len(joint_names):
         raise QueryError(f"{option} needs {len(joint_names)} numbers, got {len(words)}: {', '.join(joint_names)}")
     return np.array([number(option, word) for word in words])
-
-
-def output(
-    path: str | Path,
-    kinds: FileKind | tuple[FileKind, ...],
-    error: type[RobotDynError],
-    inputs: Iterable[str | Path],
-    force: bool,
-) -> Path:
-    """The path of a file to write, checked before the work is done as `files.target`; one that exists needs force."""
-    return target(path, kinds, error, inputs, force)

@@ -6,19 +6,16 @@ import json
 import os
 import re
 import sys
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
+
+import typer
 
 from robot_dyn.foundations.answer import Answer, Table
 from robot_dyn.foundations.errors import RobotDynError, escaped
 
 _MOST = 4000  # characters of a message
-
-
-def size_of(file: Path) -> str:
-    """Size of a file in bytes, kB or MB, as text."""
-    size = file.stat().st_size
-    return f"{size} bytes" if size < 1e4 else f"{size / 1e3:.0f} kB" if size < 1e6 else f"{size / 1e6:.1f} MB"
 
 
 class OutputError(RobotDynError):
@@ -67,6 +64,39 @@ def say(*renderables: Any) -> None:
             _guarded(lambda each=each: console.print(each))
 
 
+def show(
+    answer: Any,
+    *,
+    as_json: bool,
+    document: Any = None,
+    more: Mapping[str, Any] | None = None,
+    writes: Iterable[Callable[[], Path]] = (),
+) -> None:
+    """Write the files of an answer, then print it as text or as JSON. The exit code is 130 if Ctrl-C ended its work.
+
+    Args:
+        answer: An answer, or a list of answers, tables and texts.
+        as_json: Whether JSON is printed.
+        document: What JSON has, if not the answer.
+        more: Further answers by key.
+        writes: Functions that write a file and return its path. They are called first: a terminal or pipe may be gone.
+    """
+    written: list[Path] = []
+    more = more or {}
+    try:
+        written += [write() for write in writes]
+    finally:
+        if as_json:
+            say_json(answer if document is None else document, **more)
+        else:
+            parts = answer if isinstance(answer, list | tuple) else [answer]
+            say(*parts, *(part for each in more.values() for part in ("", each)))
+    for path in written:
+        to_stderr(f"written: {path}")
+    if getattr(answer, "interrupted", False):
+        raise typer.Exit(130)
+
+
 def _grid(table: Table) -> Any:
     """A table for a terminal: texts begin at the left and may be broken, numbers stand whole at the right."""
     from rich.table import Table as Grid
@@ -78,6 +108,13 @@ def _grid(table: Table) -> Any:
     for row in table.cells:
         grid.add_row(*row)
     return grid
+
+
+def say_written(file: Path) -> None:
+    """Print that a file was written, with its size."""
+    from rich.filesize import decimal
+
+    say(f"written: {file} ({decimal(file.stat().st_size)})")
 
 
 def put(text: str) -> None:

@@ -1,8 +1,7 @@
 """Scenes: a TOML file becomes a validated Setup. What a scene does not name does not act, gravity included.
 
-scene.py         the file: its keys, `read_scene`, and the Setup it describes
+scene.py         the file: its keys, tables of tools, `read_scene`, and the Setup it describes
 effects.py, control.py, references.py    the tables [[effect]], [control] and [reference]
-tool_tables.py   tables of tools, such as [sweep]: entry points, imported where a scene has them
 declared.py      tables whose keys are the coefficients that classes declare; user_effects.py those of the caller
 schema.py        rules for every table: types of values, units, no unknown key
 messages.py      the one place where errors of pydantic become messages: line, key, value

@@ -13,11 +13,9 @@ from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.scene.control import BLOCKS, KINDS, Control, Model
 from robot_dyn.scene.declared import Declared
 from robot_dyn.scene.effects import ACTING, EDITS
-from robot_dyn.scene.loading import Loading
 from robot_dyn.scene.references import KINDS as REFERENCES
-from robot_dyn.scene.scene import Scene, Start
+from robot_dyn.scene.scene import Loading, Scene, Start, tool_tables
 from robot_dyn.scene.schema import Part, kinds_of
-from robot_dyn.scene.tool_tables import tool_tables
 
 _OPENING = """# Scenes
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import re
 import tomllib
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, ValidationError, WrapValidator, model_validator
+from pydantic import AfterValidator, ValidationError, WrapValidator, create_model, model_validator
 
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
@@ -17,19 +18,42 @@ from robot_dyn.foundations.files import FileKind, read
 from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
+from robot_dyn.model.loading import load
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.control import Control
 from robot_dyn.scene.effects import BY_KIND, AnyEffect, Edit, bare
-from robot_dyn.scene.loading import Loading
 from robot_dyn.scene.messages import validation_message
 from robot_dyn.scene.references import AnyReference, Hold, Sampled, ViaPoints
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Truth, per_joint
-from robot_dyn.scene.tool_tables import tool_tables, with_tool_tables
 from robot_dyn.scene.user_effects import Factories, check_factories, user_defined_or
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
 MAX_BYTES = 2**20
 SCENE = FileKind("a scene", ".toml")
+
+
+class Loading(Part):
+    """How the file of the robot is read. The summary of a run lists what was estimated and what was left out."""
+
+    inertia: Literal["stated", "from_shapes"] = "stated"
+    """Inertias as in the file; or those that it lacks from the shapes of links, which opens mesh files."""
+    mass_kg: dict[str, Positive] | None = None
+    """With "from_shapes": masses by link."""
+    total_mass_kg: Positive | None = None
+    """With "from_shapes": mass of the whole robot, of which links without a mass share what is left by volume."""
+    density_kg_per_m3: Positive | None = None
+    """With "from_shapes", in place of `total_mass_kg`: of links whose mass is not known."""
+    allow_overlap: bool = False
+    """With "from_shapes": count what closed parts of a mesh share as often as they fill it; otherwise refuse it."""
+    without: tuple[Literal["tendon", "equality", "free", "ball"], ...] = ()
+    """Parts of a file of MJCF to leave out."""
+
+    def robot(self, name_or_path: str | Path) -> Robot:
+        """The robot of a name or path."""
+        return load(
+            name_or_path, inertia=self.inertia, mass=self.mass_kg, total_mass=self.total_mass_kg,
+            density=self.density_kg_per_m3, allow_overlap=self.allow_overlap, without=self.without,
+        )  # fmt: skip
 
 
 class Start(Part):
@@ -146,6 +170,11 @@ class Scene(Part):
         return method(self.method)
 
 
+def tool_tables() -> dict[str, EntryPoint]:
+    """Return the entry points of the tables of tools, such as [sweep], by name; imported where a scene has them."""
+    return {entry.name: entry for entry in entry_points(group="robot_dyn.scene_tables")}
+
+
 def read_scene(path: str | Path, *, effects: Factories | None = None) -> Setup:
     """Return the setup of a scene file.
 
@@ -185,8 +214,11 @@ def parse_scene(text: str, source: str, effects: Factories | None = None) -> Sce
         table = tomllib.loads(text.removeprefix("\ufeff"))  # the mark of some editors for UTF-8
     except (ValueError, RecursionError) as error:
         raise SceneError(f"{source}: {_syntax(error)}; correct the file") from None
+    tables = tool_tables()
+    used: Any = {key: (tables[key].load() | None, None) for key in table if key in tables}
+    schema = create_model("Scene", __base__=Scene, **used) if used else Scene
     try:
-        return with_tool_tables(Scene, table).model_validate(table, context=dict(effects or {}))
+        return schema.model_validate(table, context=dict(effects or {}))
     except ValidationError as error:
         raise SceneError(f"{source}: {validation_message(error, table, text)}") from None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from rich.filesize import decimal
 
 import robot_dyn as rd
 from tests.command import refusal, run
@@ -23,7 +24,7 @@ def files(tmp_path: Path, monkeypatch) -> Path:
 def test_export_writes_the_table_of_a_file(files: Path, name: str) -> None:
     done = run("export", f"{name}.npz", "-o", "x.csv")
     assert done.returncode == 0, done.stderr
-    assert done.stdout == f"written: x.csv ({(files / 'x.csv').stat().st_size} bytes)\n"
+    assert done.stdout == f"written: x.csv ({decimal((files / 'x.csv').stat().st_size)})\n"
     table = rd.load_run("run.npz").table() if name == "run" else rd.load_rollouts("runs.npz").table()
     lines = (files / "x.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == ",".join(table) and len(lines) == 1 + len(next(iter(table.values())))

@@ -295,9 +295,8 @@ def test_marks_and_line_ends_of_editors_change_nothing(tmp_path: Path, text: str
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (f"{HEADS}\n{ROWS}".replace(",", ";"), r"log\.csv: semicolons separate its columns.*pandas\.read_csv"),
-        (f"{HEADS}\n{ROWS}".replace(",", ";").replace(".", ","), "semicolons separate its columns.*decimal=','"),
-        (f"{HEADS}\n{ROWS}".replace(",", "\t"), "tabs separate its columns"),
+        (f"{HEADS}\n{ROWS}".replace(",", ";"), r"log\.csv: has one column, 't;.*pandas\.read_csv"),
+        (f"{HEADS}\n{ROWS}".replace(",", "\t"), "has one column"),
         (f'{HEADS}\n"0,1",0,0,0,0,0,0', "line 2: column 't' holds '0,1', not a number"),
         (f"{HEADS}\n{ROWS}".encode("utf-16"), "is not a CSV file in UTF-8"),
         ("", "is empty, or its first line is"),

@@ -184,53 +184,29 @@ length_m = 0.7
     assert "c = 2 N s/m" in said[3]
 
 
-MISTAKES = {
-    "not TOML": ("robot = ", ["is not TOML", "correct"]),
-    "unknown key": (SCENE + "colour = 3", ["line 4: start.colour: is not a key here; known: q, v"]),
-    "near key": (
-        SCENE.replace("duration_s", "duration"),
-        ["line 3: duration: is not a key here; nearest: duration_s"],
+REFERENCE = PD.split("[reference]")
+MISTAKES = [  # those of keys and types are in test_scene_mistakes.py
+    (SCENE.replace("0.1", "-1.0"), "duration_s: must be greater than 0, got -1.0"),
+    (SCENE.replace("0.1", "nan"), "duration_s: .*nan"),
+    (SCENE.replace("planar_2r", "planar_3r"), "planar_3r.*nearest: planar_2r"),
+    ('method = "rk5"' + SCENE, "method: no method 'rk5'; nearest: rk4"),
+    (SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"\nforce_N = [1, 0, 0]', "tipp.*nearest: tip"),
+    (f"{SCENE}[reference]{REFERENCE[1]}", r"reference: .*\[control\]"),
+    (
+        f'{SCENE}{REFERENCE[0]}[reference]\nkind = "via_points"\ntimes_s = [0.1, 0.2]\npoints = [[1, 2]]',
+        "2 times_s for 1 points",
     ),
-    "wrong type": (SCENE.replace("0.1", '"long"'), ["duration_s", "'long'"]),
-    "negative": (SCENE.replace("0.1", "-1.0"), ["duration_s: must be greater than 0, got -1.0"]),
-    "nan": (SCENE.replace("0.1", "nan"), ["duration_s", "nan"]),
-    "unknown joint": (SCENE.replace("joint_2 =", "joint_3 ="), ["joint_3", "nearest: joint_"]),
-    "wrong shape": (SCENE.replace("[0.3, -0.4]", "[0.3]"), ["q must be", "(2,)"]),
-    "unknown robot": (SCENE.replace("planar_2r", "planar_3r"), ["planar_3r", "nearest: planar_2r"]),
-    "unknown method": ('method = "rk5"' + SCENE, ["method", "rk5", "rk4"]),
-    "unknown effect": (
-        SCENE + '[[effect]]\nkind = "viscous"',
-        ["effect 1", "no kind 'viscous'; nearest: viscous_friction"],
-    ),
-    "unknown frame": (
-        SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"\nforce_N = [1, 0, 0]',
-        ["tipp", "nearest: tip"],
-    ),
-    "missing gain": (
-        SCENE + '[control]\nkind = "pd"',
-        ["control: give frequency_rad_per_s, or both kp and kd"],
-    ),
-    "reference alone": (SCENE + PD.split("[reference]")[1].join(["[reference]", ""]), ["reference", "[control]"]),
-    "times and points": (
-        SCENE
-        + PD.split("[reference]")[0]
-        + '[reference]\nkind = "via_points"\ntimes_s = [0.1, 0.2]\npoints = [[1, 2]]',
-        ["2 times_s for 1 points"],
-    ),
-    "wrong reference": (
+    (
         SCENE + PD.replace('"pd"', '"operational_space"\nframe = "tip"'),
-        ["reference.kind", "line or circle", "quintic"],
+        "reference.kind: .* line or circle, got 'quintic'",
     ),
-}
+]
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_is_told_by_file_key_and_value(write, mistake: str) -> None:
-    text, fragments = MISTAKES[mistake]
-    with pytest.raises(SceneError) as caught:
+@pytest.mark.parametrize(("text", "message"), MISTAKES)
+def test_a_mistake_is_told_by_file_key_and_value(write, text: str, message: str) -> None:
+    with pytest.raises(SceneError, match=f"scene.toml: .*{message}"):
         rd.read_scene(write(text))
-    for fragment in ["scene.toml", *fragments]:
-        assert fragment in str(caught.value)
 
 
 def test_a_missing_scene_is_told(tmp_path) -> None:

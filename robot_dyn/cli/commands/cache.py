@@ -8,17 +8,18 @@ from typing import Annotated, Any
 
 import typer
 
-from robot_dyn.cli.application import Json, app
-from robot_dyn.cli.terminal import say, say_json
+from robot_dyn.cli.application import FILES, command
+from robot_dyn.cli.options import Json
+from robot_dyn.cli.terminal import show
 from robot_dyn.foundations.answer import Table
 
 
-@app.command()
+@command(FILES)
 def cache(
     clear: Annotated[bool, typer.Option("--clear", help="Remove them; each is compiled again when needed.")] = False,
     as_json: Json = False,
 ) -> None:
-    """List the compiled kernels kept on disk, with their sizes."""
+    """List or remove the compiled kernels that are kept on disk."""
     from robot_dyn.codegen.store.cache import default_store
 
     store = default_store()
@@ -30,7 +31,7 @@ def cache(
         "bytes": sum(each.size for each in kernels),
         "kernels": kernels,
     }
-    say_json(answer) if as_json else say(*_lines(answer))
+    show([*_lines(answer)], as_json=as_json, document=answer)
 
 
 def _lines(answer: dict[str, Any]) -> Iterator[Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from math import isfinite
 from typing import Annotated, Any
 
@@ -10,17 +9,15 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.application import Budget, Csv, Dark, Force, Json, Name, Plot, Repeats, Scene, app, bar
-from robot_dyn.cli.outcome import give, outputs
-from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
-from robot_dyn.cli.terminal import say, say_json
+from robot_dyn.cli.application import ASK, RUN, TRUST, bar, command
+from robot_dyn.cli.options import AS_STATED, PRINTED, Budget, Json, Name, Repeats, Results, RobotOptions, Scene
+from robot_dyn.cli.terminal import show
 from robot_dyn.foundations.errors import QueryError
 
 _DURATION_S = 1.0
 
 
-@app.command()
-@takes_robot
+@command(TRUST)
 def accuracy(
     what: Annotated[
         str,
@@ -30,8 +27,6 @@ def accuracy(
             autocompletion=completion.robots,
         ),
     ],
-    output: Plot = None,
-    csv: Csv = None,
     budget: Budget = 30.0,
     repeats: Repeats = 25,
     method: Annotated[
@@ -41,46 +36,43 @@ def accuracy(
     q: Annotated[str | None, typer.Option(help="Start of a robot: as of query; random by default.")] = None,
     v: Annotated[str | None, typer.Option(help="Its velocities; 0 by default.")] = None,
     duration: Annotated[float | None, typer.Option(metavar="SECONDS", help="Of its motion; 1 by default.")] = None,
-    dark: Dark = False,
-    force: Force = False,
     options: RobotOptions = AS_STATED,
-    as_json: Json = False,
+    results: Results = PRINTED,
 ) -> None:
-    """Show what each digit of a motion costs in time, by method and program. Ctrl-C ends it and keeps its runs."""
-    paths = outputs(rd.accuracy.WorkPrecision, output, csv, [what] if os.path.isfile(what) else [], force)
+    """Show what each digit of a motion costs in time.
+
+    By method and program. Ctrl-C ends it and keeps its runs.
+    """
+    paths = results.files(rd.accuracy.WorkPrecision, what)
     setup = _setup(what, q, v, duration, options)
     with bar(budget, "starting") as spent:
         result = rd.accuracy.work_precision(
             setup, methods=method, peers=peers, budget_s=budget, repeats=repeats, on_progress=spent
         )
-    give(result, paths, as_json, dark)
+    results.give(result, paths)
 
 
-@app.command()
+@command(ASK)
 def cost(
     scene: Scene,
-    output: Plot = None,
-    csv: Csv = None,
     budget: Budget = 10.0,
     repeats: Repeats = 25,
-    dark: Dark = False,
-    force: Force = False,
-    as_json: Json = False,
+    results: Results = PRINTED,
 ) -> None:
-    """Count and time effects, control and terms of a scene, on and off, and algorithms beside each other."""
-    paths = outputs(rd.accuracy.Cost, output, csv, [scene], force)
+    """Count and time what effects, control and terms cost.
+
+    Each is switched on and off; algorithms are compared with each other.
+    """
+    paths = results.files(rd.accuracy.Cost, scene)
     setup = rd.read_scene(scene)
     with bar(budget, "starting") as spent:
         result = rd.accuracy.cost(setup, budget_s=budget, repeats=repeats, on_progress=spent)
-    give(result, paths, as_json, dark)
+    results.give(result, paths)
 
 
-@app.command()
-@takes_robot
+@command(TRUST)
 def certify(
     robot: Name,
-    output: Plot = None,
-    csv: Csv = None,
     samples: Annotated[int, typer.Option(help="Number of random states.")] = 10_000,
     seed: Annotated[int, typer.Option(help="Of the random states.")] = 0,
     repeats: Annotated[int, typer.Option(min=1, help="How often each query is timed.")] = 7,
@@ -88,35 +80,39 @@ def certify(
     v: Annotated[str | None, typer.Option(help="Its velocities; 0 by default.")] = None,
     a: Annotated[str | None, typer.Option(help="Its accelerations, of inverse dynamics; 0 by default.")] = None,
     tau: Annotated[str | None, typer.Option(help="Its torques, of forward dynamics; 0 by default.")] = None,
-    dark: Dark = False,
-    force: Force = False,
     options: RobotOptions = AS_STATED,
-    as_json: Json = False,
+    results: Results = PRINTED,
 ) -> None:
-    """Count the digits of M, C, N, inverse and forward dynamics that are true, by program and numbers, beside times."""
-    paths = outputs(rd.accuracy.Certificate, output, csv, [robot] if os.path.isfile(robot) else [], force)
+    """Count the digits of M, C, N and dynamics that are true.
+
+    By program and numbers, with times.
+    """
+    paths = results.files(rd.accuracy.Certificate, robot)
     arm = options.load(robot)
     given = {"q": q, "v": v, "a": a, "tau": tau}
     state = {key: arguments.vector(f"--{key}", x, arm.joint_names) for key, x in given.items() if x is not None}
     with bar(1.0, "starting") as done:
         result = rd.accuracy.certify(arm, **state, samples=samples, seed=seed, repeats=repeats, on_progress=done)
-    give(result, paths, as_json, dark)
+    results.give(result, paths)
 
 
-@app.command()
+@command(RUN)
 def advise(scene: Scene, as_json: Json = False) -> None:
-    """Say whether step and control period are short enough, and what error to expect; exit code 1 if they are not."""
+    """Say whether step and control period are short enough.
+
+    Also what error to expect. The exit code is 1 if they are not short enough.
+    """
     setup = rd.read_scene(scene)
     with bar(what="looking at the loop"):
         advice = rd.advise(setup)
-    say_json(advice) if as_json else say(advice)
+    show(advice, as_json=as_json)
     if not advice.stable:
         raise typer.Exit(1)
 
 
 def _setup(what: str, q: str | None, v: str | None, duration: float | None, options: RobotOptions) -> rd.Setup:
     """The setup of a scene file, or of the free swing of a robot."""
-    if setup := arguments.scene(what, {"--q": q, "--v": v, "--duration": duration} | options.given):
+    if setup := arguments.scene(what, {"--q": q, "--v": v, "--duration": duration} | options.stated):
         return setup
     import numpy as np
 

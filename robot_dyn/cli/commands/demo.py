@@ -9,26 +9,26 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli import arguments
-from robot_dyn.cli.application import Force, app, bar
+from robot_dyn.cli.application import LOOK, bar, command
+from robot_dyn.cli.options import Force
 from robot_dyn.cli.terminal import say
 from robot_dyn.foundations.errors import QueryError, RobotDynError
+from robot_dyn.foundations.files import save, target
 
 _ERROR, _METHOD = 1e-8, "DOP853"  # [rad]
 _BUDGET_S = 8.0  # compiling not counted, which happens once for a version of the library
 
 
-@app.command()
+@command(LOOK)
 def demo(
     output: Annotated[str, typer.Option("-o", "--output", metavar="FOLDER", help="Where its files go.")] = "demo",
     force: Force = False,
 ) -> None:
-    """Load a real arm, compare Pinocchio with the own Lagrangian, simulate it, write a replay and a plot.
+    """Load, compare, simulate, replay and plot a real arm.
 
-    At the end it says what 1e-8 rad takes here, by this library and by other programs that are installed.
+    At the end it prints what 1e-8 rad takes here, by this library and by other programs that are installed.
     """
     from robot_dyn.cli import report
-    from robot_dyn.foundations.files import save
     from robot_dyn.scene.scene import SCENE, SceneError
     from robot_dyn.scene.starters import starter
     from robot_dyn.simulation.results.run_file import RUN, RunFileError
@@ -42,7 +42,7 @@ def demo(
         raise QueryError(f"--output {output}: {error.strerror}; name a folder that can be written") from None
     kinds = (("toml", SCENE, SceneError), ("html", PAGE, ReplayError), ("png", PICTURES, PlotError))
     kinds += (("npz", RUN, RunFileError),)
-    files = {end: arguments.output(folder / f"panda.{end}", kind, error, (), force) for end, kind, error in kinds}
+    files = {end: target(folder / f"panda.{end}", kind, error, (), force) for end, kind, error in kinds}
     save(files["toml"], lambda stream: stream.write(starter("panda_computed_torque").encode()), SceneError)
     panda = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
     with bar(what="comparing"):

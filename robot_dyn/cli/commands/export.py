@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli import arguments
-from robot_dyn.cli.application import Force, app, bar
-from robot_dyn.cli.terminal import say, size_of
+from robot_dyn.cli.application import FILES, bar, command
+from robot_dyn.cli.options import Force
+from robot_dyn.cli.terminal import say_written
+from robot_dyn.foundations.files import target
 
 if TYPE_CHECKING:
     from robot_dyn.simulation.results.run_data import RunData
 
 
-@app.command()
+@command(FILES)
 def export(
     run: Annotated[str, typer.Argument(metavar="RUN.npz", help="A file of a run, or of rollouts.")],
     output: Annotated[
@@ -24,15 +25,18 @@ def export(
     ],
     force: Force = False,
 ) -> None:
-    """Write a run, or the runs of a batch, as a table or a log for other programs."""
+    """Write a run as CSV, Parquet, netCDF or a log of ROS 2.
+
+    The runs of a batch are one table.
+    """
     from robot_dyn.simulation.export.export import kinds
     from robot_dyn.simulation.results.run_file import RunFileError
 
     loaded = _loaded(run)
-    path = arguments.output(output, kinds(loaded), RunFileError, [run], force)
+    path = target(output, kinds(loaded), RunFileError, [run], force)
     with bar(what="writing"):
         file = rd.export(loaded, path)
-    say(f"written: {file} ({size_of(file)})")
+    say_written(file)
 
 
 def _loaded(path: str) -> RunData:

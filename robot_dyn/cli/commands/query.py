@@ -8,24 +8,23 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.application import Json, Name, app, progress
-from robot_dyn.cli.robots import AS_STATED, RobotOptions, takes_robot
-from robot_dyn.cli.terminal import say, say_json
+from robot_dyn.cli.application import ASK, LOOK, TRUST, command, progress
+from robot_dyn.cli.options import AS_STATED, Effects, Json, Name, Payloads, Positions, RobotOptions
+from robot_dyn.cli.terminal import show
 from robot_dyn.foundations.errors import QueryError, RobotDynError
 
 if TYPE_CHECKING:
     import numpy as np
 
 
-@app.command("list")
+@command(LOOK, "list")
 def list_(as_json: Json = False) -> None:
     """List the robots that can be named."""
     names = rd.list_robots()
-    say_json({"robots": names}) if as_json else say(*names)
+    show([*names], as_json=as_json, document={"robots": names})
 
 
-@app.command()
-@takes_robot
+@command(LOOK)
 def info(
     robot: Name,
     compiled: Annotated[
@@ -34,22 +33,21 @@ def info(
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Show a robot: joints, limits, friction, mass, and findings on its file."""
+    """Show a robot: joints, limits, friction, mass, findings."""
     from robot_dyn.cli import report
+    from robot_dyn.foundations.result import plain
 
     loaded = options.load(robot, quiet=True)  # the findings are shown below
-    implementations = {"compiled": report.formulations(loaded)} if compiled else {}
     answer = rd.info(loaded)
-    if as_json:
-        say_json(answer, **implementations)
-        return
-    say(answer)
     if compiled:
-        say(*report.formulation_table(implementations["compiled"]))
+        counts = report.formulations(loaded)
+        document = plain(answer) | {"compiled": counts}
+        show([answer, *report.formulation_table(counts)], as_json=as_json, document=document)
+    else:
+        show(answer, as_json=as_json)
 
 
-@app.command()
-@takes_robot
+@command(ASK)
 def query(
     what: Annotated[
         str,
@@ -59,9 +57,7 @@ def query(
             autocompletion=completion.robots,
         ),
     ],
-    q: Annotated[
-        str | None, typer.Option(help="Positions in rad or m: 0.1,-0.2,… or joint=0.1,…; 0 by default.")
-    ] = None,
+    q: Positions = None,
     v: Annotated[str | None, typer.Option(help="Velocities in rad/s or m/s, in the same form.")] = None,
     a: Annotated[str | None, typer.Option(help="Accelerations in rad/s² or m/s²: the torque is computed.")] = None,
     tau: Annotated[str | None, typer.Option(help="Torques in N m or N: the acceleration is computed.")] = None,
@@ -82,28 +78,23 @@ def query(
     frame: Annotated[
         str | None, typer.Option(metavar="LINK", help="The frame of --quantity jacobian and others.")
     ] = None,
-    effects: Annotated[str | None, typer.Option(help='"urdf" adds the friction that the file states.')] = None,
-    payload: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="LINK=MASS@X,Y,Z",
-            help="Add a body to a link, in kg and m, as tool0=5kg@0,0,0.1; may be repeated.",
-        ),
-    ] = None,
+    effects: Effects = None,
+    payload: Payloads = None,
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Ask for M, C, N at a state, and for the torque of an acceleration or the acceleration of a torque.
+    """Ask for M, C, N, torques and accelerations at a state.
 
     Of a scene: at its start, under the actuation of its control; what dry friction and rigid stops hold is listed.
     """
     from robot_dyn.cli import report
     from robot_dyn.effects.plant_state import plant_state
     from robot_dyn.effects.why import why_at
+    from robot_dyn.foundations.result import plain
 
     if a is not None and tau is not None:
         raise QueryError("give --a or --tau, not both: one follows from the other")
-    setup = arguments.scene(what, {"--effects": effects, "--payload": payload} | options.given)
+    setup = arguments.scene(what, {"--effects": effects, "--payload": payload} | options.stated)
     if setup is None:
         robot = options.load(what)
         robot = robot.with_(payload=[arguments.payload(each) for each in payload]) if payload else robot
@@ -120,11 +111,9 @@ def query(
     state = plant_state(plant, at, speed, acceleration, torque)
     cause = {} if why is None else {"why": why_at(state, why)}
     answers = report.queries(state, quantity or (), frame)
-    if as_json:
-        say_json(state, **cause, **({"quantities": answers} if answers else {}))
-        return
-    say(state, *report.query_lines(answers, names, state.types))
-    say(*(part for each in cause.values() for part in ("", each)))
+    text = [state, *report.query_lines(answers, names, state.types)]
+    document = plain(state) | ({"quantities": answers} if answers else {})
+    show(text, as_json=as_json, document=document, more=cause)
 
 
 def _actuation(setup: rd.Setup, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -137,8 +126,7 @@ def _actuation(setup: rd.Setup, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return equation.actuation(0.0, q, v, z, held)
 
 
-@app.command()
-@takes_robot
+@command(TRUST)
 def compare(
     robots: Annotated[
         list[str] | None, typer.Argument(metavar="ROBOT...", help="Names or paths.", autocompletion=completion.robots)
@@ -149,7 +137,10 @@ def compare(
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Cross-check Pinocchio against the library's own Lagrangian; exit code 1 if they disagree."""
+    """Compare Pinocchio with the library's own Lagrangian.
+
+    The exit code is 1 if they disagree.
+    """
     from robot_dyn.cli import report
 
     if robots and every:
@@ -164,6 +155,7 @@ def compare(
             if not every:
                 raise
             refused[name] = str(error)
-    say_json(report.comparison(results, refused)) if as_json else say(*report.comparison_tables(results, refused))
+    document = report.comparison(results, refused)
+    show([*report.comparison_tables(results, refused)], as_json=as_json, document=document)
     if not all(result.ok for _, result in results):
         raise typer.Exit(1)

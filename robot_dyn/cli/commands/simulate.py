@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli import arguments, completion
-from robot_dyn.cli.application import Force, Json, Scene, app, bar
-from robot_dyn.cli.terminal import put, say, say_json, to_stderr
+from robot_dyn.cli import completion
+from robot_dyn.cli.application import ASK, FILES, RUN, bar, command
+from robot_dyn.cli.options import Force, Json, Scene
+from robot_dyn.cli.terminal import put, say, show
 from robot_dyn.foundations.answer import Table
+from robot_dyn.foundations.files import target
 
 
-@app.command()
+@command(RUN)
 def simulate(
     scene: Scene,
     output: Annotated[
@@ -29,7 +32,10 @@ def simulate(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Run a scene; exit code 1 if it diverges. Ctrl-C ends the run and keeps its samples."""
+    """Run a scene.
+
+    The exit code is 1 if it diverges. Ctrl-C ends the run and keeps its samples.
+    """
     from robot_dyn.cli import report
     from robot_dyn.simulation.export.export import TABLE
     from robot_dyn.simulation.results.run_file import RUN, RunFileError
@@ -38,35 +44,32 @@ def simulate(
     if accuracy is not None:
         setup = replace(setup, accuracy=accuracy)
     inputs = [scene, setup.plant.dynamics.description.source]  # pyright: ignore[reportAttributeAccessIssue]
-    file = output and arguments.output(output, RUN, RunFileError, inputs, force)
-    table = csv and arguments.output(csv, TABLE, RunFileError, [*inputs, *([file] if file else [])], force)
+    writes: list[tuple[Any, Path]] = []
+    for path, kind, write in ((output, RUN, rd.save_run), (csv, TABLE, rd.export)):
+        if path:
+            written = [file for _, file in writes]
+            writes.append((write, target(path, kind, RunFileError, [*inputs, *written], force)))
     with bar(setup.duration_s, at_the_end="estimating the error") as advance:
         run = rd.simulate(setup, on_progress=advance)
-    try:  # the files first: a terminal or pipe may be gone
-        written = [path for path in (file and rd.save_run(run, file), table and rd.export(run, table)) if path]
-    finally:
-        say_json(report.run(run)) if as_json else say(*run.summary.split("\n"))
-    for path in written:
-        to_stderr(f"written: {path}")
+    lines, files = run.summary.split("\n"), [partial(write, run, path) for write, path in writes]
+    show(lines, as_json=as_json, document=report.run(run), writes=files)
     if run.outcome.ending != "finished":
         raise typer.Exit(130 if run.outcome.ending == "stopped" else 1)
 
 
-@app.command()
+@command(ASK)
 def explain(scene: Scene, as_json: Json = False) -> None:
-    """Say what a scene integrates: each term, what is not simulated, and where every number came from."""
-    answer = rd.explain(Path(scene))
-    say_json(answer) if as_json else say(answer)
+    """Say what a scene integrates, and where numbers came from."""
+    show(rd.explain(Path(scene)), as_json=as_json)
 
 
-@app.command()
+@command(ASK)
 def sweepable(scene: Scene, as_json: Json = False) -> None:
-    """List the parameters of a scene that `rd.rollouts` can sweep, with values and units."""
-    answer = rd.sweepable(rd.read_scene(scene))
-    say_json(answer) if as_json else say(answer)
+    """List the parameters that runs of a scene can sweep."""
+    show(rd.sweepable(rd.read_scene(scene)), as_json=as_json)
 
 
-@app.command()
+@command(FILES)
 def scene(
     name: Annotated[
         str | None,
@@ -75,7 +78,10 @@ def scene(
         ),
     ] = None,
 ) -> None:
-    """Print a scene file to start from, as `robot-dyn scene pendulum > pendulum.toml`."""
+    """Print a scene file to start from.
+
+    For example `robot-dyn scene pendulum > pendulum.toml`.
+    """
     from robot_dyn.scene.starters import opening, starter, starter_names
 
     if name:

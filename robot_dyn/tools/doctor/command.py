@@ -11,9 +11,9 @@ import typer
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError
-from robot_dyn.cli import Force, Json, PackageDir, Xacro, app, arguments, completion, progress, say, say_json, to_stderr
+from robot_dyn.cli import FILE_AS_STATED, FileOptions, Force, Json, command, completion, progress, show, to_stderr
 from robot_dyn.description import package_folders
-from robot_dyn.foundations import FileKind, QueryError, save
+from robot_dyn.foundations import FileKind, QueryError, save, target
 
 if TYPE_CHECKING:
     from robot_dyn.tools.doctor.checkup import Checkup
@@ -26,7 +26,7 @@ class RepairError(RobotDynError):
     """A repaired file that cannot be written."""
 
 
-@app.command(rich_help_panel="Files", short_help="Check URDF files, and repair what can be repaired.")
+@command("Files")
 def check(
     files: Annotated[
         list[str],
@@ -35,69 +35,37 @@ def check(
     fix: Annotated[
         bool, typer.Option("--fix", help="Write NAME.fixed.urdf here, with every change in a comment.")
     ] = False,
-    mass: Annotated[
-        list[str] | None,
-        typer.Option(metavar="LINK=KG", help="With --fix: mass of a link without inertia, which its shape gives."),
-    ] = None,
-    total_mass: Annotated[
-        float | None,
-        typer.Option(metavar="KG", help="With --fix: mass of the robot, shared by links without inertia, from shapes."),
-    ] = None,
-    density: Annotated[
-        float | None,
-        typer.Option(metavar="KG/M³", help="With --fix: inertias of this density for links without any, from shapes."),
-    ] = None,
-    allow_overlap: Annotated[
-        bool,
-        typer.Option(
-            "--allow-overlap", help="With --density: count what parts of a mesh share as often as they fill it."
-        ),
-    ] = False,
     units: Annotated[
         bool, typer.Option("--units", help="With --fix: convert what seems to be in another unit, such as kg mm².")
     ] = False,
     every: Annotated[bool, typer.Option("--all", help="Print each finding, not one line for each kind.")] = False,
     force: Force = False,
-    package_dir: PackageDir = None,
-    xacro: Xacro = None,
+    options: FileOptions = FILE_AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Check URDF files: inertias, units, limits, names, shapes; exit code 1 if errors are left."""
+    """Check URDF files, and repair what can be repaired.
+
+    Inertias, units, limits, names and shapes are checked. The exit code is 1 if errors are left. Masses, densities and
+    --units need --fix.
+    """
     from robot_dyn.foundations import plain
     from robot_dyn.tools.doctor.finding import Severity
 
-    estimated = {"--mass": mass or None, "--total-mass": total_mass, "--density": density}
-    for option, value in (estimated | {"--allow-overlap": allow_overlap or None, "--units": units or None}).items():
-        if value is not None and not fix:
+    for option in [*options.stated, *(["--units"] if units else [])]:
+        if option not in ("--package-dir", "--xacro") and not fix:
             raise QueryError(f"{option} is for --fix, which writes the changes; add it, or leave {option} out")
     targets = {file: _target(file, force) for file in files} if fix else {}
     if len({*targets.values()}) < len(targets):
         raise QueryError("--fix: two of the files would be written under one name; repair them one by one")
-    masses = arguments.assignments("--mass", mass, "link") if mass else None
-    expansion = None if xacro is None else arguments.expansion(xacro)
-    checkups = [
-        rd.tools.doctor.check(
-            file,
-            package_dirs=package_dir or (),
-            mass=masses,
-            total_mass=total_mass,
-            density=density,
-            allow_overlap=allow_overlap,
-            units=units,
-            xacro=expansion,
-        )
-        for file in progress(files, "checking")
-    ]
+    checkups = [rd.tools.doctor.check(file, units=units, **options.reading) for file in progress(files, "checking")]
     written = {}
     for file, each in zip(files, checkups, strict=True):
         if fix and each.repaired is not None:
             text, to = each.repaired, targets[file]
             written[file] = str(save(to, lambda stream, text=text: stream.write(text), RepairError))
     checked = [(file, each, written.get(file)) for file, each in zip(files, checkups, strict=True)]
-    if as_json:
-        say_json({"files": [{"file": file, "written": to} | plain(each) for file, each, to in checked]})
-    else:
-        say(*(line for each in checked for line in _lines(*each, every)))
+    document = {"files": [{"file": file, "written": to} | plain(each) for file, each, to in checked]}
+    show([line for each in checked for line in _lines(*each, every)], as_json=as_json, document=document)
     if fix and not as_json:
         for file in files:
             if file not in written:
@@ -109,7 +77,7 @@ def check(
 
 def _target(file: str, force: bool) -> Path:
     stem = Path(file).name.removesuffix(".xacro").removesuffix(".urdf")
-    return arguments.output(f"{stem}.fixed.urdf", _URDF, RepairError, [file] if Path(file).is_file() else [], force)
+    return target(f"{stem}.fixed.urdf", _URDF, RepairError, [file] if Path(file).is_file() else [], force)
 
 
 def _lines(file: str, checkup: Checkup, written: str | None, every: bool) -> Iterator[str]:

@@ -9,19 +9,15 @@ import typer
 import robot_dyn as rd
 from robot_dyn.cli import (
     AS_STATED,
-    Csv,
-    Dark,
-    Force,
-    Json,
-    Plot,
+    PRINTED,
+    Effects,
+    Payloads,
+    Results,
     RobotOptions,
-    app,
     arguments,
     bar,
+    command,
     completion,
-    give,
-    outputs,
-    takes_robot,
 )
 from robot_dyn.foundations import QueryError
 
@@ -32,8 +28,7 @@ if TYPE_CHECKING:
 _RUNS = ".toml", ".npz"
 
 
-@app.command(rich_help_panel="Ask for its dynamics", short_help="Say whether motors suffice for a motion, and why.")
-@takes_robot
+@command("Ask for its dynamics")
 def budget(
     what: Annotated[
         str,
@@ -47,13 +42,8 @@ def budget(
         str | None,
         typer.Argument(metavar="[PLAN.csv]", help="Way points or samples: a column t in s, and one for each joint."),
     ] = None,
-    payload: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="LINK=MASS@X,Y,Z", help="What it carries, in kg and m, as tool0=5kg@0,0,0.1; may be repeated."
-        ),
-    ] = None,
-    effects: Annotated[str | None, typer.Option(help='"urdf" adds the friction that the file states.')] = None,
+    payload: Payloads = None,
+    effects: Effects = None,
     limits: Annotated[
         str | None,
         typer.Option(
@@ -89,21 +79,18 @@ def budget(
         list[str] | None,
         typer.Option(metavar="JOINT=COLUMN", help="Heading of a joint in the plan, for each; others are left out."),
     ] = None,
-    output: Plot = None,
-    csv: Csv = None,
-    dark: Dark = False,
-    force: Force = False,
     options: RobotOptions = AS_STATED,
-    as_json: Json = False,
+    results: Results = PRINTED,
 ) -> None:
-    """Compare what a motion asks of each motor with its limits, by cause; exit code 1 if a motor is too small.
+    """Say whether motors suffice for a motion, and why.
 
+    It compares the demand on each motor with its limits, by cause. The exit code is 1 if a motor is too small.
     With --fastest it is 1 if one is too small for the given motion or for the fastest one.
     Torque and speed peaks, rms torque, power, energy, and the torque at which dry friction breaks away.
     """
     from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 
-    paths = outputs(MotorBudget, output, csv, [each for each in (what, plan, limits) if each], force)
+    paths = results.files(MotorBudget, what, plan, limits)
     if share is not None and not fastest:
         raise QueryError("--share is of the fastest motion: add --fastest, or leave it out")
     if time is not None and period is not None:
@@ -113,7 +100,7 @@ def budget(
         "PLAN.csv": plan, "--payload": payload, "--effects": effects, "--max-payload": max_payload,
         "--fastest": fastest, "--unit": unit, "--period": period, "--time": time, "--joint": joint,
         "--ends": ends,
-        **options.given,
+        **options.stated,
     }  # fmt: skip
     if what.lower().endswith(_RUNS):
         if given := [name for name, value in of_robots.items() if value]:
@@ -130,7 +117,7 @@ def budget(
             found = rd.tools.motors.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)
     more = _more(found, max_payload, fastest, 1.0 if share is None else share)
     judged = [found, more["fastest"].budget] if fastest else [found]
-    give(found, paths, as_json, dark, judged[-1], **more)
+    results.give(found, paths, judged[-1], **more)
     if not all(each.fits for each in judged):
         raise typer.Exit(1)
 

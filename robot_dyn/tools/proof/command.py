@@ -7,10 +7,10 @@ from typing import Annotated
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli import Json, Scene, app, bar, say, say_json
+from robot_dyn.cli import Json, Scene, bar, command, show
 
 
-@app.command(rich_help_panel="Trust it", short_help="Prove where the arm of a scene will be.")
+@command("Trust it")
 def prove(
     scene: Scene,
     until: Annotated[
@@ -20,10 +20,13 @@ def prove(
     budget: Annotated[float, typer.Option(metavar="SECONDS", help="Time that it may take.")] = 60.0,
     as_json: Json = False,
 ) -> None:
-    """Prove where the arm of a scene will be: balls that hold q and v; exit code 1 if not up to the end."""
+    """Prove where the arm of a scene will be.
+
+    It prints balls that hold q and v. The exit code is 1 if the proof does not reach the end.
+    """
     setup = rd.read_scene(scene)
     with bar(setup.duration_s if until is None else until, "proving") as advance:
         proof = rd.tools.proof.prove(setup, until, bits, budget_s=budget, on_progress=advance)
-    say_json(proof) if as_json else say(proof)
+    show(proof, as_json=as_json)
     if not proof.proven:
         raise typer.Exit(1)

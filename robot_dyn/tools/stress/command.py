@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from typing import Annotated
 
 import typer
 
 import robot_dyn as rd
-from robot_dyn.cli import AS_STATED, Force, Json, Name, RobotOptions, app, arguments, bar, give, takes_robot
+from robot_dyn.cli import AS_STATED, Force, Json, Name, RobotOptions, bar, command, show
+from robot_dyn.foundations import target
 
 
-@app.command(rich_help_panel="Trust it", short_help="Look for what breaks first on an arm.")
-@takes_robot
+@command("Trust it")
 def stress(
     robot: Name,
     output: Annotated[
@@ -29,17 +30,19 @@ def stress(
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Look for what breaks first on an arm: worst configurations, step, gain, speed, payload; exit code 1 on failures.
+    """Look for what breaks first on an arm.
 
+    Worst configurations, step, gain, speed and payload; the exit code is 1 on failures.
     Ctrl-C ends it and keeps what was found.
     """
     from robot_dyn.report import JSON, ResultError
 
     inputs = [robot] if os.path.isfile(robot) else []
-    paths = [arguments.output(output, JSON, ResultError, inputs, force)] if output else []
+    path = target(output, JSON, ResultError, inputs, force) if output else None
     arm = options.load(robot)
     with bar(budget, "starting") as spent:
         result = rd.tools.stress.stress(arm, samples=samples, runs=runs, seed=seed, budget_s=budget, on_progress=spent)
-    give(result, paths, as_json)
+    writes = [] if path is None else [partial(rd.accuracy.save_result, result, path)]
+    show(result, as_json=as_json, writes=writes)
     if not result.ok:
         raise typer.Exit(1)
