@@ -27,3 +27,8 @@ def arguments_of(method: str, n: int, seed: int = 0, batch: tuple[int, ...] = ()
 def ask(robot: rd.Robot, method: str, *arguments: Any) -> Any:
     frame = [robot.frame_names[-1]] if method in FRAMED else []
     return getattr(robot, method)(*arguments, *frame)
+
+
+def assert_close(actual: Any, expected: Any, case: str = "") -> None:
+    """Equal but for the order of sums in products of matrices, 1e-13 of the largest entry."""
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-13 * np.max(np.abs(expected), initial=0), err_msg=case)

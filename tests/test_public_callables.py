@@ -18,9 +18,13 @@ from tests.wrong_arguments import EXTREME, LAX, LONG, NOT_TEXT, Example, example
 
 LIMIT_S = 20  # of one call; the machine may be busy
 MEASURE = {
+    "MotorBudget.fastest",
+    "MotorBudget.max_payload",
     "advise",
     "budget",
     "certify",
+    "check",
+    "compare",
     "cost",
     "from_scene",
     "path",

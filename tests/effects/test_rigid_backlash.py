@@ -178,7 +178,7 @@ def test_a_motor_that_rests_at_an_end_is_an_armature(engine: str) -> None:
     np.testing.assert_allclose(run.a[-1], rest.a[-1], atol=1e-8)
 
 
-@BOTH
+@pytest.mark.parametrize("engine", ["interpreted", *long(["compiled"])])
 def test_a_payload_that_a_pushed_joint_picks_up_is_an_impact_of_its_motor_too(engine: str) -> None:
     """With the motor at an end, e = 0: (m + B + M) v⁺ = (m + B) v⁻; the slider, its motor and the ledger, 1e-12."""
     force, M, at = 1.3, 0.9, 0.5

@@ -14,6 +14,7 @@ from robot_dyn.foundations import EditError, NotFiniteError, OverflowedError, Qu
 from robot_dyn.lagrange import articulated_body
 from robot_dyn.queries import EQUATION
 from tests.codegen.arms import compiled
+from tests.long import long
 from tests.queries import ARGUMENTS, FRAMED
 
 UR5 = rd.load("ur5")
@@ -28,7 +29,7 @@ def states(rows: int) -> dict[str, np.ndarray]:
 
 
 @every_engine
-@pytest.mark.parametrize("rows", [5, 40])
+@pytest.mark.parametrize("rows", [40, *long([5])])
 @pytest.mark.parametrize("method", ARGUMENTS)
 def test_states_that_are_not_finite_leave_the_others_their_answers(engine: Any, method: str, rows: int) -> None:
     """As in a batch without bad ones, to 1e-13 of the largest: tiles are cut otherwise."""

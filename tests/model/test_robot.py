@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -11,11 +9,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError
-from tests.queries import ARGUMENTS, SEVERAL, arguments_of, ask, general
+from tests.long import long
+from tests.queries import ARGUMENTS, SEVERAL, arguments_of, ask, assert_close, general
 
 ROBOTS = ("pendulum", "cart_pole", "ur5", "kinova", "panda", "mimic_chain", "skew_tree")
 every_method = pytest.mark.parametrize("method", ARGUMENTS)
-every_robot = pytest.mark.parametrize("name", ("pendulum", "ur5", "panda", "skew_tree"))
+every_robot = pytest.mark.parametrize("name", ["pendulum", "panda", *long(["ur5", "skew_tree"])])  # one joint; coupled
 
 
 # --- what Pinocchio says
@@ -122,11 +121,6 @@ def test_total_mass_counts_the_base_and_every_payload():
 
 
 # --- batches
-
-
-def assert_close(actual: Any, expected: Any, case: str = "") -> None:
-    """Equal but for the order of sums in products of matrices, 1e-13 of the largest entry."""
-    assert_allclose(actual, expected, rtol=0, atol=1e-13 * np.max(np.abs(expected), initial=0), err_msg=case)
 
 
 @every_method

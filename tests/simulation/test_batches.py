@@ -11,7 +11,7 @@ from tests.long import long
 SEED = 20261123
 
 
-@pytest.mark.parametrize("index", [0, 2, *long([1, *range(3, len(FAMILIES))])])
+@pytest.mark.parametrize("index", [0, *long(range(1, len(FAMILIES)))])
 def test_each_run_of_a_batch_is_the_run_of_simulate(index: int) -> None:
     """To a hundred times what a push by a few roundings grows to; the same steps, samples and outcome."""
     judged = judge(SEED, index)

@@ -39,8 +39,14 @@ def pull(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return np.array([3.0, -1.0, 0.5, 0.2, -0.4, 0.3][: len(q)]) * np.sin(9.0 * t + np.arange(len(q)))
 
 
-@pytest.mark.parametrize("name", plants())
-@pytest.mark.parametrize("engine", [*long(["interpreted"]), "compiled"])
+@pytest.mark.parametrize(
+    ("name", "engine"),
+    [
+        *((name, "compiled") for name in ("payload", "LuGre", "geared motors", "dry friction", "stops", "limits")),
+        *long((name, "compiled") for name in ("friction and springs", "Dahl", "backlash")),
+        *long((name, "interpreted") for name in plants()),
+    ],
+)
 def test_causes_add_up_to_the_actuation(name: str, engine: str) -> None:
     """To rounding, at all samples: those of joints that stick, strike and break away too."""
     plant = plants()[name]

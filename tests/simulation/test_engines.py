@@ -52,7 +52,7 @@ EFFECTS = {
         rd.effects.ExternalWrench(LINK, [0, 2, 1, 0.1, 0.2, 0.3], "world", start_s=0.1),
     ],
 }
-SOME = ("semi_implicit_euler", "rk4", "gauss_4", "rosenbrock_5")  # one of each kind
+SOME = ("rk4", "gauss_4")  # in (q, v) and in (q, p)
 
 
 def both(**options) -> tuple[rd.Trajectory, rd.Trajectory]:
@@ -110,7 +110,7 @@ def test_each_effect_acts_alike(name: str) -> None:
         np.testing.assert_allclose(ours.wrenches[link], wrench, atol=1e-11)
 
 
-@pytest.mark.parametrize("method", ["rk4", *long(["gauss_4"])])
+@pytest.mark.parametrize("method", long(["rk4", "gauss_4"]))
 def test_six_joints_under_all_at_once(method: str) -> None:
     q = np.array([0.3, -0.6, 0.4, -1.2, 0.5, 1.1])
     effects = [

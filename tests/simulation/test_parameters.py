@@ -101,10 +101,10 @@ def plant_with(effect: rd.effects.Active) -> rd.Plant:
     ("name", "values"),
     [
         (f"model.payload_mass:{TIP}", np.array([0.1, 2.5])),
-        ("external_wrench.wrench", np.array([[1.0, 2, 3, 0.4, 0.5, 0.6], [3.0, 1, -2, 0.1, 0.2, 0.9]])),
         ("kp", np.array([[30.0, 20.0], [70.0, 80.0]])),
         *long(
             [
+                ("external_wrench.wrench", np.array([[1.0, 2, 3, 0.4, 0.5, 0.6], [3.0, 1, -2, 0.1, 0.2, 0.9]])),
                 ("gravity", np.array([[0.0, 0.0, -9.0], [0.4, 0.1, -3.0]])),
                 ("model.gravity", np.array([[0.0, 0.0, -9.0], [0.4, 0.1, -3.0]])),
                 (f"payload_com:{TIP}", np.array([[0.1, 0.0, 0.05], [-0.05, 0.02, 0.1]])),

@@ -13,6 +13,7 @@ from robot_dyn.effects import Active
 from robot_dyn.foundations import QueryError, TraceError
 from robot_dyn.simulation.rollouts import pool
 from tests.command import refusal, said
+from tests.long import long
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.5])
@@ -35,6 +36,7 @@ SETUP = rd.Setup(
     step_s=2e-3,
     record_period_s=0.01,
 )
+
 PID = replace(SETUP, controller=rd.control.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
 ARM_TIP, INERTIA = "tip", ((0.01, 0.0, 0.0), (0.0, 0.02, 0.001), (0.0, 0.001, 0.03))
 NOMINAL = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
@@ -51,7 +53,7 @@ def arrays(runs: rd.Rollouts) -> list[np.ndarray]:
     return [x for x in given if x is not None]
 
 
-@pytest.mark.parametrize("setup", [SETUP, PID, replace(SETUP, integrator=rd.integrate.method("gauss_2"))])
+@pytest.mark.parametrize("setup", [SETUP, PID, *long([replace(SETUP, integrator=rd.integrate.method("gauss_2"))])])
 def test_each_run_is_that_of_simulate(setup: rd.Setup) -> None:
     """To rounding: B = 1, B of one tile and a bit more."""
     for count in (1, 70):
@@ -79,7 +81,7 @@ def test_threads_change_nothing() -> None:
             np.testing.assert_array_equal(x, y)
 
 
-@pytest.mark.parametrize("method", ["rk4", "gauss_2"])
+@pytest.mark.parametrize("method", ["rk4", *long(["gauss_2"])])
 def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str) -> None:
     """Bit for bit; its own samples are those of simulate up to its end, then nan."""
     setup = replace(SETUP, integrator=rd.integrate.method(method), record_period_s=0.0)
@@ -201,7 +203,7 @@ def assert_alike(ours: np.ndarray, theirs: np.ndarray) -> None:
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-10 * (1 + np.abs(theirs).max()))
 
 
-@pytest.mark.parametrize("setup", [SETUP, PID, replace(SETUP, integrator=rd.integrate.method("gauss_2"))])
+@pytest.mark.parametrize("setup", [SETUP, PID, *long([replace(SETUP, integrator=rd.integrate.method("gauss_2"))])])
 @pytest.mark.parametrize("record", [EVERYTHING, ("q", "v")])
 def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record: tuple[str, ...]) -> None:
     """In all that was recorded or follows from it; what neither tells is nan, and nothing is in its place."""
@@ -259,7 +261,7 @@ def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
             np.testing.assert_allclose(alone.q, some.q[i], rtol=0, atol=1e-12)  # other noise moves q by 1e-3
 
 
-@pytest.mark.parametrize("method", ["rk4", "gauss_2"])
+@pytest.mark.parametrize("method", ["rk4", *long(["gauss_2"])])
 def test_a_diverged_run_names_its_joint_its_time_and_what_to_do(method: str) -> None:
     """The joint that moved fastest in its last sample; each run its own. Nothing cuts their steps."""
     plant = rd.Plant(ARM, PLANT.effects[:2])

@@ -7,6 +7,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError
 from robot_dyn.simulation.setup.setup import check_record, samples, segments, steps
+from tests.long import long
 
 ARM = rd.Plant(rd.load("planar_2r"), [rd.effects.ExternalWrench("tip", [1.0] * 6, start_s=0.3, end_s=0.7)])
 LAW = rd.control.PD(rd.control.hold([0.1, 0.2]), 3.0, 1.0, period_s=0.01)
@@ -57,7 +58,7 @@ def test_a_batch_that_fits_no_memory_is_refused_before_it_starts() -> None:
         )
 
 
-@pytest.mark.parametrize("period", [0.0, 0.01, 0.0237])
+@pytest.mark.parametrize("period", [0.0, 0.0237, *long([0.01])])
 @pytest.mark.parametrize("law", [None, LAW], ids=["free", "sampled"])
 @pytest.mark.parametrize("method", [rd.integrate.method("rk4"), rd.integrate.Adaptive()])
 def test_the_size_that_is_told_bounds_the_run(method, law, period: float) -> None:

@@ -12,6 +12,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.effects import Active
+from tests.long import long
 
 DOUBLE = rd.load("planar_2r")
 PLANT = rd.Plant(DOUBLE, [rd.effects.ViscousFriction([0.4, 0.2])])
@@ -62,7 +63,7 @@ def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> Non
 
 
 @pytest.mark.parametrize("method", METHODS, ids=name)
-@pytest.mark.parametrize("step", [0.012, 1e-3], ids=["a step a tick", "twelve steps a tick"])
+@pytest.mark.parametrize("step", [0.012, *long([1e-3])], ids=["a step a tick", "twelve steps a tick"])
 def test_states_of_a_sampled_pid_advance_once_a_tick(method, step: float) -> None:
     """z⁺ = z + period · ż at the tick, z = 0 at the first: τ at each tick is that of the recursion, to rounding."""
     law = rd.control.PID(GOAL, [80.0, 20.0], [900.0, 400.0], [9.0, 2.0], effort_limit=[25.0, 8.0], period_s=0.012)

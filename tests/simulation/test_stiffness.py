@@ -13,6 +13,7 @@ from robot_dyn.foundations import QueryError
 from robot_dyn.integrate import System
 from robot_dyn.simulation import RemarkKind, StateEquation
 from robot_dyn.simulation.dynamics.fastest_motion import BODIES, fastest
+from tests.long import long
 
 ARM = rd.load("planar_2r")
 STATE = np.array([0.4, -0.7, 0.13, -0.25])
@@ -72,7 +73,7 @@ def test_a_run_says_that_stability_bounds_its_steps() -> None:
     assert not [each for each in short.remarks if each.kind is RemarkKind.STIFF]
 
 
-@pytest.mark.parametrize("engine", ["compiled", "interpreted"])
+@pytest.mark.parametrize("engine", ["compiled", *long(["interpreted"])])
 def test_a_run_that_stability_would_keep_for_hours_ends_with_the_reason(engine: str) -> None:
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction([1.0, 1e6])])
     run = rd.simulate(plant, STATE[:2], duration_s=100.0, engine=engine, estimate_error=False, integrator="DOP853")

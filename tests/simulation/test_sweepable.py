@@ -14,6 +14,7 @@ import robot_dyn as rd
 from robot_dyn.foundations import QueryError
 from robot_dyn.scene import starter
 from tests.command import document, said
+from tests.long import long
 
 
 def setup() -> rd.Setup:
@@ -30,12 +31,13 @@ def end(given: rd.Setup, **options: Any) -> np.ndarray:
     return q[0, -1]
 
 
-def test_each_one_can_be_swept_and_has_the_value_of_the_setup() -> None:
+@pytest.mark.parametrize("every", [4, *long([1])])
+def test_each_one_can_be_swept_and_has_the_value_of_the_setup(every: int) -> None:
     """To the rounding of the same equations, in which a number is an input and not a constant."""
     given = setup()
     alone = end(given)
     known = rd.sweepable(given).parameters
-    for each in known:
+    for each in known[::every]:
         swept = end(given, params={each.name: each.value[None]})
         np.testing.assert_allclose(swept, alone, rtol=0, atol=1e-13, err_msg=each.name)
     assert {"kp", "spring 2.rest", "payload_mass:pole", "pole.mass", "model.mass_scale"} <= {x.name for x in known}

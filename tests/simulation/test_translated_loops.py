@@ -132,8 +132,7 @@ SOFT = [*HELD, *rd.effects.joint_stops([-0.75, -9.0], [0.6, 9.0], 900.0, 4.0), B
     [
         ("DOP853", GEAR, CONTINUOUS),
         ("DOP853", SOFT, SAMPLED),
-        ("rk4", GEAR, SAMPLED),
-        ("rosenbrock_5", HELD, CONTINUOUS),
+        *long([("rk4", GEAR, SAMPLED), ("rosenbrock_5", HELD, CONTINUOUS)]),
     ],
     ids=["a gear", "soft stops and a payload", "a gear, sampled", "stiff"],
 )

@@ -12,6 +12,7 @@ from matplotlib.text import Text
 from robot_dyn import plot, save_plot
 from robot_dyn.foundations import QueryError
 from robot_dyn.view import PLOTS
+from tests.long import long
 from tests.view.plotted import cart_pole, cells, headings, lines, many, stretched, ur5
 
 MM = 25.4  # in an inch
@@ -70,7 +71,7 @@ def test_a_frame_that_follows_has_its_own_row(run) -> None:
     assert titles == ["frame, x", "frame, y", "frame, z"]
 
 
-@pytest.mark.parametrize("width", [80, 120, 300])
+@pytest.mark.parametrize("width", [80, 300, *long([120])])
 def test_eight_joints_fit_a_page_of_a4_at_any_width(width: float) -> None:
     """Whatever is asked for, in [mm]; no text covers another, and all have 7 to 9 pt."""
     for name in PLOTS:

@@ -21,6 +21,7 @@ from robot_dyn.tools.motors.motor_budget.pace import least_pace
 from tests.cli.test_command_documents import PROMISE, names
 from tests.command import document, refusal
 from tests.command import run as ran
+from tests.long import long
 
 UR5 = rd.load("ur5")
 POINTS = np.array(  # pick, lift, carry, place
@@ -175,7 +176,7 @@ def test_a_limit_that_is_passed_is_named_with_the_cause_that_asks_for_it() -> No
     assert "the motors suffice; " in every.sentence
 
 
-@pytest.mark.parametrize("continuous", [np.inf, [150.0, 45.0, 40.0, 20.0, 20.0, 20.0]])
+@pytest.mark.parametrize("continuous", [*long([np.inf]), [150.0, 45.0, 40.0, 20.0, 20.0, 20.0]])
 def test_the_largest_payload_is_that_of_budgets_with_many_masses(continuous) -> None:
     """Every mass up to it fits, none of those beyond; with it a limit is reached to 1e-9."""
     plant, com = rd.Plant(UR5, FRICTION), (0.1, 0.02, 0.08)
@@ -361,7 +362,7 @@ def mean_square_of_the_swing(b: float = 0.0) -> np.ndarray:
     return table
 
 
-@pytest.mark.parametrize("b", [0.0, 0.3])
+@pytest.mark.parametrize("b", [0.3, *long([0.0])])
 def test_the_least_pace_is_the_first_root_of_the_mean_square_though_neither_1_nor_100_fit(b: float) -> None:
     """⟨τ²⟩ is a polynomial of u = 1/λ; halfway from its minimum to the lower of both ends an interval of λ fits."""
     square = np.polynomial.Polynomial(mean_square_of_the_swing(b))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.integrate import solve_ivp
 import robot_dyn as rd
 from robot_dyn.foundations import MissingExtraError, PlanError
 from robot_dyn.tools.motors.planning.geometric_path import in_time, through
+from tests.long import long
 
 LIMITS = {"effort": 20.0, "velocity": 3.0}  # for arms whose files state none
 WAY = np.array(  # the fourth and fifth joint reverse at one place
@@ -20,6 +22,10 @@ WAY = np.array(  # the fourth and fifth joint reverse at one place
 )
 WITHOUT_GRAVITY = (0.0, 0.0, 0.0)
 toppra = pytest.mark.skipif(find_spec("toppra") is None, reason="the extra plan")
+
+
+ARMS, FRICTION = ("ur5", "panda", "kinova", "ur10", "xarm7"), ("none", "viscous and dry", "regularised")
+SOME = [("ur5", "viscous and dry"), ("panda", "regularised"), ("kinova", "none")]
 
 
 def _arm(name: str) -> rd.Robot:
@@ -33,8 +39,10 @@ def _way_points(robot: rd.Robot, seed: int, count: int = 5) -> np.ndarray:
 
 
 @toppra
-@pytest.mark.parametrize("friction", ["none", "viscous and dry", "regularised"])
-@pytest.mark.parametrize("name", ["ur5", "panda", "kinova", "ur10", "xarm7"])
+@pytest.mark.parametrize(
+    ("name", "friction"),
+    [*SOME, *long(case for case in product(ARMS, FRICTION) if case not in SOME)],
+)
 def test_no_torque_is_above_its_limit_and_nearly_always_one_limit_binds(name: str, friction: str) -> None:
     """Inverse dynamics at 10 000 times, viscous friction of 20 % of the limit at full speed."""
     robot = _arm(name)

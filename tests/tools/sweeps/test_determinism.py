@@ -71,7 +71,7 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", ["stops", "steps that are chosen", *long(["noise", "samples between steps"])])
 def test_what_else_is_recorded_changes_no_bits(tmp_path: Path, name: str) -> None:
     """`run(i)` records torques, energies and works too, and goes by itself."""
     sweep = swept(scene(tmp_path, SCENES[name]).parent, 12, vary={"q0": sw.normal(mean=[0.4, 0.9], sd=0.6)})
