@@ -16,7 +16,10 @@ from packaging.requirements import Requirement
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 # Declared and not imported: robots that the catalog finds by path, and the page's own script.
-HOMES = {"pinocchio": ["pin"]}  # its wheel puts the module beside site-packages, where nothing is listed
+HOMES = {
+    "pinocchio": ["pin"],  # its wheel puts the module beside site-packages, where nothing is listed
+    "pydantic_core": ["pydantic"],  # which pins one version of it, and documents its errors and schemas
+}
 BY_PATH = {"example-robot-data", "meshcat", "pycollada"}
 
 
