@@ -324,7 +324,7 @@ def examples(folder: Path) -> dict[str, Example]:
              "motors": None, "effort": 50.0, "velocity": 4.0, "continuous": u},
         ),
         "MotorBudget.max_payload": (needs.max_payload, {"link": "pole", "com": [0.1, 0.2, 0.3]}),
-        "MotorBudget.fastest": (needs.fastest, {"share": 0.9}),
+        "fastest": (rd.tools.motors.fastest, {"motor_budget": needs, "share": 0.9}),
         "read_motors": (rd.tools.motors.read_motors, {"path": motors}),
         "point_to_point": (
             rd.tools.motors.point_to_point,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, final
 
 from robot_dyn.effects.effect import Bound, Effect, Stateful
@@ -39,6 +40,7 @@ class EffortLimit(Bound):
     _middle: Any = field(default=None, init=False, repr=False, metadata=coefficient("N m", swept=False))
 
     term = "|u| ≤ u_max"
+    largest = property(attrgetter("limit"))  # pyright: ignore[reportIncompatibleMethodOverride]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -59,10 +61,6 @@ class EffortLimit(Bound):
 
     def actuation(self, u: Array) -> Array:
         return saturated(u, self.limit, self._middle)
-
-    @property
-    def largest(self) -> Any:
-        return self.limit
 
 
 @final

@@ -249,7 +249,7 @@ class Bound(Effect, ABC):
         """Return the bounded actuation for u, (..., n), in [N m] or [N]."""
 
     @property
-    def largest(self) -> Any:
+    def largest(self) -> float | Array:
         """Largest |u| that it lets through, a scalar or (n,), in [N m] or [N]; inf by default. Runs report it."""
         return inf
 

@@ -276,7 +276,7 @@ class StateEquation(Caching):
         """The values of the events, in floats or symbols."""
         return [call(each.function, t, q, v) for each in self.events]
 
-    def bodies(self, t: Any, y: Array, held: Array | None) -> Array:
+    def bodies(self, t: float, y: Array, held: Array | None) -> Array:
         """Return what the convex problems of events take, by rows, (n² + n + motors,): M, load and u_m.
 
             load = τ + Σ τ_effect − C v − ∂V/∂q,   u_m = u − b θ̇ of each motor in a rigid backlash

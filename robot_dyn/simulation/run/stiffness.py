@@ -1,6 +1,6 @@
 """Stiff runs: stability bounds the steps of an explicit method that chooses them, h |λ| ≈ 6, and a stiff one is faster.
 
-A stiff method damps oscillations of more than a radian a step, of which its steps show nothing.
+A stiff method damps oscillations of more than a radian a step, and its steps do not show them.
 [Hairer, Wanner 1996, IV.2, p. 21]
 """
 

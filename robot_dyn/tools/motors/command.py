@@ -144,5 +144,5 @@ def _more(found: MotorBudget, max_payload: str | None, fastest: bool, share: flo
             more["max_payload"] = found.max_payload(*arguments.link_and_place("--max-payload", max_payload))
     if fastest:
         with bar(what="looking for the fastest motion"):
-            more["fastest"] = found.fastest(share)
+            more["fastest"] = rd.tools.motors.fastest(found, share)
     return more

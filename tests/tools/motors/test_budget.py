@@ -15,7 +15,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import EditError, EffectError, MissingExtraError, PlanError, QueryError
-from robot_dyn.tools.motors import budget
+from robot_dyn.tools.motors import budget, fastest
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, X
 from robot_dyn.tools.motors.motor_budget.pace import least_pace
 from tests.cli.test_command_documents import PROMISE, names
@@ -298,7 +298,7 @@ def test_what_has_no_budget_is_refused() -> None:
             QueryError,
             "this budget is of a run: give its motion",
         ),
-        (lambda: budget(run).fastest(), QueryError, "this budget is of a run"),
+        (lambda: fastest(budget(run)), QueryError, "this budget is of a run"),
         (lambda: budget(replace(run, t=run.t[:1], v=run.v[:1])), QueryError, "one sample"),
     ):
         with pytest.raises(error, match=message):
@@ -315,7 +315,7 @@ def test_the_fastest_motion_keeps_path_stops_and_pauses_and_passes_no_limit() ->
     table = np.concatenate([there.coefficients, pause, back.coefficients])
     plant = rd.Plant(UR5, FRICTION[:1])
     found = budget(rd.control.PiecewisePolynomial(breaks, table), plant, payload=LOAD)
-    fast = found.fastest()
+    fast = fastest(found)
     assert fast.strokes == 2 and fast.before == pytest.approx(3.9) and 0.4 < fast.duration < 2.0
     t = np.linspace(0, fast.duration, 10_000)
     q, v, a = fast.plan.reference.at(t)
@@ -337,12 +337,12 @@ def test_the_fastest_motion_is_slowed_down_until_it_keeps_continuous_torque() ->
     """As little as that needs, to 1e-3 of the time; a limit below the weight has no pace, and is said."""
     lasting = np.array([150.0, 60.0, 60.0, 28.0, 28.0, 28.0])
     found = budget(PLAN, UR5, payload=LOAD, continuous=lasting)
-    fast, free = found.fastest(), budget(PLAN, UR5, payload=LOAD).fastest()
+    fast, free = fastest(found), fastest(budget(PLAN, UR5, payload=LOAD))
     assert free.slowed == 1.0 and fast.slowed > 1.0
     assert fast.duration == pytest.approx(fast.slowed * free.duration, rel=1e-12)
     used = max(each.rms / each.continuous_limit for each in fast.budget.joints)
     assert used == pytest.approx(1.0, abs=1e-6) and fast.budget.fits and "slowed down by" in repr(fast)
-    held = budget(PLAN, UR5, payload=LOAD, continuous=lasting / 3).fastest()
+    held = fastest(budget(PLAN, UR5, payload=LOAD, continuous=lasting / 3))
     assert held.slowed == 1.0 and "too small: shoulder_lift_joint" in repr(held)
     assert "no pace fits: shoulder_lift_joint needs" in held.no_pace and held.no_pace in repr(held)
 
@@ -408,12 +408,12 @@ def test_the_given_motion_is_the_answer_where_it_fits_and_none_that_is_faster_do
     """Close to what it needs as continuous torque; with a share of the peak torques that it passes, it is not."""
     needs = budget(PLAN, UR5, payload=LOAD)
     given = budget(PLAN, UR5, payload=LOAD, continuous=[1.001 * each.rms + 0.01 for each in needs.joints])
-    fast = given.fastest()
+    fast = fastest(given)
     assert (
         fast.given and fast.budget is given and fast.duration == fast.before and fast.plan.reference is PLAN.reference
     )
     assert "the given one fits, and is the answer" in repr(fast)
-    half = given.fastest(share=0.4)
+    half = fastest(given, share=0.4)
     assert not half.given and "at 40 % of the peak torques" in repr(half)
 
 
@@ -425,7 +425,7 @@ def test_a_budget_needs_no_extra_and_the_fastest_motion_says_which(monkeypatch) 
     for name in [each for each in sys.modules if each.startswith("toppra.")]:
         monkeypatch.delitem(sys.modules, name)
     with pytest.raises(MissingExtraError, match=r"robot-dyn\[plan\]"):
-        found.fastest()
+        fastest(found)
 
 
 def test_a_budget_loads_no_drawing() -> None:

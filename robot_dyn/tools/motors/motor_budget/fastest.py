@@ -17,7 +17,7 @@ import numpy as np
 
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial, Plan
-from robot_dyn.foundations import UNREPORTED, Answer, Block, PlanError, reported
+from robot_dyn.foundations import UNREPORTED, Answer, Block, PlanError, instance, reported
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.budget import budget
@@ -84,19 +84,35 @@ class FastestMotion(Answer):
         yield self.budget.verdict
 
 
-def fastest(found: MotorBudget, share: float) -> FastestMotion:
-    """As of `MotorBudget.fastest`."""
-    plant, motion, limits, continuous = case_of(found, "the fastest motion")
+def fastest(motor_budget: MotorBudget, share: float = 1.0) -> FastestMotion:
+    """Plan the path of a motion as fast as the limits of its budget allow, from stop to stop; pauses keep their length.
+
+    It keeps the path and gives up the timing, which a uniform factor would keep: then the slowest place would
+    decide for all. Only what needs more than continuous torques at that pace is slowed down as a whole,
+    pauses as well, by the least factor that keeps them, if one does. If the given motion fits and this one does
+    not, or is no faster, the given one is returned.
+
+    Args:
+        motor_budget: The budget of a plan.
+        share: Of the peak torques that it may take, up to 1.
+
+    Raises:
+        QueryError: If the budget is of a run.
+        PlanError: If an effect depends on time, or no motion is within the limits.
+        MissingExtraError: Without toppra.
+    """
+    instance("motor_budget", motor_budget, MotorBudget, "give that of a plan, as rd.tools.motors.budget(plan, arm)")
+    plant, motion, limits, continuous = case_of(motor_budget, "the fastest motion")
     plan, strokes, distance = _planned(plant, at_rest_exactly(motion), limits, share)
     bounds = {"effort": limits.effort, "velocity": limits.velocity, "continuous": continuous}
     before, pace = motion.end - motion.start, least_pace(plan.reference, plant, continuous)
     if pace.fits and pace.factor > 1:
         method = f"{plan.method}, slowed down by {pace.factor:.4g}"
         plan = replace(plan, reference=at_pace(plan.reference, pace.factor), method=method)
-    of_it = replace(budget(plan, plant, **bounds), limits=found.limits)
-    if _fits(found, share) and (not of_it.fits or plan.duration >= before):
-        given = replace(plan, reference=motion, method="the given motion", findings=found.findings)
-        return FastestMotion(before, strokes, 0.0, 1.0, "", True, share, found, given)
+    of_it = replace(budget(plan, plant, **bounds), limits=motor_budget.limits)
+    if _fits(motor_budget, share) and (not of_it.fits or plan.duration >= before):
+        given = replace(plan, reference=motion, method="the given motion", findings=motor_budget.findings)
+        return FastestMotion(before, strokes, 0.0, 1.0, "", True, share, motor_budget, given)
     slowed, no_pace = (pace.factor, "") if pace.fits else (1.0, _no_pace(pace, of_it, continuous))
     return FastestMotion(before, strokes, distance, slowed, no_pace, False, share, of_it, plan)
 

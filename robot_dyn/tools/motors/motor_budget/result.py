@@ -1,4 +1,4 @@
-"""What a motion asks of the motors of an arm, as text, tables and JSON, and what follows: payload, fastest motion."""
+"""What a motion asks of the motors of an arm, as text, tables and JSON, and the payload that still fits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from robot_dyn.tools.motors.motor_budget.demand import Demand
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
 
 if TYPE_CHECKING:
-    from robot_dyn.tools.motors.motor_budget.fastest import FastestMotion
     from robot_dyn.tools.motors.motor_budget.largest_payload import LargestPayload
 
 
@@ -159,26 +158,6 @@ class MotorBudget(Result):
         from robot_dyn.tools.motors.motor_budget.largest_payload import largest_payload
 
         return largest_payload(*case_of(self, "the largest payload"), link=link, com=com)
-
-    def fastest(self, share: float = 1.0) -> FastestMotion:
-        """The path of the motion as fast as these limits allow, from stop to stop; pauses keep their length.
-
-        It keeps the path and gives up the timing, which a uniform factor would keep: then the slowest place would
-        decide for all. Only what needs more than continuous torques at that pace is slowed down as a whole,
-        pauses as well, by the least factor that keeps them, if one does. If the given motion fits and this one does
-        not, or is no faster, the given one is returned.
-
-        Args:
-            share: Of the peak torques that it may take, up to 1.
-
-        Raises:
-            QueryError: If the budget is of a run.
-            PlanError: If an effect depends on time, or no motion is within the limits.
-            MissingExtraError: Without toppra.
-        """
-        from robot_dyn.tools.motors.motor_budget.fastest import fastest
-
-        return fastest(self, share)
 
 
 def case_of(found: MotorBudget, what: str) -> tuple[Plant, PiecewisePolynomial, Limits, Any]:
