@@ -49,7 +49,8 @@ def mutate(rng: np.random.Generator, seed: bytes) -> bytes:
     for _ in range(int(rng.integers(1, 3))):
         _change(rng, arrays)
     stream = io.BytesIO()
-    np.savez(stream, **{name: np.asarray(x) for name, x in arrays.items()})
+    members: dict[str, Any] = {name: np.asarray(x) for name, x in arrays.items()}
+    np.savez(stream, **members)
     return stream.getvalue()
 
 
