@@ -66,11 +66,14 @@ class Layout:
     absent: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        from pydantic_core.core_schema import with_info_plain_validator_function
+        from pydantic import PlainValidator, ValidationInfo
 
-        return with_info_plain_validator_function(lambda name, info: self._taken(name, info.context))
+        def taken(name: Any, info: ValidationInfo) -> np.ndarray:
+            return self._taken(name, info.context)
 
-    def _taken(self, name: Any, found: Found) -> np.ndarray:
+        return PlainValidator(taken).__get_pydantic_core_schema__(source, handler)
+
+    def _taken(self, name: Any, found: Any) -> np.ndarray:
         """Return the array of a name; ValueError if the file lacks it, or if it does not have this layout."""
         if not isinstance(name, str) or name not in found.arrays:
             raise ValueError("its array is missing")
@@ -96,12 +99,10 @@ def _fits(length: int, allowed: Any, lengths: dict[str, int]) -> bool:
 
 @final
 class _NotStored:
-    """The mark of a field that files leave out, which has a default."""
+    """The mark of a field that is None in files."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        from pydantic_core import core_schema
-
-        return core_schema.none_schema(serialization=core_schema.plain_serializer_function_ser_schema(lambda _: None))
+        return handler(type(None))
 
 
 NOT_STORED = _NotStored()
@@ -181,7 +182,7 @@ class StoredFormat(Generic[Stored]):
             first = error.errors(include_url=False)[0]
             given = f"{first['msg']}, got {shorten(repr(first['input']))}"
             cause = first.get("ctx", {}).get("error", given)  # a Layout states what its array holds
-            raise StoreError(f"{shorten('/'.join(map(str, first['loc'][1:])))!r}: {cause}") from None
+            raise StoreError(f"{shorten('/'.join(map(str, first['loc'][1:])) or ABOUT)!r}: {cause}") from None
         if arrays:
             raise StoreError(f"member {shorten(min(arrays))!r} is not known to this version")
         self.check(value, found)
@@ -190,14 +191,12 @@ class StoredFormat(Generic[Stored]):
 
 def _about(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
     """Take the JSON of a file out of its arrays."""
-    from pydantic_core import from_json
-
     text = arrays.pop(ABOUT, None)
     if text is None or text.dtype.kind != "U" or text.shape:
         raise StoreError(f"it has no text {ABOUT!r}")
     try:
-        about = from_json(str(text))
-    except ValueError as error:
+        about = json.loads(str(text))
+    except (ValueError, RecursionError) as error:
         raise StoreError(f"{ABOUT!r} is not JSON ({error})") from None
     if not isinstance(about, dict) or "format" not in about:
         raise StoreError(f"{ABOUT!r} has no format")

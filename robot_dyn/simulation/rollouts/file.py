@@ -25,7 +25,7 @@ def save_rollouts(runs: Rollouts, path: str | Path) -> Path:
     if not isinstance(runs, Rollouts):
         raise RunFileError(f"save_rollouts takes the Rollouts of rd.rollouts, got {type(runs).__name__}")
     about = packed(runs.about, file_path(path, RunFileError).parent)
-    return _ROLLOUTS.save(replace(runs, about=about, saved=runs.overview), path)
+    return _ROLLOUTS.save(replace(runs, about=about, saved=runs.overview, setup=None, numbers=None), path)
 
 
 def load_rollouts(path: str | Path) -> Rollouts:

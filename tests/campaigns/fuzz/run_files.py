@@ -39,7 +39,7 @@ def seeds(folder: Path) -> list[bytes]:
 
 
 def mutate(rng: np.random.Generator, seed: bytes) -> bytes:
-    kind = int(rng.integers(3))
+    kind = int(rng.choice([0, 1, 2, 2]))
     if kind == 0:
         return damage(rng, seed)
     with np.load(io.BytesIO(seed)) as file:
@@ -49,7 +49,8 @@ def mutate(rng: np.random.Generator, seed: bytes) -> bytes:
     for _ in range(int(rng.integers(1, 3))):
         _change(rng, arrays)
     stream = io.BytesIO()
-    np.savez(stream, **{name: np.asarray(x) for name, x in arrays.items()})
+    members: dict[str, Any] = {name: np.asarray(x) for name, x in arrays.items()}
+    np.savez(stream, **members)
     return stream.getvalue()
 
 
@@ -108,7 +109,10 @@ def _text(rng: np.random.Generator, text: str) -> str:
         about = json.loads(text)
     except ValueError:
         return text
+    fields = about["value"] if isinstance(about, dict) and isinstance(about.get("value"), dict) else {}
     table: Any = about
+    if fields and rng.random() < 0.8:  # of one that is not the name of an array
+        table = fields[str(rng.choice([key for key, value in fields.items() if isinstance(value, dict | list)]))]
     while isinstance(table, dict | list) and table:
         i = int(rng.integers(len(table)))
         key: Any = list(table)[i] if isinstance(table, dict) else i
