@@ -38,12 +38,12 @@ def sheet(width: float, height: float, sentence: str, caption: str, theme: str) 
     on_page = theme == "page"
     colours = PAGE if on_page else THEMES[theme]
     size = (_PART if on_page else 1.0) * width, height
-    figure = Figure(size, facecolor=colours["paper"], layout="constrained")
-    figure.get_layout_engine().set(w_pad=_PAD, h_pad=_PAD)
-    body = figure.subfigures()
+    figure = Figure(size, facecolor=colours["paper"])
+    figure.set_layout_engine("constrained", w_pad=_PAD, h_pad=_PAD)
+    body = figure.add_subfigure(figure.add_gridspec()[0])
     if not on_page:
-        headed(figure, sentence, colours, fontsize=12, weight="bold")
-        headed(body, caption, colours, fontsize=8.5)
+        headed(figure, sentence, colours["ink"], fontsize=12, weight="bold")
+        headed(body, caption, colours["ink"], fontsize=8.5)
     return body, colours
 
 

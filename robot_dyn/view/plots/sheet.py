@@ -14,7 +14,7 @@ from robot_dyn.foundations.display import drawable
 from robot_dyn.view.plots.figure import Axes, Style, shortened
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, FigureBase
 
 WIDTH_MM, LEAST_MM, MOST_MM = 180.0, 80.0, 1000.0
 A4_MM, MM = 297.0, 1 / 25.4
@@ -44,7 +44,7 @@ class Panel:
 
 
 def in_rows(cells: Sequence[Axes], most: int) -> tuple[tuple[Axes, ...], ...]:
-    """The cells in rows of the same length, but the last, of so many at most."""
+    """The cells in rows of `most` cells or fewer."""
     across = -(-len(cells) // -(-len(cells) // most))
     return tuple(tuple(cells[k : k + across]) for k in range(0, len(cells), across))
 
@@ -63,27 +63,27 @@ def draw(
     heights = [panel.tall(panel.height) for panel in panels]
     tall = max(above + sum(panel.tall(_LEAST_ROW) for panel in panels), min(A4_MM, above + sum(heights)))
     figure = Figure((width * MM, tall * MM), 120, facecolor=style.colours["paper"], layout="constrained")
-    body = figure.subfigures()
+    body = figure.add_subfigure(figure.add_gridspec()[0])
     if style.titled:
-        headed(figure, opening, style.colours, fontsize=style.text)
-        headed(body, told, {"ink": style.colours["lines"][1]}, fontsize=style.text)
+        headed(figure, opening, style.colours["ink"], fontsize=style.text)
+        headed(body, told, style.colours["lines"][1], fontsize=style.text)
     parts = body.subfigures(len(panels), 1, squeeze=False, height_ratios=heights)[:, 0]
     for part, panel in zip(parts, panels, strict=True):
         _draw(part, panel, style, width, diverged)
     return figure
 
 
-def headed(figure: Any, text: str, colours: Any, **font: Any) -> None:
+def headed(figure: FigureBase, text: str, colour: str, **font: Any) -> None:
     """A text above what a figure shows, in as many lines as its width takes."""
     if text:
         placed = {"x": 0.01, "ha": "left", "wrap": True}
-        figure.suptitle(drawable(text), **placed, color=colours["ink"], parse_math=False, **font)
+        figure.suptitle(drawable(text), **placed, color=colour, parse_math=False, **font)
 
 
 def _draw(part: Any, panel: Panel, style: Style, width: float, diverged: bool) -> None:
     """A panel in its part of the figure."""
     if style.titled:
-        headed(part, panel.heading, style.colours, fontsize=style.heading, weight="bold")
+        headed(part, panel.heading, style.colours["ink"], fontsize=style.heading, weight="bold")
     grid = part.add_gridspec(len(panel.rows), max(map(len, panel.rows)))
     for k, row in enumerate(panel.rows):
         for j, cell in enumerate(row):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Generator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -56,7 +56,9 @@ def installed(path: str | Path | None = None) -> Path | None:
     return program.absolute()
 
 
-def frames(program: Path | None, text: str, times: np.ndarray, size: tuple[int, int], dark: bool) -> Iterator[bytes]:
+def frames(
+    program: Path | None, text: str, times: np.ndarray, size: tuple[int, int], dark: bool
+) -> Generator[bytes, None, None]:
     """Pictures (PNG) of a page of a size in pixels at times; the browser ends with the last one.
 
     Raises:

@@ -45,7 +45,8 @@ def save_video(
     function("on_progress", on_progress, "a part and a text", error=VideoError)
     times = _checked_times(duration_s, rate, kind, size)
     found, stop = installed(program), Event()
-    playwright(), encoders.ffmpeg()  # raise before the work
+    playwright()  # raises before the work, as the next
+    encoders.ffmpeg()
     with TemporaryDirectory(prefix="robot_dyn-") as folder:
         video = Path(folder) / f"video{kind}"
 
