@@ -36,6 +36,14 @@ def obeyed_interrupts() -> None:
 
 
 @pytest.fixture(scope="session")
+def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """A valid call of every public callable by its name; what they take is computed once for each worker."""
+    from tests.wrong_arguments import examples
+
+    return examples(tmp_path_factory.mktemp("public"))
+
+
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     """Chromium, one for each worker."""
     from tests.browser import FLAGS, chromium

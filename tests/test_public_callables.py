@@ -14,7 +14,7 @@ from robot_dyn import RobotDynError
 from robot_dyn.foundations import RobotDynWarning, shown
 from tests.campaigns.fuzz.campaign import HangError, limited
 from tests.long import long
-from tests.wrong_arguments import EXTREME, LAX, LONG, NOT_TEXT, Example, examples, public, wrong
+from tests.wrong_arguments import EXTREME, LAX, LONG, NOT_TEXT, Example, public, wrong
 
 LIMIT_S = 20  # of one call; the machine may be busy
 MEASURE = {
@@ -32,11 +32,6 @@ MEASURE = {
     "save_plot",
     "work_precision",
 }  # seconds
-
-
-@pytest.fixture(scope="module")
-def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Example]:
-    return examples(tmp_path_factory.mktemp("public"))
 
 
 @pytest.mark.parametrize("name", sorted(public()))

@@ -28,10 +28,10 @@ CELLS = {
     "advise": "rd.advise(arm, q, duration_s=0.1, integrator='rk4', step_s=1e-3)",
     "prove": "rd.tools.proof.prove(rd.Setup(rd.Plant(arm), q, duration_s=0.2))",
     "certify": "rd.accuracy.certify(arm, samples=100, repeats=1)",
-    "cost": "rd.accuracy.cost(arm, q, budget_s=0.5, repeats=2)",
+    "cost": "rd.accuracy.cost(arm, q, budget_s=0.1, repeats=2)",
     "work_precision": "rd.accuracy.work_precision(rd.Setup(rd.Plant(arm), q, duration_s=0.1),"
-    " methods=['rk4', 'DOP853'], peers=False, budget_s=1.0, repeats=1)",
-    "stress": "rd.tools.stress.stress(arm, samples=100, runs=0, budget_s=4.0)",
+    " methods=['rk4', 'DOP853'], peers=False, budget_s=0.3, repeats=1)",
+    "stress": "rd.tools.stress.stress(arm, samples=100, runs=0, budget_s=1.0)",
     "budget": "rd.tools.motors.budget(rd.control.quintic(q, q + 1, 1.0), arm, effort=50.0, velocity=9.0)",
     "linearise": "rd.linearise(arm, q)",
     "task_dynamics": "rd.control.task_dynamics(arm, q, np.ones(2), 'tip', rows=(0, 2))",

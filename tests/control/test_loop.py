@@ -171,6 +171,7 @@ EVERYTHING = rd.control.Loop(
 )  # fmt: skip
 
 
+@pytest.mark.long  # delays, two rates and noise are compared one by one in short
 def test_machine_code_and_rollouts_run_the_same_loop() -> None:
     """To rounding: no sample is near the edge of a step. Steps of RK4 are alike in all three."""
     setup = rd.Setup(PLANT, Q0, V0, 20 * T, EVERYTHING, "rk4", T / 8, T, estimate_error=False, engine="interpreted")

@@ -19,7 +19,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations import SingularError, UndecidedError
 from robot_dyn.integrate import METHODS
-from tests.wrong_arguments import Example, examples
+from tests.wrong_arguments import Example
 
 OPTIONAL = ("peers", "live", "video")  # need packages that may be absent
 OF_TYPE = {"bool": True, "str": "joint_1", "float": 0.25, "int": 3, "Any": 0.25, "tuple": ("effect", 0)}
@@ -100,11 +100,6 @@ def test_an_error_in_another_process_arrives_as_it_was_raised() -> None:
     ):
         pool.submit(forward_dynamics, MASSLESS).result(timeout=120)
     assert (str(there.value), there.value.joint) == (str(here.value), here.value.joint)
-
-
-@pytest.fixture(scope="module")
-def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Example]:
-    return examples(tmp_path_factory.mktemp("public"))
 
 
 def test_what_public_callables_return_survives_pickle_and_copy(known: dict[str, Example]) -> None:

@@ -96,6 +96,7 @@ def test_the_coriolis_matrix_is_that_of_300_bits() -> None:
     assert np.max(np.abs(in_world_axes - true) / scale) > 1e-9  # the case is hard enough to tell
 
 
+@pytest.mark.long
 def test_kernels_of_a_chain_from_a_kilometre_to_a_micrometre_pass_their_check() -> None:
     """A kernel as right as the robot is handed out, of C and of what is solved with light links."""
     robot = chain()

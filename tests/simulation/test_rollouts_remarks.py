@@ -13,6 +13,7 @@ import robot_dyn as rd
 from robot_dyn import export
 from robot_dyn.foundations import QueryError
 from robot_dyn.simulation import RemarkKind, remark_lines
+from tests.long import long
 
 COUNTED = (
     RemarkKind.CHATTER,
@@ -64,7 +65,9 @@ SPACING = 4e-3  # of the instants at which u is seen in lock step under continuo
 LAGGING = rd.Plant(CART, [*DAMPED.effects, rd.effects.ActuatorLag([0.02, 0.01])])
 
 
-@pytest.fixture(scope="module", params=SCENES)
+@pytest.fixture(
+    scope="module", params=[*(name for name in SCENES if name != "time stepping"), *long(["time stepping"])]
+)
 def batch(request) -> tuple[rd.Rollouts, list]:
     """A batch, and each of its runs by itself."""
     given, params = SCENES[request.param]
