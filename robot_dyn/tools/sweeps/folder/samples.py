@@ -24,7 +24,7 @@ from robot_dyn.tools.sweeps.texts import called
 
 RECORDED = ("q", "v", "u")
 _INNER = 64  # runs that are read together, where all are kept
-_EXTRA, _TIMES = "sweeps", "t/c/0"
+_TIMES = "t/c/0"
 
 
 @final
@@ -92,7 +92,7 @@ class SampleStore:
         """Write what describes the arrays, and the times of samples, (m,), unless they are there."""
         if (self.path / _TIMES).is_file():
             return
-        zarr = needs("zarr", extra=_EXTRA)
+        zarr = needs("zarr", extra="sweeps")
         memory = zarr.storage.MemoryStore()
         group = zarr.create_group(memory, zarr_format=3, attributes={"joint": list(joint_names)})
         for name in self.kept.names:
@@ -105,7 +105,7 @@ class SampleStore:
 
     def times(self) -> np.ndarray:
         """Of the samples, (m,), in [s]."""
-        zarr = needs("zarr", extra=_EXTRA)
+        zarr = needs("zarr", extra="sweeps")
         with self._reading():
             return zarr.open_group(self.path, mode="r")["t"][:]
 
@@ -115,7 +115,7 @@ class SampleStore:
         Returns:
             SHA-256 of the file of each quantity that has some.
         """
-        zarr, digests = needs("zarr", extra=_EXTRA), dict[str, str]()
+        zarr, digests = needs("zarr", extra="sweeps"), dict[str, str]()
         for name, x in samples.items():
             memory = zarr.storage.MemoryStore()
             array = self._array(zarr, memory, name, np.empty(x.shape[1]), ("",) * x.shape[2])
@@ -160,7 +160,7 @@ class SampleStore:
     def open(self, joint_types: tuple[str | None, ...]) -> Any:
         """All as a lazy `xarray.Dataset` over run, t and joint, with units."""
         xarray = needs("xarray", extra="sweeps")
-        needs("zarr", extra=_EXTRA)
+        needs("zarr", extra="sweeps")
         with self._reading():
             found = xarray.open_zarr(self.path, consolidated=False, chunks=None)
             for name in self.kept.names:
