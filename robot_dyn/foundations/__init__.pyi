@@ -80,8 +80,6 @@ from robot_dyn.foundations.spatial import rotation as rotation
 from robot_dyn.foundations.spatial import rotation_rpy as rotation_rpy
 from robot_dyn.foundations.spatial import rpy_of as rpy_of
 from robot_dyn.foundations.spatial import spatial_inertia as spatial_inertia
-from robot_dyn.foundations.store import StoreError as StoreError
-from robot_dyn.foundations.store import read_arrays as read_arrays
 from robot_dyn.foundations.validate import choice as choice
 from robot_dyn.foundations.validate import duration as duration
 from robot_dyn.foundations.validate import float64 as float64

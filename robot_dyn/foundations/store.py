@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import prod
@@ -163,7 +163,7 @@ class StoredFormat(Generic[Stored]):
         """
         with reading(path, self.error, self.remedy) as stream:
             try:
-                return self._value(read_arrays(stream))
+                return self._value(_read_arrays(stream))
             except StoreError as error:
                 raise self.error(f"{path}: cannot be read as {self.kind.name}: {error}; {self.remedy}") from None
 
@@ -231,8 +231,8 @@ def write_arrays(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
         np.savez(stream, **ordered)
 
 
-def read_arrays(stream: BinaryIO, names: Iterable[str] | None = None) -> dict[str, np.ndarray]:
-    """Return arrays of a .npz file, all or those of some names; nothing is unpickled.
+def _read_arrays(stream: BinaryIO) -> dict[str, np.ndarray]:
+    """Return the arrays of a .npz file; nothing is unpickled.
 
     Raises:
         StoreError: If the file is damaged, cut short, or holds anything else or far more than its size allows.
@@ -243,7 +243,7 @@ def read_arrays(stream: BinaryIO, names: Iterable[str] | None = None) -> dict[st
             members = {each.filename.removesuffix(".npy"): each for each in file.infolist()}
             if (size := sum(each.file_size for each in members.values())) > most:
                 raise StoreError(f"it unpacks to {size / 2**20:.3g} MiB, more than {_MOST} times its size")
-            return {name: _array(file, name, members[name]) for name in names or members}
+            return {name: _array(file, name, member) for name, member in members.items()}
     except StoreError:
         raise
     except MemoryError:

@@ -107,6 +107,7 @@ class Scene(Part):
 
     @classmethod
     def valid_keys(cls) -> tuple[str, ...]:
+        """The keys of a scene, tables of tools included."""
         return (*super().valid_keys(), *tool_tables())
 
     @model_validator(mode="after")

@@ -17,6 +17,7 @@ from robot_dyn.simulation.observation.guard_levels import NO_LEVELS
 from robot_dyn.simulation.observation.observer import CHUNK, Observer
 from robot_dyn.view import document_of
 from tests.long import long
+from tests.view.plotted import headings
 
 INERTIA = 1 / 3  # of the pendulum about its pivot, in [kg m²]
 PERIOD = 1e-3
@@ -267,7 +268,7 @@ def test_remarks_are_said_wherever_a_run_is_shown(joint, tmp_path) -> None:
     said = remark_lines(run.remarks)
     assert len(said) >= 2
     assert all(line in run.summary for line in said)
-    title = " ".join(text.get_text() for text in rd.plot(run, "torques").texts)
+    title = headings(rd.plot(run, "torques"))
     assert all(line in title for line in said)
     assert document_of((run,), (), None, False)["remarks"] == said
     told = json.loads(json_text(report.run(run)))
