@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import robot_dyn as rd
 from robot_dyn.cli import report
 from robot_dyn.foundations import QueryError
-from robot_dyn.simulation import ErrorEstimate
+from robot_dyn.simulation import ErrorEstimate, Verdict
+from robot_dyn.simulation.engine.choice import choose
+from robot_dyn.simulation.estimate.estimate import estimate
 from robot_dyn.simulation.results.error_estimate import no_estimate
+from robot_dyn.simulation.run.make_run import make_run
+from robot_dyn.simulation.run.recording import Path
 from tests.campaigns.estimates.switching import scene_of_all
 from tests.long import long
 
@@ -195,3 +201,13 @@ def test_rounding_that_the_motion_magnifies_is_in_the_estimate_of_an_adaptive_ru
     error = abs(run.q[-1, 0] - np.pi - exact)
     assert error > 1e-8
     assert run.error.at(run.error.until_s) >= 0.3 * error
+
+
+@pytest.mark.parametrize("method", [rd.integrate.method("rk4"), rd.integrate.Adaptive(rtol=1e-10)])
+def test_companions_that_end_before_their_first_shared_state_show_nothing(method) -> None:
+    step = {} if method.controls_error else {"step_s": 5e-3}
+    of = rd.Setup(rd.Plant(DOUBLE), [0.4, -0.7], [0.3, 0.5], 0.2, None, method, engine="interpreted", **step)
+    run = make_run(of, choose(of)).record()
+    nothing = Path(run.shared.key[:0], run.shared.t[:0], run.shared.y[:0])
+    found = estimate(of, run, lambda pace, of: replace(run, shared=nothing))
+    assert found.verdict is Verdict.NONE and found.largest == np.inf

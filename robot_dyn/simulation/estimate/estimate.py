@@ -25,6 +25,7 @@ from robot_dyn.simulation.estimate.verdicts import (
     PUSH,
     ROUNDED,
     Estimated,
+    at_states,
     carried,
     differences,
     meaningless,
@@ -157,8 +158,7 @@ def _with_rounding(estimated: Estimated, pushed: Path, of: Path, units: float = 
     if not len(of.key):  # it diverged before a state that it shares: nothing is observed
         return estimated
     rounds = carried(of, differences(of, pushed, estimated.n) * (PUSH / units), estimated.n)
-    rows = np.searchsorted(of.key[:-1], estimated.path.key)
-    return replace(estimated, floor=np.fmax(estimated.floor, np.append(rounds, rounds[-1])[rows]))
+    return replace(estimated, floor=np.fmax(estimated.floor, at_states(estimated.path, of, rounds)))
 
 
 def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:

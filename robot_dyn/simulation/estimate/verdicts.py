@@ -80,7 +80,7 @@ class Estimated:
     def from_shorter_steps(self, companions: Mapping[Fraction, Path], order: int) -> ErrorEstimate:
         """The estimate from companions of `FINE`: |q_h − q_{h/m}| = |e(h)| (1 − m⁻ᵖ), of order 1 where none shows."""
         half, third = (companions[pace] for pace in FINE)
-        between = differences(third, half, self.n)[np.searchsorted(third.key[:-1], self.path.key)]
+        between = at_states(self.path, third, differences(third, half, self.n))
         gaps = [differences(self.path, each, self.n) for each in (half, third)]
         largest = np.maximum(np.maximum(*gaps), between)
         order_seen = (between < largest / 2) | (largest <= self.floor)
@@ -132,6 +132,13 @@ class Estimated:
         rows = np.arange(last + 1) if last < _ROWS else np.unique(np.linspace(0, last, _ROWS).astype(int))
         verdict = Verdict.ORDER if self._smooth(order_seen)[last] else Verdict.BOUND
         return ErrorEstimate(t[rows], np.maximum.accumulate(error)[rows], float(t[last]), note, verdict)
+
+
+def at_states(run: Path, companion: Path, values: np.ndarray) -> np.ndarray:
+    """Values at the states of a companion, at those of the run: of the next one; nan of a companion without states."""
+    if not len(companion.key):  # it diverged before the first state that it shares
+        return np.full(len(run.key), np.nan)
+    return values[np.searchsorted(companion.key[:-1], run.key)]
 
 
 def differences(run: Path, companion: Path, n: int) -> np.ndarray:
