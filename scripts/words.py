@@ -48,7 +48,7 @@ CEILINGS = {
     "the same holds": 2,
     "each": 776,
     "arguments": 86,
-    "Any": 2663,
+    "Any": 2662,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.

@@ -34,7 +34,7 @@ _exact = lru_cache(maxsize=8)(Exact)
 _lagrangian = lru_cache(maxsize=8)(Lagrangian)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=8)  # each query of a robot with a `DigitCheck` asks for it
 def _unchecked(robot: Robot) -> Robot:
     return replace(robot, answer_check=None)
 
@@ -81,7 +81,7 @@ def warn_below(robot: Robot, digits: float | None) -> Robot:
 
     M, C, N, inverse and forward dynamics are checked. Digits are counted only where an estimate, 8 n u κ of the terms,
     is below the limit, for up to 64 joints. A count takes milliseconds. Machine code of the robot does not warn.
-    `rd.load` checks the forward dynamics of a nearly singular robot by the condition of M alone.
+    `rd.load` returns a nearly singular robot with a check of 8 digits.
 
     Args:
         robot: The robot.
@@ -92,7 +92,7 @@ def warn_below(robot: Robot, digits: float | None) -> Robot:
     """
     robot = instance("robot", robot, Robot, "give one of rd.load")
     if digits is None:
-        return _unchecked(robot)
+        return robot if robot.answer_check is None else replace(robot, answer_check=None)
     return replace(robot, answer_check=DigitCheck(digits))
 
 

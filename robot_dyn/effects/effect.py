@@ -248,10 +248,8 @@ class Bound(Effect, ABC):
     def actuation(self, u: Array) -> Array:
         """Return the bounded actuation for u, (..., n), in [N m] or [N]."""
 
-    @property
-    def largest(self) -> float | Array:
-        """Largest |u| that it lets through, a scalar or (n,), in [N m] or [N]; inf by default. Runs report it."""
-        return inf
+    largest: ClassVar[Any] = inf
+    """Largest |u| that it lets through, a scalar or (n,), in [N m] or [N]; inf by default. Runs report it."""
 
 
 class Timed(Effect):

@@ -173,7 +173,9 @@ def bars(label: str, rows: Mapping[str, Mapping[str, float]], causes: Sequence[s
         rows: Parts of each bar by cause, by the name of the bar; what is not finite is left out.
         causes: In the order of colours, of which the legend names those that occur.
     """
-    parts = np.array([[row.get(cause, 0.0) for cause in causes] for row in rows.values()]).reshape(len(rows), -1)
+    parts = np.array([[row.get(cause, 0.0) for cause in causes] for row in rows.values()]).reshape(
+        len(rows), len(causes)
+    )
     parts = np.where(np.isfinite(parts), parts, 0.0)
     used = np.flatnonzero(parts.any(axis=0))
     if not len(used):

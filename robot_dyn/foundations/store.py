@@ -22,6 +22,7 @@ from robot_dyn.foundations.errors import RobotDynError, shorten
 from robot_dyn.foundations.files import FileKind, reading, save, target
 
 ABOUT = "about"
+_LONGEST = 10_000  # characters of a name
 _MOST = 20  # bytes of arrays for each byte of the file: zeros take 1000
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
@@ -153,7 +154,7 @@ class StoredFormat(Generic[Stored]):
             self._value(dict(arrays))
             return save(path, lambda stream: write_arrays(stream, arrays), self.error)
         except (StoreError, TypeError, ValueError) as error:
-            raise self.error(f"{path}: cannot be written: {error}; {self.remedy}") from None
+            raise self.error(f"{path}: cannot be written: {error}; save one as the library returns it") from None
 
     def load(self, path: str | Path) -> Stored:
         """Return the value of a file.
@@ -175,9 +176,11 @@ class StoredFormat(Generic[Stored]):
         if about["format"] != self.name:
             form = shorten(repr(about["format"]))
             raise StoreError(f"it has format {form}, this version reads {self.name!r}; {self.other(about)}")
+        if about.keys() != {"format", "value"}:
+            raise StoreError(f"{ABOUT!r} has the keys {shorten(', '.join(map(str, about)))}, not format and value")
         found = Found(arrays)
         try:
-            value = self._adapter.validate_json(json.dumps([about.get("value")]), context=found)[0]
+            value = self._adapter.validate_json(json.dumps([about["value"]]), context=found)[0]
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             given = f"{first['msg']}, got {shorten(repr(first['input']))}"
@@ -221,8 +224,8 @@ def write_arrays(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
     Raises:
         StoreError: If a name cannot be that of a member.
     """
-    if any("\0" in name for name in arrays):
-        raise StoreError("a name has a NUL; rename it")
+    if any("\0" in name or len(name) > _LONGEST for name in arrays):
+        raise StoreError(f"a name has a NUL, or more than {_LONGEST} characters; use a shorter one, without NUL")
     ordered: dict[str, Any] = {name: np.asarray(x, order="C") for name, x in arrays.items()}
     np.savez_compressed(stream, **ordered)
     if sum(x.nbytes for x in ordered.values()) > _MOST / 2 * stream.tell():
@@ -241,6 +244,8 @@ def _read_arrays(stream: BinaryIO) -> dict[str, np.ndarray]:
         most = _MOST * stream.seek(0, SEEK_END)
         with zipfile.ZipFile(stream) as file:
             members = {each.filename.removesuffix(".npy"): each for each in file.infolist()}
+            if len(members) < len(file.infolist()):
+                raise StoreError("it holds two members of one name")
             if (size := sum(each.file_size for each in members.values())) > most:
                 raise StoreError(f"it unpacks to {size / 2**20:.3g} MiB, more than {_MOST} times its size")
             return {name: _array(file, name, member) for name, member in members.items()}

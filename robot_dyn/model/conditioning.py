@@ -72,23 +72,3 @@ def _nearly_singular(M: np.ndarray, joint_names: tuple[str, ...]) -> NearlySingu
     if digits >= LEAST_DIGITS:
         return None
     return NearlySingular(condition, max(digits, 0.0), joint_names[int(np.argmax(np.abs(vectors[:, 0])))])
-
-
-def few_digits(robot: str, M: np.ndarray, a: np.ndarray) -> str:
-    """Return a warning if 8 n u κ of M (..., n, n) leaves finite accelerations (..., n) too few digits; "" if not."""
-    rows = np.isfinite(a).all(axis=-1)
-    M = np.broadcast_to(M, (*a.shape, a.shape[-1]))[rows]
-    if len(M) == 0:
-        return ""
-    d = np.sqrt(np.diagonal(M, axis1=-2, axis2=-1))
-    condition = np.linalg.cond(M / (d[:, :, None] * d[:, None, :]))
-    worst = int(np.argmax(condition))
-    digits = -np.log10(4 * len(d[0]) * np.finfo(float).eps * condition[worst])
-    if digits >= LEAST_DIGITS:
-        return ""
-    where = f" in row {np.flatnonzero(rows)[worst]} of the batch" if rows.ndim else ""
-    return (
-        f"forward_dynamics of {robot} may have only {max(digits, 0.0):.1f} correct digits{where}: M is nearly singular,"
-        f" κ = {condition[worst]:.1e}; rd.accuracy.digits(robot, 'forward_dynamics', q, v, tau) counts them, and"
-        " rd.Lagrangian(robot, np.longdouble) has more"
-    )

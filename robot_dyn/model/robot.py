@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
 from pathlib import Path
+from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import Any, Unpack, final
 
@@ -29,14 +30,13 @@ from robot_dyn.foundations.errors import (
     DescriptionError,
     EditError,
     ModelWarning,
-    PrecisionWarning,
     RobotDynError,
     announce,
 )
 from robot_dyn.foundations.validate import function, instance, is_moderate, is_plain, is_state
 from robot_dyn.foundations.values import OnFirstUse
 from robot_dyn.model.calls import Scratch
-from robot_dyn.model.conditioning import few_digits
+from robot_dyn.model.conditioning import LEAST_DIGITS
 from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.evaluation import Evaluation
 from robot_dyn.model.findings import findings_of
@@ -51,6 +51,8 @@ from robot_dyn.queries.quantity import DOUBTFUL
 _F8 = np.dtype(float)
 _RAISE = "raise"
 _STATES = 3  # N is analytic in q: zero at random states, it is zero at all
+# named as an entry point is: a model needs no balls, and does not import what counts digits
+_CHECK_OF_NEARLY_SINGULAR = "robot_dyn.accuracy.correct_digits:DigitCheck"
 _ROUNDING = 1e-12  # of the weight times the length of the robot
 AnswerCheck = Callable[["Robot", str, tuple[ArrayLike, ...], ArrayLike], None]
 
@@ -244,7 +246,9 @@ class Robot(Dynamics[ndarray], Parametrised):
         length = 1.0 + sum(float(np.linalg.norm(place.translation)) for place in self.model.jointPlacements)
         length += max(float(np.linalg.norm(body.lever)) for body in self.model.inertias)
         try:
-            return bool(np.abs(self.N(q)).max() > _ROUNDING * self.total_mass * g * length)
+            return bool(
+                np.abs(self._evaluation.answer("N", (q,), _RAISE)).max() > _ROUNDING * self.total_mass * g * length
+            )
         except RobotDynError:  # overflows: far from zero
             return True
 
@@ -297,7 +301,9 @@ class Robot(Dynamics[ndarray], Parametrised):
         """Return the robot as it is loaded: warn of its findings, and let its queries warn if M is nearly singular."""
         announce(self.name, self.findings)
         regularity = self._evaluation.regularity
-        return replace(self, answer_check=_warn_of_condition) if regularity.near and not regularity.singular else self
+        if regularity.singular or not regularity.near:
+            return self
+        return replace(self, answer_check=resolve_name(_CHECK_OF_NEARLY_SINGULAR)(LEAST_DIGITS))
 
     @takes_changes
     def with_(self, **changes: Unpack[Changes]) -> Robot:
@@ -425,14 +431,6 @@ def info(robot: Robot) -> Info:
         tuple(Joint(*row) for row in rows), tuple(couplings_of(robot.description, set(robot.model.names[1:]))),
         dict(robot.edits.lock), robot.edits.payloads, dict(robot.estimated), robot.frame_names, robot.findings,
     )  # fmt: skip
-
-
-def _warn_of_condition(robot: Robot, quantity: str, state: tuple[ArrayLike, ...], answer: ArrayLike) -> None:
-    """Warn of forward dynamics that has few digits because M is nearly singular: the check of such a robot."""
-    if quantity == "forward_dynamics" and (
-        text := few_digits(robot.name, robot.M(state[0], errors="nan"), np.asarray(answer))
-    ):
-        warnings.warn(text, PrecisionWarning, stacklevel=4)  # at the query
 
 
 def _frozen(x: ndarray) -> ndarray:

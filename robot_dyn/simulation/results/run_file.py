@@ -60,7 +60,8 @@ def reader_of(about: Mapping[str, Any]) -> str:
         )
     if about["format"] == FORMAT:
         return "it is a file of one run, not of rollouts: rd.load_run reads it"
-    texts = about.get("about")
+    value = about.get("value", about)  # formats up to 6 have the texts outside
+    texts = value.get("about") if isinstance(value, dict) else None
     versions = texts.get("versions") if isinstance(texts, dict) else None
     return f"read it with the version that wrote it: {shorten(str(versions or 'unknown'))}"
 
