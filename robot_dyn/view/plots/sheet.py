@@ -38,9 +38,16 @@ class Panel:
     height: float = 24.0
     shared: bool = False
 
-    def tall(self, height: float) -> float:
-        """About how high it is, in [mm], with rows of a height."""
-        return _HEADING + sum(_TITLE + height + _NUMBERS * bool(row[0].x) for row in self.rows)
+    def letters(self, width: float, text: float) -> int:
+        """How many letters of a size in pt a line above a cell has, in a figure of a width in [mm]."""
+        return int((width / max(map(len, self.rows)) - _BESIDE) / (_LETTER * text))
+
+    def tall(self, height: float, width: float, text: float) -> float:
+        """About how high it is, in [mm], with rows of a height, in a figure of a width, with text of a size in pt."""
+        letters = self.letters(width, text)
+        lines = [max(_title(cell, letters).count("\n") for cell in row) for row in self.rows]
+        rows = sum(_TITLE + height + _NUMBERS * bool(row[0].x) for row in self.rows)
+        return _HEADING + rows + _LINE * text * sum(lines)
 
 
 def in_rows(cells: Sequence[Axes], most: int) -> tuple[tuple[Axes, ...], ...]:
@@ -60,8 +67,9 @@ def draw(
         told = f"{told[: int(_MOST_REMARKS * width)]} … the summary has all remarks"
     lines = sum(1 + _LETTER * style.text * len(line) // width for line in f"{opening}\n{told}".split("\n"))
     above = lines * _LINE * style.text if style.titled else 0.0
-    heights = [panel.tall(panel.height) for panel in panels]
-    tall = max(above + sum(panel.tall(_LEAST_ROW) for panel in panels), min(A4_MM, above + sum(heights)))
+    heights = [panel.tall(panel.height, width, style.text) for panel in panels]
+    least = sum(panel.tall(_LEAST_ROW, width, style.text) for panel in panels)
+    tall = max(above + least, min(A4_MM, above + sum(heights)))
     figure = Figure((width * MM, tall * MM), 120, facecolor=style.colours["paper"], layout="constrained")
     body = figure.add_subfigure(figure.add_gridspec()[0])
     if style.titled:
@@ -84,20 +92,28 @@ def _draw(part: Any, panel: Panel, style: Style, width: float, diverged: bool) -
     """A panel in its part of the figure."""
     if style.titled:
         headed(part, panel.heading, style.colours["ink"], fontsize=style.heading, weight="bold")
-    grid = part.add_gridspec(len(panel.rows), max(map(len, panel.rows)))
+    across = max(map(len, panel.rows))
+    grid, letters = part.add_gridspec(len(panel.rows), across), panel.letters(width, style.text)
+    room = width / across - _BESIDE
     for k, row in enumerate(panel.rows):
         for j, cell in enumerate(row):
             axes = part.add_subplot(grid[k, j])
             cell.fill(axes, style, diverged)
-            room = width / len(row) - _BESIDE
-            letters = int(room / (_LETTER * style.text))
             lines = 0 if panel.shared else _legend(axes, axes, style, room, loc="lower left", bbox_to_anchor=(0, 1))
-            title = [text for text in (shortened(cell.title, letters), fill(cell.note, letters)) if text]
-            title = (", " if len(", ".join(title)) <= letters else "\n").join(title)
             pad = 4 + 1.35 * style.small * lines
-            axes.set_title(drawable(title), loc="left", pad=pad, fontsize=style.text, **style.ink)
+            axes.set_title(drawable(_title(cell, letters)), loc="left", pad=pad, fontsize=style.text, **style.ink)
     if panel.shared:
         _legend(part, part.axes[0], style, width, loc="outside lower left")
+
+
+def _title(cell: Axes, letters: int) -> str:
+    """The title of a cell and its note, in lines of so many letters; a long name takes two."""
+    name = shortened(cell.title, 2 * letters)
+    if len(name) > letters:
+        cut = max(name.rfind("_", 0, letters) + 1, len(name) - letters)
+        name = f"{name[:cut]}\n{name[cut:]}"
+    parts = [text for text in (name, fill(cell.note, letters)) if text]
+    return (", " if len(", ".join(parts)) <= letters else "\n").join(parts)
 
 
 def _legend(owner: Any, axes: Any, style: Style, room: float, **place: Any) -> int:
