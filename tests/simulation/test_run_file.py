@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import functools
+import io
 import json
 import os
 import tracemalloc
@@ -269,10 +270,10 @@ def test_only_regular_files_are_read(tmp_path, kind: str) -> None:
         rd.load_run(path)
 
 
-def test_a_file_with_two_members_of_one_name_is_refused(tmp_path: Path) -> None:
+def test_a_file_with_two_members_of_one_name_is_refused(run, tmp_path: Path) -> None:
     """Otherwise the last one would replace the array of the run in silence."""
-    path, stream = rd.save_run(RUN, tmp_path / "run.npz"), io.BytesIO()
-    np.save(stream, RUN.q + 1.0)
+    path, stream = rd.save_run(run, tmp_path / "run.npz"), io.BytesIO()
+    np.save(stream, run.q + 1.0)
     with zipfile.ZipFile(path, "a") as file:
         file.writestr("q", stream.getvalue())
     with pytest.raises(RunFileError, match="two members of one name"):
