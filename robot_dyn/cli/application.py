@@ -41,12 +41,13 @@ def command(group: str, name: str | None = None) -> Callable[[Callable[..., Any]
 
 
 def program() -> Any:
-    """Return the program: all commands by group, those of tools after those of the core."""
+    """Return the program: all commands by group, those of tools after those of the core, unknown groups last."""
     for topic in _TOPICS:
         import_module(f"robot_dyn.cli.commands.{topic}")
     for entry in entry_points(group="robot_dyn.commands"):  # of tools
         entry.load()
-    app.registered_commands.sort(key=lambda each: GROUPS.index(str(each.rich_help_panel)))
+    order = {group: k for k, group in enumerate(GROUPS)}
+    app.registered_commands.sort(key=lambda each: order.get(str(each.rich_help_panel), len(order)))
     whole = get_command(app)
     context = whole.context_class(whole, **whole.context_settings)
     options = [*whole.get_params(context)]

@@ -22,6 +22,7 @@ from robot_dyn.foundations.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
 from robot_dyn.scene.effects import AnyEdit, bare
+from robot_dyn.scene.messages import part
 from robot_dyn.scene.references import Reference, frame_of
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Stated, one_of, per_joint
 
@@ -154,11 +155,14 @@ class Control(Part):
 
     def _controller(self, loaded: Robot, robot: Robot, q0: np.ndarray, reference: Reference) -> Controller:
         """Return the controller inside the loop."""
-        model, desired = self.model.build(loaded, robot), reference.build(robot, q0, self.frame)
+        model = self.model.build(loaded, robot)
+        with part("reference"):
+            desired = reference.build(robot, q0, self.frame)
         cartesian = isinstance(desired, CartesianReference)
         if cartesian != (self.kind == "operational_space"):
             need = "line or circle" if self.kind == "operational_space" else "hold, quintic, via_points or samples"
-            raise SceneError(f"reference.kind: {self.kind} follows {need}, got {reference.kind!r}")
+            with part("reference"):
+                raise SceneError(f"reference.kind: {self.kind} follows {need}, got {reference.kind!r}")
         kp, kd = self._gains(model, q0)
         if cartesian:
             return OperationalSpace(

@@ -1,17 +1,46 @@
-"""Error messages of scenes: the errors of pydantic, with the line, the key and the value."""
+"""Error messages of scenes: lines of keys and tables at the top, and the errors of pydantic with key and value."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from reprlib import repr as bounded_repr
 from typing import Any
 
 from pydantic import ValidationError
 
-from robot_dyn.foundations.errors import shorten
+from robot_dyn.foundations.errors import RobotDynError, SceneError, shorten
 
-_WORDS = {"Input should be": "must be", "Field required": "is missing; give it", "valid tuple": "list"}
+_WORDS = {
+    "Input should be": "must be", "Field required": "is missing; give it", "valid tuple": "list", "valid list": "list",
+    "valid dictionary": "table", "a valid string": "text", "a valid boolean": "true or false", "valid number": "number",
+    "a valid integer": "an integer", "greater than 0": "positive", "greater than or equal to": "at least",
+}  # fmt: skip
+_TABLE = re.compile(r"^[ \t]*\[+[ \t]*[A-Za-z_\"']", re.MULTILINE)  # the header of one
+
+
+class PlacedError(SceneError):
+    """An error with the path of keys to the part of a scene that it is about."""
+
+    path: Sequence[str | int] = ()
+
+
+@contextmanager
+def part(*path: str | int) -> Iterator[None]:
+    """Give errors of the library the path of the part that is built, such as ("effect", 1); that of an inner one stays.
+
+    Raises:
+        PlacedError: For each of them, with its message.
+    """
+    try:
+        yield
+    except PlacedError:
+        raise
+    except RobotDynError as error:
+        placed = PlacedError(str(error))
+        placed.path = path
+        raise placed from None
 
 
 def validation_message(error: ValidationError, table: Mapping[str, Any], text: str) -> str:
@@ -32,15 +61,25 @@ def validation_message(error: ValidationError, table: Mapping[str, Any], text: s
     key = path[-1] if kind == "missing" else context.get("key")
     place = ".".join([*_place(table, path), *([] if key is None else [shorten(key)])])
     more = f" (and {len(others)} more)" if others else ""
-    return _line(text, path or (key,)) + (f"{place}: " if place else "") + message + more
+    top = path or (str(key) if key in table else str(key).partition(".")[0],)
+    return line(text, table, top) + (f"{place}: " if place else "") + message + more
 
 
-def _line(text: str, path: Sequence[Any]) -> str:
-    """Return "line 3: " for a key or table at the top of a scene, "" if it is not found; `path` begins with it."""
-    key, index = re.escape(str(path[0])), path[1] if len(path) > 1 and isinstance(path[1], int) else 0
-    for pattern in (rf"^[ \t]*\[+[ \t]*{key}[ \t]*\]", rf"^[ \t]*{key}[ \t]*="):
-        starts = [match.start() for match in re.finditer(pattern, text, re.MULTILINE)]
-        if starts:
+def line(text: str, keys: Container[object], path: Sequence[str | int]) -> str:
+    """Return "line 3: " for the key or table at the top of a scene with which a path begins; "" if there is none.
+
+    Args:
+        text: The TOML text.
+        keys: Those at the top.
+        path: Keys, and indices from 0; ("effect", 1) is the second table of [[effect]].
+    """
+    if not path or path[0] not in keys:
+        return ""
+    key, index = rf"[\"']?{re.escape(str(path[0]))}[\"']?", path[1] if len(path) > 1 and isinstance(path[1], int) else 0
+    first_table = _TABLE.search(text)
+    top = text if first_table is None else text[: first_table.start()]
+    for pattern, where in ((rf"\[+[ \t]*{key}[ \t]*\]", text), (rf"{key}[ \t]*[=.]", top)):
+        if starts := [match.start() for match in re.finditer(rf"^\ufeff?[ \t]*{pattern}", where, re.MULTILINE)]:
             return f"line {text.count(chr(10), 0, starts[min(index, len(starts) - 1)]) + 1}: "
     return ""
 

@@ -15,6 +15,7 @@ from robot_dyn.control.samples.measured import from_samples
 from robot_dyn.control.samples.turns import joined_turns
 from robot_dyn.foundations.errors import PlanWarning, SceneError
 from robot_dyn.model.robot import Robot
+from robot_dyn.scene.messages import part
 from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Positive, Truth, Vector3, one_of, per_joint
 
 
@@ -142,7 +143,8 @@ class Line(Reference):
     """Whether the orientation of the start is kept; otherwise it is free."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> CartesianReference:
-        g = robot.placement(q0, frame_of(frame))
+        with part("control"):
+            g = robot.placement(q0, frame_of(frame))
         R = g[:3, :3] if self.hold_orientation else None
         return line(g[:3, 3], g[:3, 3] + self.by_m, self.duration_s, rotation=R, start_s=self.start_s)
 
@@ -165,7 +167,8 @@ class Circle(Reference):
     """Whether the orientation of the start is kept; otherwise it is free."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> CartesianReference:
-        g = robot.placement(q0, frame_of(frame))
+        with part("control"):
+            g = robot.placement(q0, frame_of(frame))
         axis, direction = np.array(self.normal), np.array(self.to_centre)
         if not np.linalg.norm(np.cross(axis, direction)) > 0:
             raise SceneError("reference.to_centre: must not be zero, nor along reference.normal")

@@ -22,9 +22,9 @@ from robot_dyn.model.loading import load
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.control import Control
 from robot_dyn.scene.effects import BY_KIND, AnyEffect, Edit, bare
-from robot_dyn.scene.messages import validation_message
+from robot_dyn.scene.messages import PlacedError, line, part, validation_message
 from robot_dyn.scene.references import AnyReference, Hold, Sampled, ViaPoints
-from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Truth, per_joint
+from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Truth, per_joint, wrong_key
 from robot_dyn.scene.user_effects import Factories, check_factories, user_defined_or
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
@@ -114,24 +114,22 @@ class Scene(Part):
     def _every_key_has_an_effect(self) -> Self:
         stated = self.model_fields_set
         if self.control is None and "reference" in stated:
-            raise ValueError("reference: nothing follows it; add a [control]")
+            raise wrong_key("reference", "nothing follows it; add a [control]")
         chosen = [key for key in ("method", "step_s", "rtol", "atol") if key in stated]
         if self.accuracy is not None and chosen:
-            raise ValueError(
-                f"{chosen[0]}: has no effect because accuracy chooses method and tolerance; remove one of the two"
+            raise wrong_key(
+                chosen[0], "has no effect because accuracy chooses method and tolerance; remove one of the two"
             )
         of_other_methods = ("step_s",) if self.method in ADAPTIVE else ("rtol", "atol")
         if unused := [key for key in of_other_methods if key in stated]:
             kind = "chooses its own step" if self.method in ADAPTIVE else "has a fixed step"
-            raise ValueError(
-                f"{unused[0]}: has no effect because {self.method} {kind}; remove it, or name another method"
-            )
+            raise wrong_key(unused[0], f"has no effect because {self.method} {kind}; remove it, or name another method")
         of_model = None if self.control is None else self.control.model.effects
         for place, effects in (("effect", self.effect), ("control.model.effects", of_model or ())):
             kinds = [effect.kind for effect in effects]
             for kind in ("gravity", "armature"):
                 if (count := kinds.count(kind)) > 1:
-                    raise ValueError(f"{place}: {kind} is named {count} times, and only the last would act; keep one")
+                    raise wrong_key(place, f"{kind} is named {count} times, and only the last would act; keep one")
         return self
 
     def loaded(self, folder: Path) -> Robot:
@@ -141,22 +139,26 @@ class Scene(Part):
 
     def setup(self, folder: Path, about: dict[str, str]) -> Setup:
         """Return the setup it describes; paths are relative to `folder`."""
-        loaded = self.loaded(folder)
+        with part("robot"):
+            loaded = self.loaded(folder)
         robot = bare(loaded)
         acting: list[Effect] = []
         for k, effect in sorted(enumerate(self.effect), key=lambda pair: not isinstance(pair[1], Edit)):  # edits first
-            try:
-                if isinstance(effect, Edit):
-                    robot = effect.edit(robot, loaded)
-                else:
-                    acting += effect.build(robot)
-            except RobotDynError as error:
-                raise SceneError(f"effect {k + 1} ({effect.kind}): {error}") from None
-        q0, v0 = (per_joint(f"start.{key}", getattr(self.start, key), robot) for key in ("q", "v"))
+            with part("effect", k):
+                try:
+                    if isinstance(effect, Edit):
+                        robot = effect.edit(robot, loaded)
+                    else:
+                        acting += effect.build(robot)
+                except RobotDynError as error:
+                    raise SceneError(f"effect {k + 1} ({effect.kind}): {error}") from None
+        with part("start"):
+            q0, v0 = (per_joint(f"start.{key}", getattr(self.start, key), robot) for key in ("q", "v"))
         reference = self.reference
         if isinstance(reference, Sampled | ViaPoints) and reference.file is not None:
             reference = reference.model_copy(update={"file": str(folder / reference.file)})
-        controller = None if self.control is None else self.control.build(loaded, robot, q0, reference)
+        with part("control"):
+            controller = None if self.control is None else self.control.build(loaded, robot, q0, reference)
         step_s = self.step_s if "step_s" in self.model_fields_set else None
         return Setup(
             Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),
@@ -202,7 +204,8 @@ def read_both(path: str | Path, effects: Factories | None = None) -> tuple[Scene
     try:
         return scene, scene.setup(Path(path).parent, {"scene": text})
     except RobotDynError as error:
-        raise SceneError(f"{path}: {error}") from None
+        place = error.path if isinstance(error, PlacedError) else ()
+        raise SceneError(f"{path}: {line(text, scene.model_fields_set, place)}{error}") from None
 
 
 def parse_scene(text: str, source: str, effects: Factories | None = None) -> Scene:

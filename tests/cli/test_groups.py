@@ -8,6 +8,7 @@ from importlib.metadata import entry_points
 import pytest
 
 from robot_dyn.cli import GROUPS, program
+from robot_dyn.cli.application import app
 from tests.command import said
 
 TOOLS = sorted(command.name for command in entry_points(group="robot_dyn.commands"))
@@ -48,3 +49,15 @@ def test_what_takes_no_value_has_no_type_in_help(name: str) -> None:
 
 def test_a_command_keeps_its_own_help() -> None:
     assert "exit code is 1 if it diverges" in re.sub(r"\s+", " ", said("simulate", "--help"))
+
+
+def test_commands_without_a_known_group_come_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A plug-in may name a group of its own, or none."""
+    monkeypatch.setattr(app, "registered_commands", [*app.registered_commands])
+    app.command("of-no-group")(lambda: None)
+    app.command("of-another", rich_help_panel="Others")(lambda: None)
+    assert [*program().commands][-2:] == ["of-no-group", "of-another"]
+
+
+def test_the_help_of_check_names_what_needs_fix() -> None:
+    assert re.search(r"--allow-overlap and --units need --fix", re.sub(r"[\s│]+", " ", said("check", "--help")))

@@ -296,7 +296,7 @@ def test_marks_and_line_ends_of_editors_change_nothing(tmp_path: Path, text: str
     ("text", "message"),
     [
         (f"{HEADS}\n{ROWS}".replace(",", ";"), r"log\.csv: has one column, 't;.*pandas\.read_csv"),
-        (f"{HEADS}\n{ROWS}".replace(",", "\t"), "has one column"),
+        *((f"{HEADS}\n{ROWS}".replace(",", separator), "has one column") for separator in "\t| "),
         (f'{HEADS}\n"0,1",0,0,0,0,0,0', "line 2: column 't' holds '0,1', not a number"),
         (f"{HEADS}\n{ROWS}".encode("utf-16"), "is not a CSV file in UTF-8"),
         ("", "is empty, or its first line is"),
@@ -315,6 +315,17 @@ def test_what_is_no_table_is_told_by_file_and_line(tmp_path: Path, text: str | b
     (tmp_path / "log.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(PlanError, match=message):
         rd.control.from_samples(ARM, tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("heading", ["joint", " joint ", "joint (rad)"])
+def test_a_table_of_one_column_is_read_where_the_times_are_given(tmp_path: Path, heading: str) -> None:
+    """Of an arm of one joint; a period in place of a column of times."""
+    arm, q = rd.load("pendulum"), np.sin(np.linspace(0, np.pi, 81)) ** 3
+    name = arm.joint_names[0]
+    (tmp_path / "log.csv").write_text("\n".join([heading.replace("joint", name), *map(repr, q.tolist())]) + "\n")
+    found = rd.control.from_samples(arm, tmp_path / "log.csv", time=0.05).reference
+    expected = rd.control.from_samples(arm, q[:, None], time=0.05).reference
+    np.testing.assert_array_equal(found.coefficients, expected.coefficients)
 
 
 def test_a_file_that_is_too_large_is_refused_before_it_is_read(tmp_path: Path) -> None:

@@ -186,7 +186,7 @@ length_m = 0.7
 
 REFERENCE = PD.split("[reference]")
 MISTAKES = [  # those of keys and types are in test_scene_mistakes.py
-    (SCENE.replace("0.1", "-1.0"), "duration_s: must be greater than 0, got -1.0"),
+    (SCENE.replace("0.1", "-1.0"), "duration_s: must be positive, got -1.0"),
     (SCENE.replace("0.1", "nan"), "duration_s: .*nan"),
     (SCENE.replace("planar_2r", "planar_3r"), "planar_3r.*nearest: planar_2r"),
     ('method = "rk5"' + SCENE, "method: no method 'rk5'; nearest: rk4"),

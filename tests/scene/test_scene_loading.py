@@ -97,7 +97,7 @@ def test_explanations_of_a_scene_name_what_acts_of_its_file(tmp_path: Path) -> N
     [
         ("rig.urdf", "total_mass_kg = 7.0", "", "are for inertia='from_shapes'; add it"),
         ("rig.urdf", 'inertia = "from_shapes"', "", "need a mass: give mass by link, total_mass or density"),
-        ("rig.urdf", 'inertia = "from_shapes"\ntotal_mass_kg = -1.0', "", "load.total_mass_kg: must be greater than 0"),
+        ("rig.urdf", 'inertia = "from_shapes"\ntotal_mass_kg = -1.0', "", "load.total_mass_kg: must be positive"),
         ("rig.urdf", 'inertia = "from_shapes"\nmass_kg = {three = 1.0}', "", "no link 'three'"),
         ("rig.urdf", 'without = ["tendon"]', "", "is for files of MJCF"),
         ("rig.xml", 'without = ["cable"]', "", "load.without 1: must be 'tendon'"),

@@ -20,6 +20,8 @@ from tests.snapshots import assert_text
 BASE = 'robot = "cart_pole"\nduration_s = 1.0\n'
 GRAVITY = '[[effect]]\nkind = "gravity"\n'
 PD = '[control]\nkind = "pd"\nfrequency_rad_per_s = 3\n'
+LOCK = "[[effect]]\nkind = 'lock'\njoints = {hinge = 0.0}\n"
+LINE = "[reference]\nkind = 'line'\nby_m = [0.1, 0, 0]\nduration_s = 1.0\n"
 
 MISTAKES = [
     GRAVITY + '\n[[effect]]\nkind = "sprng"\n',
@@ -81,6 +83,42 @@ def test_a_key_at_the_top_is_told_with_its_line(tmp_path: Path) -> None:
         path.write_text(BASE + mistake, encoding="utf-8")
         with pytest.raises(SceneError, match=f"scene.toml: line {line}: "):
             rd.read_scene(path)
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        (2, BASE.replace("robot", "\nrobot").replace("cart_pole", "none")),
+        (3, BASE + "step_s = 1e-3\nmethod = 'DOP853'\n"),
+        (3, BASE + "rtol = 1e-3\nmethod = 'rk4'\n"),
+        (4, BASE + "accuracy = 1e-3\nstep_s = 1e-3\n"),
+        (4, BASE + "\n[reference]\nkind = 'hold'\n"),
+        (4, BASE + "\n[start]\nq = [1, 2, 3]\n"),
+        (3, BASE + "start.q = [1, 2, 3]\n"),
+        (6, BASE + GRAVITY + "\n[[effect]]\nkind = 'payload'\nframe = 'none'\nmass_kg = 1.0\n"),
+        (5, BASE + GRAVITY + "[[effect]]\nkind = 'spring'\nstiffness_N_m_per_rad = {none = 1}\n" + LOCK),
+        (3, BASE + GRAVITY + GRAVITY),
+        (3, BASE + PD + "damping_ratio = 1.0\nkp = 1.0\nkd = 1.0\n"),
+        (6, BASE + PD + "[reference]\nkind = 'quintic'\nto = [1, 2, 3]\nduration_s = 1.0\n"),
+        (3, BASE + PD + "[[control.model.effects]]\nkind = 'gravity'\n" * 2),
+        (4, BASE + PD.replace("[control]", "\n[control]").replace("pd", "operational_space") + LINE),
+        (4, BASE + PD.replace("[control]", "\n[control]\nframe = 'none'").replace("pd", "operational_space") + LINE),
+        (7, BASE + PD.replace("pd", "operational_space") + "\n[reference]\nkind = 'hold'\n"),
+    ],
+)
+def test_a_mistake_is_told_with_its_line(tmp_path: Path, line: int, text: str) -> None:
+    """That of the key or table at the top, found by the schema or on the robot; [control] if its frame is wrong."""
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError, match=f"scene.toml: line {line}: "):
+        rd.read_scene(tmp_path / "scene.toml")
+
+
+@pytest.mark.parametrize("text", ['robot = "cart_pole"\n' + LINE, "duration_s = 1.0\n[control]\nrobot = 3\n"])
+def test_a_missing_key_has_no_line(tmp_path: Path, text: str) -> None:
+    """Also where a table has one of its name."""
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError, match=r"scene.toml: (robot|duration_s): is missing"):
+        rd.read_scene(tmp_path / "scene.toml")
 
 
 def test_a_scene_is_read_within_bounds(tmp_path: Path) -> None:

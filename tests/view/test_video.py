@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import subprocess
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -165,6 +166,16 @@ def test_pages_without_time_and_films_without_end_are_refused(tmp_path: Path) ->
         rd.replay(long).save_video(tmp_path / "x.mp4", fps=240)
     with pytest.raises(VideoError, match="5000 frames of 1280 × 720 pixels are too many"):
         rd.replay(long).save_video(tmp_path / "x.gif", fps=50)
+
+
+def test_ffmpeg_is_not_started_where_no_picture_comes(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    def without_a_browser() -> Iterator[bytes]:
+        raise VideoError("none is installed")
+        yield b""
+
+    with pytest.raises(VideoError, match="none is installed"):
+        encoders.encode(without_a_browser(), tmp_path / "run.gif", (320, 240), 25)
+    assert not caplog.records
 
 
 def test_the_command_refuses_what_it_cannot_read(motion: rd.Trajectory, tmp_path: Path) -> None:

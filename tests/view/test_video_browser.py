@@ -114,6 +114,19 @@ def test_without_a_browser_it_is_said_what_to_install(monkeypatch: pytest.Monkey
         pool.submit(filmed, browser.installed()).result()
 
 
+def test_chromium_in_the_folder_of_applications_is_found_after_the_path(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "bin").mkdir()
+    application, on_path = tmp_path / "Chromium", tmp_path / "bin" / "chromium"
+    monkeypatch.setenv("PATH", str(on_path.parent))
+    monkeypatch.setattr(browser, "_PROGRAMS", (str(application),))
+    for program in (application, on_path):
+        program.write_text("#!/bin/sh\n")
+        program.chmod(0o700)
+        assert browser.installed() == program
+
+
 @pytest.mark.parametrize(
     ("script", "patience_ms", "message"),
     [("echo no display >&2; exit 1", 20e3, "has been closed; it said: no display"), ("sleep 60", 500.0, "500ms")],

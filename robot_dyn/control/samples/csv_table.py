@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import numpy as np
 
+from robot_dyn.control.samples.headings import name_of
 from robot_dyn.foundations.errors import PlanError, shorten
 from robot_dyn.foundations.files import read
 
@@ -47,7 +49,7 @@ def _wrong_headings(headings: list[str]) -> str:
     """Return why a first line does not name columns that commas separate; empty if it does."""
     if not any(map(str.strip, headings)):
         return f"is empty, or its first line is; {_REMEDY}"
-    if len(headings) == 1:
+    if len(headings) == 1 and re.search(r"[;\t| ]", name_of(headings[0]).strip()):
         return (
             f"has one column, {shorten(headings[0])!r}; separate columns by commas and write decimal points, or give"
             " the data frame of pandas.read_csv(path, sep=…, decimal=…)"

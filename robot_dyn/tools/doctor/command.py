@@ -45,8 +45,8 @@ def check(
 ) -> None:
     """Check URDF files, and repair what can be repaired.
 
-    Inertias, units, limits, names and shapes are checked. The exit code is 1 if errors are left. Masses, densities and
-    --units need --fix.
+    Inertias, units, limits, names and shapes are checked. The exit code is 1 if errors are left. Masses, densities,
+    --allow-overlap and --units need --fix.
     """
     from robot_dyn.foundations import plain
     from robot_dyn.tools.doctor.finding import Severity

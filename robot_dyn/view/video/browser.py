@@ -24,6 +24,7 @@ _NAMES = (
     "google-chrome", "google-chrome-stable", "chromium", "chromium-browser", "chrome", "microsoft-edge",
     "microsoft-edge-stable",
 )  # fmt: skip
+_PROGRAMS = ("/Applications/Chromium.app/Contents/MacOS/Chromium",)  # of browsers without a channel, on macOS
 _CHANNELS = ("chrome", "msedge")  # of browsers that are not on the path
 # WebGL by the processor, so that pictures do not depend on a graphics card; no network.
 _FLAGS = [
@@ -42,13 +43,13 @@ def playwright() -> Any:
 
 
 def installed(path: str | Path | None = None) -> Path | None:
-    """The program of a browser: the one at `path`, or the first on the path; None if there is none.
+    """The program of a browser: the one at `path`, or the first on the path or at a known place; None if there is none.
 
     Raises:
         VideoError: If what is at `path` cannot be run.
     """
     if path is None:
-        found = next(filter(None, map(shutil.which, _NAMES)), None)
+        found = next(filter(None, map(shutil.which, (*_NAMES, *_PROGRAMS))), None)
         return None if found is None else Path(found)
     program = file_path(path, VideoError)
     if not (program.is_file() and os.access(program, os.X_OK)):

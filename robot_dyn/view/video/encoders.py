@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +53,10 @@ def encode(pictures: Iterable[bytes], file: Path, size: tuple[int, int], fps: in
         **of_kind,
     )  # fmt: skip
     try:
+        pictures = iter(pictures)
+        first = [*islice(pictures, 1)]  # before ffmpeg starts, which prints texts where no picture comes
         writer.send(None)
-        for picture in pictures:
+        for picture in chain(first, pictures):
             writer.send(Image.open(io.BytesIO(picture)).convert("RGB").tobytes())
     except OSError as cause:
         raise VideoError(f"ffmpeg fails: {why(cause).splitlines()[0]}") from None
