@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from robot_dyn import RobotDynError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from tests.campaigns.fuzz.campaign import limited
 from tests.long import long
@@ -179,6 +180,35 @@ def test_what_is_not_a_regular_file_is_refused_at_once(
     damage(copy)
     first = f"sw.read({str(whole.path)!r}).{question}"
     assert outcome_of(f"sw.read(folder).{question}", copy, wait_s=6.0, first=first) == "refused"
+
+
+# --- the design
+
+
+def short(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-8])
+
+
+def changed(path: Path) -> None:
+    data = path.read_bytes()
+    path.write_bytes(flipped(data, len(data) - 3))
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [Path.unlink, short, changed, lambda path: path.write_bytes(b""), lambda path: path.write_bytes(b"PK\x03\x04")],
+    ids=["gone", "short", "changed", "empty", "another kind"],
+)
+def test_a_damaged_design_is_refused_until_the_sweep_is_run_again(
+    copy: Path, whole: sw.SweepResult, damage: Callable[[Path], object]
+) -> None:
+    (design,) = copy.glob("design-*.npy")
+    rows = design.read_bytes()
+    damage(design)
+    with pytest.raises(SweepError, match="run the sweep into this folder again"):
+        sw.read(copy)
+    sw.run(whole.sweep, copy)
+    assert design.read_bytes() == rows and sw.read(copy).verify() == whole.verify()
 
 
 # --- bits

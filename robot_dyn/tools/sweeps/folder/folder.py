@@ -14,6 +14,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, final
@@ -30,6 +31,7 @@ _MOST_TEXT, _MOST_TABLE = 2**26, 2**34
 _SPECIFICATION = "sweep.json"
 _SUFFIX, _FOOTER = ".parquet", b"footer"
 _REMEDY = "run the sweep again, after removing this file"
+_ANEW = "run the sweep into this folder again, which writes the file anew"
 _NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
 
 
@@ -200,13 +202,29 @@ def read_specification(path: Path) -> str:
 
 
 def read_design(path: Path, digest: str) -> np.ndarray:
-    """The rows of the design of a folder, whose SHA-256 its specification states; errors as in `read_specification`."""
+    """The rows of the design of a folder.
+
+    Raises:
+        SweepError: If their file is missing or damaged, or has another SHA-256 than the specification states.
+    """
     file = _design(path, digest)
-    data = read(file, _MOST_TABLE, SweepError, _NONE)
+    data = read(file, _MOST_TABLE, SweepError, _ANEW)
     try:
-        return np.load(io.BytesIO(data), allow_pickle=False)
-    except (ValueError, EOFError) as error:
-        raise SweepError(f"{file}: is not a table of numbers ({error})") from None
+        rows = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    except Exception as error:  # of a damaged header NumPy promises no kinds
+        raise SweepError(f"{file}: is not a table of numbers ({why(error)}); {_ANEW}") from None
+    if sha256(np.ascontiguousarray(rows).tobytes()).hexdigest() != digest:
+        raise SweepError(f"{file}: was changed after it was written; {_ANEW}")
+    return rows
+
+
+def mend_design(path: Path, rows: np.ndarray, digest: str) -> None:
+    """Write the rows of a design anew where their file is missing or damaged; SweepError if it cannot be written."""
+    try:
+        read_design(path, digest)
+    except SweepError:
+        with _writing(path):
+            _write_design(path, rows, digest)
 
 
 def begin(path: Path, text: str, rows: np.ndarray, digest: str) -> None:
@@ -222,14 +240,25 @@ def begin(path: Path, text: str, rows: np.ndarray, digest: str) -> None:
     strange = sorted(name for name in names if not name.startswith("design-"))
     if strange and _SPECIFICATION not in names:
         raise SweepError(f"{path}: holds other files, such as {strange[0]}; give a new folder")
-    try:
-        stream = io.BytesIO()
-        np.save(stream, rows, allow_pickle=False)
-        write(_design(path, digest), stream.getvalue())
+    with _writing(path):
+        _write_design(path, rows, digest)
         with suppress(FileExistsError):
             write(path / _SPECIFICATION, text.encode(), exclusive=True)
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Raise errors of writing into a folder as a SweepError with its path."""
+    try:
+        yield
     except OSError as error:
         raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
+
+
+def _write_design(path: Path, rows: np.ndarray, digest: str) -> None:
+    stream = io.BytesIO()
+    np.save(stream, rows, allow_pickle=False)
+    write(_design(path, digest), stream.getvalue())
 
 
 def _design(path: Path, digest: str) -> Path:
