@@ -79,7 +79,7 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
 
 
 def _times(sweep: Sweep) -> np.ndarray:
-    """Those of the samples, (m,), in [s]; errors where samples cannot be kept."""
+    """Times of the samples, (m,), in [s]; errors where samples cannot be kept."""
     needs("zarr", extra="sweeps")
     return Work(sweep).times()
 

@@ -72,8 +72,9 @@ def test_samples_that_are_missing_or_changed_are_found(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_kept_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SweepError, match="samples"):
-        swept(tmp_path, samples="x")
+    for name in ("x", "w", "samples"):
+        with pytest.raises(SweepError, match=r"samples.*q, v, u"):
+            swept(tmp_path, samples=name)
     with pytest.raises(SweepError, match="every"):
         sw.samples("q", every=0)
     with pytest.raises(SweepError, match="no samples are kept"):
