@@ -60,4 +60,4 @@ _EXAMPLES = {
     "figure": "rms_error() or peak('u')",
     "samples": "samples('q', every=10)",
 }
-_ELSE = {"figure": ", or an import path such as 'my_figures:settling'"}  # what is no call, and allowed
+_ELSE = {"figure": ", or an import path such as 'my_figures:settling'"}
