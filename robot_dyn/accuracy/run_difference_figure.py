@@ -11,12 +11,14 @@ from robot_dyn.foundations.display import drawable
 from robot_dyn.queries.units import unit
 from robot_dyn.report.figure import Colours, ResultError, key, legend, sheet, styled
 from robot_dyn.simulation.results.provenance import joint_types
+from robot_dyn.view.plots.figure import shortened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDE, _PAIR, _AROUND = 13.0, 3.6, 1.5  # [inch]: the sheet, a row of joints, heading and legend
 _ACROSS, _MOST = 4, 64  # joints beside each other; that one figure shows
+_LETTERS = 96  # of the names of a row of joints
 
 
 def draw(result: RunDifference, theme: str = "light") -> Figure:
@@ -38,7 +40,7 @@ def draw(result: RunDifference, theme: str = "light") -> Figure:
     for i, name in enumerate(names):
         cell = grid[divmod(i, across)].subgridspec(2, 1, height_ratios=(1.3, 1))
         above = figure.add_subplot(cell[0])
-        _over_each_other(above, result.runs, i, unit("q", types[i]), colours, name)
+        _over_each_other(above, result.runs, i, unit("q", types[i]), colours, shortened(name, _LETTERS // across))
         below = figure.add_subplot(cell[1], sharex=above)
         _difference(below, result, i, unit("q", types[i]), colours)
     a, b, _, grey = (colours["lines"][k] for k in (0, 1, 2, 3))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.accuracy.run_difference_figure import draw
 from robot_dyn.foundations import QueryError
 from tests.campaigns.run_pairs import one_motion, two_motions
 from tests.cli.test_command_documents import names, promised
@@ -276,3 +278,26 @@ def test_runs_are_named_by_both_settings_in_which_they_differ() -> None:
     assert all(each.endswith(", …") for each in rd.compare_runs(a, run(400.0, 40.0, 0.2)).names)
     title = rd.replay(a, run(400.0, 20.0)).document["title"]
     assert title == f"planar_2r: {one[0]} / {one[1]} (transparent, dashed)"
+
+
+def test_titles_of_many_joints_with_long_names_do_not_overlap() -> None:
+    """12 joints in rows of 4, on paper and on the narrower page; names stay distinct by their ends."""
+    from matplotlib.text import Text
+
+    names = [f"left_hand_middle_finger_distal_phalanx_flexion_joint_{k}" for k in range(12)]
+    joints = "".join(
+        f'<link name="l{k + 1}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        f'</inertial></link><joint name="{name}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/>'
+        '<axis xyz="0 0 1"/></joint>'
+        for k, name in enumerate(names)
+    )
+    arm = rd.Robot.from_text(f'<robot name="chain"><link name="l0"/>{joints}</robot>')
+    a, b = (rd.simulate(arm, q0=np.full(12, q), duration_s=0.02, estimate_error=False) for q in (0.0, 0.1))
+    for theme in ("light", "page"):
+        figure = draw(rd.compare_runs(a, b), theme)
+        figure.draw_without_rendering()
+        parts: list[Any] = [text for axes in figure.axes for text in axes.get_children() if isinstance(text, Text)]
+        titles = [text for text in parts if "joint_" in text.get_text()]
+        assert len({title.get_text() for title in titles}) == 12
+        for one, other in combinations([title.get_window_extent() for title in titles], 2):
+            assert not one.overlaps(other)

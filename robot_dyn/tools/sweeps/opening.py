@@ -10,12 +10,15 @@ from pathlib import Path
 from shutil import disk_usage
 from time import process_time
 
+import numpy as np
+
 from robot_dyn.foundations import SceneError, SweepError, integer, needs
 from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.tools.sweeps.folder.folder import (
     Folder,
     begin,
     has_specification,
+    mend_design,
     read_design,
     read_specification,
 )
@@ -59,16 +62,26 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
         chunk = integer("chunk", chunk, least=1, most=2**31, error=SweepError)
     needs("pyarrow", extra="sweeps")
     where = str(path / "sweep.json")
-    if not has_specification(path):
+    new, t = not has_specification(path), None
+    if new:
         _check_room(sweep, path)
         stated = specification(sweep, pilot(sweep, chunk))
+        t = None if sweep.samples is None else _times(sweep)  # before the folder holds a sweep that is refused
         begin(path, stated.text, sweep.points.rows, stated.rows_sha256)
     stored = parsed(read_specification(path), where)
     stored.check_same(specification(sweep, chunk or stored.chunk), where)
+    if not new:
+        mend_design(path, sweep.points.rows, stored.rows_sha256)
     folder = _folder(path, sweep, stored)
     if folder.samples is not None and not folder.present().any():
-        folder.samples.create(Work(sweep).times(), sweep.setup.plant.dynamics.joint_names)
+        folder.samples.create(_times(sweep) if t is None else t, sweep.setup.plant.dynamics.joint_names)
     return folder
+
+
+def _times(sweep: Sweep) -> np.ndarray:
+    """Times of the samples, (m,), in [s]; errors where samples cannot be kept."""
+    needs("zarr", extra="sweeps")
+    return Work(sweep).times()
 
 
 def _check_room(sweep: Sweep, path: Path) -> None:

@@ -28,7 +28,7 @@ def called(what: str, text: str, functions: Mapping[str, Callable[..., Any]]) ->
     """
     name, arguments, by_name = _parsed(what, text)
     if name not in functions:
-        raise SweepError(f"no {what} {shorten(name)!r}; {nearest(name, functions)}")
+        raise SweepError(f"no {what} {shorten(name)!r}; {nearest(name, functions)}{_ELSE.get(what, '')}")
     function = functions[name]
     try:
         signature(function).bind(*arguments, **by_name)
@@ -39,7 +39,8 @@ def called(what: str, text: str, functions: Mapping[str, Callable[..., Any]]) ->
 
 def _parsed(what: str, text: Any) -> tuple[str, list[Any], dict[str, Any]]:
     """Name and arguments of a call."""
-    wrong = SweepError(f"{what}: {shorten(text)!r} is not a name with numbers, such as {_EXAMPLES[what]}")
+    such = _EXAMPLES[what] + _ELSE.get(what, "")
+    wrong = SweepError(f"{what}: {shorten(text)!r} is not a name with numbers, such as {such}")
     if not isinstance(text, str) or len(text) > _MOST:
         raise wrong
     try:
@@ -59,3 +60,4 @@ _EXAMPLES = {
     "figure": "rms_error() or peak('u')",
     "samples": "samples('q', every=10)",
 }
+_ELSE = {"figure": ", or an import path such as 'my_figures:settling'"}

@@ -13,14 +13,17 @@ import numpy as np
 import pytest
 
 from robot_dyn import RobotDynError
+from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from tests.campaigns.fuzz.campaign import limited
 from tests.long import long
 from tests.tools.sweeps.children import outcome_of
 from tests.tools.sweeps.swept import swept
 
-for _module in ("zarr", "xarray", "pyarrow"):
+for _module in ("zarr", "xarray"):
     pytest.importorskip(_module)
+pa = pytest.importorskip("pyarrow")
+parquet = pytest.importorskip("pyarrow.parquet")
 Damage = Callable[[Path], object]
 
 
@@ -78,6 +81,36 @@ def design_of_zeros(folder: Path) -> None:
     zeros(design.name)(folder)
 
 
+def rows_of(change: Callable[[Any], Any]) -> Damage:
+    """Another table of a chunk, with the footer that `change` leaves it."""
+
+    def write(folder: Path) -> None:
+        parquet.write_table(change(parquet.read_table(folder / ROWS)), folder / ROWS)
+
+    return write
+
+
+def cell(name: str, value: Any) -> Damage:
+    """Another value of the first row of a column."""
+
+    def change(table: Any) -> Any:
+        at, values = table.column_names.index(name), [value, *table[name].to_pylist()[1:]]
+        return table.set_column(at, table.schema.field(name), pa.array(values, table.schema.field(name).type))
+
+    return rows_of(change)
+
+
+def footer(**changes: Any) -> Damage:
+    """Another footer of a chunk; None removes a key."""
+
+    def change(table: Any) -> Any:
+        found = json.loads(table.schema.metadata[b"footer"]) | changes
+        found = {name: each for name, each in found.items() if each is not None}
+        return table.replace_schema_metadata({b"footer": json.dumps(found)})
+
+    return rows_of(change)
+
+
 ROWS, SHARD = "rows/000001.parquet", "samples/q/c/1/0/0"
 
 
@@ -109,6 +142,37 @@ def test_a_damaged_specification_or_chunk_is_refused(copy: Path, damage: Damage)
     damage(copy)
     with pytest.raises(RobotDynError):
         sw.read(copy).table()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        pytest.param(footer(rows=None), id="no digest of rows"),
+        pytest.param(footer(rows=3), id="digest of a number"),
+        pytest.param(footer(samples=None), id="no digests of samples"),
+        pytest.param(footer(samples=[]), id="a list of digests"),
+        pytest.param(cell("reason", None), id="no reason"),
+        pytest.param(cell("outcome", None), id="no outcome"),
+        pytest.param(cell("outcome", "finishedX"), id="another outcome"),
+        pytest.param(cell("error", None), id="no figure"),
+        pytest.param(cell("run", 7), id="another run"),
+    ],
+)
+@pytest.mark.parametrize("question", [sw.SweepResult.verify, sw.SweepResult.table])
+def test_a_chunk_written_by_hand_is_refused_by_its_file(
+    copy: Path, damage: Damage, question: Callable[[sw.SweepResult], object]
+) -> None:
+    question(sw.read(copy))
+    damage(copy)
+    with pytest.raises(SweepError, match=r"000001\.parquet: .*; run the sweep again"):
+        question(sw.read(copy))
+
+
+@pytest.mark.parametrize("found", [4, 6])
+def test_a_folder_of_another_format_is_refused_with_both(copy: Path, found: int) -> None:
+    key("format", found)(copy)
+    with pytest.raises(SweepError, match=f"has format {found}, this version reads 5; read it with the version"):
+        sw.read(copy)
 
 
 @pytest.mark.parametrize(
@@ -179,6 +243,35 @@ def test_what_is_not_a_regular_file_is_refused_at_once(
     damage(copy)
     first = f"sw.read({str(whole.path)!r}).{question}"
     assert outcome_of(f"sw.read(folder).{question}", copy, wait_s=6.0, first=first) == "refused"
+
+
+# --- the design
+
+
+def short(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-8])
+
+
+def changed(path: Path) -> None:
+    data = path.read_bytes()
+    path.write_bytes(flipped(data, len(data) - 3))
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [Path.unlink, short, changed, lambda path: path.write_bytes(b""), lambda path: path.write_bytes(b"PK\x03\x04")],
+    ids=["gone", "short", "changed", "empty", "another kind"],
+)
+def test_a_damaged_design_is_refused_until_the_sweep_is_run_again(
+    copy: Path, whole: sw.SweepResult, damage: Callable[[Path], object]
+) -> None:
+    (design,) = copy.glob("design-*.npy")
+    rows = design.read_bytes()
+    damage(design)
+    with pytest.raises(SweepError, match="run the sweep into this folder again"):
+        sw.read(copy)
+    sw.run(whole.sweep, copy)
+    assert design.read_bytes() == rows and sw.read(copy).verify() == whole.verify()
 
 
 # --- bits

@@ -287,6 +287,8 @@ def test_a_figure_that_raises_makes_its_run_one_that_raised(tmp_path: Path, modu
         ({"mine": "figures_of_a_test:text"}, "all 64 runs of the pilot raise.*return a number"),
         ({"mine": "figures_of_a_test:absent"}, "cannot be imported"),
         ({"mine": "no_such_module_here:f"}, "cannot be imported"),
+        ({"mine": "my_figures.settling"}, "or an import path such as 'my_figures:settling'"),
+        ({"mine": "settling"}, "or an import path such as 'my_figures:settling'"),
         ({"mine": lambda run: 0.0}, "which other processes cannot import: write it to my_figures.py"),
         ({"kp": sw.rms_error()}, None),
         ({"diverged": sw.rms_error()}, "'diverged' is the name of another column"),

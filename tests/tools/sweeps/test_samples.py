@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from robot_dyn import RobotDynError
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from tests.tools.sweeps.swept import VARY, swept
@@ -70,9 +72,26 @@ def test_samples_that_are_missing_or_changed_are_found(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_kept_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SweepError, match="samples"):
-        swept(tmp_path, samples="x")
+    for name in ("x", "w", "samples"):
+        with pytest.raises(SweepError, match=r"samples.*q, v, u"):
+            swept(tmp_path, samples=name)
     with pytest.raises(SweepError, match="every"):
         sw.samples("q", every=0)
     with pytest.raises(SweepError, match="no samples are kept"):
         sw.run(swept(tmp_path, 10), tmp_path / "out", chunk=10).samples()
+
+
+def test_a_sweep_refused_for_its_samples_leaves_a_folder_that_takes_the_corrected_one(tmp_path: Path) -> None:
+    """All runs of the first diverge at once, so that times of samples are not known."""
+    out = tmp_path / "out"
+    with pytest.raises(SweepError, match="times are not known"):
+        sw.run(swept(tmp_path, 20, vary={"kd": sw.choice([4e6])}, samples="q"), out, chunk=10)
+    sw.run(swept(tmp_path, 20, vary={"kd": sw.choice([4.0])}, samples="q"), out, chunk=10)
+    assert np.isfinite(sw.read(out).samples().q.values).all()
+
+
+def test_without_the_package_of_samples_no_folder_is_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "zarr", None)
+    with pytest.raises(RobotDynError, match="zarr"):
+        sw.run(swept(tmp_path, 20, samples="q"), tmp_path / "out", chunk=10)
+    assert not (tmp_path / "out").exists()

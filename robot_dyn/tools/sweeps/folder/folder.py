@@ -14,15 +14,16 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import SweepError, needs, read, reading, why
+from robot_dyn.foundations import SweepError, needs, read, reading, shown, why
 from robot_dyn.tools.sweeps.folder.files import make_folder, remove_abandoned, write
-from robot_dyn.tools.sweeps.folder.rows import TEXTS, Rows, digest_of, schema, type_of
+from robot_dyn.tools.sweeps.folder.rows import OUTCOMES, TEXTS, Rows, digest_of, schema, type_of
 from robot_dyn.tools.sweeps.folder.samples import SampleStore
 
 MOST_FILES = 20_000  # of a folder
@@ -30,6 +31,7 @@ _MOST_TEXT, _MOST_TABLE = 2**26, 2**34
 _SPECIFICATION = "sweep.json"
 _SUFFIX, _FOOTER = ".parquet", b"footer"
 _REMEDY = "run the sweep again, after removing this file"
+_AGAIN = "run the sweep into this folder again, which writes the file"
 _NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
 
 
@@ -169,13 +171,26 @@ class Folder:
                 raise SweepError(f"{path}: is of another sweep; {_REMEDY}")
             if (footer["chunk"], footer["start"], footer["stop"]) != (chunk, *expected):
                 raise SweepError(f"{path}: is of other runs than its name says; {_REMEDY}")
+            if not isinstance(footer["rows"], str) or not isinstance(footer["samples"], dict):
+                raise SweepError(f"{path}: its footer lacks digests of rows and samples; {_REMEDY}")
             if not file.schema_arrow.equals(schema(self.names)):
                 raise SweepError(f"{path}: its columns are not those of the sweep; {_REMEDY}")
-            table = file.read(columns=names, use_threads=False)
-            rows = {name: table[name].to_numpy().astype(type_of(name)) for name in names}
-            if any(x.shape != (expected[1] - expected[0],) for x in rows.values()):
+            if not names:
+                return {}, footer
+            table = file.read(columns=["run", *names], use_threads=False)
+            if len(table) != expected[1] - expected[0]:
                 raise SweepError(f"{path}: has {len(table)} rows, not {expected[1] - expected[0]}; {_REMEDY}")
-            return rows, footer
+            columns = {name: table[name].to_numpy() for name in table.column_names}
+            if any(table[name].null_count for name in columns):
+                raise SweepError(f"{path}: has cells without a value; {_REMEDY}")
+            if (columns.pop("run") != np.arange(*expected)).any():
+                raise SweepError(
+                    f"{path}: its rows are not those of runs {expected[0]} to {expected[1] - 1}; {_REMEDY}"
+                )
+            if strange := set(columns.get("outcome", ())) - set(OUTCOMES):
+                known = ", ".join(OUTCOMES)
+                raise SweepError(f"{path}: has the outcome {shown(min(strange))}, not one of {known}; {_REMEDY}")
+            return {name: x.astype(type_of(name)) for name, x in columns.items()}, footer
 
 
 @contextmanager
@@ -200,13 +215,29 @@ def read_specification(path: Path) -> str:
 
 
 def read_design(path: Path, digest: str) -> np.ndarray:
-    """The rows of the design of a folder, whose SHA-256 its specification states; errors as in `read_specification`."""
+    """The rows of the design of a folder.
+
+    Raises:
+        SweepError: If their file is missing or damaged, or has another SHA-256 than the specification states.
+    """
     file = _design(path, digest)
-    data = read(file, _MOST_TABLE, SweepError, _NONE)
+    data = read(file, _MOST_TABLE, SweepError, _AGAIN)
     try:
-        return np.load(io.BytesIO(data), allow_pickle=False)
-    except (ValueError, EOFError) as error:
-        raise SweepError(f"{file}: is not a table of numbers ({error})") from None
+        rows = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    except Exception as error:  # of a damaged header NumPy promises no kinds
+        raise SweepError(f"{file}: is not a table of numbers ({why(error)}); {_AGAIN}") from None
+    if sha256(np.ascontiguousarray(rows).tobytes()).hexdigest() != digest:
+        raise SweepError(f"{file}: was changed after it was written; {_AGAIN}")
+    return rows
+
+
+def mend_design(path: Path, rows: np.ndarray, digest: str) -> None:
+    """Write the rows of a design where their file is missing or damaged; SweepError if it cannot be written."""
+    try:
+        read_design(path, digest)
+    except SweepError:
+        with _writing(path):
+            _write_design(path, rows, digest)
 
 
 def begin(path: Path, text: str, rows: np.ndarray, digest: str) -> None:
@@ -222,14 +253,25 @@ def begin(path: Path, text: str, rows: np.ndarray, digest: str) -> None:
     strange = sorted(name for name in names if not name.startswith("design-"))
     if strange and _SPECIFICATION not in names:
         raise SweepError(f"{path}: holds other files, such as {strange[0]}; give a new folder")
-    try:
-        stream = io.BytesIO()
-        np.save(stream, rows, allow_pickle=False)
-        write(_design(path, digest), stream.getvalue())
+    with _writing(path):
+        _write_design(path, rows, digest)
         with suppress(FileExistsError):
             write(path / _SPECIFICATION, text.encode(), exclusive=True)
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Raise errors of writing into a folder as a SweepError with its path."""
+    try:
+        yield
     except OSError as error:
         raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
+
+
+def _write_design(path: Path, rows: np.ndarray, digest: str) -> None:
+    stream = io.BytesIO()
+    np.save(stream, rows, allow_pickle=False)
+    write(_design(path, digest), stream.getvalue())
 
 
 def _design(path: Path, digest: str) -> Path:

@@ -48,7 +48,7 @@ FIXED = (
         "outcome", "U8", "", f"outcome of the run: {', '.join(OUTCOMES)}", RAISED,
         lambda made: np.where(made.diverged, DIVERGED, FINISHED),
     ),
-    Column("ended", float, "s", "time at which the run ended; nan if it raised", np.nan, lambda made: made.ended),
+    Column("ended", float, "s", "time at which the run ended; nan if it was not made", np.nan, lambda made: made.ended),
     Column(
         "reason", object, "", "why the run failed, or which event ended it", "",
         lambda made: np.array(made.advice, object),

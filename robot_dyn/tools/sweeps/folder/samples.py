@@ -66,7 +66,7 @@ def samples(*names: str, every: int = 1, failed: bool = False) -> Samples:
 
 def samples_of(given: Any) -> Samples | None:
     """What `Sweep.samples` may be: None, a name, or `samples(…)`, also as a text; SweepError otherwise."""
-    if isinstance(given, str) and given not in RECORDED:
+    if isinstance(given, str) and "(" in given:
         return called("samples", given, {"samples": samples})
     return given if given is None or isinstance(given, Samples) else samples(given)
 

@@ -28,6 +28,7 @@ from robot_dyn.tools.sweeps.plan.figures import Figure, UserFigure
 from robot_dyn.tools.sweeps.plan.stated import StatedScene, stated_scene
 from robot_dyn.tools.sweeps.plan.sweep import Sweep, is_scene
 
+FORMAT = 5
 _PLACE = "scene"  # where it lies may differ
 
 
@@ -99,9 +100,15 @@ class Specification(BaseModel):
 
 
 def parsed(text: str, where: str) -> Specification:
-    """The specification of a text; SweepError with the key and the value if it is not one, or of another version."""
+    """The specification of a text; SweepError with the key and the value if it is not one, or of another format."""
     try:
-        return Specification.model_validate(json.loads(text))
+        data = json.loads(text)
+        if isinstance(data, dict) and type(found := data.get("format")) is int and found != FORMAT:
+            raise SweepError(
+                f"{where}: has format {found}, this version reads {FORMAT}; read it with the version that wrote it, or"
+                " run the sweep into a new folder"
+            )
+        return Specification.model_validate(data)
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
@@ -118,7 +125,7 @@ def parsed(text: str, where: str) -> Specification:
 def specification(sweep: Sweep, chunk: int) -> Specification:
     """The specification of a sweep in chunks of so many runs."""
     data = {
-        "format": 5,
+        "format": FORMAT,
         "scene": sweep.source,
         "setup": _stated_setup(sweep),
         "runs": int(sweep.runs),
