@@ -39,7 +39,7 @@ class Panel:
     shared: bool = False
 
     def letters(self, width: float, text: float) -> int:
-        """How many letters of a size in pt a line above a cell has, in a figure of a width in [mm]."""
+        """Number of letters of a size in pt in a line above a cell, in a figure of a width in [mm]."""
         return int((width / max(map(len, self.rows)) - _BESIDE) / (_LETTER * text))
 
     def tall(self, height: float, width: float, text: float) -> float:
@@ -107,7 +107,7 @@ def _draw(part: Any, panel: Panel, style: Style, width: float, diverged: bool) -
 
 
 def _title(cell: Axes, letters: int) -> str:
-    """The title of a cell and its note, in lines of so many letters; a long name takes two."""
+    """The title of a cell and its note, in lines of at most `letters` letters; a long name takes two."""
     name = shortened(cell.title, 2 * letters)
     if len(name) > letters:
         cut = max(name.rfind("_", 0, letters) + 1, len(name) - letters)
