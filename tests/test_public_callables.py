@@ -18,7 +18,6 @@ from tests.wrong_arguments import EXTREME, LAX, LONG, NOT_TEXT, Example, public,
 
 LIMIT_S = 20  # of one call; the machine may be busy
 MEASURE = {
-    "MotorBudget.fastest",
     "MotorBudget.max_payload",
     "advise",
     "budget",
@@ -26,6 +25,7 @@ MEASURE = {
     "check",
     "compare",
     "cost",
+    "fastest",
     "from_scene",
     "path",
     "prove",

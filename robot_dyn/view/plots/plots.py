@@ -27,6 +27,7 @@ from robot_dyn.view.plots.sheet import LEAST_MM, MOST_MM, WIDTH_MM, draw
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_LEAST_DPI = 10.0  # below, letters of a figure have no size in pixels
 MOST_JOINTS = 64  # that one figure shows
 PICTURES = (
     files.FileKind("a plot", ".png", b"\x89PNG"),
@@ -112,13 +113,13 @@ def save_plot(
         run: As `plot`.
         path: Where to.
         *names: As `plot`.
-        dpi: Dots per inch of a PNG.
+        dpi: Dots per inch of a PNG, at least 10.
         **options: As `plot`.
 
     Raises:
         PlotError: If it cannot be written; else as `plot`.
     """
-    dpi = number("dpi", dpi, above=0)
+    dpi = number("dpi", dpi, least=_LEAST_DPI)
     path = files.target(path, PICTURES, PlotError)
     picture = io.BytesIO()
     figure = plot(run, *names, **options)
