@@ -104,8 +104,11 @@ def inline(figure: Figure, label: str = "") -> str:
         figure: The figure.
         label: Its description for readers who do not see it.
     """
+    from matplotlib import rc_context
+
     stream = io.StringIO()
-    figure.savefig(stream, format="svg", bbox_inches="tight", pad_inches=0.05, metadata={"Date": None})
+    with rc_context({"svg.fonttype": "none"}):  # texts stay texts, which can be searched and read aloud
+        figure.savefig(stream, format="svg", bbox_inches="tight", pad_inches=0.05, metadata={"Date": None})
     svg = stream.getvalue()
     dropped = r'<!--.*?-->|<metadata>.*?</metadata>| xmlns:xlink="[^"]*"|xlink:(?=href)'
     svg = re.sub(dropped, "", svg[svg.index("<svg") + 4 :], flags=re.DOTALL)

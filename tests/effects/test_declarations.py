@@ -396,7 +396,7 @@ def test_a_smooth_function_that_declares_nothing_is_not_said_to_act_between_step
         return _Stiff.kp * (_Stiff.plan.at(t)[0] - q) - _Stiff.kd * v + _Stiff.arm.N(q)
 
     for law in (follows, without_velocity):
-        run = rd.simulate(_Stiff.arm, _Stiff.start, duration_s=0.3, controller=law, record_period_s=0.01)
+        run = rd.simulate(_Stiff.arm, _Stiff.start, duration_s=1.2, controller=law, record_period_s=0.01)
         assert "acts between steps" not in str(run.error) and run.error.largest < 1e-9
 
 

@@ -111,9 +111,10 @@ def test_torque_is_that_of_the_formula(effect: Force) -> None:
     """A handful of roundings of the largest value: 1e-14 of it."""
     q, v = states()
     expected = FORMULAS[effect](0.3, q, v)
-    np.testing.assert_allclose(
-        effect.torque(ROBOT, 0.3, q, v), expected, rtol=1e-14, atol=1e-14 * np.abs(expected).max()
-    )
+    got = effect.torque(ROBOT, 0.3, q, v)
+    np.testing.assert_allclose(got, expected, rtol=1e-14, atol=1e-14 * np.abs(expected).max())
+    one_by_one = [effect.torque(ROBOT, 0.3, *state) for state in zip(q, v, strict=True)]
+    np.testing.assert_allclose(one_by_one, got, rtol=1e-15)
 
 
 @pytest.mark.parametrize("name", WITHOUT_STATES)
