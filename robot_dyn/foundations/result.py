@@ -27,7 +27,8 @@ def plain(value: Any) -> Any:
     """
     if is_dataclass(value):
         names = [each.name for each in fields(value) if each.metadata.get("reported", True)]
-        names += [name for name, each in vars(type(value)).items() if isinstance(each, reported)]
+        kinds = reversed(type(value).__mro__)
+        names += [name for kind in kinds for name, each in vars(kind).items() if isinstance(each, reported)]
         return {name: plain(getattr(value, name)) for name in names}
     if isinstance(value, Mapping):
         return {key: plain(each) for key, each in value.items()}

@@ -105,9 +105,6 @@ class ToleranceLadder(Method):
     ended: str
     floor: float = field(metadata=UNREPORTED)
 
-    # plain data hold properties of the class itself
-    name = Method.name  # pyright: ignore[reportIncompatibleMethodOverride]
-
     @reported
     def measured_order(self) -> float | None:
         """Median slope of log error against log steps between neighbours; None if too few runs show it.

@@ -35,16 +35,7 @@ _PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for e
 
 
 def choose(setup: Setup, seen: float) -> Engine:
-    """Return the engine of a setup; machine code is chosen once, but with events it is checked for each run.
-
-    Args:
-        setup: What to run.
-        seen: A lower bound of its evaluations, without its companions.
-
-    Raises:
-        TraceError: If engine is "compiled" and a part cannot be; names it.
-        MachineError: If the machine code does not agree with the interpreted engine.
-    """
+    """Return the engine of a setup, as `engine.choice`; machine code with events is checked for each run."""
     return cached(setup, _chosen, seen, lasts=lambda engine: isinstance(engine, MachineCode) and not setup.events)
 
 
