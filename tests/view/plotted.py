@@ -32,8 +32,8 @@ def cart_pole():
 
 
 def cells(figure, symbol: str) -> list:
-    """The axes whose y axis begins with that symbol."""
-    return [axes for axes in figure.axes if axes.get_ylabel().startswith(f"{symbol} [")]
+    """The axes whose y axis has that symbol before its unit."""
+    return [axes for axes in figure.axes if axes.get_ylabel().partition("[")[0].strip() == symbol]
 
 
 def headings(figure) -> str:

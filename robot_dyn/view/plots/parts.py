@@ -207,8 +207,7 @@ def _torque(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
 def _off(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
     off = np.zeros_like(view.run.t) if view.run.deviation is None else view.run.deviation[:, i]
     curves, of_q = (Curve("error", view.run.t, off),), view.unit("q", i)
-    y = f"q − q_d\n[{of_q}]" if " or " in of_q else f"q − q_d [{of_q}]"  # a row is not as high as both units are long
-    return Cell("", x, y, curves, note=f"rms {_rms(off):.2e} {of_q}")
+    return Cell("", x, f"q − q_d\n[{of_q}]", curves, note=f"rms {_rms(off):.2e} {of_q}")
 
 
 def _ledger(view: View) -> list[Cell]:
