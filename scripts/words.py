@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 541,
+    "opening": 539,
     "as of": 140,
     "what without noun": 634,
     "is told": 21,

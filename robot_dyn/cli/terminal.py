@@ -50,10 +50,9 @@ def say(*renderables: Any) -> None:
         def render_str(self, text: str, **options: Any) -> Text:  # a cell of a table, to measure and to print
             return super().render_str(escaped(text), **options)
 
-    terminal = sys.stdout.isatty()  # lines in a pipe are not wrapped
-    console = Safe(
-        highlight=False, markup=False, emoji=False, width=None if terminal else 1000
-    )  # lines in a pipe are not wrapped
+    terminal = sys.stdout.isatty()
+    width = None if terminal else 1000  # lines in a pipe are not wrapped
+    console = Safe(highlight=False, markup=False, emoji=False, width=width)
     for each in (part for one in renderables for part in (one.blocks() if isinstance(one, Answer) else (one,))):
         if isinstance(each, Table) and terminal:
             for part in each.within(console.width):  # a number that is cut off is another number

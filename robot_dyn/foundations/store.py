@@ -36,7 +36,7 @@ class StoreError(RobotDynError):
 @final
 @dataclass
 class Found:
-    """What the fields of a value take from a file.
+    """Arrays of a file that the fields of a value take.
 
     Attributes:
         arrays: The arrays that no field has taken yet, by name.
@@ -51,7 +51,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Layout:
-    """How a file stores an array, stated in the type of its field: `Annotated[np.ndarray, Layout(("m", "n"))]`.
+    """Form of an array in a file, stated in the type of its field: `Annotated[np.ndarray, Layout(("m", "n"))]`.
 
     Attributes:
         shape: A number; a letter, which stands for the same length in all arrays of a file; None for any length; or

@@ -15,7 +15,7 @@ from robot_dyn.foundations.errors import RobotDynError, SceneError, shorten
 _WORDS = {
     "Input should be": "must be", "Field required": "is missing; give it", "valid tuple": "list", "valid list": "list",
     "valid dictionary": "table", "a valid string": "text", "a valid boolean": "true or false", "valid number": "number",
-    "a valid integer": "an integer", "greater than 0": "positive", "greater than or equal to": "at least",
+    "a valid integer": "an integer", "greater than or equal to": "at least",
 }  # fmt: skip
 _TABLE = re.compile(r"^[ \t]*\[+[ \t]*[A-Za-z_\"']", re.MULTILINE)  # the header of one
 
@@ -54,10 +54,12 @@ def validation_message(error: ValidationError, table: Mapping[str, Any], text: s
     first, *others = error.errors(include_url=False)
     kind, context, path = first["type"], first.get("ctx", {}), first["loc"]
     message = str(context["error"]) if kind == "value_error" else first["msg"]
-    for pydantics, words in _WORDS.items():
-        message = message.replace(pydantics, words)
-    if kind not in ("missing", "wrong_key", "value_error"):
-        message += f", got {shorten(bounded_repr(first['input']))}"
+    if kind not in ("wrong_key", "value_error"):  # pydantic's own
+        for pydantics, words in _WORDS.items():
+            message = message.replace(pydantics, words)
+        message = re.sub("greater than 0$", "positive", message)
+        if kind != "missing":
+            message += f", got {shorten(bounded_repr(first['input']))}"
     key = path[-1] if kind == "missing" else context.get("key")
     place = ".".join([*_place(table, path), *([] if key is None else [shorten(key)])])
     more = f" (and {len(others)} more)" if others else ""

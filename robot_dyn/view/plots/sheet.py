@@ -21,7 +21,7 @@ A4_MM, MM = 297.0, 1 / 25.4
 _HEADING, _TITLE, _NUMBERS = 10.0, 5.0, 8.0  # [mm]: about what they take above a panel, above and below a row
 _BESIDE = 14.0  # [mm], about what numbers and the name of the y axis take
 _LETTER, _LINE, _HANDLE = 0.19, 0.5, 1.5  # [mm], of 1 pt: width of a letter, a line, beside the text of a legend
-_LEAST_ROW = 12.0  # [mm], of which the room between rows takes some
+_LEAST_ROW = 12.0  # [mm], with the room between rows
 _MOST_REMARKS = 5  # letters of remarks above the panels, in a mm of the width; all are in the summary
 
 
