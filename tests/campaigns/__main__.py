@@ -50,9 +50,12 @@ class Campaign:
 
 def campaigns() -> list[Campaign]:
     """All, the shortest first."""
-    estimates = "tests.campaigns.estimates"
+    estimates, sweeps = "tests.campaigns.estimates", "tests.campaigns.sweeps"
     return [
         *(Campaign(f"fuzz, {name}", "tests.campaigns.fuzz", (name,), "--cases", 4000) for name in FUZZERS),
+        Campaign("sweeps, flipped bits", sweeps, ("flips",), "--count", 400),
+        Campaign("sweeps, rows by run(i)", sweeps, ("repeats",), "--count", 200),
+        Campaign("sweeps, killed", sweeps, ("kills",), "--count", 50),
         Campaign("batches and single runs", "tests.campaigns.batches", (), "--scenes", 300),
         Campaign("pairs of runs", "tests.campaigns.run_pairs", (), "--pairs", 200),
         Campaign("estimates, thin layers", estimates, (), "--layers", 400),
