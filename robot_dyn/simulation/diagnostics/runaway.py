@@ -9,7 +9,6 @@ from math import log
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
@@ -25,13 +24,13 @@ _TIMES = 100.0  # a velocity limit
 _LIMIT = 100.0  # [rad/s] or [m/s] of a joint whose file states none
 
 
-def speed_limits(dynamics: Dynamics) -> Array:
+def speed_limits(dynamics: Dynamics) -> np.ndarray:
     """Return the speed of each joint beyond which a run has left all speeds of the arm, (n,), in [rad/s] or [m/s]."""
     limits = dynamics.velocity_limit if isinstance(dynamics, Robot) else np.full(dynamics.n, np.inf)
     return _TIMES * np.where((limits > 0) & np.isfinite(limits), limits, _LIMIT)
 
 
-def runaway(setup: Setup, speeds: Array) -> str:
+def runaway(setup: Setup, speeds: np.ndarray) -> str:
     """Return which joint has passed its speed limit most, as text; empty if none has.
 
     Args:
@@ -63,9 +62,11 @@ def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
         return ()
     text = f"{step:.4g} s, {setup.integrator.name} is stable up to {limit:.4g} s; {motion}"
     remedy = f"take step_s={below(limit)}, or an implicit method"
-    return (
-        Remark(RemarkKind.TOO_LONG, motion.joint, "v", 0.0, setup.duration_s, 0.0, step, limit, text, remedy),
+    remark = Remark(
+        kind=RemarkKind.TOO_LONG, joint=motion.joint, quantity="v", start=0.0, duration=setup.duration_s, at=0.0,
+        value=step, limit=limit, text=text, remedy=remedy,
     )  # fmt: skip
+    return (remark,)
 
 
 def judged(setup: Setup, outcome: Outcome) -> Outcome:

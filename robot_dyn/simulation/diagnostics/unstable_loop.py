@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import declared
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.simulation.diagnostics.runaway import EXPLAINS
@@ -79,7 +78,8 @@ class GrowingLoop(NamedTuple):
             text = f"{joint} with {self.rate:.3g} per second about the state at {t:.4g} s" + (gains and f", {gains}")
             what_to_do = self.lower_gains()
         return Remark(
-            RemarkKind.UNSTABLE, joint, "q", t, 0.0, t, self.rate, 1.0 if period else 0.0, text, what_to_do
+            kind=RemarkKind.UNSTABLE, joint=joint, quantity="q", start=t, duration=0.0, at=t, value=self.rate,
+            limit=1.0 if period else 0.0, text=text, remedy=what_to_do,
         )  # fmt: skip
 
     def other_period(self, period_s: float) -> str:
@@ -132,11 +132,11 @@ def growing_loop(setup: Setup, t: float, y: np.ndarray) -> GrowingLoop | None:
         if not rate > 2 * replace(loop, continuous=loop.A).grows_anyway():
             return None
         values, vectors = np.linalg.eig(loop.continuous)
-        return GrowingLoop(t, _joint(vectors[:, int(np.argmax(values.real))], n, 1 / rate), rate, loop)
+        return GrowingLoop(t, _joint(vectors[:, int(np.argmax(np.real(values)))], n, 1 / rate), rate, loop)
     return None
 
 
-def _joint(deviation: Array, n: int, time_s: float) -> int:
+def _joint(deviation: np.ndarray, n: int, time_s: float) -> int:
     """Return the index of the joint that takes part most in a deviation (δq, δv, …) that grows within a time."""
     return int(np.argmax(np.abs(deviation[:n]) + time_s * np.abs(deviation[n : 2 * n])))
 
@@ -144,8 +144,9 @@ def _joint(deviation: Array, n: int, time_s: float) -> int:
 def _gains(setup: Setup, joint: int) -> str:
     """Return the gains of a joint as text, such as "kp = 2e+04 N m/rad"; empty for a law that declares none."""
     law, n = setup.controller, setup.plant.dynamics.n
-    stated = ((name, each.unit, getattr(law, name)) for name, each in declared(type(law)).items() if name in _GAINS)
-    return ", ".join(f"{name} = {np.broadcast_to(x, (n,))[joint]:.4g} {unit}" for name, unit, x in stated)
+    units = {name: gain.unit for name, gain in declared(type(law)).items() if name in _GAINS}
+    values = {name: np.broadcast_to(getattr(law, name), (n,))[joint] for name in units}
+    return ", ".join(f"{name} = {values[name]:.4g} {unit}" for name, unit in units.items())
 
 
 def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outcome:

@@ -2,8 +2,8 @@
 
 chatter · an effort limit or a stop reached · beyond a limit that the file states · a record coarser than the motion ·
 an effect declared dissipative that does positive work · friction that creeps · steps that stability bounds ·
-a step that is too long, a control loop that is unstable · a task that is damped · a reference that jumps where it begins · a joint that is held
-while its reference moves
+a step that is too long · a control loop that is unstable · a task that is damped · a reference that jumps where it
+begins · a joint that is held while its reference moves
 """
 
 from __future__ import annotations
