@@ -12,6 +12,7 @@ import numpy as np
 from robot_dyn.effects.plant import Plant
 from robot_dyn.simulation.diagnostics.damped_task import damped
 from robot_dyn.simulation.diagnostics.imbalance import cause
+from robot_dyn.simulation.diagnostics.runaway import runaway, step_too_long
 from robot_dyn.simulation.diagnostics.step_remarks import remarks
 from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.observation import Observed
@@ -141,10 +142,14 @@ class Results:
 
     @cached_property
     def _of_control(self) -> tuple[Remark, ...]:
-        """Remarks on the controller; one that was interrupted is not called again."""
+        """Remarks on the step and on the controller; one that was interrupted is not called again."""
         if self.record.outcome.ending is Ending.STOPPED:
             return ()
-        return (*unstable(self.setup, self.record.t, self.record.y), *damped(self.setup, self.record))
+        runs_away = self.record.outcome.ending is Ending.DIVERGED or bool(runaway(self.setup, self.observer.fastest))
+        doubtful = runs_away or (self.error is not None and self.error.note)
+        step = step_too_long(self.setup, self.record.outcome.t) if doubtful else ()
+        loop = unstable(self.setup, self.record.t, self.record.y, runs_away)
+        return (*step, *loop, *damped(self.setup, self.record))
 
     @property
     def acting(self) -> tuple[str, ...]:

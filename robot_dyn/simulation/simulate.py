@@ -18,6 +18,7 @@ from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
 from robot_dyn.integrate.time_stepping import TimeStepping
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.derived import Results
+from robot_dyn.simulation.diagnostics.runaway import judged, runaway
 from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.declarations import named
 from robot_dyn.simulation.engine.choice import choose
@@ -99,6 +100,7 @@ class _Ran(NamedTuple):
         record: Its record.
         ready: When it began, on the clock, put later by what it compiled.
         remarks: On a run before it.
+        runaway: Which joint left all speeds of an arm; empty if none did.
     """
 
     setup: Setup
@@ -107,6 +109,7 @@ class _Ran(NamedTuple):
     record: Recording
     ready: float
     remarks: tuple[Remark, ...]
+    runaway: str
 
 
 def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _Ran:
@@ -127,7 +130,10 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
                 setup, chooses, said = cached(setup, _nonsmooth), False, (*said, remark)
             case record:
                 observer.end()
-                return _Ran(setup, engine, observer, record, ready + engine.compiling_s() - before, said)
+                far = runaway(setup, observer.fastest)
+                if far:
+                    record = replace(record, outcome=judged(setup, record.outcome))
+                return _Ran(setup, engine, observer, record, ready + engine.compiling_s() - before, said, far)
 
 
 def _stiff(setup: Setup) -> Setup:
@@ -148,6 +154,8 @@ def _with_estimate(
     setup, record, spent, companions = ran.setup, ran.record, 0, 0
     if not setup.estimate_error or record.outcome.ending is Ending.STOPPED:
         return record, None, 0, 0
+    if ran.runaway:
+        return record, no_estimate(ran.runaway), 0, 0
     at_the_end = None if on_progress is None else lambda _: on_progress(record.outcome.t)
 
     def companion(pace: Any, of: Setup) -> Recording:

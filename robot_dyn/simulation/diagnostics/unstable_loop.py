@@ -1,9 +1,10 @@
-"""Whether the loop of a sampled controller is unstable about states of a run, and whether a run diverged for that.
+"""Control loops that are unstable about states of a run, and runs that diverged because of one.
 
-    δx⁺ = Φ(T) δx over a period T:   ρ(Φ) > 1, and more than the square of e^{T max Re λ} under control at all times
+    sampled      δx⁺ = Φ(T) δx over a period T:   ρ(Φ) > 1, and more than the square of e^{T max Re λ} without sampling
+    continuous   δx' = J δx:   max Re λ(J) > 0, and more than twice as fast as with the actuation held
 
-Slow growth may end before it shows. It explains a divergence at t if ρ(Φ)^(t/T) > 1e3: shorter steps follow such growth
-more closely, and do not end it, so that the advice is then that on the loop.
+Slow growth may end before it shows. It explains a divergence at t if deviations grow by more than 1e3 until t: shorter
+steps follow such growth more closely, and do not end it, so that the advice is then about the loop.
 """
 
 from __future__ import annotations
@@ -16,42 +17,73 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robot_dyn.foundations.coefficients import declared
 from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.simulation.diagnostics.runaway import EXPLAINS
 from robot_dyn.simulation.dynamics.sampled_loop import SampledLoop, linearised, remedy
 from robot_dyn.simulation.dynamics.stability import after, below, periods, shown
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind, remark_lines
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
 
-_EXPLAINS = 1e3  # growth of deviations
+_GAINS = ("kp", "ki", "kd")
+_HALVINGS = 20  # of the gains, tried for a stable loop
 
 
-def unstable(setup: Setup, t: np.ndarray, y: np.ndarray) -> Iterator[Remark]:
-    """A remark if the loop is unstable about the start, the middle or the end of a run, as far as it is finite there.
+def unstable(setup: Setup, t: np.ndarray, y: np.ndarray, runs_away: bool) -> Iterator[Remark]:
+    """Yield a remark if the loop is unstable about the start, the middle or the end of a run, where states are finite.
 
     Args:
         setup: What ran.
         t: Times of its samples, (m,), in [s].
         y: Its states there, (m, size).
+        runs_away: True if the run diverged or left all speeds of an arm. A continuous loop is examined only then:
+            deviations may grow for a while along a motion that is as it should be.
     """
-    good = np.flatnonzero(np.isfinite(y).all(axis=1))
-    looks = sorted({int(k) for k in good[[0, len(good) // 2, -1]]}) if len(good) else []
-    for k in looks:  # the first of them: later ones may be far out
-        if found := growing(setup, float(t[k]), y[k]):
-            yield _remark(setup, found)
+    if setup.controller is None or not (setup.equation.sampled or runs_away):
+        return
+    finite = np.flatnonzero(np.isfinite(y).all(axis=1))
+    rows = sorted({int(k) for k in finite[[0, len(finite) // 2, -1]]}) if len(finite) else []
+    for k in rows:  # the first of them: later ones may be far out
+        if growing := growing_loop(setup, float(t[k]), y[k]):
+            yield growing.remark(setup)
             return
 
 
-class Growing(NamedTuple):
-    """A loop in which deviations grow: the time, the joint, the factor in each period, and its linearisation."""
+class GrowingLoop(NamedTuple):
+    """A loop in which deviations grow.
+
+    Attributes:
+        t: Time of the state it is linearised about, in [s].
+        joint: Index of the joint that takes part most.
+        rate: Growth: the factor in each period, or of a continuous loop the rate in [1/s].
+        loop: Linearisation.
+    """
 
     t: float
-    joint: str
-    factor: float
+    joint: int
+    rate: float
     loop: SampledLoop
 
-    def remedy(self, period_s: float) -> str:
-        """What to do about it."""
+    def remark(self, setup: Setup) -> Remark:
+        """Return the remark about it."""
+        assert setup.controller is not None
+        period, joint, t = setup.controller.period_s, setup.plant.dynamics.joint_names[self.joint], self.t
+        if period:
+            over_the_run = shown(after(self.rate, periods(setup.duration_s, period)))
+            growth = f"by {shown(self.rate)} in each period of {period:.4g} s about the state at {t:.4g} s, by"
+            text, what_to_do = f"{joint} {growth} {over_the_run} over the run", self.other_period(period)
+        else:
+            gains = _gains(setup, self.joint)
+            text = f"{joint} with {self.rate:.3g} per second about the state at {t:.4g} s" + (gains and f", {gains}")
+            what_to_do = self.lower_gains()
+        return Remark(
+            kind=RemarkKind.UNSTABLE, joint=joint, quantity="q", start=t, duration=0.0, at=t, value=self.rate,
+            limit=1.0 if period else 0.0, text=text, remedy=what_to_do,
+        )  # fmt: skip
+
+    def other_period(self, period_s: float) -> str:
+        """Return what to do about a sampled loop."""
         if limit := self.loop.longest_period(period_s):
             return f"the loop is stable up to {limit:.3g} s: take period_s={below(limit)}, or lower gains"
         anyway = self.loop.grows_anyway()
@@ -61,49 +93,72 @@ class Growing(NamedTuple):
             return f"{slower}; sampling adds to that beyond {limit:.3g} s: take period_s={below(limit)}, or lower gains"
         return f"so it is with every period: take {remedy(anyway)}"
 
+    def lower_gains(self) -> str:
+        """Return what to do about a continuous loop: A + s B K is tried for s = ½, ¼ and so on."""
+        A, closed = self.loop.A, self.loop.continuous
+        if closed.shape == A.shape:
+            for s in 0.5 ** np.arange(1, _HALVINGS + 1):
+                if replace(self.loop, continuous=A + s * (closed - A)).grows_anyway() == 0.0:
+                    return f"lower the gains: about this state the loop is stable with {s:.3g} times these"
+        return "lower the gains"
 
-def growing(setup: Setup, t: float, y: np.ndarray) -> Growing | None:
-    """The loop about a state y of a run, if it is sampled and deviations grow there because it is; otherwise None.
 
-    Where they grow under control at all times too, as of an arm that falls, that is if they grow twice as fast.
+def growing_loop(setup: Setup, t: float, y: np.ndarray) -> GrowingLoop | None:
+    """Return the loop about a state y of a run if deviations grow there because of the control; otherwise None.
+
+    Where they grow without it too, as those of an arm that falls, it must make them grow twice as fast. "Without it" is
+    for a sampled loop the same control at all times, for a continuous one the actuation held.
     """
     controller, equation, n = setup.controller, setup.equation, setup.plant.dynamics.n
     motion = equation.equation_of_motion
-    if controller is None or not equation.sampled or equation.canonical:
+    if controller is None or equation.canonical:
         return None
     if motion.payloads or any(drive.coupled for drive in motion.drives.values()):  # no one linearisation holds
         return None
-    z, first, period = np.zeros(controller.at_period(0.0).state_size), 2 * n + equation.state_size, controller.period_s
+    sampled, period = equation.sampled, controller.period_s
+    size = controller.at_period(0.0).state_size
+    z = np.zeros(size) if sampled else y[2 * n : 2 * n + size]
+    first = 2 * n + equation.state_size
     x = np.concatenate([y[: 2 * n], z, y[first : first + motion.state_size]])
     with suppress(RobotDynError, np.linalg.LinAlgError, ValueError), np.errstate(all="ignore"):  # too far out
         loop = linearised(setup.plant, controller, t, x)
-        if not loop.adds_growth(period):
+        if sampled:
+            if not loop.adds_growth(period):
+                return None
+            values, vectors = np.linalg.eig(loop.matrix(period))
+            worst = vectors[:, int(np.argmax(np.abs(values)))]
+            return GrowingLoop(t, _joint(worst, n, period), loop.factor(period), loop)
+        rate = loop.grows_anyway()
+        if not rate > 2 * replace(loop, continuous=loop.A).grows_anyway():
             return None
-        factor = loop.factor(period)
-        values, vectors = np.linalg.eig(loop.matrix(period))
-        worst = vectors[:, int(np.argmax(np.abs(values)))]
-        part = np.abs(worst[:n]) + period * np.abs(worst[n : 2 * n])
-        return Growing(t, setup.plant.dynamics.joint_names[int(np.argmax(part))], factor, loop)
+        values, vectors = np.linalg.eig(loop.continuous)
+        return GrowingLoop(t, _joint(vectors[:, int(np.argmax(np.real(values)))], n, 1 / rate), rate, loop)
     return None
 
 
-def _remark(setup: Setup, found: Growing) -> Remark:
-    assert setup.controller is not None
-    period, joint, t = setup.controller.period_s, found.joint, found.t
-    text = (
-        f"{joint} by {shown(found.factor)} in each period of {period:.4g} s about the state at {t:.4g} s, by"
-        f" {shown(after(found.factor, periods(setup.duration_s, period)))} over the run"
-    )
-    return Remark(RemarkKind.UNSTABLE, joint, "q", t, 0.0, t, found.factor, 1.0, text, found.remedy(period))
+def _joint(deviation: np.ndarray, n: int, time_s: float) -> int:
+    """Return the index of the joint that takes part most in a deviation (δq, δv, …) that grows within a time."""
+    return int(np.argmax(np.abs(deviation[:n]) + time_s * np.abs(deviation[n : 2 * n])))
+
+
+def _gains(setup: Setup, joint: int) -> str:
+    """Return the gains of a joint as text, such as "kp = 2e+04 N m/rad"; empty for a law that declares none."""
+    law, n = setup.controller, setup.plant.dynamics.n
+    units = {name: gain.unit for name, gain in declared(type(law)).items() if name in _GAINS}
+    values = {name: np.broadcast_to(getattr(law, name), (n,))[joint] for name in units}
+    return ", ".join(f"{name} = {values[name]:.4g} {unit}" for name, unit in units.items())
 
 
 def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outcome:
-    """The outcome of a run; if it diverged and a remark on its loop explains it, with that as advice."""
-    if outcome.ending is not Ending.DIVERGED or setup.controller is None:
+    """Return the outcome of a run; if it diverged and a remark on its step or loop explains it, with that as advice."""
+    if outcome.ending is not Ending.DIVERGED:
         return outcome
     for remark in remarks:
-        if remark.kind is RemarkKind.UNSTABLE:
-            elapsed = periods(outcome.t, setup.controller.period_s)
-            if elapsed * log(remark.value) > log(_EXPLAINS):
+        if remark.kind is RemarkKind.TOO_LONG:
+            return replace(outcome, advice=remark_lines([remark])[0])
+        if remark.kind is RemarkKind.UNSTABLE and setup.controller is not None:
+            period = setup.controller.period_s
+            grown = periods(outcome.t, period) * log(remark.value) if period else outcome.t * remark.value
+            if grown > log(EXPLAINS):
                 return replace(outcome, advice=remark_lines([remark])[0])
     return outcome

@@ -51,6 +51,12 @@ class Observer:
         """Columns that can still be written."""
         return self._chunk - self.filled
 
+    @property
+    def fastest(self) -> np.ndarray:
+        """Largest speed of each joint so far, (n,)."""
+        v = slice(self.n, 2 * self.n)
+        return np.maximum(-self.observation.low[v, 0], self.observation.high[v, 0])
+
     def step(self, began: float, t: float, y: Array, acted: bool) -> None:
         """One step to the state y at t; whether the controller `acted` at its start. Its actuation is `seen`."""
         n, column = self.n, self.columns[:, self.filled]

@@ -2,8 +2,8 @@
 
 chatter · an effort limit or a stop reached · beyond a limit that the file states · a record coarser than the motion ·
 an effect declared dissipative that does positive work · friction that creeps · steps that stability bounds ·
-a sampled loop that is unstable · a task that is damped · a reference that jumps where it begins · a joint that is held
-while its reference moves
+a step that is too long · a control loop that is unstable · a task that is damped · a reference that jumps where it
+begins · a joint that is held while its reference moves
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ class RemarkKind(StrEnum):
     CREEPS = "regularised_friction_creeps"
     ACCUMULATE = "events_accumulate"
     STIFF = "steps_bounded_by_stability"
-    UNSTABLE = "sampled_loop_unstable"
+    TOO_LONG = "step_too_long"
+    UNSTABLE = "control_loop_unstable"
     DAMPED = "task_damped"
     JUMPS = "reference_jumps"
     HELD = "held_while_reference_moves"
@@ -44,7 +45,8 @@ _HEADINGS = {
     RemarkKind.CREEPS: "regularised friction creeps",
     RemarkKind.ACCUMULATE: "events accumulate",
     RemarkKind.STIFF: "steps bounded by stability",
-    RemarkKind.UNSTABLE: "sampled loop unstable, deviations grow",
+    RemarkKind.TOO_LONG: "step too long to be stable",
+    RemarkKind.UNSTABLE: "control loop unstable, deviations grow",
     RemarkKind.DAMPED: "task damped near a singularity",
     RemarkKind.JUMPS: "reference does not begin as the joint does",
     RemarkKind.HELD: "held by friction at every step",

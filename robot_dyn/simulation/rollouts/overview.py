@@ -162,7 +162,7 @@ def _linearised(runs: RolloutsData, run: int) -> Iterator[Remark]:
     if runs.q is not None and runs.v is not None and not equation.equation_of_motion.state_size:
         t, rest = runs.t, np.zeros((len(runs.t), equation.size - 2 * len(setup.q0)))
         y = np.hstack([runs.q[run], runs.v[run], rest])
-    for remark in unstable(setup, t, y):
+    for remark in unstable(setup, t, y, bool(runs.diverged[run])):
         yield replace(remark, runs=(run,), looked=1)
 
 
@@ -198,11 +198,11 @@ def causes(runs: RolloutsData) -> tuple[str, ...]:
     """
     advice, diverged = list(runs.advice), np.flatnonzero(runs.diverged)
     controller = None if runs.setup is None else runs.setup.controller
-    if controller is None or not controller.period_s or not len(diverged):
+    if controller is None or not len(diverged):
         return runs.advice
     earliest = diverged[np.argsort(runs.ended[diverged], kind="stable")]
     for run in list(dict.fromkeys([int(diverged[0]), *earliest.tolist()]))[:_JUDGED]:
         setup = runs.setup_of(run)
-        remarks = unstable(setup, np.zeros(1), setup.equation.start(setup.q0, setup.v0)[None])
+        remarks = unstable(setup, np.zeros(1), setup.equation.start(setup.q0, setup.v0)[None], True)
         advice[run] = explained(runs.outcome(run), setup, remarks).advice
     return tuple(advice)

@@ -1,0 +1,76 @@
+"""Runs that leave all speeds of an arm, past 100 times a velocity limit, and steps that are too long as the reason.
+
+Such a motion is that of no arm: its error means nothing, and companion runs would take most of the time.
+"""
+
+from __future__ import annotations
+
+from math import log
+
+import numpy as np
+
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.model.robot import Robot
+from robot_dyn.queries.dynamics import Dynamics
+from robot_dyn.queries.units import joint_types_of, unit
+from robot_dyn.simulation.dynamics.fastest_motion import fastest, jacobian
+from robot_dyn.simulation.dynamics.stability import below, excess_rate, longest_step
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind, remark_lines
+from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.setup.setup import Setup
+
+EXPLAINS = 1e3  # growth of deviations over a run
+_TIMES = 100.0  # a velocity limit
+_LIMIT = 100.0  # [rad/s] or [m/s] of a joint whose file states none
+
+
+def speed_limits(dynamics: Dynamics) -> np.ndarray:
+    """Return the speed of each joint beyond which a run has left all speeds of the arm, (n,), in [rad/s] or [m/s]."""
+    limits = dynamics.velocity_limit if isinstance(dynamics, Robot) else np.full(dynamics.n, np.inf)
+    return _TIMES * np.where((limits > 0) & np.isfinite(limits), limits, _LIMIT)
+
+
+def runaway(setup: Setup, speeds: np.ndarray) -> str:
+    """Return which joint has passed its speed limit most, as text; empty if none has.
+
+    Args:
+        setup: What ran.
+        speeds: Largest speed of each joint, (n,).
+    """
+    dynamics = setup.plant.dynamics
+    limits = speed_limits(dynamics)
+    ratio = np.nan_to_num(speeds / limits, nan=np.inf)
+    joint = int(np.argmax(ratio))
+    if ratio[joint] <= 1:
+        return ""
+    reached = f"{speeds[joint]:.3g} {unit('v', joint_types_of(dynamics)[joint])}"
+    return f"{dynamics.joint_names[joint]} reached {reached}, over {limits[joint]:.3g}: the motion of no arm"
+
+
+def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
+    """Return a remark if a fixed step is too long to be stable at the start, and deviations grow by 1e3 until t."""
+    if setup.integrator.controls_error or setup.integrator.nonsmooth or setup.equation.canonical:
+        return ()
+    equation, step = setup.equation, setup.taken_step_s
+    y, held = equation.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if equation.sampled else None
+    try:
+        linear = setup.integrator, jacobian(equation, 0.0, y, held), len(setup.q0)
+        if not excess_rate(*linear)(step) * t > log(EXPLAINS):
+            return ()
+        limit, motion = longest_step(*linear), fastest(equation, 0.0, y, held)
+    except (RobotDynError, np.linalg.LinAlgError):
+        return ()
+    text = f"{step:.4g} s, {setup.integrator.name} is stable up to {limit:.4g} s; {motion}"
+    remedy = f"take step_s={below(limit)}, or an implicit method"
+    remark = Remark(
+        kind=RemarkKind.TOO_LONG, joint=motion.joint, quantity="v", start=0.0, duration=setup.duration_s, at=0.0,
+        value=step, limit=limit, text=text, remedy=remedy,
+    )  # fmt: skip
+    return (remark,)
+
+
+def judged(setup: Setup, outcome: Outcome) -> Outcome:
+    """Return the outcome of a run that left all speeds: diverged if its step is too long to be stable at the start."""
+    if outcome.ending is Ending.FINISHED and (remarks := step_too_long(setup, outcome.t)):
+        return Outcome(Ending.DIVERGED, outcome.t, remark_lines(remarks)[0])
+    return outcome
