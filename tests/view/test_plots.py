@@ -17,7 +17,7 @@ from robot_dyn.foundations import QueryError
 from robot_dyn.simulation import Ending, Ledger, Outcome
 from robot_dyn.view import PLOTS, PlotError
 from robot_dyn.view.plots.plots import MOST_JOINTS
-from tests.view.plotted import cart_pole, cells, headings, lines, many, stretched, ur5
+from tests.view.plotted import cart_pole, cells, headings, legend, lines, many, stretched, ur5
 
 
 @pytest.fixture(scope="module")
@@ -160,13 +160,7 @@ def test_names_are_drawn_letter_by_letter(run, tmp_path) -> None:
     titles = [axes.get_title(loc="left") for axes in cells(plot(hostile, "joints"), "q")]
     assert titles[:3] == list(names[:3]) and titles[3] in ("関節", r"\u95a2\u7bc0") and titles[5] == names[5]
     assert titles[4].startswith("arm_x") and titles[4].endswith("x_end") and "…" in titles[4]
-    legends = [
-        text.get_text()
-        for axes in plot(hostile, "energy").axes
-        if axes.get_legend()
-        for text in axes.get_legend().texts
-    ]
-    assert r"W _$\sum$" in legends
+    assert r"W _$\sum$" in legend(plot(hostile, "energy"))
 
 
 @pytest.mark.parametrize(

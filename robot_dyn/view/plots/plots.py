@@ -144,7 +144,7 @@ def _of_batch(view: BatchView, parts: list[str], style: Style) -> Figure:
                     raise
     first, *more = view.runs.summary.splitlines()
     title = f"{view.runs.about.get('robot', 'runs')}: {first}"
-    return draw(panels, title, more[:-1], style, view.width, bool(view.runs.diverged.any()))
+    return draw(panels, title, more[:-1], style, view.width, bool(view.runs.diverged.all()))
 
 
 def _names(option: str, given: Any, of: str) -> tuple[str, ...]:
