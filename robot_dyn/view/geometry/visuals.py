@@ -76,6 +76,10 @@ class Drawing:
     remarks: tuple[str, ...] = ()
     boxes: tuple[Piece, ...] = ()
 
+    def seen(self, inertia: bool) -> tuple[Piece, ...]:
+        """The pieces that are shown at first."""
+        return self.pieces + self.boxes if inertia else self.pieces
+
 
 def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: bool = False) -> Drawing:
     """The pieces of every visual of a robot, wherever its mesh files can be found.
