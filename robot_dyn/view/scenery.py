@@ -11,7 +11,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.spatial import hat, homogeneous
+from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.model.robot import Robot
 from robot_dyn.view.commands import Canvas, triangles
 from robot_dyn.view.geometry.shapes import arrow
@@ -83,15 +83,12 @@ def scenery(points: np.ndarray) -> Scenery:
 
 def upright(gravity: tuple[float, float, float]) -> np.ndarray:
     """The least rotation (3, 3) that turns gravity down, to −z; the identity without gravity."""
+    from scipy.spatial.transform import Rotation
+
     size = float(np.linalg.norm(gravity))
     if size == 0:
         return np.eye(3)
-    x, y, z = np.array(gravity) / size
-    level = x**2 + y**2
-    if z > 0 and level == 0:  # straight up: about x
-        return np.diag([1.0, -1.0, -1.0])
-    axis = hat(np.array([-y, x, 0.0]))  # of (x, y, z) × (0, 0, −1), times the sine
-    return np.eye(3) + axis + axis @ axis * ((1 + z) / level if z > 0 else 1 / (1 - z))
+    return Rotation.align_vectors([[0.0, 0.0, -1.0]], [np.array(gravity) / size])[0].as_matrix()
 
 
 def surround(canvas: Canvas, seen: Scenery, gravity: tuple[float, float, float]) -> None:
