@@ -124,7 +124,7 @@ def _enclosed(parts: Iterable[ndarray]) -> MassProperties | None:
         return None
     low, high = (f([f(part, axis=(0, 1)) for part in parts], axis=0) for f in (np.min, np.max))
     middle = (low + high) / 2
-    body = mass_properties(np.concatenate([part - middle for part in parts]))
+    body: Any = mass_properties(np.concatenate([part - middle for part in parts]))
     if not body.volume > _FLAT * float((high - low).max()) ** 3:
         return None
     try:

@@ -76,12 +76,11 @@ def welded(
 
 def _distinct(rows: ndarray) -> tuple[ndarray, ndarray]:
     """Index of the first of each kind of row of float32, in order; and for each row the number of its kind."""
+    from trimesh.grouping import unique_ordered
+
     bits = np.ascontiguousarray(rows).view(f"V{4 * rows.shape[1]}").ravel()
-    _, first, kind = np.unique(bits, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return first[order], rank[kind]
+    _, first, kind = unique_ordered(bits, return_index=True, return_inverse=True)
+    return first, kind
 
 
 def _sane(normals: ndarray | None, face_normals: ndarray) -> ndarray | None:
