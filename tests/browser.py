@@ -18,6 +18,7 @@ from urllib.parse import urlparse
 import numpy as np
 import pytest
 
+from robot_dyn import Robot
 from robot_dyn.view import Page
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -52,6 +53,15 @@ class View:
     def placement(self, path: str) -> np.ndarray:
         """Homogeneous matrix (4, 4) of a node in the scene."""
         return np.array(self.ask(f"matrix(node({path!r}))")).reshape(4, 4).T
+
+    def path(self, link: str, root: str = "run") -> str:
+        """Path of a link's node in a robot's tree."""
+        return self.ask(f"find(viewer.scene_tree.children[{root!r}], {root!r}, {'link ' + link!r})")
+
+    def stands(self, robot: Robot, q: Any, *links: str, within: float = 2e-6, root: str = "run") -> None:
+        """Assert that links are where Pinocchio puts them, within single precision or a tolerance in [m]."""
+        for link in links:
+            np.testing.assert_allclose(self.placement(self.path(link, root)), robot.placement(q, link), atol=within)
 
     def bounds(self, path: str) -> np.ndarray:
         """Least and largest coordinates (2, 3) of all vertices that are shown below a node, in the scene."""
@@ -114,6 +124,8 @@ const node = (path) => {
   for (const name of path.split('/')) if (!(at = at.children[name])) throw Error(`no ${name} of ${path}`);
   return at.object;
 };
+const find = (at, path, name) => Object.entries(at.children).reduce((found, [key, child]) =>
+  found ?? (key === name ? `${path}/${key}` : find(child, `${path}/${key}`, name)), undefined);
 const base = () => { viewer.scene.updateMatrixWorld(true); return viewer.scene.matrixWorld.clone().invert(); };
 const matrix = (object) => { const from = base(); return from.multiply(object.matrixWorld).toArray(); };
 const bounds = (object) => {

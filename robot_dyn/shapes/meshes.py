@@ -227,7 +227,7 @@ def _parts(nodes: Iterable[Node], missing: list[str], y_up: str | None) -> Itera
 def _nodes(
     path: Path, factors: ndarray, turned: frozenset[str], missing: list[str], digits: str = "f4"
 ) -> tuple[Iterable[Node], str | None]:
-    """The nodes of a mesh file, scaled, and its format if it says that y is up; STL has the type of `digits`."""
+    """Return the scaled nodes of a mesh file, and its format if y is up in it; STL has the type of `digits`."""
     kind, data = path.suffix.lower().removeprefix("."), bounded(path)
     if kind not in FORMATS:
         raise MeshError(f"its format {path.suffix!r} is not read; convert it to {', '.join(FORMATS)}")

@@ -5,7 +5,7 @@ The first run is drawn opaque, the others as ghosts. Problems list what is drawn
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, final
@@ -84,8 +84,8 @@ def document_of(
         instance("run", run, TrajectoryData, "give the trajectory of rd.simulate, or a run of rollouts, as runs[0]")
     package_dirs, inertia = searched(package_dirs), truth("inertia", inertia)
     instance("frame", frame, str | None, "give the name of a link, or None")
-    names, look = run_names(*runs), look_of(meshes)
-    shown = [_shown(number, run, names, look, package_dirs, inertia) for number, run in enumerate(runs)]
+    names = run_names(*runs)
+    shown = [_shown(number, run, names, package_dirs, inertia, meshes) for number, run in enumerate(runs)]
     if frame is not None and all(frame not in each.stage.linkage.links for each in shown):
         shown[0].stage.link_path(frame)  # raises, with the nearest names
     first = shown[0]
@@ -148,7 +148,7 @@ def still(
     at: Array = np.zeros(robot.n) if q is None else one_state("q", q, robot.joint_names)
     if np.abs(at).max() > _FAR:
         raise QueryError(f"q must be within ±{_FAR:g}, got {shorten(at)}")
-    stage, look = Stage("run", robot), look_of(meshes)(robot, package_dirs, inertia=inertia)
+    stage, look = Stage("run", robot), look_of(robot, package_dirs, inertia, meshes)
     page = _Document(stage.corners(look.seen(inertia), at[None]), robot, inertia)
     page.draw(stage, look, keyframes(np.zeros(1), stage.linkage.couplings.position(at[None])))
     page.notes += look.remarks
@@ -209,19 +209,18 @@ def _title(shown: list[Shown]) -> str:
 
 
 def _shown(
-    number: int, run: TrajectoryData, names: tuple[str, ...], look: Callable[..., Drawing], dirs: tuple[Path, ...],
-    inertia: bool,
-) -> Shown:  # fmt: skip
+    number: int, run: TrajectoryData, names: tuple[str, ...], dirs: tuple[Path, ...], inertia: bool, meshes: str
+) -> Shown:
     robot = robot_of(run)
     whole, run = len(run.t), _drawable(run)
     stage = Stage(f"ghost {number}", robot, _GHOST) if number else Stage("run", robot)
     if unknown := run.wrenches.keys() - stage.linkage.links.keys():
         raise QueryError(f"the run has a wrench on {min(unknown)!r}, which is not a link of its robot; simulate again")
     motion = motion_of(run)
-    keys, drawn = keyframes(motion.t, stage.linkage.couplings.position(motion.q)), look(robot, dirs, inertia=inertia)
+    keys = keyframes(motion.t, stage.linkage.couplings.position(motion.q))
     name = names[number] if len(names) > 1 else robot.name
     prefix = f"{name}: " if len(names) > 1 else ""
-    return Shown(name, prefix, run, stage, motion, keys, drawn, whole - len(run.t))
+    return Shown(name, prefix, run, stage, motion, keys, look_of(robot, dirs, inertia, meshes), whole - len(run.t))
 
 
 def _drawable(run: TrajectoryData) -> TrajectoryData:

@@ -10,6 +10,7 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 import pytest
 
 import robot_dyn as rd
+from robot_dyn.description import structure_of
 from robot_dyn.queries import format_duration
 from tests.browser import opened, until
 from tests.command import run as command
@@ -34,14 +35,8 @@ def view(fall, browser):
 
 def keyframes(view) -> np.ndarray:
     """Times of the joints' keyframes, as the viewer holds them."""
-    path = chain(rd.load("ur5"), "shoulder_pan_joint")
-    return np.array(view.ask(f"[...viewer.animator.actions.find(a => a._clip.name == {path!r})._clip.tracks[1].times]"))
-
-
-def chain(arm: rd.Robot, joint: str, root: str = "run") -> str:
-    """Path of a joint's node in a robot of one chain."""
-    names = arm.joint_names[: arm.joint_names.index(joint) + 1]
-    return "/".join([root, *(f"{i} {name}" for i, name in enumerate(names))])
+    clip = "viewer.animator.actions.find(a => a._clip.name == 'run/0 shoulder_pan_joint')._clip"
+    return np.array(view.ask(f"[...{clip}.tracks[1].times]"))
 
 
 def at(run, t: float) -> np.ndarray:
@@ -61,14 +56,11 @@ def test_the_canvas_shows_the_arm(view) -> None:
 def test_links_stand_where_forward_kinematics_puts_them(view, fall) -> None:
     """Pinocchio's placement of each link; single precision of six quaternions in a chain of 1 m: 1e-6."""
     arm = rd.load("ur5")
-    links = {name: i for i, name in enumerate(arm.joint_names)}
+    links = arm.description.element.xpath("joint[@type='revolute']/child/@link")
+    assert len(links) == 6
     for t in keyframes(view)[[0, 7, -9, -1]]:
         view.ask(f"(replay.seek({t}), 0)")
-        q = fall.q[np.abs(fall.t - t).argmin()]
-        for joint in links:
-            link = arm.description.element.xpath(f"joint[@name='{joint}']/child/@link")[0]
-            seen = view.placement(f"{chain(arm, joint)}/link {link}")
-            np.testing.assert_allclose(seen, arm.placement(q, link), atol=1e-6)
+        view.stands(arm, fall.q[np.abs(fall.t - t).argmin()], *links, within=1e-6)
 
 
 def test_the_thinning_error_is_as_stated(view, fall) -> None:
@@ -77,7 +69,7 @@ def test_the_thinning_error_is_as_stated(view, fall) -> None:
     stated = float(note.partition("at most ")[2].split()[0])
     assert stated <= 5.6e-4  # 5e-4, and a tenth of that for lines between the times that are thinned
     arm = rd.load("ur5")
-    path, parent = chain(arm, "wrist_3_joint"), chain(arm, "wrist_2_joint")
+    path, parent = view.path("wrist_3_link"), view.path("wrist_2_link")
     for t, q in zip(fall.t[3::40], fall.q[3::40], strict=True):
         view.ask(f"(replay.seek({t}), 0)")
         seen = np.linalg.inv(view.placement(parent)) @ view.placement(path)
@@ -87,9 +79,7 @@ def test_the_thinning_error_is_as_stated(view, fall) -> None:
 
 def test_the_slider_moves_robot_and_plots_together(view, fall) -> None:
     view.page.locator("#time").fill("0.4")
-    arm = rd.load("ur5")
-    seen = view.placement(f"{chain(arm, 'elbow_joint')}/link forearm_link")
-    np.testing.assert_allclose(seen, arm.placement(at(fall, 0.4), "forearm_link"), atol=2e-3)  # the thinning error
+    view.stands(rd.load("ur5"), at(fall, 0.4), "forearm_link", within=2e-3)  # the thinning error
     numbers = "m => [Number(m.dataset.t), parseFloat(m.style.left), m.parentElement.clientWidth]"
     marks = view.ask(f"[...document.querySelectorAll('.mark')].map({numbers})")
     assert len(marks) == 3  # of q, v and the energies; u is 0
@@ -97,7 +87,7 @@ def test_the_slider_moves_robot_and_plots_together(view, fall) -> None:
         assert t == 0.4
         assert left == pytest.approx(0.4 * width, abs=1.5)  # the axis of a run of 1 s spans the plot
     view.page.locator("#time").fill("0.9")
-    assert np.abs(view.placement(f"{chain(arm, 'elbow_joint')}/link forearm_link") - seen).max() > 0.05
+    view.stands(rd.load("ur5"), at(fall, 0.9), "forearm_link", within=2e-3)
     assert view.ask("document.querySelector('#now').textContent").startswith("0.900")
 
 
@@ -155,12 +145,14 @@ def test_an_arrow_stands_at_the_hand_while_the_wrench_acts(view, fall, t: float,
 def test_a_joint_is_red_while_it_bears_on_its_stop(view, fall) -> None:
     assert fall.at_stop.any(axis=0).sum() >= 2  # the scene has something to show
     arm = rd.load("ur5")
+    links = {name: joint.child for name, joint in structure_of(arm.description, arm.edits).joints.items()}
     for name, bears in zip(fall.joint_names, fall.at_stop.T, strict=True):
         if not bears.any():
             continue
         for k in (0, int(bears.argmax()), int(bears.argmax()) - 1):
             view.ask(f"(replay.seek({fall.t[k]} + 1e-7), 0)")
-            assert view.ask(f"node({chain(arm, name) + '/at its stop'!r}).visible") is bool(bears[k])
+            node = f"{view.path(links[name]).rpartition('/')[0]}/at its stop"
+            assert view.ask(f"node({node!r}).visible") is bool(bears[k])
 
 
 def test_a_ghost_is_a_second_arm_that_lets_light_through(browser, fall, tmp_path) -> None:
@@ -175,12 +167,11 @@ def test_a_ghost_is_a_second_arm_that_lets_light_through(browser, fall, tmp_path
     with opened(browser, both) as view:
         view.ask("(replay.seek(0.7), 0)")
         for run, root in ((fall, "run"), (other, "ghost 1")):
-            seen = view.placement(f"{chain(arm, 'elbow_joint', root)}/link forearm_link")
-            np.testing.assert_allclose(seen, arm.placement(at(run, 0.7), "forearm_link"), atol=2e-3)
+            view.stands(arm, at(run, 0.7), "forearm_link", within=2e-3, root=root)
         collect = "node({!r}).traverseVisible(o => o.isMesh && all.push(o.material.opacity))"
         clear = "(() => {{ const all = []; " + collect + "; return all; }})()"
-        assert max(view.ask(clear.format(chain(arm, "elbow_joint", "ghost 1")))) < 0.5
-        assert min(view.ask(clear.format(chain(arm, "elbow_joint") + "/link forearm_link"))) == 1
+        assert max(view.ask(clear.format("ghost 1"))) < 0.5
+        assert min(view.ask(clear.format(view.path("forearm_link")))) == 1
         labels = view.ask("[...document.querySelectorAll('.plot')].map(p => p.textContent)")
         name = rd.compare_runs(fall, other).names[1]
         assert all("elbow_joint" in text and f"elbow_joint ({name})" in text for text in labels[:2])

@@ -27,13 +27,4 @@ def test_each_link_fills_the_box_of_its_pieces(browser, name: str, least: int) -
     assert len(points) >= least
     with opened(browser, rd.show(arm, q)) as view:
         for link, places in points.items():
-            np.testing.assert_allclose(view.bounds(path_of(view, link)), box(np.concatenate(places)), atol=2e-6)
-
-
-def path_of(view, link: str) -> str:
-    """Path of a link's node, wherever it stands in the tree."""
-    return view.ask(
-        f"(() => {{ const find = (n, path) => {{ for (const [k, c] of Object.entries(n.children)) {{"
-        f" if (k === {'link ' + link!r}) return path + k; const f = find(c, path + k + '/'); if (f) return f; }} }};"
-        f" return find(viewer.scene_tree, ''); }})()"
-    )
+            np.testing.assert_allclose(view.bounds(view.path(link)), box(np.concatenate(places)), atol=2e-6)

@@ -72,7 +72,7 @@ def test_what_falls_goes_down_on_the_screen(browser, gravity) -> None:
         base, down = view.placement("run"), np.array(gravity) / np.linalg.norm(gravity)
         np.testing.assert_allclose(base[:3, :3] @ down, [0, 0, -1], atol=1e-6)  # single precision
         np.testing.assert_allclose(view.placement("gravity")[:3, 2], [0, 0, -1], atol=1e-6)
-        tip = view.placement("run/0 joint_1/1 joint_2/link tip")
+        tip = view.placement(view.path("tip"))
         np.testing.assert_allclose(tip, base @ arm.placement(run_.q[0], "tip"), atol=2e-6)
         on_screen = "(z => new MeshCat.THREE.Vector3(0, z, 0).project(viewer.camera).y)"
         assert view.ask(f"{on_screen}(0) > {on_screen}(-0.1)")  # the viewer's y is up
@@ -83,17 +83,12 @@ def test_a_robot_is_shown_without_a_run(browser) -> None:
     """Links stand where Pinocchio puts them; there is no slider of time and no plot; sliders have q."""
     arm, q = rd.load("ur5"), np.linspace(-0.7, 0.9, 6)
     with opened(browser, rd.show(arm, q), offline=True) as view:
-        path = "run/" + "/".join(f"{i} {name}" for i, name in enumerate(arm.joint_names[:3]))
-        np.testing.assert_allclose(
-            view.placement(f"{path}/link forearm_link"), arm.placement(q, "forearm_link"), atol=2e-6
-        )
+        view.stands(arm, q, "forearm_link")
         assert not view.page.locator("#controls").is_visible() and view.page.locator(".plot, .price").count() == 0
         assert view.ask("sliders.q") == pytest.approx(list(q))
     with rd.show(arm).serve() as server, opened(browser, server.url) as view:
         view.ask("(replay.seek(0), 0)")
-        np.testing.assert_allclose(
-            view.placement(f"{path}/link forearm_link"), arm.placement(0 * q, "forearm_link"), atol=2e-6
-        )
+        view.stands(arm, 0 * q, "forearm_link")
 
 
 @pytest.mark.parametrize("q", [[0.1], np.zeros((2, 6)), ["a"] * 6, [np.nan] * 6, [1e300] * 6])

@@ -35,18 +35,15 @@ def motion() -> rd.Trajectory:
 
 
 @pytest.fixture(scope="module")
-def seen(browser: Any, motion: rd.Trajectory, tmp_path_factory: pytest.TempPathFactory) -> list[np.ndarray]:
+def seen(browser: Any, motion: rd.Trajectory) -> list[np.ndarray]:
     """Pictures of the page at k / fps, by another driver of the browser; each shows its time and the run's state."""
-    file = rd.save_replay(motion, tmp_path_factory.mktemp("page") / "run.html")
     found = []
-    with opened(browser, file, size=SIZE, color_scheme="light") as view:
+    with opened(browser, rd.replay(motion), size=SIZE, color_scheme="light") as view:
         view.page.evaluate("film.begin()")
         for k in range(6):
             assert view.page.evaluate("(t) => film.show(t)", k / FPS) == k / FPS == view.ask("replay.time")
             assert view.page.locator("#now").text_content() == f"{k / FPS:.3f} / 0.500 s"
-            tip = view.placement("run/0 joint_1/1 joint_2/link tip")
-            expected = rd.load("planar_2r").placement(motion.q[10 * k], "tip")
-            np.testing.assert_allclose(tip, expected, atol=2e-3)  # the page is thinned to 5e-4 rad
+            view.stands(rd.load("planar_2r"), motion.q[10 * k], "tip", within=2e-3)  # the page is thinned to 5e-4 rad
             found.append(_pixels(view.page.screenshot()))
     return found
 

@@ -33,7 +33,7 @@ class Panel:
         heading: What the cells show.
         rows: Cells from the left to the right.
         height: About how high a row is, with title and numbers, in [mm]; less where the page is full.
-        every: Of so many rows the last one alone has the numbers and the name of x.
+        every: Number of rows that share the numbers and the name of x, below the last of them.
     """
 
     heading: str
