@@ -255,6 +255,7 @@ def test_bad_input_is_told_in_one_line(swing, tmp_path) -> None:
     file = rd.save_run(swing, tmp_path / "run.npz")
     half = tmp_path / "half.npz"
     half.write_bytes(file.read_bytes()[:2000])
+    (tmp_path / "x.mp4").write_text("a letter")
     cases = {
         (str(half),): "cannot be read as a run file",
         (str(tmp_path / "none.npz"),): "there is no such file",
@@ -262,6 +263,9 @@ def test_bad_input_is_told_in_one_line(swing, tmp_path) -> None:
         (str(file), "--html", str(tmp_path)): "is a folder",
         (str(file), "--html", str(tmp_path / "a.html"), "--frame", "hnd"): "no link 'hnd'",
         (str(file), "--html", "a.html", "--port", "8000"): "not both",
+        (str(file), "--video", "x.gif", "--html", "x.html"): "give --video, --html or --port",
+        (str(file), "--video", "x.gif", "--size", "wide"): "--size must be WIDTHxHEIGHT",
+        (str(file), "--video", str(tmp_path / "x.mp4"), "--force"): "is not an MP4 video",
     }
     for args, text in cases.items():
         done = command("replay", *args)

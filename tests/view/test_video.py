@@ -21,7 +21,7 @@ from robot_dyn.foundations import VideoError
 from robot_dyn.view.video import encoders
 from robot_dyn.view.video.video import frame_times
 from tests.browser import chromium, opened
-from tests.command import run, said
+from tests.command import said
 from tests.long import long
 
 SIZE = (320, 240)
@@ -172,15 +172,3 @@ def test_ffmpeg_is_not_started_where_no_picture_comes(tmp_path: Path, caplog: py
     with pytest.raises(VideoError, match="none is installed"):
         encoders.encode(without_a_browser(), tmp_path / "run.gif", (320, 240), 25)
     assert not caplog.records
-
-
-def test_the_command_refuses_what_it_cannot_read(motion: rd.Trajectory, tmp_path: Path) -> None:
-    file = rd.save_run(motion, tmp_path / "run.npz")
-    (tmp_path / "x.mp4").write_text("a letter")
-    for options, message in (
-        (["--video", "x.gif", "--size", "wide"], "--size must be WIDTHxHEIGHT"),
-        (["--video", "x.gif", "--html", "x.html"], "give --video, --html or --port"),
-        (["--video", str(tmp_path / "x.mp4"), "--force"], "is not an MP4 video"),
-    ):
-        done = run("replay", file, *options)
-        assert done.returncode == 2 and message in done.stderr and done.stderr.count("\n") == 1
