@@ -12,7 +12,7 @@ import json
 from base64 import b64decode
 from collections import deque
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import umsgpack
 import zmq
@@ -21,9 +21,6 @@ import zmq.asyncio
 from robot_dyn.foundations.errors import shorten
 from robot_dyn.view.commands import Command, as_message
 
-if TYPE_CHECKING:
-    from robot_dyn.view.live.server import Browser
-
 _ORDER = ("set_object", "set_property", "set_transform", "set_animation")  # in which a node is drawn
 _PATIENCE_S = 30.0  # for a picture: a browser may be busy, hidden or gone
 _MAX_MESSAGE = 2**28  # [bytes]
@@ -31,6 +28,18 @@ _MAX_MESSAGE = 2**28  # [bytes]
 
 class _RequestError(Exception):
     """Internal: a request that has no answer; the message says why."""
+
+
+class Browser(Protocol):
+    """A connected browser."""
+
+    def send(self, message: bytes) -> None:
+        """Send a message."""
+        ...
+
+    def hang_up(self) -> None:
+        """End the connection."""
+        ...
 
 
 class Scene:
