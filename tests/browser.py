@@ -11,10 +11,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
+from urllib.parse import urlparse
 
 import numpy as np
 import pytest
+
+from robot_dyn import Robot
+from robot_dyn.view import Page
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 # Root needs --no-sandbox; WebGL comes from software; the rest keeps Chromium from asking the network for itself.
@@ -49,9 +54,22 @@ class View:
         """Homogeneous matrix (4, 4) of a node in the scene."""
         return np.array(self.ask(f"matrix(node({path!r}))")).reshape(4, 4).T
 
+    def path(self, link: str, root: str = "run") -> str:
+        """Path of a link's node in a robot's tree."""
+        return self.ask(f"find(viewer.scene_tree.children[{root!r}], {root!r}, {'link ' + link!r})")
+
+    def stands(self, robot: Robot, q: Any, *links: str, within: float = 2e-6, root: str = "run") -> None:
+        """Assert that links are where Pinocchio puts them, within single precision or a tolerance in [m]."""
+        for link in links:
+            np.testing.assert_allclose(self.placement(self.path(link, root)), robot.placement(q, link), atol=within)
+
     def bounds(self, path: str) -> np.ndarray:
         """Least and largest coordinates (2, 3) of all vertices that are shown below a node, in the scene."""
         return np.array(self.ask(f"bounds(node({path!r}))"))
+
+    def notes(self) -> list[str]:
+        """The notes at the end of the page."""
+        return self.ask("[...document.querySelectorAll('#notes li')].map(e => e.textContent)")
 
     def picture(self) -> np.ndarray:
         """What the canvas shows, (h, w, 3)."""
@@ -62,18 +80,34 @@ class View:
 
 
 @contextmanager
-def opened(browser: Any, url: str | Path, *, size: tuple[int, int] = (900, 800), **options: Any) -> Iterator[View]:
-    """A page once its animation is loaded; other arguments as of a context of Playwright, such as `offline`."""
+def opened(
+    browser: Any, where: Page | Path | str, *, size: tuple[int, int] = (900, 800), anchor: str = "",
+    complains: bool = False, **options: Any,
+) -> Iterator[View]:  # fmt: skip
+    """A page once its animation is loaded; in the end it has asked nothing of a network, and has not complained.
+
+    Args:
+        browser: The browser.
+        where: The page, its file or its address.
+        size: Of the window.
+        anchor: Put after the address.
+        complains: Whether it may complain.
+        **options: Of a context of Playwright, such as `offline`.
+    """
     context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **options)
     view = View(context.new_page())
     view.page.on("console", lambda m: view.complaints.append(m.text) if m.type == "error" else None)
     view.page.on("pageerror", lambda error: view.complaints.append(str(error)))
     view.page.on("dialog", lambda dialog: (view.complaints.append(dialog.message), dialog.dismiss()))
     view.page.on("request", lambda request: view.requests.append(request.url))
-    view.page.goto(url.absolute().as_uri() if isinstance(url, Path) else url)
-    until(lambda: view.ask("!!(window.replay && viewer.animator.actions.length)"), "the page did not load", view)
-    yield view
+    with TemporaryDirectory() as folder:
+        file = where.save(Path(folder) / "page.html") if isinstance(where, Page) else where
+        view.page.goto((file if isinstance(file, str) else file.absolute().as_uri()) + anchor)
+        until(lambda: view.ask("!!(window.replay && viewer.animator.actions.length)"), "the page did not load", view)
+        yield view
     context.close()
+    assert complains or not view.complaints, view.complaints
+    assert all(urlparse(url).hostname in ("127.0.0.1", "", None) for url in view.requests), view.requests
 
 
 def until(condition: Any, what: str, view: View | None = None, seconds: float = 60.0) -> None:
@@ -90,6 +124,8 @@ const node = (path) => {
   for (const name of path.split('/')) if (!(at = at.children[name])) throw Error(`no ${name} of ${path}`);
   return at.object;
 };
+const find = (at, path, name) => Object.entries(at.children).reduce((found, [key, child]) =>
+  found ?? (key === name ? `${path}/${key}` : find(child, `${path}/${key}`, name)), undefined);
 const base = () => { viewer.scene.updateMatrixWorld(true); return viewer.scene.matrixWorld.clone().invert(); };
 const matrix = (object) => { const from = base(); return from.multiply(object.matrixWorld).toArray(); };
 const bounds = (object) => {

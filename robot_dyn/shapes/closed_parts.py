@@ -50,11 +50,14 @@ def closed_parts(corners: ndarray) -> ClosedParts | None:
     Args:
         corners: Of its triangles, (m, 3, 3), in [m].
     """
+    from trimesh.grouping import unique_rows
+
     middle = (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1))) / 2
     size = float(np.abs(corners - middle).max())
     if not 0 < size < np.inf:
         return None
-    faces = _numbered(np.rint((corners - middle).reshape(-1, 3) / (_SAME * size))).reshape(-1, 3)
+    _, vertex = unique_rows(np.rint((corners - middle).reshape(-1, 3) / (_SAME * size)).astype(np.int64))
+    faces = vertex.reshape(-1, 3)
     proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)  # two corners of one place: a line, which has no area
     faces, corners = faces[proper], corners[proper]
     if not len(faces):
@@ -70,15 +73,6 @@ def closed_parts(corners: ndarray) -> ClosedParts | None:
             found.append(within)
             was_turned.append(bool(any_turned[part]))
     return _nested(found, was_turned)
-
-
-def _numbered(rows: ndarray) -> ndarray:
-    """A number for each row, the same for equal rows."""
-    number = np.zeros(len(rows), dtype=np.int64)
-    for column in rows.T:
-        kinds, kind = np.unique(column, return_inverse=True)
-        _, number = np.unique(number * len(kinds) + kind.reshape(-1), return_inverse=True)
-    return number.reshape(-1)
 
 
 def _oriented(faces: ndarray) -> tuple[ndarray | None, ndarray, ndarray]:

@@ -12,7 +12,7 @@ import logging
 import re
 import struct
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,6 +37,7 @@ Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # from y up: a quarter tu
 
 Rgba = tuple[float, float, float, float]
 WHITE: Rgba = (1.0, 1.0, 1.0, 1.0)
+Node = tuple[ndarray, ndarray | None, Any]  # corners and normals (m, 3, 3), and what trimesh holds of it, not of STL
 
 
 @final
@@ -73,17 +74,10 @@ def read(
     Raises:
         MeshError: If there is no such file, or it is too large, damaged, empty or of another format.
     """
-    missing, factors = [], np.array(scale, dtype=float)
-    kind, data = _content(path)
+    missing: list[str] = []
     with _reading(missing):
-        if kind == "stl":
-            found = _stl(data, missing)
-            del data  # of 1 GB that a large file would take, this is the part that is not needed
-            parts = _uncoloured(found, factors)
-        else:
-            scene, unit, y_up = _scene(data, kind, path.parent, missing)
-            A = unit * factors[:, None] * (Z_UP if y_up in turned else np.eye(3))
-            parts = tuple(_parts(scene, A, missing, y_up))
+        nodes, y_up = _nodes(path, np.array(scale, dtype=float), turned, missing)
+        parts = tuple(_parts(nodes, missing, y_up))
     if not parts:
         raise MeshError("holds no triangles; export it again")
     return parts, tuple(dict.fromkeys(missing))
@@ -102,28 +96,13 @@ def corners(path: Path, scale: Any = (1.0, 1.0, 1.0)) -> ndarray:
     Raises:
         MeshError: See `read`.
     """
-    missing, factors = [], np.array(scale, dtype=float)
-    kind, data = _content(path)
-    with _reading(missing):
-        if kind == "stl":
-            found = _stl(data, missing, "f8").astype(float) * factors
-            found = found[:, ::-1] if np.prod(factors) < 0 else found
-        else:
-            scene, unit, y_up = _scene(data, kind, path.parent, missing)
-            A = unit * factors[:, None] * (Z_UP if y_up == GLTF else np.eye(3))
-            found = np.concatenate([np.zeros((0, 3, 3)), *(placed for placed, _, _ in _nodes(scene, A))])
+    with _reading([]):
+        nodes, _ = _nodes(path, np.array(scale, dtype=float), frozenset({GLTF}), [], "f8")
+        found = np.concatenate([np.zeros((0, 3, 3)), *(placed for placed, _, _ in nodes)])
         found = found[np.isfinite(found).all(axis=(1, 2))]
     if not len(found):
         raise MeshError("holds no triangles; export it again")
     return found
-
-
-def _content(path: Path) -> tuple[str, bytes]:
-    """The format of a mesh file, and its bytes."""
-    kind, data = path.suffix.lower().removeprefix("."), bounded(path)
-    if kind not in FORMATS:
-        raise MeshError(f"its format {path.suffix!r} is not read; convert it to {', '.join(FORMATS)}")
-    return kind, data
 
 
 @contextmanager
@@ -138,10 +117,8 @@ def _reading(missing: list[str]) -> Iterator[None]:
         raise MeshError(f"is damaged ({type(error).__name__}: {shorten(error, 120)}); export it again") from None
 
 
-def _stl(data: bytes, missing: list[str], text: str = "f4") -> ndarray:
-    """Corners (m, 3, 3) of the triangles of an STL file, float32, or of type `text` if it is text.
-
-    Stated normals are not used.
+def _stl(data: bytes, missing: list[str], digits: str) -> ndarray:
+    """Corners (m, 3, 3) of the triangles of an STL file, as floats of a type; stated normals are not used.
 
     A normal that is not three numbers is added to `missing`.
 
@@ -154,10 +131,10 @@ def _stl(data: bytes, missing: list[str], text: str = "f4") -> ndarray:
     if not ascii_:
         if stated > len(data):
             raise ValueError(f"it states {count} triangles and holds {(len(data) - _HEADER) // _RECORD.itemsize}")
-        return np.frombuffer(data, _RECORD, count, _HEADER)["corners"].astype("f4")
+        return np.frombuffer(data, _RECORD, count, _HEADER)["corners"].astype(digits)
     if _BAD_NORMAL.search(data):
         missing.append("a normal is not three numbers")
-    corners = np.fromiter((float(word) for match in _VERTEX.finditer(data) for word in match.groups()), text)
+    corners = np.fromiter((float(word) for match in _VERTEX.finditer(data) for word in match.groups()), digits)
     if len(corners) % 9:
         raise ValueError("a facet has not three corners")
     return corners.reshape(-1, 3, 3)
@@ -176,13 +153,6 @@ def _logged(missing: list[str]) -> Iterator[None]:
     finally:
         logger.propagate = propagate
         logger.removeHandler(handler)
-
-
-def _uncoloured(corners: ndarray, scale: ndarray) -> tuple[Part, ...]:
-    """The part of triangles without material, their corners scaled in place."""
-    np.multiply(corners, scale, out=corners, casting="unsafe")
-    mesh = welded(corners[:, ::-1] if np.prod(scale) < 0 else corners)
-    return () if mesh is None else (Part(mesh),)
 
 
 def png(picture: Any) -> bytes:
@@ -232,11 +202,11 @@ def _scene(data: bytes, kind: str, folder: Path, missing: list[str]) -> tuple[An
     return scene, metres if 0 < metres < np.inf else 1.0, COLLADA if y_up else None
 
 
-def _parts(scene: Any, A: ndarray, missing: list[str], y_up: str | None) -> Iterator[Part]:
-    """One part for each material, from all nodes of the scene that wear it, after x ↦ A x with A (3, 3)."""
+def _parts(nodes: Iterable[Node], missing: list[str], y_up: str | None) -> Iterator[Part]:
+    """One part for each material, from all nodes that wear it."""
     groups: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}
     images: dict[int, bytes | None] = {}
-    for corners, normals, geometry in _nodes(scene, A):
+    for corners, normals, geometry in nodes:
         rgba, picture, *columns = _look(geometry)
         if picture is not None and id(picture) not in images:
             try:
@@ -247,18 +217,29 @@ def _parts(scene: Any, A: ndarray, missing: list[str], y_up: str | None) -> Iter
         key = (rgba, image, normals is None, *(column is None for column in columns))
         groups.setdefault(key, []).append((corners, normals, *columns))
     for (rgba, image, *_), pieces in groups.items():
-        columns: Any = [None if each[0] is None else np.concatenate(each) for each in zip(*pieces, strict=True)]
+        columns: Any = pieces[0]
+        if len(pieces) > 1:
+            columns = [None if each[0] is None else np.concatenate(each) for each in zip(*pieces, strict=True)]
         if (mesh := welded(*columns)) is not None:
             yield Part(mesh, rgba, image, y_up)
 
 
-def _nodes(scene: Any, A: ndarray) -> Iterator[tuple[ndarray, ndarray | None, Any]]:
-    """Corners and normals of the triangles of each node after x ↦ A x, with A (3, 3), and its geometry."""
-    for node in scene.graph.nodes_geometry:
-        transform, name = scene.graph[node]
-        geometry = scene.geometry[name]
-        if len(getattr(geometry, "faces", ())):  # not lines and points
-            yield *_placed(geometry, A @ transform[:3]), geometry
+def _nodes(
+    path: Path, factors: ndarray, turned: frozenset[str], missing: list[str], digits: str = "f4"
+) -> tuple[Iterable[Node], str | None]:
+    """Return the scaled nodes of a mesh file, and its format if y is up in it; STL has the type of `digits`."""
+    kind, data = path.suffix.lower().removeprefix("."), bounded(path)
+    if kind not in FORMATS:
+        raise MeshError(f"its format {path.suffix!r} is not read; convert it to {', '.join(FORMATS)}")
+    if kind == "stl":
+        corners = _stl(data, missing, digits)
+        np.multiply(corners, factors, out=corners, casting="unsafe")
+        return [(corners[:, ::-1] if np.prod(factors) < 0 else corners, None, None)], None
+    scene, unit, y_up = _scene(data, kind, path.parent, missing)
+    A = unit * factors[:, None] * (Z_UP if y_up in turned else np.eye(3))
+    places = ((scene.graph[node][0], scene.geometry[scene.graph[node][1]]) for node in scene.graph.nodes_geometry)
+    has_faces = ((g, geometry) for g, geometry in places if len(getattr(geometry, "faces", ())))  # not lines and points
+    return ((*_placed(geometry, A @ g[:3]), geometry) for g, geometry in has_faces), y_up
 
 
 def _placed(geometry: Any, A: ndarray) -> tuple[ndarray, ndarray | None]:
@@ -275,6 +256,8 @@ def _placed(geometry: Any, A: ndarray) -> tuple[ndarray, ndarray | None]:
 
 def _look(geometry: Any) -> tuple[Rgba | None, Any, ndarray | None, ndarray | None]:
     """Colour, picture, texture coordinates and colours of the corners, each None where the file has none."""
+    if geometry is None:
+        return None, None, None, None
     visual, faces = geometry.visual, np.asarray(geometry.faces)
     if visual.kind in ("vertex", "face"):
         index = faces if visual.kind == "vertex" else np.arange(len(faces))[:, None].repeat(3, axis=1)

@@ -4,10 +4,9 @@
     shell         the same over the surface                                     at 1 kg/m², m is the area
 
 Over a triangle with corners v₁, v₂, v₃ and area A, ∫ x dA = A s/3 and ∫ x xᵀ dA = A (Σ vᵢ vᵢᵀ + s sᵀ)/12, s = Σ vᵢ.
-Over the tetrahedron on it with its tip at the origin and volume V = det(v₁, v₂, v₃)/6, ∫ x dx = V s/4 and
-∫ x xᵀ dx = V (Σ vᵢ vᵢᵀ + s sᵀ)/20. The origin is the middle of the triangles, so that bodies far from the frame lose
-no digits. [Tonon, Explicit exact formulas for the 3-D tetrahedron inertia tensor, 2005, of which the triangle is the
-plane case]
+Solids are integrated by trimesh. The origin is the middle of the triangles, so that bodies far from the frame lose no
+digits. [Tonon, Explicit exact formulas for the 3-D tetrahedron inertia tensor, 2005, of which the triangle is the plane
+case]
 """
 
 from __future__ import annotations
@@ -118,21 +117,17 @@ def _enclosed(parts: Iterable[ndarray]) -> MassProperties | None:
     Args:
         parts: Corners of the triangles of each closed part, (m, 3, 3), in [m].
     """
+    from trimesh.triangles import mass_properties
+
     parts = [part for part in parts if len(part)]
     if not parts:
         return None
     low, high = (f([f(part, axis=(0, 1)) for part in parts], axis=0) for f in (np.min, np.max))
     middle = (low + high) / 2
-    v = np.concatenate([part - middle for part in parts])
-    volumes = np.einsum("fi,fi->f", v[:, 0], np.cross(v[:, 1], v[:, 2])) / 6
-    total = volumes.sum()
-    if not total > _FLAT * float((high - low).max()) ** 3:
+    body: Any = mass_properties(np.concatenate([part - middle for part in parts]))
+    if not body.volume > _FLAT * float((high - low).max()) ** 3:
         return None
-    com = volumes @ v.sum(axis=1) / 4 / total
-    s = v.sum(axis=1)
-    second = (np.einsum("f,fki,fkj->ij", volumes, v, v) + np.einsum("f,fi,fj->ij", volumes, s, s)) / 20
-    second -= total * np.outer(com, com)
     try:
-        return MassProperties(total, com + middle, np.trace(second) * np.eye(3) - second)
+        return MassProperties(body.mass, body.center_mass + middle, body.inertia)
     except QueryError:  # faces that overlap themselves enclose what no body has
         return None

@@ -76,12 +76,11 @@ def welded(
 
 def _distinct(rows: ndarray) -> tuple[ndarray, ndarray]:
     """Index of the first of each kind of row of float32, in order; and for each row the number of its kind."""
+    from trimesh.grouping import unique_ordered
+
     bits = np.ascontiguousarray(rows).view(f"V{4 * rows.shape[1]}").ravel()
-    _, first, kind = np.unique(bits, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return first[order], rank[kind]
+    _, first, kind = unique_ordered(bits, return_index=True, return_inverse=True)
+    return first, kind
 
 
 def _sane(normals: ndarray | None, face_normals: ndarray) -> ndarray | None:
@@ -104,7 +103,10 @@ def _creased(corners: ndarray, face_normals: ndarray) -> ndarray:
 
     Source: Thürmer and Wüthrich, Computing vertex normals from polygonal facets, 1998.
     """
-    angle = np.concatenate([_angles(block) for block in np.array_split(corners, 1 + len(corners) // 2**16)]).reshape(-1)
+    from trimesh.triangles import angles
+
+    blocks = np.array_split(corners, 1 + len(corners) // 2**16)
+    angle = np.concatenate([angles(block).astype("f4") for block in blocks]).reshape(-1)
     _, vertex = _distinct(corners.reshape(-1, 3))
     order = np.argsort(vertex, kind="stable")
     degree = np.bincount(vertex)
@@ -119,10 +121,3 @@ def _creased(corners: ndarray, face_normals: ndarray) -> ndarray:
                 out[block] = np.einsum("vab,vbi->vai", near, n) + 1e-9 * n
     out /= np.linalg.norm(out, axis=1, keepdims=True)
     return out.reshape(-1, 3, 3)
-
-
-def _angles(corners: ndarray) -> ndarray:
-    """Angle of each corner, (m, 3)."""
-    edges = np.roll(corners, -1, axis=1).astype(float) - corners
-    edges /= np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), 1e-300)
-    return np.arccos(np.clip(-np.einsum("fci,fci->fc", edges, np.roll(edges, 1, axis=1)), -1, 1)).astype("f4")

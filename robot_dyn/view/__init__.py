@@ -5,7 +5,7 @@ document.py      what a page consists of: runs, or a robot at one configuration
 stage.py, keyframes.py    the robot as a tree of moving nodes; the samples that are drawn
 overlays.py, rests.py, scenery.py    centre of mass, trace, stops, arrows; held joints; floor, gravity, camera
 series.py, tables.py  the plots and the table of a page
-commands.py      commands of meshcat's viewer
+commands.py      the canvas: commands of meshcat's viewer
 page.py, picture.py       the page as a value; its still picture
 geometry/        meshes and shapes, as triangles fastened to links
 live/            the server on this machine

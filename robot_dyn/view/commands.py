@@ -17,49 +17,81 @@ import numpy as np
 from robot_dyn.shapes.triangles import Mesh
 
 Command = dict[str, Any]
+Rgba = tuple[float, float, float, float]
 
 _EXTENSION = {"int8": 0x11, "uint8": 0x12, "uint16": 0x14, "uint32": 0x16, "float32": 0x17, "float64": 0x18}
+_KINDS = {"position": "vector", "quaternion": "quaternion", "scale": "vector", "visible": "bool"}  # of tracks
 _DOUBLE_SIDE = 2  # meshes of real robots have triangles that face the wrong way
 
 
-def set_transform(path: str, matrix: np.ndarray) -> Command:
-    """Place a node in its parent, by a matrix (4, 4)."""
-    return {"type": "set_transform", "path": path, "matrix": matrix.T.ravel().tolist()}
+class Canvas:
+    """The commands that draw a scene; what moves stands at its beginning until the page moves it."""
 
+    def __init__(self) -> None:
+        self._commands: list[Command] = []
+        self._tracks: dict[str, list[Command]] = {}
 
-def set_property(path: str, name: str, value: Any) -> Command:
-    """Set a property of a node."""
-    return {"type": "set_property", "path": path, "property": name, "value": value}
+    @property
+    def commands(self) -> list[Command]:
+        """All commands, the animation last."""
+        clips = [
+            {"path": path, "clip": {"name": path, "fps": 1, "tracks": each}} for path, each in self._tracks.items()
+        ]
+        options = {"play": True, "repetitions": 1}
+        return [*self._commands, {"type": "set_animation", "animations": clips, "options": options, "path": "replay"}]
 
+    def mesh(self, path: str, geometry: Command, rgba: Rgba, image: bytes | None = None) -> None:
+        """Put the geometry of a mesh, with its colour and its texture, a PNG, at a node."""
+        shading = {"side": _DOUBLE_SIDE, "shininess": 30, "specular": 0x222222}
+        has_colors = "color" in geometry["data"]["attributes"]
+        self._put(path, "Mesh", geometry, "MeshPhongMaterial", rgba, shading | {"vertexColors": has_colors}, image)
 
-def set_object(path: str, geometry: Command, material: Command, kind: str = "Mesh") -> Command:
-    """Put a geometry with a material at a node; its `image`, if it has one, is a PNG file."""
-    material = dict(material)
-    image = material.pop("image", None)
-    object_: Command = {
-        "metadata": {"version": 4.5, "type": "Object"},
-        "geometries": [geometry],
-        "materials": [material],
-        "object": {"uuid": _name(path), "type": kind, "geometry": geometry["uuid"], "material": material["uuid"]},
-    }
-    if image is not None:
-        picture = {"uuid": _name(image), "url": "data:image/png;base64," + base64.b64encode(image).decode()}
-        texture = {"uuid": _name(picture["uuid"]), "image": picture["uuid"], "wrap": [1000, 1000], "repeat": [1, 1]}
-        object_ |= {"images": [picture], "textures": [texture]}
-        material["map"] = texture["uuid"]
-    return {"type": "set_object", "path": path, "object": object_}
+    def line(self, path: str, points: np.ndarray, rgba: Rgba, kind: str = "Line") -> None:
+        """Put a line through points (k, 3) at a node; of kind "LineSegments" each pair of points is a line."""
+        geometry = _geometry({"position": _attribute(points.astype(np.float32))})
+        self._put(path, kind, geometry, "LineBasicMaterial", rgba, {"linewidth": 2, "vertexColors": False})
 
+    def place(self, path: str, matrix: np.ndarray) -> None:
+        """Place a node in its parent, by a matrix (4, 4)."""
+        self._commands.append({"type": "set_transform", "path": path, "matrix": matrix.T.ravel().tolist()})
 
-def set_animation(tracks: dict[str, list[Command]]) -> Command:
-    """Animate nodes, by path; it stands at its beginning until the page moves it."""
-    clips = [{"path": path, "clip": {"name": path, "fps": 1, "tracks": each}} for path, each in tracks.items()]
-    return {"type": "set_animation", "animations": clips, "options": {"play": True, "repetitions": 1}, "path": "replay"}
+    def hide(self, path: str) -> None:
+        """Hide a node."""
+        self._commands.append({"type": "set_property", "path": path, "property": "visible", "value": False})
 
+    def move(self, path: str, **tracks: tuple[np.ndarray, np.ndarray]) -> None:
+        """Move a node: times (k,) and values of its position, quaternion (x, y, z, w) or scale, or if it is visible."""
+        self._tracks[path] = [
+            {
+                "name": f".{name}",
+                "type": _KINDS[name],
+                "times": t.astype(np.float32),
+                "values": values.tolist() if name == "visible" else values.astype(np.float32).ravel(),
+            }
+            for name, (t, values) in tracks.items()
+        ]
 
-def track(name: str, kind: str, t: np.ndarray, values: np.ndarray) -> Command:
-    """A property of a node at times t (k,): "vector", "quaternion" (x, y, z, w) or "bool"."""
-    numbers = values.tolist() if kind == "bool" else values.astype(np.float32).ravel()
-    return {"name": f".{name}", "type": kind, "times": t.astype(np.float32), "values": numbers}
+    def _put(
+        self, path: str, kind: str, geometry: Command, shader: str, rgba: Rgba, shading: Command,
+        image: bytes | None = None,
+    ) -> None:  # fmt: skip
+        red, green, blue = (round(255 * min(max(part, 0.0), 1.0)) for part in rgba[:3])
+        look: Command = {"type": shader, "color": red << 16 | green << 8 | blue} | shading
+        if rgba[3] < 1:
+            look |= {"transparent": True, "opacity": rgba[3], "depthWrite": False}
+        material = {"uuid": _name(json.dumps(look))} | look
+        object_: Command = {
+            "metadata": {"version": 4.5, "type": "Object"},
+            "geometries": [geometry],
+            "materials": [material],
+            "object": {"uuid": _name(path), "type": kind, "geometry": geometry["uuid"], "material": material["uuid"]},
+        }
+        if image is not None:
+            picture = {"uuid": _name(image), "url": "data:image/png;base64," + base64.b64encode(image).decode()}
+            texture = {"uuid": _name(picture["uuid"]), "image": picture["uuid"], "wrap": [1000, 1000], "repeat": [1, 1]}
+            object_ |= {"images": [picture], "textures": [texture]}
+            material["map"] = texture["uuid"]
+        self._commands.append({"type": "set_object", "path": path, "object": object_})
 
 
 def triangles(mesh: Mesh) -> Command:
@@ -74,24 +106,6 @@ def triangles(mesh: Mesh) -> Command:
     if mesh.colors is not None:
         attributes["color"] = _attribute(mesh.colors.astype(np.uint8), normalized=True)
     return _geometry(attributes, index={"type": _array_type(index), "array": index})
-
-
-def polyline(points: np.ndarray) -> Command:
-    """The geometry of a line through points (k, 3)."""
-    return _geometry({"position": _attribute(points.astype(np.float32))})
-
-
-def material(rgba: tuple[float, ...], *, line: bool = False, vertex_colors: bool = False) -> Command:
-    """A colour, in parts of 1; transparent where its last part is below 1."""
-    red, green, blue = (round(255 * min(max(part, 0.0), 1.0)) for part in rgba[:3])
-    clear = {} if rgba[3] >= 1 else {"transparent": True, "opacity": rgba[3], "depthWrite": False}
-    shading = {"linewidth": 2} if line else {"side": _DOUBLE_SIDE, "shininess": 30, "specular": 0x222222}
-    look = {
-        "type": "LineBasicMaterial" if line else "MeshPhongMaterial",
-        "color": red << 16 | green << 8 | blue,
-        "vertexColors": vertex_colors,
-    } | (shading | clear)
-    return {"uuid": _name(json.dumps(look))} | look
 
 
 def as_message(command: Command) -> bytes:

@@ -11,10 +11,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.spatial import hat, homogeneous
+from robot_dyn.foundations.spatial import homogeneous
 from robot_dyn.model.robot import Robot
-from robot_dyn.view import commands
-from robot_dyn.view.commands import Command
+from robot_dyn.view.commands import Canvas, triangles
 from robot_dyn.view.geometry.shapes import arrow
 
 _GROUND = (0.7, 0.73, 0.77, 1.0)
@@ -84,37 +83,25 @@ def scenery(points: np.ndarray) -> Scenery:
 
 def upright(gravity: tuple[float, float, float]) -> np.ndarray:
     """The least rotation (3, 3) that turns gravity down, to −z; the identity without gravity."""
+    from scipy.spatial.transform import Rotation
+
     size = float(np.linalg.norm(gravity))
     if size == 0:
         return np.eye(3)
-    x, y, z = np.array(gravity) / size
-    level = x**2 + y**2
-    if z > 0 and level == 0:  # straight up: about x
-        return np.diag([1.0, -1.0, -1.0])
-    axis = hat(np.array([-y, x, 0.0]))  # of (x, y, z) × (0, 0, −1), times the sine
-    return np.eye(3) + axis + axis @ axis * ((1 + z) / level if z > 0 else 1 / (1 - z))
+    return Rotation.align_vectors([[0.0, 0.0, -1.0]], [np.array(gravity) / size])[0].as_matrix()
 
 
-def ground(seen: Scenery) -> Command:
-    """Squares on the floor, each edge a separate line: viewers drop lines that pass behind the camera."""
+def surround(canvas: Canvas, seen: Scenery, gravity: tuple[float, float, float]) -> None:
+    """Draw squares on the floor, and an arrow down at the left of what is seen; none without gravity."""
     middle, count = np.round(seen.center[:2] / seen.square), int(np.ceil(_FLOOR * seen.radius / seen.square))
     ticks = np.arange(-count, count + 1)
-    x, y = np.meshgrid(ticks, ticks[:-1], indexing="ij")
+    x, y = np.meshgrid(ticks, ticks[:-1], indexing="ij")  # each edge is a line: viewers drop lines behind the camera
     along = np.stack([np.stack([x, y], axis=-1), np.stack([x, y + 1], axis=-1)], axis=-2).reshape(-1, 2)
     flat = (np.vstack([along, along[:, ::-1]]) + middle) * seen.square
-    points = np.column_stack([flat, np.full(len(flat), seen.floor)])
-    look = commands.material(_GROUND, line=True)
-    return commands.set_object("ground", commands.polyline(points), look, kind="LineSegments")
-
-
-def gravity_arrow(seen: Scenery, gravity: tuple[float, float, float]) -> list[Command]:
-    """An arrow down, at the left of what is seen; none without gravity."""
-    if not any(gravity):
-        return []
-    down = np.diag([1.0, -1.0, -1.0])
-    look = commands.material(_GRAVITY)
-    drawn = commands.set_object("gravity", commands.triangles(arrow(_ARROW * seen.radius)), look)
-    return [drawn, commands.set_transform("gravity", homogeneous(down, seen.aside))]
+    canvas.line("ground", np.column_stack([flat, np.full(len(flat), seen.floor)]), _GROUND, kind="LineSegments")
+    if any(gravity):
+        canvas.mesh("gravity", triangles(arrow(_ARROW * seen.radius)), _GRAVITY)
+        canvas.place("gravity", homogeneous(np.diag([1.0, -1.0, -1.0]), seen.aside))
 
 
 def gravity_label(robot: Robot) -> str:

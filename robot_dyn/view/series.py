@@ -8,8 +8,9 @@ A plot whose curves are all 0, or all absent, has no series and says why.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from robot_dyn.simulation.comparison.difference import comparable, difference
 from robot_dyn.simulation.results.run_data import TrajectoryData
 
 if TYPE_CHECKING:
-    from robot_dyn.model.robot import Robot
     from robot_dyn.view.stage import Stage
 
 Columns = dict[str, np.ndarray]  # by name
@@ -28,6 +28,16 @@ _MOST = 1e38  # of single precision
 _UNSTATED = 1e300  # what a file states from here on limits nothing
 
 
+class Curve(NamedTuple):
+    """Values over times t, both (m,), of a run, or of a ghost, whose mark is after the name."""
+
+    name: str
+    t: np.ndarray
+    values: np.ndarray
+    mark: str = ""
+    is_desired: bool = False
+
+
 def plots(runs: list[TrajectoryData], stages: list[Stage], names: list[str]) -> list[dict[str, Any]]:
     """Return title, unit, times, series and limits of each plot, and why it has none.
 
@@ -35,37 +45,44 @@ def plots(runs: list[TrajectoryData], stages: list[Stage], names: list[str]) -> 
     """
     types = {"revolute" if body.revolute else "prismatic" for stage in stages for body in stage.linkage.bodies}
     kind = types.pop() if len(types) == 1 else None
-    marks = ["", *(f" ({name})" for name in names[1:])]
-    each = {name: [_by_joint(run, getattr(run, name)) for run in runs] for name in ("q", "v", "u")}
-    robot = stages[0].robot
-    found = [
-        _plot("joint positions q", unit("q", kind), runs, marks, each["q"], _desired(runs, "desired"))
-        | _limits(robot, robot.lower, robot.upper, each["q"]),
-        _plot("joint velocities v", unit("v", kind), runs, marks, each["v"], _desired(runs, "desired_velocity"))
-        | _limits(robot, -robot.velocity_limit, robot.velocity_limit, each["v"]),
-        _plot("actuation u", unit("u", kind), runs, marks, each["u"])
-        | _limits(robot, -robot.effort_limit, robot.effort_limit, each["u"]),
-    ]
+    marks, robot, first, found = ["", *(f" ({name})" for name in names[1:])], stages[0].robot, runs[0], []
+
+    def curves(columns: Iterable[Columns], is_desired: bool = False) -> list[Curve]:
+        return [
+            Curve(name, run.t, values, mark, is_desired)
+            for run, mark, of_run in zip(runs, marks, columns, strict=True)
+            for name, values in of_run.items()
+        ]
+
+    for title, symbol, reference, lower, upper in (
+        ("joint positions q", "q", "desired", robot.lower, robot.upper),
+        ("joint velocities v", "v", "desired_velocity", -robot.velocity_limit, robot.velocity_limit),
+        ("actuation u", "u", "", -robot.effort_limit, robot.effort_limit),
+    ):
+        actual = curves(_by_joint(run, getattr(run, symbol)) for run in runs)
+        desired = curves((_desired(run, first, reference) for run in runs), True) if reference else []
+        dotted = ", desired dotted" if desired else ""
+        limits = _limits(robot.joint_names, lower, upper, actual)
+        found.append(_plot(title + dotted, unit(symbol, kind), actual + desired) | limits)
     if any(run.deviation is not None for run in runs):
         of_frame = all(run.desired is None for run in runs)
         title, of = ("tracking error p − p_d", "m") if of_frame else ("tracking error q − q_d", unit("q", kind))
-        found.append(_plot(title, of, runs, marks, [_deviation(run) for run in runs]))
-    found += [_difference(runs[0], run, names[0], name, unit("q", kind)) for run, name in _others(runs, names)]
-    return [*found, _plot("energy ledger", "J", runs, marks, [_energy(run) for run in runs])]
+        found.append(_plot(title, of, curves(_deviation(run) for run in runs)))
+    for run, name in zip(runs[1:], names[1:], strict=True):
+        if comparable(first, run):
+            found.append(_difference(first, run, names[0], name, unit("q", kind)))
+    return [*found, _plot("energy ledger", "J", curves(_energy(run) for run in runs))]
 
 
 def _by_joint(run: TrajectoryData, x: np.ndarray) -> Columns:
     return dict(zip(run.joint_names, x.T, strict=True))
 
 
-def _desired(runs: list[TrajectoryData], field: str) -> list[Columns]:
-    """Desired values of each run; none where they are those of the first."""
-    found, first = [], getattr(runs[0], field)
-    for run in runs:
-        x = getattr(run, field)
-        again = run is not runs[0] and first is not None and np.array_equal(x, first)
-        found.append({} if x is None or again else _by_joint(run, x))
-    return found
+def _desired(run: TrajectoryData, first: TrajectoryData, field: str) -> Columns:
+    """Desired values of a run; none where they are those of the first."""
+    x, of_first = getattr(run, field), getattr(first, field)
+    again = run is not first and of_first is not None and np.array_equal(x, of_first)
+    return {} if x is None or again else _by_joint(run, x)
 
 
 def _deviation(run: TrajectoryData) -> Columns:
@@ -86,11 +103,6 @@ def _energy(run: TrajectoryData) -> Columns:
     return {name: column[:m] for name, column in energy.items()}
 
 
-def _others(runs: list[TrajectoryData], names: list[str]) -> list[tuple[TrajectoryData, str]]:
-    """The runs that can be compared with the first, with their names."""
-    return [(run, name) for run, name in zip(runs[1:], names[1:], strict=True) if comparable(runs[0], run)]
-
-
 def _difference(a: TrajectoryData, b: TrajectoryData, of_a: str, of_b: str, of_q: str) -> dict[str, Any]:
     """Positions of a run less those of the first, and when they part."""
     found = difference(a, b)
@@ -100,75 +112,57 @@ def _difference(a: TrajectoryData, b: TrajectoryData, of_a: str, of_b: str, of_q
         at = ": they do not part"
     else:
         at = f": compared over {found.fraction:.0%} of the time only; record both at the same times"
-    title = f"difference of q, {of_b} − {of_a}{at}"
-    if not len(found.t):
-        empty = {"t": found.t, "limits": [], "beyond": "", "series": []}
-        return {"title": title, "unit": of_q, **empty, "why": "no common samples"}
-    columns = dict(zip(found.joint_names, found.q.T, strict=True))
-    return _drawn(title, of_q, [(found.t, columns, "", False, False)])
+    curves = [Curve(name, found.t, x) for name, x in zip(found.joint_names, found.q.T, strict=True)]
+    return _plot(f"difference of q, {of_b} − {of_a}{at}", of_q, curves)
 
 
-def _plot(
-    title: str,
-    unit: str,
-    runs: list[TrajectoryData],
-    marks: list[str],
-    columns: list[Columns],
-    desired: list[Columns] | None = None,
-) -> dict[str, Any]:
-    """The plot of columns of runs, and of desired ones."""
-    drawn = [(run.t, each, mark, mark != "", False) for run, each, mark in zip(runs, columns, marks, strict=True)]
-    of_reference = zip(runs, desired or [], marks, strict=False)
-    drawn += [(run.t, each, f" desired{mark}", mark != "", True) for run, each, mark in of_reference]
-    dashed = ", desired dotted" if any(desired or []) else ""
-    return _drawn(title + dashed, unit, drawn)
-
-
-def _drawn(title: str, unit: str, parts: list[tuple[np.ndarray, Columns, str, bool, bool]]) -> dict[str, Any]:
-    """A plot of (times, columns, mark, whether a ghost, whether desired), at the times that thinning keeps of any.
-
-    Numbers are nan where a run has ended. Columns that are nan throughout are left out.
-    """
-    parts = [part for part in parts if part[1]]
-    times = [t[thinned(np.stack(list(each.values()), axis=1))] for t, each, *_ in parts]
-    t = np.unique(np.concatenate(times))
-    colors = {name: index for index, name in enumerate(dict.fromkeys(name for part in parts for name in part[1]))}
-    series = []
-    for known, columns, mark, ghost, desired in parts:
-        for name, values in columns.items():
-            y = np.interp(t, known, np.clip(values, -_MOST, _MOST), right=np.nan).astype(np.float32)
-            look = {"label": name + mark, "values": y, "color": colors[name], "ghost": ghost, "desired": desired}
-            series.append(look)
-    every = np.concatenate([each["values"] for each in series])
+def _plot(title: str, unit: str, curves: list[Curve]) -> dict[str, Any]:
+    """A plot of curves, at the times that thinning keeps of any; nan where a run has ended."""
+    curves = [curve for curve in curves if len(curve.t)]
+    t = np.unique(np.concatenate([np.zeros(0), *(curve.t[thinned(curve.values[:, None])] for curve in curves)]))
+    colors = {name: index for index, name in enumerate(dict.fromkeys(curve.name for curve in curves))}
+    series = [
+        {
+            "label": f"{curve.name}{' desired' * curve.is_desired}{curve.mark}",
+            "values": np.interp(t, curve.t, np.clip(curve.values, -_MOST, _MOST), right=np.nan).astype(np.float32),
+            "color": colors[curve.name],
+            "ghost": curve.mark != "",
+            "desired": curve.is_desired,
+        }
+        for curve in curves
+    ]
+    every = np.concatenate([np.zeros(0), *(each["values"] for each in series)])
+    is_drawn = bool(np.nan_to_num(every).any())
+    why = "0 throughout" if not np.isnan(every).all() else "not recorded" if series else "no common samples"
     plot = {"title": title, "unit": unit, "t": t, "limits": [], "beyond": ""}
-    if np.nan_to_num(every).any():
-        return plot | {"series": series, "why": ""}
-    return plot | {"series": [], "why": "not recorded" if np.isnan(every).all() else "0 throughout"}
+    return plot | {"series": series if is_drawn else [], "why": "" if is_drawn else why}
 
 
-def _limits(robot: Robot, lower: np.ndarray, upper: np.ndarray, columns: list[Columns]) -> dict[str, Any]:
+def _limits(names: Sequence[str], lower: np.ndarray, upper: np.ndarray, curves: list[Curve]) -> dict[str, Any]:
     """Limits of the file: those that are drawn, since they are near the curve of their joint, and in words the others.
 
     Near is within 1.5 times the largest value of its joint, or within a tenth of the height of all curves; and within
     half this height, so that no limit makes the curves much flatter.
     """
-    every = np.concatenate([x for each in columns for x in each.values()])
-    every = every[np.isfinite(every)]
+    every = _finite(curves)
     if not every.any():
         return {}
     near, drawn, beyond = np.ptp(every) / 2, {}, {}
-    for index, name in enumerate(robot.joint_names):
-        own = np.concatenate([each.get(name, every[:0]) for each in columns])
-        own = own[np.isfinite(own)]
+    for index, name in enumerate(names):
+        own = _finite([curve for curve in curves if curve.name == name])
         for side, sign in ((float(lower[index]), -1), (float(upper[index]), 1)):
-            if not (np.isfinite(side) and abs(side) < _UNSTATED and len(own)):
-                continue
-            peak = (sign * own).max()
-            gap = sign * side - peak
-            is_near = gap <= near and (gap <= near / 5 or sign * side <= 1.5 * peak)
-            (drawn if is_near else beyond).setdefault(side, []).append(name)
+            if np.isfinite(side) and abs(side) < _UNSTATED and len(own):
+                peak = (sign * own).max()
+                gap = sign * side - peak
+                is_near = gap <= near and (gap <= near / 5 or sign * side <= 1.5 * peak)
+                (drawn if is_near else beyond).setdefault(side, []).append(name)
     limits = [{"value": value, "label": _of(names)} for value, names in sorted(drawn.items())]
     return {"limits": limits, "beyond": _in_words(beyond)}
+
+
+def _finite(curves: list[Curve]) -> np.ndarray:
+    values = np.concatenate([np.zeros(0), *(curve.values for curve in curves)])
+    return values[np.isfinite(values)]
 
 
 def _in_words(beyond: dict[float, list[str]]) -> str:
@@ -190,14 +184,11 @@ def _of(names: list[str]) -> str:
 def thinned(columns: np.ndarray, buckets: int = _BUCKETS) -> np.ndarray:
     """Indices of samples (m, c) that keep the least and the largest of each column in each bucket, and both ends."""
     m = len(columns)
-    return np.arange(m) if m <= 4 * buckets else extremes(columns, np.linspace(0, m, buckets + 1).astype(int))
-
-
-def extremes(columns: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Indices of the least and the largest finite number of each column between edges, and of both ends."""
+    if m <= 4 * buckets:
+        return np.arange(m)
     finite = np.isfinite(columns)
     low, high = np.where(finite, columns, np.inf), np.where(finite, columns, -np.inf)
-    indices = [np.array([0, len(columns) - 1])]
-    for a, b in pairwise(edges):
+    indices = [np.array([0, m - 1])]
+    for a, b in pairwise(np.linspace(0, m, buckets + 1).astype(int)):
         indices += [a + low[a:b].argmin(axis=0), a + high[a:b].argmax(axis=0)]
     return np.unique(np.concatenate(indices))

@@ -6,7 +6,7 @@ keyframes is the arm at the q between them. [Murray, Li, Sastry 1994, ch. 3 §2]
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -15,14 +15,16 @@ from typing import final
 import numpy as np
 
 from robot_dyn.foundations.errors import QueryError, nearest
-from robot_dyn.foundations.spatial import homogeneous
+from robot_dyn.foundations.spatial import first_moment, homogeneous
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage, Pose
 from robot_dyn.model.robot import Robot
-from robot_dyn.view import commands
-from robot_dyn.view.commands import Command
-from robot_dyn.view.geometry.visuals import Piece
+from robot_dyn.view.commands import Canvas, Rgba, triangles
+from robot_dyn.view.geometry.visuals import Drawing, Piece
 from robot_dyn.view.keyframes import Keyframes
+
+Placements = Mapping[int, tuple[np.ndarray, np.ndarray]]  # (R, p) in the base, by body
+_CHUNK = 20_000  # samples whose placements are held at a time
 
 
 @final
@@ -33,10 +35,16 @@ class Stage:
     Attributes:
         root: Path of the robot.
         robot: What is shown.
+        opacity: Of all that is drawn there.
     """
 
     root: str
     robot: Robot
+    opacity: float = 1.0
+
+    def tint(self, rgba: Rgba) -> Rgba:
+        """A colour with the opacity of this stage."""
+        return (*rgba[:3], rgba[3] * self.opacity)
 
     @cached_property
     def linkage(self) -> Linkage:
@@ -59,37 +67,45 @@ class Stage:
         body, _, _ = self.linkage.links[link]
         return f"{self.root if body == BASE else self.paths[body]}/link {plain(link)}"
 
-    def draw(self, pieces: tuple[Piece, ...], opacity: float = 1.0) -> list[Command]:
-        """The commands that put links and their pieces in place."""
-        found = [
-            commands.set_transform(self.link_path(link), homogeneous(pose.R, pose.p))
-            for link, (_, pose, _) in self.linkage.links.items()
-        ]
-        return found + self.fasten(pieces, opacity)
-
-    def fasten(
-        self, pieces: tuple[Piece, ...], opacity: float = 1.0, kind: str = "", seen: bool = True
-    ) -> list[Command]:
-        """The commands that fasten pieces to links; their names begin with their kind."""
-        found, meshes = [], {id(piece.mesh): commands.triangles(piece.mesh) for piece in pieces}
-        for number, piece in enumerate(pieces):
+    def draw(self, canvas: Canvas, look: Drawing, keys: Keyframes, shows_boxes: bool) -> None:
+        """Draw the robot, as it moves by keyframes, with its boxes of inertia, shown or not."""
+        for link, (_, pose, _) in self.linkage.links.items():
+            canvas.place(self.link_path(link), homogeneous(pose.R, pose.p))
+        pieces = [("", number, piece) for number, piece in enumerate(look.pieces)]
+        pieces += [("inertia ", number, piece) for number, piece in enumerate(look.boxes)]
+        meshes = {id(piece.mesh): triangles(piece.mesh) for _, _, piece in pieces}
+        for kind, number, piece in pieces:
             path = f"{self.link_path(piece.link)}/{kind}{number}"
-            rgba = (*piece.rgba[:3], piece.rgba[3] * opacity)
-            look = commands.material(rgba, vertex_colors=piece.mesh.colors is not None)
-            if piece.image is not None:
-                look["image"] = piece.image
-            found.append(commands.set_object(path, meshes[id(piece.mesh)], look))
-            found.append(commands.set_transform(path, piece.pose))
-            if not seen:
-                found.append(commands.set_property(path, "visible", False))
-        return found
+            canvas.mesh(path, meshes[id(piece.mesh)], self.tint(piece.rgba), piece.image)
+            canvas.place(path, piece.pose)
+            if kind and not shows_boxes:
+                canvas.hide(path)
+        for index, (path, body) in enumerate(zip(self.paths, self.linkage.bodies, strict=True)):
+            canvas.move(path, **_tracks(body, keys.t, keys.q[:, index]))
 
-    def tracks(self, keys: Keyframes) -> dict[str, list[Command]]:
-        """The track of each joint, by path; and its place at the first keyframe."""
-        return {
-            path: _tracks(body, keys.t, keys.q[:, index])
-            for index, (path, body) in enumerate(zip(self.paths, self.linkage.bodies, strict=True))
-        }
+    def positions(self, q: np.ndarray, links: Sequence[str]) -> np.ndarray:
+        """Origins of links in the base at positions q (m, n), shape (m, k, 3)."""
+        poses = [self.linkage.links[link][:2] for link in links]
+
+        def origins(at: Placements, m: int) -> np.ndarray:
+            return np.stack([np.broadcast_to(placement(at, *pose)[1], (m, 3)) for pose in poses], axis=1)
+
+        return self._over(q, origins)
+
+    def centre_of_mass(self, q: np.ndarray) -> np.ndarray:
+        """Centre of mass of the bodies that move, in the base, (m, 3): Σ mᵢ pᵢ / Σ mᵢ."""
+
+        def middle(at: Placements, m: int) -> np.ndarray:
+            total, mass = np.zeros((m, 3)), 0.0
+            for inertia, (R, p) in zip(self.linkage.inertias, at.values(), strict=True):
+                total, mass = total + inertia[0, 0] * p + R @ first_moment(inertia), mass + inertia[0, 0]
+            return total / mass if mass > 0 else total
+
+        return self._over(q, middle)
+
+    def _over(self, q: np.ndarray, function: Callable[[Placements, int], np.ndarray]) -> np.ndarray:
+        chunks = np.array_split(q, 1 + len(q) // _CHUNK)
+        return np.concatenate([function(self.linkage.at(chunk).in_base, len(chunk)) for chunk in chunks])
 
     def corners(self, pieces: tuple[Piece, ...], q: np.ndarray) -> np.ndarray:
         """Corners of the boxes about all pieces at positions q (k, n), and the base and the tip, (m, 3)."""
@@ -113,21 +129,19 @@ class Stage:
         return max(self.linkage.links, key=reach)
 
 
-def _tracks(body: Body, t: np.ndarray, q: np.ndarray) -> list[Command]:
+def _tracks(body: Body, t: np.ndarray, q: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Placement g exp(ξ̂ q) of a joint's node at keyframes."""
     from scipy.spatial.transform import Rotation
 
     zero = Rotation.from_matrix(body.pose.R)
     if body.revolute:
         turns = (zero * Rotation.from_rotvec(q[:, None] * body.axis)).as_quat()
-        fixed = commands.track("position", "vector", t[:1], body.pose.p)
-        return [fixed, commands.track("quaternion", "quaternion", t, turns)]
+        return {"position": (t[:1], body.pose.p), "quaternion": (t, turns)}
     slides = body.pose.p + q[:, None] * (body.pose.R @ body.axis)
-    fixed = commands.track("quaternion", "quaternion", t[:1], zero.as_quat())
-    return [fixed, commands.track("position", "vector", t, slides)]
+    return {"quaternion": (t[:1], zero.as_quat()), "position": (t, slides)}
 
 
-def placement(at: Mapping[int, tuple[np.ndarray, np.ndarray]], body: int, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+def placement(at: Placements, body: int, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
     """(R, p) in the base of a pose in a body, from those of all bodies."""
     if body == BASE:
         return pose.R, pose.p

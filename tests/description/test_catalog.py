@@ -103,30 +103,23 @@ def test_folder_is_no_robot(package: Path):
 ADDRESS = "package://arms/urdf/pendulum.urdf"
 
 
-def test_package_in_a_named_folder(package: Path):
-    file = package / "arms" / "urdf" / "pendulum.urdf"
+def test_a_package_is_found_in_named_folders_above_and_in_the_ros_package_path(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Above the working directory, or above the file that names it."""
+    file, deep = package / "arms" / "urdf" / "pendulum.urdf", package / "arms" / "urdf" / "deep"
     for folders in ([package], (str(package),), iter([package.parent, package])):
         assert catalog.find(ADDRESS, folders) == file
     assert rd.load(ADDRESS, package_dirs=[package]).name == "pendulum"
-
-
-def test_package_above_the_working_directory(package: Path, monkeypatch: pytest.MonkeyPatch):
-    deep = package / "arms" / "urdf" / "deep"
+    for source in (file, package / "other" / "robot.urdf"):
+        assert catalog.resolve(ADDRESS, source) == file
+    with monkeypatch.context() as ros:
+        ros.setenv("ROS_PACKAGE_PATH", os.pathsep.join(["", "/nowhere", str(package)]))
+        assert rd.load(ADDRESS).n == 1
     deep.mkdir()
     for place in (package, package / "arms", deep):
         monkeypatch.chdir(place)
         assert rd.load(ADDRESS).n == 1
-
-
-def test_package_above_the_file(package: Path):
-    file = package / "arms" / "urdf" / "pendulum.urdf"
-    assert catalog.resolve(ADDRESS, file) == file
-    assert catalog.resolve("package://arms/urdf/pendulum.urdf", package / "other" / "robot.urdf") == file
-
-
-def test_package_in_the_ros_package_path(package: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("ROS_PACKAGE_PATH", os.pathsep.join(["", "/nowhere", str(package)]))
-    assert rd.load(ADDRESS).n == 1
 
 
 def test_named_folder_comes_before_those_above_and_these_before_the_ros_path(

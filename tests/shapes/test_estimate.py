@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -70,22 +71,22 @@ def test_primitives_have_their_closed_forms(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "dae"])
-def test_a_closed_mesh_is_the_solid_within_and_scales(tmp_path: Path, suffix: str) -> None:
+@pytest.mark.parametrize(
+    ("faces", "basis"),
+    [
+        (slice(None), "closed collision mesh"),
+        (slice(1, None), "open collision mesh, by its convex hull"),
+        ((slice(None), slice(None, None, -1)), "closed collision mesh (1 part turned"),  # it is inside out
+    ],
+)
+def test_a_mesh_is_the_solid_within_or_its_hull_and_scales(tmp_path: Path, suffix: str, faces: Any, basis: str) -> None:
     """Of a box, away from the origin: its lengths times `scale`; float32 corners allow 1e-6."""
-    mesh = trimesh.creation.box((0.3, 0.2, 0.5))
-    mesh.apply_translation([0.1, 0.05, 0.2])
+    box = trimesh.creation.box((0.3, 0.2, 0.5))
+    mesh = trimesh.Trimesh(box.vertices + np.array([0.1, 0.05, 0.2]), box.faces[faces], process=False)
     mesh.export(tmp_path / f"box.{suffix}")
     robot = estimated(arm(tmp_path, MESH.format(f"box.{suffix}", "2 1 0.5")), mass={"link1": 40.0}, density=900)
     same(body(robot, "link1"), solid_box(40.0, 0.6, 0.2, 0.25).moved(np.eye(3), [0.2, 0.05, 0.1]), 1e-6)
-    assert "closed collision mesh" in robot.estimated["link1"]
-
-
-def test_an_open_mesh_is_taken_by_its_convex_hull_and_that_is_said(tmp_path: Path) -> None:
-    mesh = trimesh.creation.box((0.3, 0.2, 0.5))
-    trimesh.Trimesh(mesh.vertices, mesh.faces[1:]).export(tmp_path / "open.stl")
-    robot = estimated(arm(tmp_path, MESH.format("open.stl", "1 1 1")), mass={"link1": 40.0})
-    same(body(robot, "link1"), solid_box(40.0, 0.3, 0.2, 0.5), 1e-6)
-    assert "open collision mesh, by its convex hull" in robot.estimated["link1"]
+    assert basis in robot.estimated["link1"]
 
 
 def test_a_mesh_whose_parts_overlap_is_refused_unless_it_is_allowed(tmp_path: Path) -> None:
@@ -108,14 +109,6 @@ def test_a_mesh_whose_parts_overlap_is_refused_unless_it_is_allowed(tmp_path: Pa
     np.testing.assert_array_equal(rd.Robot.from_text(repaired).M([0.3]), robot.M([0.3]))
 
 
-def test_a_mesh_that_is_inside_out_is_turned_and_that_is_reported(tmp_path: Path) -> None:
-    mesh = trimesh.creation.box((0.3, 0.2, 0.5))
-    trimesh.Trimesh(mesh.vertices, mesh.faces[:, ::-1], process=False).export(tmp_path / "inside.stl")
-    robot = estimated(arm(tmp_path, MESH.format("inside.stl", "1 1 1")), density=1000)
-    same(body(robot, "link1"), solid_box(30.0, 0.3, 0.2, 0.5), 1e-6)
-    assert "closed collision mesh (1 part turned" in robot.estimated["link1"]
-
-
 @pytest.mark.parametrize("suffix", ["stl", "obj"])
 def test_a_mesh_of_text_one_kilometre_from_the_origin_keeps_its_digits(tmp_path: Path, suffix: str) -> None:
     """float32 would leave 0.06 mm of the edges there, 2e-4 of the mass; float64 1e-13 m, 1e-12 of it."""
@@ -134,19 +127,13 @@ def test_a_mesh_of_text_one_kilometre_from_the_origin_keeps_its_digits(tmp_path:
     np.testing.assert_allclose(body(robot, "link1").inertia, true.inertia, atol=1e-11 * np.trace(true.inertia))
 
 
-@pytest.mark.parametrize("masses", [{"total_mass": 8.0}, {"density": 900.0}, {"mass": {"link1": 3.0, "link2": 2.0}}])
-def test_a_flat_mesh_is_refused_with_the_reason(tmp_path: Path, masses: dict[str, object]) -> None:
-    flat = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+def test_a_flat_mesh_is_refused_with_the_reason_and_takes_no_share_beside_a_body(tmp_path: Path) -> None:
+    flat, mesh = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), MESH.format("flat.stl", "1 1 1")
     flat.export(tmp_path / "flat.stl")
-    path = arm(tmp_path, MESH.format("flat.stl", "1 1 1"), ROD)
-    with pytest.raises(rd.RobotDynError, match=r"link 'link1'.*mesh flat\.stl: is flat"):
-        estimated(path, **masses)
-
-
-def test_a_flat_mesh_beside_a_body_takes_no_share(tmp_path: Path) -> None:
-    flat = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    flat.export(tmp_path / "flat.stl")
-    both = estimated(arm(tmp_path, MESH.format("flat.stl", "1 1 1") + ROD), density=900)
+    for masses in ({"total_mass": 8.0}, {"density": 900.0}, {"mass": {"link1": 3.0, "link2": 2.0}}):
+        with pytest.raises(rd.RobotDynError, match=r"link 'link1'.*mesh flat\.stl: is flat"):
+            estimated(arm(tmp_path, mesh, ROD), **masses)
+    both = estimated(arm(tmp_path, mesh + ROD), density=900)
     same(body(both, "link1"), body(estimated(arm(tmp_path, ROD), density=900), "link1"))
 
 

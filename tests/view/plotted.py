@@ -41,6 +41,12 @@ def headings(figure) -> str:
     return " ".join([*(text.get_text() for text in figure.texts), *map(headings, figure.subfigs)])
 
 
+def legend(figure) -> list[str]:
+    """The entries of the legends of a figure and of its parts."""
+    own = [text.get_text() for each in figure.legends for text in each.texts]
+    return own + [text for part in figure.subfigs for text in legend(part)]
+
+
 def lines(axes, label: str) -> list:
     return [line for line in axes.lines if line.get_label() == label]
 

@@ -1,8 +1,10 @@
-"""Plots: axes hold what the run holds, with names and units; of odd, long or many-jointed runs too, and in files."""
+"""Plots: axes hold what the run holds, with names and units; of odd, long or many-jointed runs too, and in files.
+
+Sizes are those asked for, and text keeps its own.
+"""
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from time import perf_counter
 
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib import rcParams
 from matplotlib.colors import to_rgb
+from matplotlib.text import Text
 
 import robot_dyn as rd
 from robot_dyn import plot, save_plot
@@ -17,7 +20,10 @@ from robot_dyn.foundations import QueryError
 from robot_dyn.simulation import Ending, Ledger, Outcome
 from robot_dyn.view import PLOTS, PlotError
 from robot_dyn.view.plots.plots import MOST_JOINTS
-from tests.view.plotted import cart_pole, cells, headings, lines, many, stretched, ur5
+from tests.long import long
+from tests.view.plotted import cart_pole, cells, headings, legend, lines, many, stretched, ur5
+
+MM = 25.4  # in an inch
 
 
 @pytest.fixture(scope="module")
@@ -30,22 +36,64 @@ def cart():
     return cart_pole()
 
 
-def test_positions_and_velocities_are_the_runs(run) -> None:
+def test_positions_and_velocities_are_the_runs_and_desired_ones_dashed(run, cart) -> None:
     figure = plot(run, "joints")
-    for symbol, values in (("q", run.q), ("v", run.v)):
+    for symbol, label, values in (("q", "actual", run.q), ("v", "actual", run.v), ("q", "desired", run.desired)):
         for axes, column in zip(cells(figure, symbol), values.T, strict=True):
-            (line,) = lines(axes, "actual")
-            np.testing.assert_array_equal(line.get_xdata(), run.t)
-            np.testing.assert_array_equal(line.get_ydata(), column)
+            (line,) = lines(axes, label)
+            assert line.is_dashed() is (label == "desired")
+            np.testing.assert_array_equal(line.get_xydata(), np.column_stack([run.t, column]))
     assert [axes.get_title(loc="left") for axes in cells(figure, "q")] == list(run.joint_names)
-
-
-def test_desired_positions_are_dashed(run, cart) -> None:
-    for axes, column in zip(cells(plot(run, "joints"), "q"), run.desired.T, strict=True):
-        (line,) = lines(axes, "desired")
-        assert line.is_dashed()
-        np.testing.assert_array_equal(line.get_ydata(), column)
     assert not any(lines(axes, "desired") for axes in plot(cart, "joints").axes)
+
+
+def test_tracking_is_the_deviation_with_its_rms(run, cart) -> None:
+    """Of joints, or of a frame, which the overview has, too."""
+    figure = plot(run, "tracking")
+    for axes, column in zip(figure.axes, run.deviation.T, strict=True):
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), column)
+    assert f"rms {run.tracking_error:.2e} rad" in headings(figure)
+    for names in ((), ("tracking",)):
+        frame = cells(plot(replace(run, desired=None, deviation=run.deviation[:, :3]), *names), "p − p_d")
+        assert [axes.get_title(loc="left") for axes in frame] == ["frame, x", "frame, y", "frame, z"]
+        assert {axes.get_ylabel() for axes in frame} == {"p − p_d [m]"}
+    with pytest.raises(PlotError, match="no reference"):
+        plot(cart, "tracking")
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"only": "torque"}, "no plot 'torque'; nearest: torques"),
+        ({"only": "x"}, "known: overview, joints, torques"),
+        ({"only": "elbow_joint"}, r"no plot 'elbow_joint'; it is a joint: give joints=\['elbow_joint'\]"),
+        ({"only": 3}, "only: give names of parts, got 3"),
+        ({"joints": ["elbow"]}, "no joint 'elbow'; nearest: elbow_joint"),
+        ({"theme": "blue"}, "no theme"),
+        ({"style": "papr"}, "no style 'papr'; nearest: paper"),
+        ({"style": "paper", "theme": "dark"}, "leave theme='dark' out"),
+        ({"limits": np.ones(2)}, r"limits must have shape \(6,\) or .*, got \(2,\)"),
+        ({"width_mm": 10}, "width_mm must be at least 80, got 10"),
+        ({"width_mm": 2e3}, "width_mm must be at most 1000, got 2000"),
+    ],
+)
+def test_options_without_meaning_are_refused(run, options: dict, text: str) -> None:
+    with pytest.raises(QueryError, match=text):
+        plot(run, **options)
+
+
+def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
+    """In the overview each has a row of 8.4 mm or more."""
+    thirty = replace(many(run, 30), extremes=None)
+    for figure in (plot(thirty, "joints"), plot(thirty)):
+        figure.draw_without_rendering()
+        assert [axes.get_title(loc="left") for axes in cells(figure, "q")] == [f"joint_{i:02d}" for i in range(30)]
+        boxes, page = [axes.get_window_extent() for axes in figure.axes], figure.bbox
+        assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+        assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1 for box in boxes)
+    assert all(box.height / figure.dpi * MM >= 8.4 for box in boxes)
+    with pytest.raises(PlotError, match=f"1 to {MOST_JOINTS}; name those to show"):
+        plot(many(run, MOST_JOINTS + 1), "joints")
 
 
 def test_units_are_those_of_each_joint(run, cart) -> None:
@@ -99,18 +147,6 @@ def test_the_energy_ledger_is_the_runs(cart) -> None:
     np.testing.assert_array_equal(drawn[drawn > 0], np.abs(ledger.residual)[ledger.residual != 0])
 
 
-def test_tracking_is_the_deviation_with_its_rms(run, cart) -> None:
-    figure = plot(run, "tracking")
-    for axes, column in zip(figure.axes, run.deviation.T, strict=True):
-        np.testing.assert_array_equal(axes.lines[0].get_ydata(), column)
-    assert f"rms {run.tracking_error:.2e} rad" in headings(figure)
-    frame = plot(replace(run, desired=None, deviation=run.deviation[:, :3]), "tracking")
-    assert [axes.get_title(loc="left") for axes in frame.axes] == ["frame, x", "frame, y", "frame, z"]
-    assert {axes.get_ylabel() for axes in frame.axes} == {"p − p_d [m]"}
-    with pytest.raises(PlotError, match="no reference"):
-        plot(cart, "tracking")
-
-
 def test_phase_is_velocity_over_position(cart) -> None:
     for i, axes in enumerate(plot(cart, "phase").axes):
         path = np.column_stack([cart.q[:, i], cart.v[:, i]])
@@ -128,29 +164,6 @@ def test_error_growth_is_veiled_where_it_is_not_resolved(run) -> None:
         plot(replace(run, error=None), "error_growth")
 
 
-def test_asked_joints_alone_are_shown(run) -> None:
-    figure = plot(run, "joints", "torques", "tracking", joints=["elbow_joint"])
-    assert {re.split(",|\n", axes.get_title(loc="left"))[0] for axes in figure.axes} == {"elbow_joint", ""}
-    np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), run.q[:, 2])
-
-
-def test_unknown_names_are_refused_with_the_nearest(run) -> None:
-    for asked, advice in (
-        (["torque"], "no plot 'torque'; nearest: torques"),
-        (["x"], "known: overview, joints, torques"),
-    ):
-        with pytest.raises(QueryError, match=advice):
-            plot(run, *asked)
-    with pytest.raises(QueryError, match="no joint 'elbow'; nearest: elbow_joint"):
-        plot(run, joints=["elbow"])
-    with pytest.raises(QueryError, match=r"no plot 'elbow_joint'; it is a joint: give joints=\['elbow_joint'\]"):
-        plot(run, only="elbow_joint")
-    with pytest.raises(QueryError, match="no theme"):
-        plot(run, theme="blue")  # type: ignore[arg-type]
-    with pytest.raises(QueryError, match=r"limits must have shape \(6,\) or .*, got \(2,\)"):
-        plot(run, limits=np.ones(2))
-
-
 def test_names_are_drawn_letter_by_letter(run, tmp_path) -> None:
     """No mathematics, no hidden labels, no letters that the font lacks; a long name keeps both its ends."""
     names = (r"$\frac", "_first", "a_b^{c$x$", "関節", "arm_" + "x" * 200 + "_end", "per%cent #1")
@@ -160,13 +173,7 @@ def test_names_are_drawn_letter_by_letter(run, tmp_path) -> None:
     titles = [axes.get_title(loc="left") for axes in cells(plot(hostile, "joints"), "q")]
     assert titles[:3] == list(names[:3]) and titles[3] in ("関節", r"\u95a2\u7bc0") and titles[5] == names[5]
     assert titles[4].startswith("arm_x") and titles[4].endswith("x_end") and "…" in titles[4]
-    legends = [
-        text.get_text()
-        for axes in plot(hostile, "energy").axes
-        if axes.get_legend()
-        for text in axes.get_legend().texts
-    ]
-    assert r"W _$\sum$" in legends
+    assert r"W _$\sum$" in legend(plot(hostile, "energy"))
 
 
 @pytest.mark.parametrize(
@@ -226,18 +233,6 @@ def test_a_diverged_run_shows_how_it_began_and_how_it_ended(cart, tmp_path) -> N
     save_plot(stretched(run, 200, q=nothing, v=nothing, u=nothing), tmp_path / "nan.png", dpi=40)
 
 
-def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
-    figure = plot(many(run, 30), "joints")
-    figure.draw_without_rendering()
-    assert [axes.get_title(loc="left") for axes in cells(figure, "q")] == [f"joint_{i:02d}" for i in range(30)]
-    boxes = [axes.get_window_extent() for axes in figure.axes]
-    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
-    page = figure.bbox
-    assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1 for box in boxes)
-    with pytest.raises(PlotError, match=f"1 to {MOST_JOINTS}; name those to show"):
-        plot(many(run, MOST_JOINTS + 1), "joints")
-
-
 def test_a_long_run_is_thinned_and_keeps_its_peaks(run) -> None:
     """Of 300 000 samples one is a peak, one a trough; all joints are drawn in seconds."""
     long = stretched(run, 300_000)
@@ -267,3 +262,107 @@ def test_the_list_of_plots_cannot_be_changed() -> None:
     assert list(PLOTS) == ["overview", "joints", "torques", "energy", "tracking", "phase", "error_growth"]
     with pytest.raises(TypeError):
         PLOTS["mine"] = PLOTS["joints"]  # type: ignore[index]
+
+
+def eight():
+    """Eight joints with all that an overview may hold: a reference, torques, work of four sources, an estimate."""
+    run = ur5()
+    one = replace(many(run, 8), extremes=None)
+    works = {f"source_{k}": np.sin(one.t + k) for k in range(4)}
+    ledger = replace(run.ledger, kinetic=one.t, potential=np.cos(one.t), work=works)
+    return replace(one, desired=one.q + 0.1, deviation=-0.1 + 0 * one.q, ledger=ledger, error=run.error)
+
+
+def test_the_overview_is_the_runs(run) -> None:
+    """A row for each joint, with q and q_d, v, u and q − q_d; then energy, work, residual and estimated error."""
+    figure, n = plot(run), len(run.joint_names)
+    columns = [figure.axes[k : 4 * n : 4] for k in range(4)]
+    for column, values, symbol in zip(
+        columns, (run.q, run.v, run.u, run.deviation), ("q", "v", "u", "q − q_d"), strict=True
+    ):
+        for axes, expected in zip(column, values.T, strict=True):
+            np.testing.assert_array_equal(axes.lines[0].get_xydata(), np.column_stack([run.t, expected]))
+            assert axes.get_ylabel().partition("[")[0].strip() == symbol
+    for axes, expected in zip(columns[0], run.desired.T, strict=True):
+        (desired,) = lines(axes, "desired")
+        assert desired.is_dashed()
+        np.testing.assert_array_equal(desired.get_ydata(), expected)
+    assert [axes.get_title(loc="left") for axes in columns[0]] == list(run.joint_names)
+    stores, work, residual, error = figure.axes[4 * n :]
+    np.testing.assert_array_equal(lines(stores, "K")[0].get_ydata(), run.ledger.kinetic)
+    np.testing.assert_array_equal(work.lines[0].get_ydata(), run.ledger.work["control"])
+    assert residual.get_title(loc="left").startswith("Residual")
+    np.testing.assert_array_equal(error.lines[0].get_xdata(), run.error.t)
+
+
+def test_what_a_run_lacks_has_no_axes(run) -> None:
+    """A swing without control, reference or estimate: q, v, the ledger. That u is 0 is said."""
+    cart = replace(cart_pole(), error=None)
+    figure = plot(cart)
+    assert not cells(figure, "q − q_d") and not cells(figure, "u") and "u is 0 throughout" in headings(figure)
+    assert not any("Estimated" in axes.get_title(loc="left") for axes in figure.axes)
+    assert "u is 0" not in headings(plot(run))
+    unknown = plot(replace(cart, u=np.full_like(cart.u, np.nan)))  # not recorded, which is not 0
+    assert not cells(unknown, "u") and "u is 0" not in headings(unknown)
+
+
+@pytest.mark.parametrize("width", [80, 300, *long([120])])
+def test_eight_joints_fit_a_page_of_a4_at_any_width(width: float) -> None:
+    """Whatever is asked for, in [mm]; no text covers another, and all have 7 to 9 pt."""
+    for name in PLOTS:
+        figure = plot(eight(), name, width_mm=width)
+        across, tall = figure.get_size_inches() * MM
+        assert across == pytest.approx(width) and tall <= 297 + 1e-9, name
+        figure.draw_without_rendering()
+        texts = {text for text in figure.findobj(Text) if text.get_text() and text.get_visible()}
+        assert {text.get_fontsize() for text in texts} <= {7.0, 7.5, 8.0, 9.0}
+        numbers = {text for axes in figure.axes for text in (*axes.get_xticklabels(), *axes.get_yticklabels())}
+        boxes = [axes.get_window_extent() for axes in figure.axes]
+        boxes += [text.get_window_extent().padded(-1) for text in texts - numbers]
+        assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i]), name
+        page = figure.bbox.padded(1)
+        assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 for box in boxes), name
+        assert all(box.y1 <= page.y1 for box in boxes), name
+
+
+def test_what_a_narrow_page_has_no_room_for_is_said(run) -> None:
+    narrow = plot(run, width_mm=85)
+    assert cells(narrow, "u") and not cells(narrow, "v") and "no room for error and v" in headings(narrow)
+    assert "no room" not in headings(plot(run))
+
+
+def test_parts_and_joints_are_named_alike(run) -> None:
+    """Positions of names, `only`, one name as a text."""
+    asked = [plot(run, "torques", joints="elbow_joint"), plot(run, only=("torques",), joints=("elbow_joint",))]
+    for figure in (*asked, plot(run, only="torques", joints=["elbow_joint"])):
+        (axes,) = figure.axes
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), run.u[:, 2])
+    overview = plot(run, joints=["wrist_3_joint", "elbow_joint"])
+    assert [axes.get_title(loc="left") for axes in cells(overview, "q")] == ["elbow_joint", "wrist_3_joint"]
+
+
+def test_a_paper_has_no_title_thin_lines_and_dashes_that_differ(run) -> None:
+    """Curves on the same axes differ in their dashes, so that a grey print keeps them apart."""
+    paper = plot(run, style="paper")
+    assert not headings(paper).strip() and paper.get_facecolor()[:3] == (1, 1, 1)
+    for axes in paper.axes:
+        curves = [line for line in axes.lines if not line.get_label().startswith("_")]
+        assert len({str(line._dash_pattern) for line in curves}) == len(curves)
+        assert all(line.get_linewidth() <= 0.8 for line in axes.lines)
+        assert max(to_rgb(curves[0].get_color())) < 0.6  # dark enough on white
+
+
+@pytest.mark.parametrize(("suffix", "page"), [(".svg", b'width="340.157'), (".pdf", b"340.157")])
+def test_vector_files_have_the_width(run, tmp_path, suffix: str, page: bytes) -> None:
+    """120 mm are 340.157 pt; a PNG has them by its dots."""
+    path = save_plot(run, tmp_path / f"run{suffix}", "torques", width_mm=120, style="paper")
+    assert page in path.read_bytes() and b"<image" not in path.read_bytes()
+    png = save_plot(run, tmp_path / "run.png", "torques", width_mm=127, dpi=100).read_bytes()
+    assert int.from_bytes(png[16:20], "big") == 500
+
+
+def test_many_remarks_leave_room_for_the_curves(run) -> None:
+    """The last line says where the others are."""
+    long = replace(run, outcome=replace(run.outcome, advice="take a smaller step, " * 90))
+    figure = plot(long)
+    assert figure.get_size_inches()[1] * MM <= 297 and "the summary has all remarks" in headings(figure)

@@ -1,4 +1,4 @@
-"""Geometry of real robots: each link fills the box of its files and stands on its collision shape."""
+"""Geometry of real robots: each link fills the box of its files, on the page too, and stands on its collision shape."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import robot_dyn as rd
 from robot_dyn import Robot
 from robot_dyn.description import description
 from robot_dyn.view import drawing
+from tests.browser import opened
 from tests.drawings import WRITTEN_FOR_GAZEBO, Z_UP, box, boxes, stated_boxes
 from tests.long import long
 
@@ -103,3 +104,18 @@ def test_every_link_with_a_visual_is_drawn(name: str) -> None:
         assert not mesh.vertices.flags.writeable
         assert len(piece.rgba) == 4
         assert all(0 <= x <= 1 for x in piece.rgba)
+
+
+@pytest.mark.parametrize("name, least", [("ur5", 7), *long([("panda", 10), ("kinova", 9), ("twodofs", 1)])])
+def test_each_link_fills_the_box_of_its_pieces(browser, name: str, least: int) -> None:
+    """In the browser's scene, placed by Pinocchio; single precision in a scene of about 1 m: 2e-6."""
+    arm = rd.load(name)
+    q = np.linspace(0.2, 0.7, arm.n)
+    points: dict[str, list[np.ndarray]] = {}
+    for piece in drawing(arm).pieces:
+        place = arm.placement(q, piece.link) @ piece.pose
+        points.setdefault(piece.link, []).append(piece.mesh.vertices @ place[:3, :3].T + place[:3, 3])
+    assert len(points) >= least
+    with opened(browser, rd.show(arm, q)) as view:
+        for link, places in points.items():
+            np.testing.assert_allclose(view.bounds(view.path(link)), box(np.concatenate(places)), atol=2e-6)

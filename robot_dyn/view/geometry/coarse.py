@@ -5,12 +5,14 @@ Source: Rossignac and Borrel, Multi-resolution 3D approximations for rendering c
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from robot_dyn.foundations.validate import choice
+from robot_dyn.model.robot import Robot
 from robot_dyn.shapes.triangles import Mesh, welded
 from robot_dyn.view.geometry.visuals import Drawing, drawing
 
@@ -31,10 +33,11 @@ def coarse(mesh: Mesh) -> Mesh:
     return welded(means[cell[mesh.faces]], None, *columns) or mesh  # which leaves out what has no area
 
 
-def look_of(meshes: str) -> Callable[..., Drawing]:
-    """What draws a robot, as `visuals.drawing`: with the meshes of its files, or coarse ones."""
+def look_of(robot: Robot, package_dirs: Iterable[str | Path], inertia: bool, meshes: str) -> Drawing:
+    """Return what draws a robot, with the meshes of its files or coarse ones."""
     choice("meshes", meshes, ("full", "coarse"))
-    return drawing if meshes == "full" else lambda *args, **options: _coarsened(drawing(*args, **options))
+    look = drawing(robot, package_dirs, inertia=inertia)
+    return look if meshes == "full" else _coarsened(look)
 
 
 def _coarsened(look: Drawing) -> Drawing:

@@ -76,6 +76,10 @@ class Drawing:
     remarks: tuple[str, ...] = ()
     boxes: tuple[Piece, ...] = ()
 
+    def seen(self, inertia: bool) -> tuple[Piece, ...]:
+        """The pieces that are shown at first."""
+        return self.pieces + self.boxes if inertia else self.pieces
+
 
 def drawing(robot: Robot, package_dirs: Iterable[str | Path] = (), *, inertia: bool = False) -> Drawing:
     """The pieces of every visual of a robot, wherever its mesh files can be found.
@@ -192,10 +196,9 @@ class _Artist:
 
     def stand_in(self, name: str, link: Any) -> tuple[list[Piece], str]:
         """The readable collision shapes of a link, otherwise the ellipsoid of its inertia; and which of them."""
-        where = f"collision shape of link {name!r}"
-        pieces, failed = self.shapes(name, link, "collision", where, _STAND_IN)
+        pieces, failed = self.shapes(name, link, "collision", _STAND_IN)
         if link.find("visual") is None:  # otherwise the note on the visual stands for both
-            self.notes += [f"{where}: {why}" for why in failed]
+            self.notes += [f"link {name!r}: <collision>: {why}" for why in failed]
         if pieces:
             return pieces, "the collision shape is"
         inertial = self.checked[name].find("inertial")
@@ -204,38 +207,34 @@ class _Artist:
         moment = {key: float(value) for key, value in inertial.find("inertia").items()}
         inertia = np.array([[moment[f"i{min(i, j)}{max(i, j)}"] for j in "xyz"] for i in "xyz"])
         mesh, axes = inertia_ellipsoid(mass, inertia)
-        pose = self.pose(inertial, f"inertia of link {name!r}") @ homogeneous(axes, np.zeros(3))
+        pose = self.pose(name, inertial) @ homogeneous(axes, np.zeros(3))
         return [Piece(name, pose, mesh, _STAND_IN)], "the ellipsoid of its inertia is"
 
-    def shapes(
-        self, name: str, link: Any, kind: str, where: str = "", color: Rgba | None = None
-    ) -> tuple[list[Piece], list[str]]:
+    def shapes(self, name: str, link: Any, kind: str, color: Rgba | None = None) -> tuple[list[Piece], list[str]]:
         """The pieces of all shapes of a kind that can be read, and why the others cannot."""
         pieces, failed = [], []
-        for each in link.iterfind(kind):
+        for element in link.iterfind(kind):
             try:
-                pieces += self.shape(name, each, where or f"link {name!r}", color)
+                pieces += self.shape(name, element, color)
             except MeshError as error:
                 failed.append(str(error))
         return pieces, failed
 
-    def shape(self, name: str, element: Any, where: str, color: Rgba | None = None) -> list[Piece]:
+    def shape(self, name: str, element: Any, color: Rgba | None) -> list[Piece]:
         """The pieces of a <visual> or <collision>."""
-        pose, (stated, texture) = self.pose(element, where), self.material(element, where)
-        parts = self.parts(elements.shape(element))
-        self._y_up += [(part.y_up, name, pose, part.mesh) for part in parts if part.y_up]
-        # As in rviz: a material of the mesh file wins over that of the URDF. [robot_link.cpp]
-        return [
-            Piece(name, pose, part.mesh, color or stated or GREY, texture if part.mesh.uv is not None else None)
-            if part.rgba is None
-            else Piece(name, pose, part.mesh, part.rgba, part.image)
-            for part in parts
-        ]
-
-    def parts(self, shape: Any) -> tuple[Part, ...]:
+        pose, (stated, texture) = self.pose(name, element), self.material(name, element)
+        shape = elements.shape(element)
         if shape.tag == "mesh":
-            return self.mesh(shape)
-        return (Part(self._primitive(shape.tag, elements.lengths(shape))),)
+            parts = self.mesh(shape)
+        else:
+            parts = (Part(self._primitive(shape.tag, elements.lengths(shape))),)
+        self._y_up += [(part.y_up, name, pose, part.mesh) for part in parts if part.y_up]
+        pieces = []
+        for part in parts:  # as in rviz, a material of the mesh file wins over that of the URDF [robot_link.cpp]
+            of_urdf = color or stated or GREY, None if part.mesh.uv is None else texture
+            look = of_urdf if part.rgba is None else (part.rgba, part.image)
+            pieces.append(Piece(name, pose, part.mesh, *look))
+        return pieces
 
     def mesh(self, element: Any) -> tuple[Part, ...]:
         address = element.get("filename")
@@ -249,14 +248,14 @@ class _Artist:
         self.notes += [f"mesh {shown(address)}: {complaint}; drawn without it" for complaint in complaints]
         return parts
 
-    def pose(self, element: Any, where: str) -> ndarray:
+    def pose(self, name: str, element: Any) -> ndarray:
         try:
             return elements.pose(element)
         except MeshError as error:
-            self.notes.append(f"{where}: {error}; drawn at the origin of the link")
+            self.notes.append(f"link {name!r}: {error}; drawn at the origin of the link")
             return np.eye(4)
 
-    def material(self, element: Any, where: str) -> tuple[Rgba | None, bytes | None]:
+    def material(self, name: str, element: Any) -> tuple[Rgba | None, bytes | None]:
         """Colour and texture that a visual names, or None."""
         material = element.find("material")
         if material is None:
@@ -272,5 +271,5 @@ class _Artist:
                 return (r, g, b, a), None
         except MeshError as error:
             what = f"texture {shown(address)}" if address else "material"
-            self.notes.append(f"{where}: {what}: {error}; drawn without it")
+            self.notes.append(f"link {name!r}: {what}: {error}; drawn without it")
         return None, None

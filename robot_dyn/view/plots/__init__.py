@@ -2,7 +2,7 @@
 
 plots.py    `plot` and `save_plot`
 parts.py    what a figure of a run shows, by name; batch.py that of rollouts
-sheet.py    the layout on a page, in mm
-figure.py   axes with curves, limits and scales; themes and styles
+sheet.py    panels of cells on a page, with their titles and legends
+figure.py   cells: axes with curves, limits and scales; themes and styles
 shown.py    a figure that a notebook shows
 """

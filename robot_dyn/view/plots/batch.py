@@ -19,13 +19,13 @@ from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import tracking_of
 from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.view.plots.figure import Axes, Style, named, scale
+from robot_dyn.view.plots.figure import LOST, TIME, Axes, Cell, Curve, Style
 from robot_dyn.view.plots.parts import PlotError
 from robot_dyn.view.plots.sheet import Panel, in_rows
 
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 _MOST_LINES = 100  # of runs that diverged
-_CELL_MM, _LOST = 42.0, 1  # the least width of a cell; colour of what diverged
+_CELL_MM = 42.0  # the least width of a cell
 
 
 @final
@@ -48,36 +48,6 @@ class BatchView:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Fan(Axes):
-    """Quantiles `bands` (levels, m) over t (m,), and `lost` (k, m), runs that diverged: lines up to a cross."""
-
-    t: np.ndarray
-    bands: np.ndarray
-    lost: np.ndarray
-
-    def fill(self, axes: Any, style: Style, diverged: bool) -> None:
-        """Draw them; what diverged leaves the scale of the others."""
-        colours = style.colours["lines"]
-        named(axes, self, style)
-        axes.plot(self.t, self.bands[2], color=colours[0], linewidth=style.line, label="median")
-        for low, high, alpha, label in ((1, 3, 0.4, "25 to 75 %"), (0, 4, 0.18, "5 to 95 %")):
-            between = self.bands[low], self.bands[high]
-            axes.fill_between(self.t, *between, color=colours[0], alpha=alpha, linewidth=0, label=label)
-        known = np.isfinite(self.bands).any()
-        scale(axes, "y", (self.bands if known else self.lost).ravel(), np.inf, diverged and not known, False)
-        low, high = axes.get_ylim()
-        for k, line in enumerate(self.lost[:_MOST_LINES]):
-            style_of = {"color": colours[_LOST], "linewidth": 0.6 * style.line, "linestyle": (0, (4, 2))}
-            axes.plot(self.t, line, label="_diverged" if k else f"diverged ({len(self.lost)})", **style_of)
-            if len(last := np.flatnonzero(np.isfinite(line))):
-                end = self.t[last[-1]], np.clip(line[last[-1]], low, high)
-                axes.plot(*end, "x", color=colours[_LOST], markersize=4, clip_on=False, label="_end")
-        scale(axes, "x", self.t[[0, -1]], np.inf, False, False)
-        axes.set_xlim(self.t[0], self.t[-1] if self.t[-1] > self.t[0] else self.t[0] + 1)
-
-
-@final
-@dataclass(frozen=True, eq=False)
 class Bars(Axes):
     """Counts between `edges`; `lost` of what diverged, beside them. Without edges each count has a name."""
 
@@ -89,47 +59,23 @@ class Bars(Axes):
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """Draw bars, with the count where they have names, and of what diverged."""
         colours, paper = style.colours["lines"], style.colours["paper"]
-        named(axes, self, style)
+        numbers = {"padding": 1, "fontsize": style.small - 0.5} | style.ink
+        hues = [colours[LOST if name == Ending.DIVERGED.value else 0] for name in self.names] or colours[0]
+        look = {"edgecolor": paper, "linewidth": 0.5, "label": "_counts"}
         if self.edges is None:
-            at, wide = np.arange(len(self.counts)), np.full(len(self.counts), 0.6)
+            at = np.arange(len(self.counts))
+            bars = axes.bar(at, self.counts, 0.6, color=hues, **look)
             axes.set_xticks(at, [drawable(name) for name in self.names])
             axes.set_xlim(-0.6, max(len(at), 4) - 0.4)
+            axes.bar_label(bars, **numbers)
         else:
-            at, wide = (self.edges[1:] + self.edges[:-1]) / 2, np.diff(self.edges)
-        hues = [colours[_LOST if name == Ending.DIVERGED.value else 0] for name in self.names] or colours[0]
-        bars = axes.bar(at, self.counts, wide, color=hues, edgecolor=paper, linewidth=0.5, label="_counts")
-        if self.edges is None:
-            axes.bar_label(bars, padding=1, fontsize=style.small - 0.5, **style.ink)
-        elif self.lost:
-            width = self.edges[-1] - self.edges[0]
-            look = {"color": colours[_LOST], "hatch": "///", "edgecolor": paper, "label": "_diverged"}
-            beyond = axes.bar([self.edges[-1] + 0.12 * width], [self.lost], 0.08 * width, **look)
-            axes.bar_label(beyond, [f"{self.lost} diverged"], padding=1, fontsize=style.small - 0.5, **style.ink)
+            axes.bar(self.edges[:-1], self.counts, np.diff(self.edges), align="edge", color=hues, **look)
+            if self.lost:
+                width = np.ptp(self.edges)
+                hatched = {"color": colours[LOST], "hatch": "///", "edgecolor": paper, "label": "_diverged"}
+                bars = axes.bar([self.edges[-1] + 0.12 * width], [self.lost], 0.08 * width, **hatched)
+                axes.bar_label(bars, [f"{self.lost} diverged"], **numbers)
         axes.set_ylim(0, 1.18 * max(1, *self.counts, self.lost))
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Points(Axes):
-    """y over x of each run; those that diverged are crosses at the upper edge, whatever their y."""
-
-    at: np.ndarray
-    values: np.ndarray
-    lost: np.ndarray
-
-    def fill(self, axes: Any, style: Style, diverged: bool) -> None:
-        """Draw them."""
-        colours, held = style.colours["lines"], ~self.lost
-        named(axes, self, style)
-        dots = {"linestyle": "", "markersize": 3, "rasterized": len(self.at) > 20_000}
-        axes.plot(self.at[held], self.values[held], marker="o", color=colours[0], label="run", **dots)
-        scale(axes, "y", self.values[held], np.inf, False, False)
-        scale(axes, "x", self.at, np.inf, False, False)
-        if self.lost.any():
-            edge = {"transform": axes.get_xaxis_transform(), "clip_on": False} | dots | {"markersize": 4}
-            many = int(self.lost.sum())
-            mark = {"marker": "x", "color": colours[_LOST], "label": f"diverged ({many})"}
-            axes.plot(self.at[self.lost], np.ones(many), **mark, **edge)
 
 
 def fan(view: BatchView) -> list[Panel]:
@@ -169,21 +115,11 @@ def outcomes(view: BatchView) -> list[Panel]:
     """How many runs finished, ended by an event, diverged, or were stopped."""
     runs = view.runs
     by_event = np.array([text != "" for text in runs.advice]) & ~runs.diverged & ~runs.stopped
-    other = ~(by_event | runs.diverged | runs.stopped)
-    kinds = (
-        ("finished", other),
-        ("ended by an event", by_event),
-        ("diverged", runs.diverged),
-        ("stopped", runs.stopped),
-    )
-    counts = {name: int(some.sum()) for name, some in kinds if some.any()}
-    return [
-        Panel(
-            "Outcomes",
-            ((Bars("", "outcome", "runs [1]", np.array(list(counts.values())), names=tuple(counts)),),),
-            30.0,
-        )
-    ]
+    kinds = {"ended by an event": by_event, "diverged": runs.diverged, "stopped": runs.stopped}
+    kinds = {"finished": ~np.any(list(kinds.values()), axis=0)} | kinds
+    counts = {name: int(some.sum()) for name, some in kinds.items() if some.any()}
+    bars = Bars("", "outcome", "runs [1]", np.array(list(counts.values())), names=tuple(counts))
+    return [Panel("Outcomes", ((bars,),))]
 
 
 def histogram(view: BatchView) -> list[Panel]:
@@ -194,7 +130,7 @@ def histogram(view: BatchView) -> list[Panel]:
         raise PlotError(f"no run that did not diverge has a {name}")
     counts, edges = np.histogram(values[some], bins=min(30, max(5, int(np.sqrt(some.sum()) * 1.5))))
     bars = Bars(_title(view, some), name, "runs [1]", counts, edges, lost=int(view.runs.diverged.sum()))
-    return [Panel(f"Histogram of {name}", ((bars,),), 34.0)]
+    return [Panel(f"Histogram of {name}", ((bars,),), 47.0)]
 
 
 def scatter(view: BatchView) -> list[Panel]:
@@ -209,8 +145,10 @@ def scatter(view: BatchView) -> list[Panel]:
         raise PlotError("scatter: no parameter and no start differs from run to run; name a column by x=")
     x, at = _column(runs, "x", view.x or varied[0], ())
     y, values = _column(runs, "y", view.y, ("tracking error", "largest", "ended"))
-    points = Points(_title(view, np.isfinite(values) & ~runs.diverged), x, y, at, values, runs.diverged)
-    return [Panel(f"{y} over {x}", ((points,),), 50.0)]
+    held = ~runs.diverged
+    points = (Curve("run", at[held], values[held], dots=True),)
+    cell = Cell(_title(view, np.isfinite(values) & held), x, y, points, lost=at[runs.diverged])
+    return [Panel(f"{y} over {x}", ((cell,),), 63.0)]
 
 
 BATCH_PLOTS: Mapping[str, Callable[[BatchView], list[Panel]]] = MappingProxyType(
@@ -220,19 +158,23 @@ BATCH_PLOTS: Mapping[str, Callable[[BatchView], list[Panel]]] = MappingProxyType
 
 def _fans(view: BatchView, what: str, names: list[tuple[str, str]], values: np.ndarray) -> Panel:
     """A fan of each column of values (B, m, c)."""
-    gone, cells = view.runs.diverged, []
+    t, gone = view.runs.t, view.runs.diverged
+    cells = []
     for k, (name, y) in enumerate(names):
-        held = values[~gone, :, k]
+        held, lost = values[~gone, :, k], values[gone, :, k]
         known = np.isfinite(held).any(axis=0)
-        bands = np.full((len(LEVELS), values.shape[1]), np.nan)
+        low, quarter, median, three_quarters, high = bands = np.full((len(LEVELS), len(t)), np.nan)
         if known.any():
             bands[:, known] = np.nanquantile(held[:, known], LEVELS, axis=0)
-        cells.append(Fan(name, "t [s]", y, view.runs.t, bands, values[gone, :, k]))
+        lines = tuple(Curve("_diverged", t, line, (LOST, LOST), is_scaled=False) for line in lost[:_MOST_LINES])
+        shades = (("25 to 75 %", quarter, three_quarters, 0.4), ("5 to 95 %", low, high, 0.18))
+        ends = np.array([t[np.isfinite(line)][-1] for line in lost if np.isfinite(line).any()])
+        cells.append(Cell(name, TIME, y, (Curve("median", t, median), *lines), bands=shades, lost=ends))
     rows = in_rows(cells, int(view.width / _CELL_MM))
-    early = int(((view.runs.ended < view.runs.t[-1]) & ~gone).sum())
+    early = int(((view.runs.ended < t[-1]) & ~gone).sum())
     counted = f"; {early} ended early, bands are of those still running" if early else ""
     many = f", {_MOST_LINES} of them drawn" if gone.sum() > _MOST_LINES else ""
-    return Panel(f"{what} of {int((~gone).sum())} runs{view.lost}{many}{counted}", rows, 28.0, shared=True)
+    return Panel(f"{what} of {int((~gone).sum())} runs{view.lost}{many}{counted}", rows)
 
 
 def _title(view: BatchView, some: np.ndarray) -> str:

@@ -6,7 +6,7 @@ Nothing global is set: no pyplot, no rcParams, so that figures can be drawn in a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
@@ -30,7 +30,8 @@ _GREYS = {"paper": "#ffffff", "ink": "#000000", "grid": "#e4e4e4", "veil": "#eee
     "lines": ("#000000", "#d55e00", "#0072b2", "#8c8c8c", "#009e73", "#e69f00", "#56b4e9")
 }
 _DASHES = ("-", (0, (4, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)))
-_STOP = 1  # colour of a rest at a stop
+LOST = 1  # colour of what diverged, and of a rest at a stop
+TIME = "t [s]"
 DESIRED = 1, 1  # colour and dashes of desired values
 
 
@@ -66,12 +67,21 @@ PAPER = Style(_GREYS, heading=8.0, small=7.5, line=0.8, titled=False)
 @final
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """y over x, both (m,); `style` numbers its colour and its dashes."""
+    """y over x, both (m,).
+
+    Attributes:
+        label: Its name in the legend; one that begins with _ has no entry there.
+        style: Numbers of its colour and its dashes.
+        dots: Whether its points are drawn, without a line.
+        is_scaled: Whether the axes have room for it.
+    """
 
     label: str
     x: np.ndarray
     y: np.ndarray
     style: tuple[int, int] = (0, 0)
+    dots: bool = False
+    is_scaled: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +90,8 @@ class Axes:
 
     Attributes:
         title: Text above them.
-        x, y: Names of the axes, with their units; without `x` it is that of the row below.
-        note: Small text beside the title.
+        x, y: Names of the axes, with their units.
+        note: Text after the title.
     """
 
     title: str
@@ -97,9 +107,17 @@ class Axes:
 @final
 @dataclass(frozen=True, eq=False)
 class Cell(Axes):
-    """Curves; `limit` is drawn at ±limit, `marks` as dotted lines, what lies after `until` is veiled.
+    """Curves and what explains them.
 
-    `rests` are shaded, those at a stop in colour.
+    Attributes:
+        curves: What is drawn; over time unless `x` names another quantity.
+        log: Whether y has a logarithmic scale.
+        limit: Drawn at ±limit.
+        until: What lies after this time is veiled.
+        marks: Times of events, dotted.
+        rests: Shaded, those at a stop in colour.
+        bands: Label, lower and upper edge over the x of the first curve, and opacity.
+        lost: x of runs that diverged, crosses at the upper edge.
     """
 
     curves: tuple[Curve, ...]
@@ -108,49 +126,56 @@ class Cell(Axes):
     until: float = np.inf
     marks: tuple[float, ...] = ()
     rests: tuple[Rest, ...] = ()
+    bands: tuple[tuple[str, np.ndarray, np.ndarray, float], ...] = ()
+    lost: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
-        """The curves, limits and scales."""
+        """Draw the curves, limits and scales."""
         theme, colours = style.colours, style.colours["lines"]
-        named(axes, self, style)
-        curves = [replace(curve, x=_shown(curve.x), y=_shown(curve.y)) for curve in self.curves]
-        log = self.log and any(np.any(curve.y > 0) for curve in curves)  # of zeros alone there is no logarithm
-        for curve in curves:
-            x, y = curve.x, np.where(curve.y > 0, curve.y, np.nan) if log else curve.y
-            at, (hue, dash) = _thinned(x, y), curve.style
-            shape = (
-                {"marker": "o", "markersize": 3.5}
-                if np.isfinite(y).sum() == 1
-                else {"linestyle": _DASHES[dash % len(_DASHES)]}
-            )
-            drawn = {"color": colours[hue % len(colours)], "linewidth": style.line, "rasterized": len(at) > 20_000}
-            axes.plot(x[at], y[at], label=drawable(shortened(curve.label, 30)), **drawn | shape)
+        log = self.log and any(np.any(curve.y > 0) for curve in self.curves)  # of zeros alone there is no logarithm
+        for curve in self.curves:
+            self._draw(curve, axes, style, log)
+        first = self.curves[0].x
+        for label, low, high, alpha in self.bands:
+            axes.fill_between(first, low, high, color=colours[0], alpha=alpha, linewidth=0, label=label)
         for level in (-self.limit, self.limit) if np.isfinite(self.limit) else ():
             axes.axhline(level, label="_limit", color=theme["ink"], alpha=0.7, linestyle=_DASHES[3], linewidth=0.6)
-        axes.vlines(
-            self.marks[:_MOST_MARKS], 0, 1, transform=axes.get_xaxis_transform(), color=theme["ink"], linewidth=0.6,
-            linestyle=":", label="_events",
-        )  # fmt: skip
-        for each in self.rests:
-            shade = {"color": colours[_STOP], "alpha": 0.25} if each.at_stop else {"color": theme["grid"]}
-            axes.axvspan(each.start, each.end, linewidth=0, zorder=0.5, label="_rest", **shade)
+        upright = {"transform": axes.get_xaxis_transform()}
+        dotted = {"color": theme["ink"], "linewidth": 0.6, "linestyle": ":"}
+        axes.vlines(self.marks[:_MOST_MARKS], 0, 1, label="_events", **dotted, **upright)
+        for rest in self.rests:
+            shade = {"color": colours[LOST], "alpha": 0.25} if rest.at_stop else {"color": theme["grid"]}
+            axes.axvspan(rest.start, rest.end, linewidth=0, zorder=0.5, label="_rest", **shade)
         if np.isfinite(self.until):
-            axes.axvspan(self.until, curves[0].x[-1], color=theme["veil"], zorder=0.5, label="_not resolved")
-        scale(axes, "y", np.concatenate([curve.y for curve in curves]), self.limit, diverged, log)
-        begin, end = curves[0].x[[0, -1]]
-        if self.x.startswith("q"):
-            scale(axes, "x", curves[0].x, np.inf, diverged, False)
-        else:
-            scale(axes, "x", np.array([begin, end]), np.inf, False, False)
+            axes.axvspan(self.until, first[-1], color=theme["veil"], zorder=0.5, label="_not resolved")
+        if len(self.lost):
+            crosses = {"linestyle": "", "marker": "x", "markersize": 4, "color": colours[LOST], "clip_on": False}
+            axes.plot(self.lost, np.ones(len(self.lost)), label=f"diverged ({len(self.lost)})", **crosses, **upright)
+        edges = [edge for _, low, high, _ in self.bands for edge in (low, high)]
+        y = np.concatenate([*edges, *(curve.y for curve in self.curves if curve.is_scaled)])
+        if not np.isfinite(y).any():
+            y = np.concatenate([curve.y for curve in self.curves])
+        scale(axes, "y", y, self.limit, diverged, log)
+        if self.x == TIME:
+            begin, end = first[[0, -1]]
+            scale(axes, "x", np.array([begin, end]))
             axes.set_xlim(begin, end if end > begin else begin + 1)
+        else:
+            scale(axes, "x", np.concatenate([first, self.lost]), np.inf, diverged)
 
-
-def named(axes: Any, cell: Axes, style: Style) -> None:
-    """Axes with their names. All colours are given to the axes: later ticks take them from there."""
-    framed(axes, style.colours, style.small - 0.5)
-    axes.tick_params(labelbottom=bool(cell.x), length=2, pad=2)
-    axes.set_xlabel(drawable(cell.x), labelpad=1, fontsize=style.small, **style.ink)
-    axes.set_ylabel(drawable(cell.y), fontsize=style.small, **style.ink)
+    @staticmethod
+    def _draw(curve: Curve, axes: Any, style: Style, log: bool) -> None:
+        """A line, or dots where it has none; a point alone is a dot."""
+        x, y = (np.where(np.abs(z) < _LARGEST, z, np.nan) for z in (curve.x, curve.y))
+        y = np.where(y > 0, y, np.nan) if log else y
+        if curve.dots or np.isfinite(y).sum() == 1:
+            shape = {"marker": "o", "markersize": 3, "linestyle": "", "rasterized": len(y) > 20_000}
+        else:
+            at = thinned(np.column_stack([x, y]), _PIXELS)
+            x, y, shape = x[at], y[at], {"linestyle": _DASHES[curve.style[1] % len(_DASHES)]}
+        hue = style.colours["lines"][curve.style[0] % len(style.colours["lines"])]
+        width = style.line if curve.is_scaled else style.line / 2
+        axes.plot(x, y, label=drawable(shortened(curve.label, 30)), color=hue, linewidth=width, **shape)
 
 
 def framed(axes: Any, theme: Mapping[str, Any], size: float) -> None:
@@ -163,20 +188,17 @@ def framed(axes: Any, theme: Mapping[str, Any], size: float) -> None:
     axes.tick_params(which="both", colors=theme["ink"], labelsize=size)
 
 
-def _shown(z: np.ndarray) -> np.ndarray:
-    """Return the numbers, nan beyond the range of an axis."""
-    return np.where(np.abs(z) < _LARGEST, z, np.nan)
-
-
-def scale(axes: Any, side: str, z: np.ndarray, limit: float, diverged: bool, log: bool) -> None:
+def scale(
+    axes: Any, side: str, z: np.ndarray, limit: float = np.inf, diverged: bool = False, log: bool = False
+) -> None:
     """Bounds that show all that is finite; ± the limit too, unless the curve would be flat between such far lines."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
     axis = getattr(axes, f"{side}axis")
-    z = z[np.isfinite(z) & (z > 0)] if log else z[np.isfinite(z)]
+    z = z[(np.abs(z) < _LARGEST) & (z > 0 if log else True)]
     size = np.abs(z[z != 0]) if np.any(z) else np.ones(1)
     low, high = (float(z.min()), float(z.max())) if len(z) else (-1.0, 1.0)
-    if log:
+    if log and len(z):
         axes.set_yscale("log")
         bounds = (
             10.0 ** max(np.floor(np.log10(np.quantile(z, 0.01, method="lower"))), -307),
@@ -194,38 +216,17 @@ def scale(axes: Any, side: str, z: np.ndarray, limit: float, diverged: bool, log
         middle = low / 2 + high / 2
         half = max(high / 2 - low / 2, 5e-4 * abs(middle)) or 1.0  # noise on a constant stays noise
         bounds = middle - 1.08 * half, middle + 1.08 * half
-        steps = [1, 2, 5, 10] if _small(bounds) else [1, 2, 2.5, 5, 10]  # −1.5e−3 would reach into the label
-        axis.set_major_locator(MaxNLocator(nbins=4, steps=steps))
+        axis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
     axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda x, _: _tick(x, _small(bounds))))
+    axis.set_major_formatter(FuncFormatter(lambda x, _: _tick(x, max(map(abs, bounds)) < 0.01)))
     getattr(axes, f"set_{side}lim")(*np.clip(bounds, -_LARGEST, _LARGEST))
 
 
-def _small(bounds: tuple[float, float]) -> bool:
-    """Whether numbers at an axis are shorter as powers of ten: 5e−4 in place of 0.0005."""
-    return max(map(abs, bounds)) < 0.01
-
-
-def _tick(x: float, small: bool) -> str:
-    """A number at an axis."""
-    if small and x:
-        mantissa, exponent = f"{x:.4e}".split("e")
-        return f"{float(mantissa):g}e{int(exponent)}".replace("-", "−")
-    return f"{x:.5g}".replace("e+0", "e").replace("e-0", "e-").replace("e+", "e").replace("-", "−")
-
-
-def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Which samples to draw of a long run: of each pixel's the least and the largest, so no peak is lost."""
-    if len(y) <= 4 * _PIXELS or np.all(x[1:] >= x[:-1]):
-        return thinned(y[:, None], _PIXELS)
-    moved = np.zeros(len(y), dtype=bool)
-    for z in (x, y):
-        size = np.abs(z[np.isfinite(z) & (z != 0)])
-        if len(size):  # of a run that diverged, what came before is as large in the picture
-            pixel = min(size.max(), _WILD * np.quantile(size, 0.25, method="lower")) / _PIXELS
-            moved |= np.diff(np.round(z / pixel), prepend=np.nan) != 0
-    moved[[0, -1]] = True
-    return np.flatnonzero(moved)
+def _tick(x: float, is_small: bool) -> str:
+    """A number at an axis: 5e−4 where numbers are small, otherwise up to five digits."""
+    scientific = x and (is_small or abs(x) >= 1e5)
+    text = np.format_float_scientific(x, 4, trim="-", exp_digits=1) if scientific else f"{x:.5g}"
+    return text.replace("e+", "e").replace("-", "−")
 
 
 def shortened(name: str, most: int) -> str:

@@ -16,12 +16,11 @@ from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate
 from robot_dyn.simulation.results.run_data import TrajectoryData
-from robot_dyn.view.plots.figure import DESIRED, NEAR, Cell, Curve
+from robot_dyn.view.plots.figure import DESIRED, NEAR, TIME, Cell, Curve
 from robot_dyn.view.plots.sheet import Panel, in_rows
 from robot_dyn.view.rests import Rest, rests
 
-_CELL_MM, _WIDE_MM = 36.0, 60.0  # the least width of a cell, and of one with a legend
-_HIGH_MM, _LOW_MM = 26.0, 19.0  # rows of details, and of the overview
+_CELL_MM, _WIDE_MM = 36.0, 60.0  # the least width of a cell, and of one with a long title
 
 
 class PlotError(RobotDynError):
@@ -73,32 +72,30 @@ def overview(view: View) -> list[Panel]:
     shown = [name for name in ("q", "v", "u", "error") if name in list(known)[: view.columns]]
     rows = []
     for i in view.joints:
-        x = "t [s]" if i == view.joints[-1] else ""
-        cells = [known[name](view, i, x, held[i]) for name in shown]
-        rows.append((replace(cells[0], title=run.joint_names[i]), *cells[1:]))
+        first, *others = (known[name](view, i, held[i]) for name in shown)
+        rows.append((first, *(replace(cell, title="") for cell in others)))
     limits = {name: values for name, values in (("v", view.speeds), ("u", view.efforts)) if name in shown}
     heading = f"Joints{_legend(view, held)}{_limits(view, **limits)}"
     heading += "; u is 0 throughout" if not run.u.any() else ""
     hidden = " and ".join(name for name in known if name not in shown)
     heading += f"; no room for {hidden}" if hidden else ""
-    panels = [Panel(heading, tuple(rows), _LOW_MM, shared=True)]
+    panels = [Panel(heading, tuple(rows), 24.0, every=len(rows))]
     if run.deviation is not None and run.desired is None:
         panels += tracking(view)
-    lower = [*_ledger(view), _residual(view)] if run.ledger.known else []
+    lower = _ledger(view) if run.ledger.known else []
     lower += [_growth(view, run.error)] if run.error is not None and len(run.error.t) > 1 else []
-    lower = [replace(cell, x="t [s]", y=cell.y[cell.y.index("[") :]) for cell in lower]  # titles name the quantity
+    lower = [replace(cell, y=cell.y[cell.y.index("[") :]) for cell in lower]  # titles name the quantity
     across = max(1, min(2, int(view.width / _WIDE_MM)))
-    return [*panels, Panel("", in_rows(lower, across), _LOW_MM)] if lower else panels
+    return [*panels, Panel("", in_rows(lower, across), 32.0)] if lower else panels
 
 
 def joints(view: View) -> list[Panel]:
     """Position and velocity of each joint, with the desired position where there is a reference, and its rests."""
     held = rests(view.run)
-    q = [_position(view, i, "", held[i]) for i in view.joints]
-    v = [_velocity(view, i, "t [s]", held[i]) for i in view.joints]
-    pairs = zip(in_rows(q, view.columns), in_rows(v, view.columns), strict=True)
+    q = in_rows([_position(view, i, held[i]) for i in view.joints], view.columns)
+    v = in_rows([replace(_velocity(view, i, held[i]), title="") for i in view.joints], view.columns)
     heading = f"Joint positions and velocities{_legend(view, held)}{_limits(view, v=view.speeds)}"
-    return [Panel(heading, tuple(row for pair in pairs for row in pair), _HIGH_MM, shared=True)]
+    return [Panel(heading, tuple(row for pair in zip(q, v, strict=True) for row in pair), 35.0, every=2)]
 
 
 def torques(view: View) -> list[Panel]:
@@ -109,8 +106,8 @@ def torques(view: View) -> list[Panel]:
     """
     if np.isnan(view.run.u).all():
         raise PlotError("the torques of the run were not recorded; add u to record of rollouts")
-    cells = [replace(_torque(view, i, "t [s]"), title=view.run.joint_names[i]) for i in view.joints]
-    return [Panel(f"Actuation{_limits(view, u=view.efforts)}", in_rows(cells, view.columns), _HIGH_MM)]
+    cells = [_torque(view, i) for i in view.joints]
+    return [Panel(f"Actuation{_limits(view, u=view.efforts)}", in_rows(cells, view.columns))]
 
 
 def energy(view: View) -> list[Panel]:
@@ -124,8 +121,8 @@ def energy(view: View) -> list[Panel]:
         raise PlotError("energy and work of the run were not recorded; add energy and work to record of rollouts")
     known = np.isfinite(ledger.residual).any() and np.isfinite(ledger.exchanged)
     part = f": the residual is {ledger.closure:.1e} of what was exchanged" if known and ledger.exchanges else ""
-    cells = [*_ledger(view), replace(_residual(view), x="t [s]")]
-    return [Panel(f"Energy ledger{part}", tuple((cell,) for cell in cells), 32.0)]
+    rows = in_rows(_ledger(view), 1)
+    return [Panel(f"Energy ledger{part}", rows, every=len(rows))]
 
 
 def tracking(view: View) -> list[Panel]:
@@ -142,14 +139,14 @@ def tracking(view: View) -> list[Panel]:
     if run.desired is None:
         columns, units = [0, 1, 2], ["m"] * 3
         each = zip("xyz", run.deviation.T, strict=True)
-        cells = [Cell(f"frame, {axis}", "t [s]", "p − p_d [m]", (Curve("error", run.t, y),)) for axis, y in each]
+        cells = [Cell(f"frame, {axis}", TIME, "p − p_d [m]", (Curve("error", run.t, y),)) for axis, y in each]
     else:
         columns, units = list(view.joints), [view.unit("q", i) for i in view.joints]
-        cells = [replace(_off(view, i, "t [s]"), title=run.joint_names[i], note="") for i in view.joints]
+        cells = [replace(_off(view, i), note="") for i in view.joints]
     off = run.deviation[:, columns]
     rms = {unit: _rms(off[:, [each == unit for each in units]]) for unit in dict.fromkeys(units)}
     heading = "Tracking error, rms " + ", ".join(f"{x:.2e} {unit}" for unit, x in rms.items())
-    return [Panel(heading, in_rows(cells, view.columns), _HIGH_MM)]
+    return [Panel(heading, in_rows(cells, view.columns))]
 
 
 def phase(view: View) -> list[Panel]:
@@ -159,7 +156,7 @@ def phase(view: View) -> list[Panel]:
         path = Curve("path", run.q[:, i], run.v[:, i])
         start = Curve("start", run.q[:1, i], run.v[:1, i], (1, 0))
         cells.append(Cell(name, f"q [{view.unit('q', i)}]", f"v [{view.unit('v', i)}]", (path, start)))
-    return [Panel("Phase portrait", in_rows(cells, view.columns), 40.0, shared=True)]
+    return [Panel("Phase portrait", in_rows(cells, view.columns), 53.0)]
 
 
 def error_growth(view: View) -> list[Panel]:
@@ -172,7 +169,7 @@ def error_growth(view: View) -> list[Panel]:
     if error is None or len(error.t) < 2:
         why = "estimate_error was False" if error is None else error.note or "it ended too soon"
         raise PlotError(f"the run has no estimate of its error ({why}); simulate with estimate_error=True")
-    return [Panel(f"Error of the positions: {error}", ((replace(_growth(view, error), title=""),),), 32.0)]
+    return [Panel(f"Error of the positions: {error}", ((replace(_growth(view, error), title=""),),))]
 
 
 PLOTS: Mapping[str, Callable[[View], list[Panel]]] = MappingProxyType(
@@ -180,51 +177,52 @@ PLOTS: Mapping[str, Callable[[View], list[Panel]]] = MappingProxyType(
 )
 
 
-def _position(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
+def _position(view: View, i: int, held: tuple[Rest, ...] = ()) -> Cell:
     run = view.run
     q = [Curve("actual", run.t, run.q[:, i])]
     if run.desired is not None:
         q.append(Curve("desired", run.t, run.desired[:, i], DESIRED))
-    return Cell(run.joint_names[i], x, f"q [{view.unit('q', i)}]", tuple(q), marks=_marks(run, i), rests=held)
+    return Cell(run.joint_names[i], TIME, f"q [{view.unit('q', i)}]", tuple(q), marks=_marks(run, i), rests=held)
 
 
-def _velocity(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
+def _velocity(view: View, i: int, held: tuple[Rest, ...] = ()) -> Cell:
     run, limit = view.run, float(view.speeds[i])
-    curves = (Curve("actual", run.t, run.v[:, i]),)
-    return Cell("", x, f"v [{view.unit('v', i)}]", curves, limit=limit, marks=_marks(run, i), rests=held)
+    curves, y = (Curve("actual", run.t, run.v[:, i]),), f"v [{view.unit('v', i)}]"
+    return Cell(run.joint_names[i], TIME, y, curves, limit=limit, marks=_marks(run, i), rests=held)
 
 
-def _torque(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
-    u, limit = view.run.u[:, i], float(view.efforts[i])
-    every = u if view.run.extremes is None else np.append(u, view.run.extremes[2, :, i])
-    peak = float(np.max(np.abs(every), where=np.isfinite(every), initial=0.0))
-    share = peak / limit
+def _torque(view: View, i: int, held: tuple[Rest, ...] = ()) -> Cell:
+    run, limit = view.run, float(view.efforts[i])
+    every = run.u[:, i] if run.extremes is None else np.append(run.u[:, i], run.extremes[2, :, i])
+    share = float(np.max(np.abs(every), where=np.isfinite(every), initial=0.0)) / limit
     used = "under 1%" if 0 < share < 0.005 else f"{share:.0%}" if share < 10 else "over 1000%"
     note = f"{used} of the limit" if np.isfinite(limit) else ""
-    return Cell("", x, f"u [{view.unit('u', i)}]", (Curve("u", view.run.t, u),), limit=limit, note=note)
+    curves = (Curve("u", run.t, run.u[:, i]),)
+    return Cell(run.joint_names[i], TIME, f"u [{view.unit('u', i)}]", curves, limit=limit, note=note)
 
 
-def _off(view: View, i: int, x: str, held: tuple[Rest, ...] = ()) -> Cell:
-    off = np.zeros_like(view.run.t) if view.run.deviation is None else view.run.deviation[:, i]
-    curves, of_q = (Curve("error", view.run.t, off),), view.unit("q", i)
-    return Cell("", x, f"q − q_d\n[{of_q}]", curves, note=f"rms {_rms(off):.2e} {of_q}")
+def _off(view: View, i: int, held: tuple[Rest, ...] = ()) -> Cell:
+    run, of_q = view.run, view.unit("q", i)
+    off = np.zeros_like(run.t) if run.deviation is None else run.deviation[:, i]
+    note = f"rms {_rms(off):.2e} {of_q}"
+    return Cell(run.joint_names[i], TIME, f"q − q_d\n[{of_q}]", (Curve("error", run.t, off),), note=note)
 
 
 def _ledger(view: View) -> list[Cell]:
+    """Energies, the work of each source if any was done, and the residual."""
     t, ledger = view.run.t, view.run.ledger
     E, V = ledger.energy, ledger.potential
     own = (("K", ledger.kinetic), ("V − V(0)", V - V[0]), ("E − E(0)", E - E[0]))
     stores = tuple(Curve(label, t, y, (i, i)) for i, (label, y) in enumerate(own))
-    works = tuple(Curve(f"W {name}", t, y, (i + 3, i)) for i, (name, y) in enumerate(ledger.work.items()))
+    works = tuple(  # the dashes of a colour that comes again are others
+        Curve(f"W {name}", t, y, (k, k - 3 + 2 * (k // 7))) for k, (name, y) in enumerate(ledger.work.items(), 3)
+    )
     sole = f" by {next(iter(ledger.work))}" if len(works) == 1 else ""
-    cells = [Cell("Energy since the start", "", "energy [J]", stores)]
-    done = any(np.nan_to_num(work.y).any() for work in works)
-    return [*cells, Cell(f"Work since the start{sole}", "", "work [J]", works)] if done else cells
-
-
-def _residual(view: View) -> Cell:
-    left = Curve("|residual|", view.run.t, np.abs(view.run.ledger.residual))
-    return Cell("Residual |E − E(0) − Σ W|", "", "residual [J]", (left,), log=True)
+    left = Curve("|residual|", t, np.abs(ledger.residual))
+    cells = [Cell("Energy since the start", TIME, "energy [J]", stores)]
+    if any(np.nan_to_num(work.y).any() for work in works):
+        cells.append(Cell(f"Work since the start{sole}", TIME, "work [J]", works))
+    return [*cells, Cell("Residual |E − E(0) − Σ W|", TIME, "residual [J]", (left,), log=True)]
 
 
 def _growth(view: View, error: ErrorEstimate) -> Cell:
@@ -232,7 +230,7 @@ def _growth(view: View, error: ErrorEstimate) -> Cell:
     of_q = units.pop() if len(units) == 1 else unit("q", None)
     until = error.until_s if error.until_s < error.t[-1] else np.inf
     curve = Curve("estimated error", error.t, error.error)
-    return Cell("Estimated error |q − exact|", "t [s]", f"|q − exact| [{of_q}]", (curve,), log=True, until=until)
+    return Cell("Estimated error |q − exact|", TIME, f"|q − exact| [{of_q}]", (curve,), log=True, until=until)
 
 
 def _marks(run: TrajectoryData, i: int) -> tuple[float, ...]:

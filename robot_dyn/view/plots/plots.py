@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from robot_dyn.description import description
+from robot_dyn.description.description import check
+from robot_dyn.description.edits import Edits
+from robot_dyn.description.structure import structure_of
 from robot_dyn.foundations import files
 from robot_dyn.foundations.errors import DescriptionError, QueryError, shorten
 from robot_dyn.foundations.errors import shown as text_of
@@ -144,7 +146,7 @@ def _of_batch(view: BatchView, parts: list[str], style: Style) -> Figure:
                     raise
     first, *more = view.runs.summary.splitlines()
     title = f"{view.runs.about.get('robot', 'runs')}: {first}"
-    return draw(panels, title, more[:-1], style, view.width, bool(view.runs.diverged.any()))
+    return draw(panels, title, more[:-1], style, view.width, bool(view.runs.diverged.all()))
 
 
 def _names(option: str, given: Any, of: str) -> tuple[str, ...]:
@@ -185,20 +187,18 @@ def _view(run: TrajectoryData, shown: Collection[str], limits: np.ndarray | None
     """Types of joints and limits by the URDF of the run; without one both units are named."""
     columns = _columns(run, shown)
     try:
-        element = description.check(run.about.get("urdf", "").encode(), "the run's URDF").element
-        of = {joint.get("name"): joint for joint in element.iterfind("joint")}
+        joints = structure_of(check(run.about.get("urdf", "").encode(), "the run's URDF"), Edits()).joints
     except DescriptionError:
-        of = {}
-    known = [of.get(name) for name in run.joint_names]
-    types = tuple(None if j is None else j.get("type") for j in known)
-    stated = {
-        key: np.array([np.inf if j is None else float(j.find("limit").get(key)) for j in known])
-        for key in ("effort", "velocity")
-    }
-    efforts = shaped("limits", stated["effort"] if limits is None else limits, run.joint_names).astype(float)
+        joints = {}
+    known = [joints.get(name) for name in run.joint_names]
+    stated, speeds = (
+        np.array([np.inf if j is None else getattr(j, key) or np.inf for j in known]) for key in ("effort", "velocity")
+    )
+    efforts = shaped("limits", stated if limits is None else limits, run.joint_names).astype(float)
     if efforts.ndim != 1:
         raise QueryError(f"limits must have shape ({len(known)},), got {efforts.shape}")
-    return View(run, columns, types, _known(efforts), _known(stated["velocity"]), width)
+    types = tuple(j and j.kind for j in known)
+    return View(run, columns, types, _known(efforts), _known(speeds), width)
 
 
 def _known(limits: np.ndarray) -> np.ndarray:

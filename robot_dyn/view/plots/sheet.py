@@ -11,43 +11,39 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, final
 
 from robot_dyn.foundations.display import drawable
-from robot_dyn.view.plots.figure import Axes, Style, shortened
+from robot_dyn.view.plots.figure import Axes, Style, framed, shortened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, FigureBase
 
 WIDTH_MM, LEAST_MM, MOST_MM = 180.0, 80.0, 1000.0
 A4_MM, MM = 297.0, 1 / 25.4
-_HEADING, _TITLE, _NUMBERS = 10.0, 5.0, 8.0  # [mm]: about what they take above a panel, above and below a row
-_BESIDE = 14.0  # [mm], about what numbers and the name of the y axis take
+_HEADING, _BESIDE = 10.0, 14.0  # [mm]: about what a heading and a legend take, and what the y axis of a cell takes
 _LETTER, _LINE, _HANDLE = 0.19, 0.5, 1.5  # [mm], of 1 pt: width of a letter, a line, beside the text of a legend
-_LEAST_ROW = 12.0  # [mm], with the room between rows
+_LEAST_ROW = 20.0  # [mm], with its title and its numbers
 _MOST_REMARKS = 5  # letters of remarks above the panels, in a mm of the width; all are in the summary
 
 
 @final
 @dataclass(frozen=True)
 class Panel:
-    """Rows of cells under a heading; each row is about `height` mm high, or less where the page is full.
+    """Rows of cells under a heading, and below them the legend of those that have several curves.
 
-    With `shared` the legend of the first cell is that of all, below them; else each cell has its own.
+    Attributes:
+        heading: What the cells show.
+        rows: Cells from the left to the right.
+        height: About how high a row is, with title and numbers, in [mm]; less where the page is full.
+        every: Number of rows that share the numbers and the name of x, below the last of them.
     """
 
     heading: str
     rows: tuple[tuple[Axes, ...], ...]
-    height: float = 24.0
-    shared: bool = False
+    height: float = 40.0
+    every: int = 1
 
-    def letters(self, width: float, text: float) -> int:
-        """Number of letters of a size in pt in a line above a cell, in a figure of a width in [mm]."""
-        return int((width / max(map(len, self.rows)) - _BESIDE) / (_LETTER * text))
-
-    def tall(self, height: float, width: float, text: float) -> float:
-        """About how high it is, in [mm], with rows of a height, in a figure of a width, with text of a size in pt."""
-        letters = self.letters(width, text)
-        lines = [max(_title(cell, letters).count("\n") for cell in row) for row in self.rows]
-        rows = sum(_TITLE + height + _NUMBERS * bool(row[0].x) for row in self.rows)
-        return _HEADING + rows + _LINE * text * sum(lines)
+    def tall(self, height: float) -> float:
+        """About how high it is, in [mm], with rows of a height."""
+        return _HEADING + height * len(self.rows)
 
 
 def in_rows(cells: Sequence[Axes], most: int) -> tuple[tuple[Axes, ...], ...]:
@@ -67,9 +63,8 @@ def draw(
         told = f"{told[: int(_MOST_REMARKS * width)]} … the summary has all remarks"
     lines = sum(1 + _LETTER * style.text * len(line) // width for line in f"{opening}\n{told}".split("\n"))
     above = lines * _LINE * style.text if style.titled else 0.0
-    heights = [panel.tall(panel.height, width, style.text) for panel in panels]
-    least = sum(panel.tall(_LEAST_ROW, width, style.text) for panel in panels)
-    tall = max(above + least, min(A4_MM, above + sum(heights)))
+    heights = [panel.tall(panel.height) for panel in panels]
+    tall = max(above + sum(panel.tall(_LEAST_ROW) for panel in panels), min(A4_MM, above + sum(heights)))
     figure = Figure((width * MM, tall * MM), 120, facecolor=style.colours["paper"], layout="constrained")
     body = figure.add_subfigure(figure.add_gridspec()[0])
     if style.titled:
@@ -93,40 +88,38 @@ def _draw(part: Any, panel: Panel, style: Style, width: float, diverged: bool) -
     if style.titled:
         headed(part, panel.heading, style.colours["ink"], fontsize=style.heading, weight="bold")
     across = max(map(len, panel.rows))
-    grid, letters = part.add_gridspec(len(panel.rows), across), panel.letters(width, style.text)
-    room = width / across - _BESIDE
+    grid, letters = part.add_gridspec(len(panel.rows), across), int((width / across - _BESIDE) / (_LETTER * style.text))
+    entries = {}
     for k, row in enumerate(panel.rows):
         for j, cell in enumerate(row):
             axes = part.add_subplot(grid[k, j])
+            framed(axes, style.colours, style.small - 0.5)
             cell.fill(axes, style, diverged)
-            lines = 0 if panel.shared else _legend(axes, axes, style, room, loc="lower left", bbox_to_anchor=(0, 1))
-            pad = 4 + 1.35 * style.small * lines
-            axes.set_title(drawable(_title(cell, letters)), loc="left", pad=pad, fontsize=style.text, **style.ink)
-    if panel.shared:
-        _legend(part, part.axes[0], style, width, loc="outside lower left")
+            has_x = (k + 1) % panel.every == 0
+            axes.tick_params(labelbottom=has_x, length=2, pad=2)
+            axes.set_xlabel(drawable(cell.x) if has_x else "", labelpad=1, fontsize=style.small, **style.ink)
+            axes.set_ylabel(drawable(cell.y), fontsize=style.small, **style.ink)
+            axes.set_title(drawable(_title(cell, letters)), loc="left", pad=4, fontsize=style.text, **style.ink)
+            handles, labels = axes.get_legend_handles_labels()
+            entries |= zip(labels, handles, strict=True) if len(labels) > 1 else ()
+    if entries:
+        _legend(part, entries, style, width)
 
 
 def _title(cell: Axes, letters: int) -> str:
     """The title of a cell and its note, in lines of at most `letters` letters; a long name takes two."""
-    name = shortened(cell.title, 2 * letters)
-    if len(name) > letters:
-        cut = max(name.rfind("_", 0, letters) + 1, len(name) - letters)
-        name = f"{name[:cut]}\n{name[cut:]}"
-    parts = [text for text in (name, fill(cell.note, letters)) if text]
-    return (", " if len(", ".join(parts)) <= letters else "\n").join(parts)
+    parts = [text for text in (shortened(cell.title, 2 * letters), cell.note) if text]
+    in_one = ", ".join(parts)
+    return in_one if len(in_one) <= letters else "\n".join(fill(text, letters) for text in parts)
 
 
-def _legend(owner: Any, axes: Any, style: Style, room: float, **place: Any) -> int:
-    """The legend of curves that have names, and how many lines it has; 0 if there is a single one."""
-    handles, labels = axes.get_legend_handles_labels()
-    if len(labels) < 2:
-        return 0
-    wide = (_LETTER * max(map(len, labels)) + _HANDLE) * style.small
-    across = min(max(1, int(room / wide)), len(labels))
-    legend = owner.legend(
-        handles, labels, ncols=across, frameon=False, fontsize=style.small, borderpad=0, borderaxespad=0.5,
-        handlelength=2.2, handletextpad=0.5, columnspacing=1.2, labelspacing=0.25, **place,
+def _legend(part: Any, entries: dict[str, Any], style: Style, width: float) -> None:
+    """The legend of a panel below it, in as many columns as its width takes."""
+    wide = (_LETTER * max(map(len, entries)) + _HANDLE) * style.small
+    legend = part.legend(
+        entries.values(), entries.keys(), ncols=min(max(1, int(width / wide)), len(entries)), frameon=False,
+        loc="outside lower left", fontsize=style.small, borderpad=0, borderaxespad=0.5, handlelength=2.2,
+        handletextpad=0.5, columnspacing=1.2, labelspacing=0.25,
     )  # fmt: skip
     for label in legend.get_texts():
         label.set(**style.ink)
-    return -(-len(labels) // across)
