@@ -30,16 +30,16 @@ from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.cache import machine_code
 from robot_dyn.simulation.compiled.choice import checked
 from robot_dyn.simulation.results.acting import frame_of, rotors_of
-from robot_dyn.simulation.results.provenance import edits_of_machine_code
+from robot_dyn.simulation.results.provenance import edits_of_machine_code, origin
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.rollouts.one_by_one import one_by_one
 from robot_dyn.simulation.rollouts.overview import causes
 from robot_dyn.simulation.rollouts.result import Rollouts
-from robot_dyn.simulation.rollouts.thresholds import Thresholds, thresholds
+from robot_dyn.simulation.rollouts.thresholds import Thresholds
 from robot_dyn.simulation.setup.checks import check_stops
 from robot_dyn.simulation.setup.options import Options, setup_of, takes_options
-from robot_dyn.simulation.setup.setup import MOST_BYTES, Setup
+from robot_dyn.simulation.setup.setup import MOST_BYTES, Setup, check_batch
 
 LARGEST_NUMBER = 2**53  # of a run
 RECORDS = ("q", "v", "u", "energy", "work")
@@ -123,8 +123,7 @@ def rollouts(
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
     batch = batch_of(setup, q0, v0, params or {}, record, numbers)
-    passed = None if _why_one_by_one(setup) else thresholds(setup, batch.sweep, len(batch))
-    runs = run_batch(batch, passed, truth("cuts", cuts), thread_count(threads), most_bytes, on_progress)
+    runs = run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), most_bytes, on_progress)
     return replace(runs, advice=causes(replace(runs, setup=setup)))
 
 
@@ -146,13 +145,12 @@ def _numbers(given: Any, count: int) -> np.ndarray:
 
 
 def manners(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
-    """The runs of a batch in groups of which each is run in one manner whatever runs are beside it, with thresholds.
+    """Return the runs of a batch in groups that go alike, with thresholds.
 
     A batch in which some run has a threshold detects what passes it; its runs without any go apart from it, as they go
     in a batch of such runs alone.
     """
-    runs = np.arange(len(batch))
-    passed = None if _why_one_by_one(batch.setup) else thresholds(batch.setup, batch.sweep, len(batch))
+    runs, passed = np.arange(len(batch)), batch.thresholds
     if passed is None or passed.some.all():
         return [(runs, passed)]
     with_some = runs[passed.some]
@@ -163,46 +161,33 @@ def run_batch(
     batch: Batch, passed: Thresholds | None, cuts: bool, threads: int, most_bytes: int,
     on_progress: Callable[[float], object] | None = None,
 ) -> Rollouts:  # fmt: skip
-    """The runs of a batch with thresholds `passed`, as of `rollouts`, but for the causes of their divergence."""
-    setup = batch.setup
-    why = _why_one_by_one(setup)
+    """Return the rollouts of a batch with thresholds `passed`, without the causes of their divergence."""
+    setup, why = batch.setup, batch.why_one_by_one
     if not cuts and why:
         raise QueryError(f"cuts=False: {why}, and so the runs go one after the other; leave it out")
+    check_batch(setup, len(batch), sum(batch.sizes.values()), most_bytes)
     cut = passed is not None or setup.finds_events  # samples are then interpolated within steps, which lock step cannot
     if why or (cuts and cut and not setup.samples_on_steps):
-        runs = one_by_one(batch, most_bytes, threads, on_progress)
+        record = one_by_one(batch, threads, on_progress)
     else:
-        runs = _side_by_side(batch, passed if cuts else None, most_bytes).run(threads, on_progress)
-        if passed is not None and not cuts:
-            runs = replace(runs, uncut=passed.names)
-    return replace(runs, about=frame_of(setup) | rotors_of(setup) | edits_of_machine_code(setup) | runs.about)
-
-
-def _why_one_by_one(setup: Setup) -> str:
-    """Why runs of a setup do not go in lock step; "" if they do."""
-    motion, method = setup.plant.equation_of_motion, setup.integrator
-    if method.controls_error:
-        return f"{method.name} chooses its steps"
-    if setup.engine == "interpreted":
-        return "the engine is interpreted"
-    if motion.set_valued and not method.nonsmooth:
-        return f"{motion.set_valued[0].name} holds joints and lets them go, where steps must end"
-    if motion.payloads:
-        return f"{motion.payloads[0].name} comes and goes, where steps must end"
-    return "steps end at events" if setup.events else ""
-
-
-def _side_by_side(batch: Batch, passed: Thresholds | None, most: int) -> Tiles:
-    """The runs in lock step, of which those that pass a threshold are repeated one by one."""
-    setup, recorded = batch.setup, batch.recorded
-    equation = setup.equation
-    from_code = ("u", "v", "energy") if equation.canonical else ("u", "energy")
-    extras = tuple(name for name in from_code if name in recorded)
-    build = partial(
-        machine_code, equation, setup.integrator, lanes=LANES, extras=extras, swept=tuple(batch.sweep),
-        detects=passed is not None,
+        build = partial(
+            machine_code, setup.equation, setup.integrator, lanes=LANES, extras=batch.extras,
+            swept=tuple(batch.sweep), detects=passed is not None and cuts,
+        )  # fmt: skip
+        record = Tiles(batch, checked(setup, build), passed if cuts else None).run(threads, on_progress)
+    columns, sources = record.columns, tuple(setup.equation.sources)
+    energy, work = columns.get("energy"), columns.get("work")
+    about = frame_of(setup) | rotors_of(setup) | edits_of_machine_code(setup) | origin(setup.plant.dynamics)
+    return Rollouts(
+        joint_names=setup.plant.dynamics.joint_names, t=record.t, q=columns.get("q"), v=columns.get("v"),
+        u=columns.get("u"), kinetic=None if energy is None else energy[..., 0],
+        potential=None if energy is None else energy[..., 1],
+        work=None if work is None else dict(zip(sources, np.moveaxis(work, -1, 0), strict=True)),
+        ended=record.ended, diverged=record.diverged, stopped=record.stopped, advice=tuple(record.advice),
+        steps=record.steps, evaluations=record.evaluations, statistics=record.statistics, sources=sources,
+        about=about | setup.about, params=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
+        observed=record.observed, numbers=batch.numbers, uncut=() if cuts or passed is None else passed.names,
     )  # fmt: skip
-    return Tiles(batch, checked(setup, build), extras, most, passed)
 
 
 def _recorded(record: Any) -> tuple[str, ...]:
