@@ -141,7 +141,9 @@ def _more(found: MotorBudget, max_payload: str | None, fastest: bool, share: flo
     more: dict[str, Any] = {}
     if max_payload is not None:
         with bar(what="looking for the largest payload"):
-            more["max_payload"] = found.max_payload(*arguments.link_and_place("--max-payload", max_payload))
+            more["max_payload"] = rd.tools.motors.max_payload(
+                found, *arguments.link_and_place("--max-payload", max_payload)
+            )
     if fastest:
         with bar(what="looking for the fastest motion"):
             more["fastest"] = rd.tools.motors.fastest(found, share)

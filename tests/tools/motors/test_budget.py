@@ -15,7 +15,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import EditError, EffectError, MissingExtraError, PlanError, QueryError
-from robot_dyn.tools.motors import budget, fastest
+from robot_dyn.tools.motors import budget, fastest, max_payload
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, X
 from robot_dyn.tools.motors.motor_budget.pace import least_pace
 from tests.cli.test_command_documents import PROMISE, names
@@ -180,7 +180,7 @@ def test_a_limit_that_is_passed_is_named_with_the_cause_that_asks_for_it() -> No
 def test_the_largest_payload_is_that_of_budgets_with_many_masses(continuous) -> None:
     """Every mass up to it fits, none of those beyond; with it a limit is reached to 1e-9."""
     plant, com = rd.Plant(UR5, FRICTION), (0.1, 0.02, 0.08)
-    found = budget(PLAN, plant, continuous=continuous).max_payload("wrist_3_link", com)
+    found = max_payload(budget(PLAN, plant, continuous=continuous), "wrist_3_link", com)
     assert found.mass is not None and found.least == 0.0
     assert found.limit in (("continuous torque",) if np.ndim(continuous) else ("peak torque", "break-away torque"))
     assert found.largest_share == pytest.approx(1.0, abs=1e-9)
@@ -203,7 +203,7 @@ def test_the_payload_of_a_held_rod_balances_its_weight(side: int, kind: str) -> 
     per_mass = float(ROD.with_(payload=rd.Payload("bar", 1.0, (0.0, 0.0, -side * x))).N(np.array([q]))[0]) - N
     assert abs(per_mass) == pytest.approx(9.80665 * x * np.sin(q), rel=1e-9)
     judged = budget(rd.control.hold([q]), ROD, **({"effort": np.inf} | {kind: limit}))
-    found = judged.max_payload("bar", (0.0, 0.0, -side * x))
+    found = max_payload(judged, "bar", (0.0, 0.0, -side * x))
     least, most = sorted(((limit - N) / per_mass, (-limit - N) / per_mass))
     if most < 0:
         assert found.mass is None and found.joint == ROD.joint_names[0]
@@ -214,8 +214,8 @@ def test_the_payload_of_a_held_rod_balances_its_weight(side: int, kind: str) -> 
 def test_the_largest_payload_counts_what_is_carried_already() -> None:
     """The same place: the mass in all is that of the arm without it."""
     motion, com = rd.control.hold([0.8]), (0.0, 0.0, -0.4)
-    alone = budget(motion, ROD, effort=15.0).max_payload("bar", com)
-    found = budget(motion, ROD, payload=rd.Payload("bar", 0.3, com), effort=15.0).max_payload("bar", com)
+    alone = max_payload(budget(motion, ROD, effort=15.0), "bar", com)
+    found = max_payload(budget(motion, ROD, payload=rd.Payload("bar", 0.3, com), effort=15.0), "bar", com)
     assert found.mass is not None and alone.mass is not None and (alone.carried, found.carried) == (0.0, 0.3)
     assert found.mass + found.carried == pytest.approx(alone.mass, rel=1e-9)
     assert f"{found.mass:.5g} kg more, {alone.mass:.5g} kg in all" in repr(found) and "more," not in repr(alone)
@@ -223,12 +223,12 @@ def test_the_largest_payload_counts_what_is_carried_already() -> None:
 
 def test_no_payload_fits_where_speed_is_passed_and_any_where_nothing_limits() -> None:
     motion = rd.control.quintic([0.2], [0.9], 0.5)
-    fast = budget(motion, ROD, effort=100.0, velocity=1.0).max_payload("bar")
+    fast = max_payload(budget(motion, ROD, effort=100.0, velocity=1.0), "bar")
     assert fast.mass is None and fast.limit == "speed" and "no payload" in repr(fast)
-    free = budget(motion, ROD, effort=np.inf, velocity=np.inf).max_payload("bar")
+    free = max_payload(budget(motion, ROD, effort=np.inf, velocity=np.inf), "bar")
     assert free.mass == np.inf and "no limit" in repr(free)
     with pytest.raises(EditError, match="no frame 'nowhere'"):
-        budget(motion, ROD, effort=9.0).max_payload("nowhere")
+        max_payload(budget(motion, ROD, effort=9.0), "nowhere")
 
 
 def test_an_effect_that_knows_the_mass_of_the_arm_has_no_closed_form_and_says_so() -> None:
@@ -238,7 +238,7 @@ def test_an_effect_that_knows_the_mass_of_the_arm_has_no_closed_form_and_says_so
 
     plant = rd.Plant(ROD, [Heavy()])
     with pytest.raises(QueryError, match="not affine in the mass"):
-        budget(rd.control.quintic([0.3], [0.9], 1.0), plant, effort=50.0).max_payload("bar", (0.0, 0.0, -0.4))
+        max_payload(budget(rd.control.quintic([0.3], [0.9], 1.0), plant, effort=50.0), "bar", (0.0, 0.0, -0.4))
 
 
 def followed(plant: rd.Plant, **options: Any) -> rd.Trajectory:
@@ -294,7 +294,7 @@ def test_what_has_no_budget_is_refused() -> None:
         (lambda: budget(run, ROD), QueryError, "has its own plant"),
         (lambda: budget(run, payload=LOAD), QueryError, "has its own payload"),
         (
-            lambda: budget(run).max_payload("bar"),
+            lambda: max_payload(budget(run), "bar"),
             QueryError,
             "this budget is of a run: give its motion",
         ),
@@ -421,7 +421,7 @@ def test_a_budget_needs_no_extra_and_the_fastest_motion_says_which(monkeypatch) 
     for name in ("toppra", "ruckig", "pandas", "xarray", "pyarrow", "mcap"):
         monkeypatch.setitem(sys.modules, name, None)
     found = budget(PLAN, UR5)
-    assert found.fits and found.max_payload("wrist_3_link").mass
+    assert found.fits and max_payload(found, "wrist_3_link").mass
     for name in [each for each in sys.modules if each.startswith("toppra.")]:
         monkeypatch.delitem(sys.modules, name)
     with pytest.raises(MissingExtraError, match=r"robot-dyn\[plan\]"):
@@ -467,7 +467,7 @@ def test_the_document_of_the_command_has_the_keys_of_its_page(files: Path) -> No
     assert all(each.keys() == promised_keys(of_joints=True).keys() for each in found["joints"])
     assert found["max_payload"].keys() == names(keys["max_payload"].partition(": ")[2])
     assert found["joints"][1]["headroom"].keys() == {"peak", "continuous", "speed"}
-    own = budget(rd.control.from_samples(UR5, files / "plan.csv"), UR5).max_payload("wrist_3_link", (0.1, 0.0, 0.05))
+    own = max_payload(budget(rd.control.from_samples(UR5, files / "plan.csv"), UR5), "wrist_3_link", (0.1, 0.0, 0.05))
     assert found["max_payload"]["mass"] == pytest.approx(own.mass, rel=1e-12)
 
 

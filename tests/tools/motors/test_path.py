@@ -213,7 +213,7 @@ def test_what_depends_on_time_or_has_states_is_refused_by_name(effect: rd.effect
         ("ur5", [[0.1] * 5] * 2, {}, "shape"),
         ("ur5", [[0.1] * 6, [0.1] * 6, [0.3] * 6], {}, "equal"),
         ("planar_2r", [[0.3, -0.4], [0.7, 1e308]], {}, r"points must be within 1e\+100 rad or m, got 1e\+308"),
-        ("ur5", [[0.1] * 6, [9.0] * 6], {}, "beyond its limits"),
+        ("ur5", [[0.1] * 6, [9.0] * 6], {}, "outside its limits"),
         ("ur5", [[0.1] * 6, [0.5] * 6], {"share": 1.2}, "at most 1"),
         ("ur5", [[0.1] * 6, [0.5] * 6], {"effort": {"elbow": 3.0}}, "elbow"),
         ("ur5", [[0.1] * 6, [0.5] * 6], {"effort": 3.0}, "'shoulder_lift_joint' needs"),

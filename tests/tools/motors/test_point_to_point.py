@@ -114,7 +114,7 @@ def test_a_run_follows_it() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"q1": np.full(6, 7.0)}, "shoulder_pan_joint would be at 7 rad at .* s, above its limit 6.28319 rad"),
+        ({"q1": np.full(6, 7.0)}, "shoulder_pan_joint is at 7 rad at .* s, outside its limits -6.28319 to 6.28319"),
         ({"v0": np.full(6, 9.0)}, "v0: shoulder_pan_joint moves at 9 rad/s, beyond its limit 3.15"),
         ({"q1": np.zeros(6)}, "nothing moves"),
         ({"acceleration": np.inf}, "acceleration must be finite"),

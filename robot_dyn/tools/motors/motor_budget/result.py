@@ -1,23 +1,20 @@
-"""What a motion asks of the motors of an arm, as text, tables and JSON, and the payload that still fits."""
+"""What a motion asks of the motors of an arm, as text, tables and JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Any, ClassVar, final
+from typing import Any, ClassVar, final
 
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial
-from robot_dyn.foundations import UNREPORTED, Block, QueryError, Table, number_or_dash, reported
+from robot_dyn.foundations import UNREPORTED, Block, QueryError, Table, instance, number_or_dash, reported
 from robot_dyn.queries import of_joint, without_rounding
 from robot_dyn.report import Result
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.demand import Demand
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
-
-if TYPE_CHECKING:
-    from robot_dyn.tools.motors.motor_budget.largest_payload import LargestPayload
 
 
 @final
@@ -35,7 +32,7 @@ class MotorBudget(Result):
         error: Largest difference of two rules of integration, as a part of the mean τ² or |τ v|; the better one counts.
         findings: What is doubtful, each with its remedy.
         demand: Torque by cause and velocity at the times that were looked at.
-        case: The plant, the motion and the limits of torque and speed, and of continuous torque, of a plan; else None.
+        case: The plant, the motion and the limits of a plan; else None.
     """
 
     diagram: ClassVar[str] = "robot_dyn.tools.motors.motor_budget.diagram"
@@ -54,7 +51,7 @@ class MotorBudget(Result):
     left_out: tuple[str, ...]
     environment: dict[str, str]
     demand: Demand = field(metadata=UNREPORTED)
-    case: tuple[Plant, PiecewisePolynomial, Limits, Any] | None = field(metadata=UNREPORTED)
+    case: tuple[Plant, PiecewisePolynomial, Limits] | None = field(metadata=UNREPORTED)
     interrupted: bool = False
 
     @reported
@@ -141,33 +138,16 @@ class MotorBudget(Result):
         at = ("at t [s]",) if key == "of_peak" else ()
         return Table(("joint", "unit", *at, what, *names), tuple(rows), digits=4)
 
-    def max_payload(self, link: str, com: Any = (0.0, 0.0, 0.0)) -> LargestPayload:
-        """The largest point mass on a link with which the motors suffice, besides what the arm carries.
 
-        Torque is affine in it, so the masses that fit are an interval, in closed form at each time; where the torque
-        peaks between times is found again with that mass, until no limit is passed.
-
-        Args:
-            link: The link that carries it.
-            com: Where, in the axes of the link, (3,), in [m].
-
-        Raises:
-            QueryError: If the budget is of a run, whose control would change as well.
-            EditError: If there is no such link.
-        """
-        from robot_dyn.tools.motors.motor_budget.largest_payload import largest_payload
-
-        return largest_payload(*case_of(self, "the largest payload"), link=link, com=com)
-
-
-def case_of(found: MotorBudget, what: str) -> tuple[Plant, PiecewisePolynomial, Limits, Any]:
-    """The case of a plan; QueryError for a run, of which what is asked for is not known."""
-    if found.case is None:
+def case_of(motor_budget: MotorBudget, what: str) -> tuple[Plant, PiecewisePolynomial, Limits]:
+    """Return the plant, the motion and the limits of the budget of a plan; QueryError for that of a run."""
+    instance("motor_budget", motor_budget, MotorBudget, "give that of a plan, as rd.tools.motors.budget(plan, arm)")
+    if motor_budget.case is None:
         raise QueryError(
             f"{what} is of a plan, this budget is of a run: give its motion,"
             " rd.tools.motors.budget(rd.control.from_samples(arm, run.table(), ends='measured'), plant)"
         )
-    return found.case
+    return motor_budget.case
 
 
 def _known(x: float) -> str:

@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robot_dyn import Robot
-from robot_dyn.control import PiecewisePolynomial, Plan, extreme_values
+from robot_dyn.control import PiecewisePolynomial, Plan
 from robot_dyn.foundations import PlanError, instance, needs, number, numbers, one_state
 from robot_dyn.queries import of_joint
+from robot_dyn.tools.motors.limits import outside_positions
 
 _SAME = 1e-12  # of the duration: breaks of two joints that differ by their rounding
-_BEYOND = 1e-9  # of a position limit [rad, m] that rounding may pass
 
 
 class _Segment(NamedTuple):
@@ -76,24 +76,9 @@ def point_to_point(
         raise PlanError("acceleration must be finite: the file of a robot states none, motors have one")
     _check_ends(arm, ends, rates, limits["velocity"])
     reference = _merged([list(_segments(each)) for each in _profiles(ends, rates, limits)], start_s)
-    check_positions(arm, reference)
+    for where in outside_positions(arm, reference):
+        raise PlanError(f"{where}; change the ends or their velocities")
     return Plan(arm.name, arm.joint_names, arm.joint_types, reference, "from point to point, by ruckig", limits)
-
-
-def check_positions(arm: Robot, reference: PiecewisePolynomial) -> None:
-    """Raise PlanError, with joint, time and value, if a motion leaves the position limits."""
-    found = extreme_values(reference)
-    for low, bounds, values, times in (
-        (True, arm.lower, found.least, found.at_least),
-        (False, arm.upper, found.greatest, found.at_greatest),
-    ):
-        beyond = (bounds - values if low else values - bounds) > _BEYOND
-        for i in np.flatnonzero(beyond)[:1]:
-            unit = of_joint("rad", arm.joint_types[i])
-            raise PlanError(
-                f"{arm.joint_names[i]} would be at {values[i]:.6g} {unit} at {times[i]:.4g} s, "
-                f"{'below' if low else 'above'} its limit {bounds[i]:.6g} {unit}; change the ends or their velocities"
-            )
 
 
 def _of_joints(name: str, values: Any, shape: tuple[int], *, limit: bool = False) -> np.ndarray:
