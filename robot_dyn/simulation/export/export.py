@@ -14,7 +14,7 @@ from robot_dyn.simulation.columns import EXTRA, Column
 from robot_dyn.simulation.export import mcap_log, tables
 from robot_dyn.simulation.results.run_data import RunData
 from robot_dyn.simulation.results.run_file import RunFileError
-from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 
 
 @final
@@ -61,7 +61,7 @@ def export(run: RunData, path: str | Path) -> Path:
     if not isinstance(run, RunData):
         raise RunFileError(f"export takes a Trajectory of rd.simulate, or Rollouts, got {shown(run)}")
     path = file_path(path, RunFileError)
-    if isinstance(run, Rollouts) and path.suffix.lower() == _LOG.kind.suffix:
+    if isinstance(run, RolloutsData) and path.suffix.lower() == _LOG.kind.suffix:
         raise RunFileError(f"{path}: a log is of one run, and these are {len(run)}; give one of them, such as runs[0]")
     path = target(path, kinds(run), RunFileError)
     form = _formats(run)[path.suffix.lower()]
@@ -73,4 +73,4 @@ def export(run: RunData, path: str | Path) -> Path:
 
 def _formats(run: RunData) -> Mapping[str, Format]:
     """By suffix."""
-    return {each.kind.suffix: each for each in (_OF_RUNS if isinstance(run, Rollouts) else _OF_RUN)}
+    return {each.kind.suffix: each for each in (_OF_RUNS if isinstance(run, RolloutsData) else _OF_RUN)}

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, final
+from dataclasses import replace
 
 import numpy as np
 
 from robot_dyn.effects.dry_friction import DryFriction
 from robot_dyn.foundations.coefficients import with_values
-from robot_dyn.foundations.store import Layout
-from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, jumps
 from robot_dyn.simulation.diagnostics.step_remarks import KINDS, Units, against, of_reference, of_steps, units_of
@@ -21,33 +18,14 @@ from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_square, tracking_of
+from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 from robot_dyn.simulation.setup.setup import Setup
-
-if TYPE_CHECKING:
-    from robot_dyn.simulation.rollouts.result import Rollouts
 
 OF_REFERENCES = RemarkKind.JUMPS, RemarkKind.HELD
 _JUDGED = 8  # runs that diverged: each loop is linearised about a start of its own
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Overview(Value):
-    """The overview of a batch.
-
-    Attributes:
-        worst, remarks, tracking_error: See `Rollouts`.
-    """
-
-    worst: int
-    remarks: tuple[Remark, ...]
-    tracking_error: Annotated[np.ndarray, Layout(("B",))] | None
-
-    def __post_init__(self) -> None:
-        read_only(self)
-
-
-def overview(runs: Rollouts) -> Overview:
+def overview(runs: RolloutsData) -> Overview:
     """Of runs with their setup."""
 
     def remedy(run: int) -> Callable[[Episode], str]:
@@ -62,7 +40,7 @@ def overview(runs: Rollouts) -> Overview:
     return Overview(worst, remarks, errors)
 
 
-def remarks_on_each(runs: Rollouts) -> tuple[Remark, ...]:
+def remarks_on_each(runs: RolloutsData) -> tuple[Remark, ...]:
     """The remarks that a run has whatever the others of its batch are, without remedies."""
     found = () if runs.observed is None else tuple(counted(runs, runs.observed, lambda _: lambda _: ""))
     return found if runs.setup is None else (*found, *_of_references(runs, runs.setup))
@@ -77,7 +55,7 @@ def texts_by_run(remarks: Iterable[Remark], count: int) -> list[str]:
     return ["; ".join(texts) for texts in of_run]
 
 
-def of_some(runs: Rollouts, numbers: range, whole: Overview) -> Overview:
+def of_some(runs: RolloutsData, numbers: range, whole: Overview) -> Overview:
     """Of runs without their setup that were these of a larger batch."""
     errors = None if whole.tracking_error is None else whole.tracking_error[numbers]
     remedies = {each.kind: each.remedy for each in whole.remarks}
@@ -90,7 +68,7 @@ def of_some(runs: Rollouts, numbers: range, whole: Overview) -> Overview:
     return Overview(worst_of(runs, tuple(remarks), errors), tuple(remarks), errors)
 
 
-def remarks_of(runs: Rollouts, run: int, setup: Setup | None, t: np.ndarray, q: np.ndarray) -> tuple[Remark, ...]:
+def remarks_of(runs: RolloutsData, run: int, setup: Setup | None, t: np.ndarray, q: np.ndarray) -> tuple[Remark, ...]:
     """On what was observed of one run, with positions q (m, n) at times t (m,)."""
     if runs.observed is None:
         return ()
@@ -114,14 +92,14 @@ def _of_whole(whole: Overview, numbers: range) -> Iterator[Remark]:
             yield replace(each, runs=of, looked=len(numbers), text=each.text + other)
 
 
-def units(runs: Rollouts) -> Units:
+def units(runs: RolloutsData) -> Units:
     """Of q, v and u of each joint."""
     if runs.setup is not None:
         return units_of(runs.setup.plant.dynamics)
     return [(unit("q", each), unit("v", each), unit("u", each)) for each in joint_types(runs)]
 
 
-def counted(runs: Rollouts, of: Observed, remedy: Callable[[int], Callable[[Episode], str]]) -> Iterator[Remark]:
+def counted(runs: RolloutsData, of: Observed, remedy: Callable[[int], Callable[[Episode], str]]) -> Iterator[Remark]:
     """For each kind, joint and quantity the remark on the worst run, and which runs have one.
 
     Args:
@@ -151,7 +129,7 @@ def counted(runs: Rollouts, of: Observed, remedy: Callable[[int], Callable[[Epis
             yield _in_runs(remark, worst, some)
 
 
-def _of_references(runs: Rollouts, setup: Setup) -> Iterator[Remark]:
+def _of_references(runs: RolloutsData, setup: Setup) -> Iterator[Remark]:
     """Remarks on the reference, which all runs share: where it jumps from their starts, which joints friction holds."""
     q0 = np.tile(setup.q0, (len(runs), 1)) if runs.q0 is None else runs.q0
     v0 = np.tile(setup.v0, (len(runs), 1)) if runs.v0 is None else runs.v0
@@ -176,7 +154,7 @@ def _in_runs(remark: Remark, worst: int, some: np.ndarray) -> Remark:
     return replace(remark, runs=(worst, *numbers), looked=len(some))
 
 
-def _linearised(runs: Rollouts, run: int) -> Iterator[Remark]:
+def _linearised(runs: RolloutsData, run: int) -> Iterator[Remark]:
     """The remark on the sampled loop of one run."""
     setup = runs.setup_of(run)
     equation = setup.equation
@@ -188,7 +166,7 @@ def _linearised(runs: Rollouts, run: int) -> Iterator[Remark]:
         yield replace(remark, runs=(run,), looked=1)
 
 
-def worst_of(runs: Rollouts, remarks: tuple[Remark, ...], errors: np.ndarray | None) -> int:
+def worst_of(runs: RolloutsData, remarks: tuple[Remark, ...], errors: np.ndarray | None) -> int:
     """As of `Rollouts.worst`."""
     if runs.diverged.any():
         return int(np.where(runs.diverged, runs.ended, np.inf).argmin())
@@ -201,7 +179,7 @@ def worst_of(runs: Rollouts, remarks: tuple[Remark, ...], errors: np.ndarray | N
     return 0 if errors is None or np.isnan(errors).all() else int(np.nanargmax(errors))
 
 
-def tracking_errors(runs: Rollouts) -> np.ndarray | None:
+def tracking_errors(runs: RolloutsData) -> np.ndarray | None:
     """As of `Rollouts.tracking_error`; nan for a run that was not begun."""
     if runs.q is None or runs.setup is None or runs.setup.controller is None:
         return None
@@ -213,7 +191,7 @@ def tracking_errors(runs: Rollouts) -> np.ndarray | None:
     return np.array([root_mean_square(x[of]) if of.any() else np.nan for x, of in zip(deviation, known, strict=True)])
 
 
-def causes(runs: Rollouts) -> tuple[str, ...]:
+def causes(runs: RolloutsData) -> tuple[str, ...]:
     """The advice of each run; of the first that diverged with its loop as the cause, where that explains it.
 
     Loops are linearised about the starts, which differ from run to run, as their parameters may.

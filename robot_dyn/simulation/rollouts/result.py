@@ -3,34 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from operator import index
-from typing import Annotated, Any, final, overload
+from typing import Any, final, overload
 
 import numpy as np
 
-from robot_dyn.control.controller import Controller
-from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.display import MOST_JOINTS, curves, page, plot, text
 from robot_dyn.foundations.errors import QueryError, escaped
-from robot_dyn.foundations.store import NOT_STORED, Layout
-from robot_dyn.foundations.validate import integer
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.columns import Column, Variable
-from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.observation.remarks import remark_lines as lines_of
 from robot_dyn.simulation.results.provenance import about_the_robot, joint_types
-from robot_dyn.simulation.results.run_data import SAMPLED, RunData
 from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.rollouts.overview import Overview, of_some, overview
+from robot_dyn.simulation.rollouts.overview import of_some, overview
+from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 from robot_dyn.simulation.rollouts.run import trajectory
-from robot_dyn.simulation.rollouts.sweepable import parts_of_run
 from robot_dyn.simulation.rollouts.table import columns, samples
-from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.setup.setup import Setup
 
 _SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved", "numbers")  # by all runs
 _MOST_DRAWN = 2000  # runs whose quantiles a notebook shows
@@ -38,8 +30,7 @@ _QUANTILES = {"least": 0.0, "median": 0.5, "largest": 1.0}
 
 
 @final
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Rollouts(RunData):
+class Rollouts(RolloutsData):
     """B runs with m samples each. Samples after the end of a run are nan; quantities not recorded are None.
 
     `runs[i]` is the `Trajectory` of one run and `runs[i:j]` a subset, numbered from 0; neither copies samples. All
@@ -71,31 +62,6 @@ class Rollouts(RunData):
         numbers: Number of each run, which determines its noise, (B,): those that were given, or of a slice those in
             the original batch; None for a batch numbered from 0 on, and for runs read from a file.
     """
-
-    q: Annotated[np.ndarray, SAMPLED["q"].of_runs] | None
-    v: Annotated[np.ndarray, SAMPLED["v"].of_runs] | None
-    u: Annotated[np.ndarray, SAMPLED["u"].of_runs] | None
-    kinetic: Annotated[np.ndarray, SAMPLED["kinetic"].of_runs] | None
-    potential: Annotated[np.ndarray, SAMPLED["potential"].of_runs] | None
-    work: dict[str, Annotated[np.ndarray, SAMPLED["work"].of_runs]] | None
-    ended: Annotated[np.ndarray, Layout(("B",))]
-    diverged: Annotated[np.ndarray, Layout(("B",), "bool")]
-    stopped: Annotated[np.ndarray, Layout(("B",), "bool")]
-    advice: tuple[str, ...]
-    steps: Annotated[np.ndarray, Layout(("B",), "int64")]
-    evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
-    sources: tuple[str, ...]
-    params: dict[str, Annotated[np.ndarray, Layout(("B", None))]]
-    setup: Annotated[Setup | None, NOT_STORED] = None
-    uncut: tuple[str, ...] = ()
-    q0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
-    v0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
-    observed: Observed | None = None
-    saved: Overview | None = None
-    numbers: Annotated[np.ndarray | None, NOT_STORED] = None
-
-    def __len__(self) -> int:
-        return len(self.ended)
 
     def __iter__(self) -> Iterator[Trajectory]:
         return (self[run] for run in range(len(self)))
@@ -143,33 +109,6 @@ class Rollouts(RunData):
         by_run = {field.name: of(getattr(self, field.name)) for field in fields(self) if field.name not in _SHARED}
         numbers = np.arange(len(self)) if self.numbers is None else self.numbers
         return replace(self, **by_run, numbers=numbers[runs], saved=None)
-
-    def outcome(self, run: int) -> Outcome:
-        """Return how a run ended; raises QueryError if no run has that number."""
-        run = integer("run", run, least=-len(self), most=len(self) - 1)
-        if self.stopped[run]:
-            return Outcome(Ending.STOPPED, float(self.ended[run]), "interrupted; all samples up to here are kept")
-        ending = Ending.DIVERGED if self.diverged[run] else Ending.FINISHED
-        return Outcome(ending, float(self.ended[run]), self.advice[run])
-
-    def setup_of(self, run: int) -> Setup:
-        """Return the setup of a single run: `rd.simulate(runs.setup_of(17))` repeats the run with an error estimate.
-
-        Raises:
-            QueryError: If no run has that number, or the runs were read from a file.
-        """
-        setup = self.setup
-        if setup is None:
-            raise QueryError("runs that were read from a file have no setup; run rd.rollouts again, and use its result")
-        run = integer("run", run, least=-len(self), most=len(self) - 1) % len(self)
-        plant, controller = self._parts(setup, run)
-        starts = {name: x[run] for name, x in (("q0", self.q0), ("v0", self.v0)) if x is not None}
-        return replace(setup, plant=plant, controller=controller, estimate_error=True, **starts)
-
-    def _parts(self, setup: Setup, run: int) -> tuple[Plant, Controller | None]:
-        """Return plant and controller of a run, with its parameters and noise."""
-        number = run if self.numbers is None else int(self.numbers[run])
-        return parts_of_run(setup, {name: x[run] for name, x in self.params.items()}, number)
 
     @cached_property
     def overview(self) -> Overview:

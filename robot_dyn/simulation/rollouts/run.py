@@ -6,7 +6,6 @@ a = M⁻¹ (τ − C v − N),   P_k = τ_kᵀ v;   nan where neither the record
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,13 +18,11 @@ from robot_dyn.simulation.results.provenance import settings_text
 from robot_dyn.simulation.results.samples import Tracking, columns, tracking_of
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.overview import remarks_of
+from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.setup.setup import Setup
 
-if TYPE_CHECKING:
-    from robot_dyn.simulation.rollouts.result import Rollouts
 
-
-def trajectory(runs: Rollouts, run: int) -> Trajectory:
+def trajectory(runs: RolloutsData, run: int) -> Trajectory:
     """Return the trajectory of a run; see `Rollouts`.
 
     Raises:

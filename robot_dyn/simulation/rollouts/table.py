@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,14 +14,11 @@ from robot_dyn.simulation.results.run_data import SAMPLED
 from robot_dyn.simulation.results.samples import root_mean_squares
 from robot_dyn.simulation.results.table import Types, of_joints
 from robot_dyn.simulation.rollouts.overview import texts_by_run
+from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 from robot_dyn.simulation.rollouts.sweepable import swept_parameter
 
-if TYPE_CHECKING:
-    from robot_dyn.simulation.rollouts.overview import Overview
-    from robot_dyn.simulation.rollouts.result import Rollouts
 
-
-def columns(runs: Rollouts, of: Overview) -> Iterator[Column]:
+def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
     """A number for each run; the rms is over the samples up to its end, extremes are over its steps."""
     types = dict(zip(runs.joint_names, joint_types(runs), strict=True))
     yield Column("run", np.arange(len(runs)))
@@ -49,7 +45,7 @@ def columns(runs: Rollouts, of: Overview) -> Iterator[Column]:
                 yield from of_joints(f"{which} {key}", runs.observed.extremes[:, row, side], key, types)
 
 
-def samples(runs: Rollouts) -> dict[str, Variable]:
+def samples(runs: RolloutsData) -> dict[str, Variable]:
     """What was recorded of the runs, over runs and sample times."""
     kinds, found = joint_types(runs), dict[str, Variable]()
     for key, row in SAMPLED.items():
@@ -63,7 +59,7 @@ def samples(runs: Rollouts) -> dict[str, Variable]:
     return found
 
 
-def _of_parameters(runs: Rollouts, types: Types) -> Iterator[Column]:
+def _of_parameters(runs: RolloutsData, types: Types) -> Iterator[Column]:
     """What was swept: by joint, where its setup is known and says that it is of joints; else numbered if of several."""
     setup = runs.setup
     known = (

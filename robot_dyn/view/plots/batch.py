@@ -17,7 +17,7 @@ from robot_dyn.foundations.errors import QueryError, nearest, shown
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import tracking_of
-from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.view.plots.figure import Axes, Style, named, scale
 from robot_dyn.view.plots.parts import PlotError
@@ -33,7 +33,7 @@ _CELL_MM, _LOST = 42.0, 1  # the least width of a cell; colour of what diverged
 class BatchView:
     """A batch, the columns of its joints that are shown, what a histogram and a scatter show, and the width [mm]."""
 
-    runs: Rollouts
+    runs: RolloutsData
     joints: tuple[int, ...]
     x: str | None
     y: str | None
@@ -240,7 +240,7 @@ def _title(view: BatchView, some: np.ndarray) -> str:
     return f"{int(some.sum())} runs{view.lost}" + (f"; {missing} without this figure" if missing else "")
 
 
-def _column(runs: Rollouts, option: str, name: str | None, preferred: tuple[str, ...]) -> tuple[str, np.ndarray]:
+def _column(runs: RolloutsData, option: str, name: str | None, preferred: tuple[str, ...]) -> tuple[str, np.ndarray]:
     """Heading and numbers of a column of the table of runs, named with or without its unit.
 
     Raises:

@@ -17,7 +17,7 @@ from robot_dyn.foundations.validate import choice, instance, number, shaped
 from robot_dyn.foundations.values import several
 from robot_dyn.simulation.observation.remarks import remark_lines
 from robot_dyn.simulation.results.run_data import TrajectoryData
-from robot_dyn.simulation.rollouts.result import Rollouts
+from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.view.plots.batch import BATCH_PLOTS, BatchView
 from robot_dyn.view.plots.figure import PAPER, THEMES, Style
@@ -38,7 +38,7 @@ STYLES = ("screen", "paper")
 
 
 def plot(
-    run: TrajectoryData | Rollouts,
+    run: TrajectoryData | RolloutsData,
     *names: str,
     only: Collection[str] | str | None = None,
     joints: Collection[str] | str | None = None,
@@ -73,8 +73,8 @@ def plot(
         QueryError: If a part, a joint, a style or a theme is unknown, or the limits or the width cannot be.
         PlotError: If the run has no samples, too many joints, or lacks what a requested part shows.
     """
-    instance("run", run, TrajectoryData | Rollouts, "give the trajectory of rd.simulate, or rollouts")
-    of_batch = isinstance(run, Rollouts)
+    instance("run", run, TrajectoryData | RolloutsData, "give the trajectory of rd.simulate, or rollouts")
+    of_batch = isinstance(run, RolloutsData)
     parts = [*names, *_names("only", only, "parts")]
     known = BATCH_PLOTS if of_batch else PLOTS
     for name in parts:
@@ -85,7 +85,7 @@ def plot(
     for name in shown:
         choice("joint", name, run.joint_names)
     look, width = _style(theme, style), _width(width_mm)
-    if isinstance(run, Rollouts):
+    if isinstance(run, RolloutsData):
         if limits is not None:
             raise QueryError("limits are of a run; plot(runs[0], limits=…)")
         return _of_batch(BatchView(run, _columns(run, shown), x, y, width), parts, look)
@@ -102,7 +102,9 @@ def plot(
         return draw(panels, title, remarks, look, width, end.ending is Ending.DIVERGED)
 
 
-def save_plot(run: TrajectoryData | Rollouts, path: str | Path, *names: str, dpi: float = 200, **options: Any) -> Path:
+def save_plot(
+    run: TrajectoryData | RolloutsData, path: str | Path, *names: str, dpi: float = 200, **options: Any
+) -> Path:
     """Write a figure of a run as PNG, SVG or PDF by the suffix of `path` (.png is added if it has none).
 
     Another picture of that format under that name is replaced; a file of another kind is not.
@@ -170,7 +172,7 @@ def _width(width_mm: float) -> float:
     return width
 
 
-def _columns(run: TrajectoryData | Rollouts, shown: Collection[str]) -> tuple[int, ...]:
+def _columns(run: TrajectoryData | RolloutsData, shown: Collection[str]) -> tuple[int, ...]:
     """Of the joints shown."""
     columns = tuple(i for i, name in enumerate(run.joint_names) if name in shown)
     if not 0 < len(columns) <= MOST_JOINTS:

@@ -1,0 +1,95 @@
+"""The fields of rollouts: those of `RunData` with a leading axis of runs, and the start, parameters and end of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, final
+
+import numpy as np
+
+from robot_dyn.control.controller import Controller
+from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.errors import QueryError
+from robot_dyn.foundations.store import NOT_STORED, Layout
+from robot_dyn.foundations.validate import integer
+from robot_dyn.foundations.values import Value, read_only
+from robot_dyn.simulation.observation.observation import Observed
+from robot_dyn.simulation.observation.remarks import Remark
+from robot_dyn.simulation.results.run_data import SAMPLED, RunData
+from robot_dyn.simulation.rollouts.sweepable import parts_of_run
+from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.setup.setup import Setup
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Overview(Value):
+    """The overview of a batch.
+
+    Attributes:
+        worst, remarks, tracking_error: As of `Rollouts`.
+    """
+
+    worst: int
+    remarks: tuple[Remark, ...]
+    tracking_error: Annotated[np.ndarray, Layout(("B",))] | None
+
+    def __post_init__(self) -> None:
+        read_only(self)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class RolloutsData(RunData):
+    """The fields of B runs, as `Rollouts` describes them."""
+
+    q: Annotated[np.ndarray, SAMPLED["q"].of_runs] | None
+    v: Annotated[np.ndarray, SAMPLED["v"].of_runs] | None
+    u: Annotated[np.ndarray, SAMPLED["u"].of_runs] | None
+    kinetic: Annotated[np.ndarray, SAMPLED["kinetic"].of_runs] | None
+    potential: Annotated[np.ndarray, SAMPLED["potential"].of_runs] | None
+    work: dict[str, Annotated[np.ndarray, SAMPLED["work"].of_runs]] | None
+    ended: Annotated[np.ndarray, Layout(("B",))]
+    diverged: Annotated[np.ndarray, Layout(("B",), "bool")]
+    stopped: Annotated[np.ndarray, Layout(("B",), "bool")]
+    advice: tuple[str, ...]
+    steps: Annotated[np.ndarray, Layout(("B",), "int64")]
+    evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
+    sources: tuple[str, ...]
+    params: dict[str, Annotated[np.ndarray, Layout(("B", None))]]
+    setup: Annotated[Setup | None, NOT_STORED] = None
+    uncut: tuple[str, ...] = ()
+    q0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
+    v0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
+    observed: Observed | None = None
+    saved: Overview | None = None
+    numbers: Annotated[np.ndarray | None, NOT_STORED] = None
+
+    def __len__(self) -> int:
+        return len(self.ended)
+
+    def outcome(self, run: int) -> Outcome:
+        """Return how a run ended; raises QueryError if no run has that number."""
+        run = integer("run", run, least=-len(self), most=len(self) - 1)
+        if self.stopped[run]:
+            return Outcome(Ending.STOPPED, float(self.ended[run]), "interrupted; all samples up to here are kept")
+        ending = Ending.DIVERGED if self.diverged[run] else Ending.FINISHED
+        return Outcome(ending, float(self.ended[run]), self.advice[run])
+
+    def setup_of(self, run: int) -> Setup:
+        """Return the setup of a single run: `rd.simulate(runs.setup_of(17))` repeats the run with an error estimate.
+
+        Raises:
+            QueryError: If no run has that number, or the runs were read from a file.
+        """
+        setup = self.setup
+        if setup is None:
+            raise QueryError("runs that were read from a file have no setup; run rd.rollouts again, and use its result")
+        run = integer("run", run, least=-len(self), most=len(self) - 1) % len(self)
+        plant, controller = self._parts(setup, run)
+        starts = {name: x[run] for name, x in (("q0", self.q0), ("v0", self.v0)) if x is not None}
+        return replace(setup, plant=plant, controller=controller, estimate_error=True, **starts)
+
+    def _parts(self, setup: Setup, run: int) -> tuple[Plant, Controller | None]:
+        """Return plant and controller of a run, with its parameters and noise."""
+        number = run if self.numbers is None else int(self.numbers[run])
+        return parts_of_run(setup, {name: x[run] for name, x in self.params.items()}, number)
