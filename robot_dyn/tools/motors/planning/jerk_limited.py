@@ -8,7 +8,7 @@ states, 2021]
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -21,14 +21,7 @@ from robot_dyn.tools.motors.limits import outside_positions
 _SAME = 1e-12  # of the duration: breaks of two joints that differ by their rounding
 
 
-class _Segment(NamedTuple):
-    """A piece of one joint: from time `start`, with the state there and the jerk."""
-
-    start: float
-    p: float
-    v: float
-    a: float
-    j: float
+_Segment = tuple[float, ...]  # of one joint: the time at which it starts, position, velocity, acceleration, jerk
 
 
 def point_to_point(
@@ -122,22 +115,19 @@ def _profiles(ends: list[np.ndarray], rates: list[np.ndarray], limits: dict[str,
 
 
 def _segments(profile: Any) -> Iterator[_Segment]:
-    """The pieces of a joint: what brings its start within the limits, then seven of constant jerk; then its end."""
+    """Yield the pieces of a joint: what brings its start within the limits, seven of constant jerk, and its end."""
     t = 0.0
-    for duration, *state in zip(*(getattr(profile.brake, key) for key in "tpvaj"), strict=True):
-        if duration > 0:
-            yield _Segment(t, *state)
-            t += duration
-    for duration, *state in zip(profile.t, *(getattr(profile, key) for key in "pvaj"), strict=False):
-        if duration > 0:
-            yield _Segment(t, *state)
-            t += duration
-    yield _Segment(t, profile.pf, profile.vf, profile.af, 0.0)
+    for times, of in ((profile.brake.t, profile.brake), (profile.t, profile)):
+        for duration, *state in zip(times, of.p, of.v, of.a, of.j, strict=False):
+            if duration > 0:
+                yield t, *state
+                t += duration
+    yield t, profile.pf, profile.vf, profile.af, 0.0
 
 
 def _merged(joints: list[list[_Segment]], start_s: float) -> PiecewisePolynomial:
     """The pieces of all joints between all their breaks."""
-    times = np.unique([each.start for joint in joints for each in joint])
+    times = np.unique([segment[0] for joint in joints for segment in joint])
     kept = times[np.concatenate([[True], np.diff(times) > _SAME * times[-1]])]
     middles = (kept[1:] + kept[:-1]) / 2
     coefficients = np.zeros((len(middles), 4, len(joints)))

@@ -156,7 +156,7 @@ def _solved(
     Also the error of what was linearised, as a share of the effort limits.
     """
     places = imposed(grid).ravel()
-    known = np.maximum(last.at(places), _REST * last.x.max())
+    known = np.maximum(np.interp(places, *last), _REST * last.x.max())
     for slower in 4.0 ** np.arange(6 if plant.forces else 1):
         effects = Effects.about(plant, path, places, known / slower) if plant.forces else None
         made = cells(plant, limits, path, grid, effects)
@@ -165,7 +165,7 @@ def _solved(
                 speed = Speed(grid, x)
                 if effects is None:
                     return speed, 0.0
-                return speed, float(np.abs(effects.error(plant, path, speed.at(places)) / limits.effort).max())
+                return speed, float(np.abs(effects.error(plant, path, np.interp(places, *speed)) / limits.effort).max())
     raise PlanError(why_not(plant, limits, path))
 
 
