@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any, ClassVar, final
@@ -89,54 +89,44 @@ class MotorBudget(Result):
         return (vars(each) | {"unit": of_joint("N m", each.type)} for each in self.joints)
 
     def tables(self) -> Iterator[Block]:
+        joints = self.joints
+        torque = {"joint": [x.joint for x in joints], "unit": [of_joint("N m", x.type) for x in joints]}
+        speed = torque | {"unit": [of_joint("rad/s", x.type) for x in joints]}
+        at_peak, starts = {"at t [s]": [x.peak_at for x in joints]}, [x.breakaway for x in joints]
         yield f"limits: {self.limits}"
         yield f"{self.resolution}; integrals by two rules differ by {self.error:.1g} of them"
         yield ""
-        yield self._torques()
+        needs = torque | {"peak": [x.peak for x in joints]} | at_peak
+        needs |= {"break-away": map(_known, starts)} if any(x > 0 for x in starts) else {}
+        needs |= {
+            "limit": [_known(x.peak_limit) for x in joints],
+            "headroom": [_percent(x.headroom["peak"], x.peak_limit) for x in joints],
+            "rms": [x.rms for x in joints],
+            "continuous": [_known(x.continuous_limit) for x in joints],
+            "left of it": [_percent(x.headroom["continuous"], x.continuous_limit) for x in joints],
+        }
+        yield _table(needs)
         yield ""
         yield "at the joint, without losses of motor and gear:"
-        yield self._speeds()
+        speed |= {
+            "speed": [x.speed for x in joints],
+            "at t [s]": [x.speed_at for x in joints],
+            "limit": [_known(x.speed_limit) for x in joints],
+            "headroom": [_percent(x.headroom["speed"], x.speed_limit) for x in joints],
+            "power [W]": [x.power for x in joints],
+            "mean [W]": [x.mean_power for x in joints],
+            "energy [J]": [x.energy for x in joints],
+            "regenerated [J]": [x.regenerated for x in joints],
+        }
+        yield _table(speed)
         yield ""
         yield "torque by cause at the peak:"
-        yield self._causes("torque", "of_peak")
+        yield _table(torque | at_peak | _by_cause("torque", [x.of_peak for x in joints]))
         yield ""
         yield "rms torque, and the part of it that each cause asks for:"
-        yield self._causes("rms", "of_rms")
+        yield _table(torque | _by_cause("rms", [x.of_rms for x in joints]))
         yield ""
-        yield from (f"finding: {each}" for each in self.findings)
-
-    def _torques(self) -> Table:
-        starts = any(each.breakaway > 0 for each in self.joints)
-        peak = "joint", "unit", "peak", "at t [s]", *(("break-away",) if starts else ()), "limit", "headroom"
-        rows = []
-        for x in self.joints:
-            needs = (x.joint, of_joint("N m", x.type), x.peak, x.peak_at, *((_known(x.breakaway),) if starts else ()))
-            of_peak = _known(x.peak_limit), _percent(x.headroom["peak"], x.peak_limit)
-            lasting = x.rms, _known(x.continuous_limit), _percent(x.headroom["continuous"], x.continuous_limit)
-            rows.append((*needs, *of_peak, *lasting))
-        heading = (*peak, "rms", "continuous", "left of it")
-        return Table(heading, tuple(rows), digits=4, right=(*peak[4:], *heading[-2:]))
-
-    def _speeds(self) -> Table:
-        rows = []
-        for x in self.joints:
-            speed = x.joint, of_joint("rad/s", x.type), x.speed, x.speed_at, _known(x.speed_limit)
-            power = x.power, x.mean_power, x.energy, x.regenerated
-            rows.append((*speed, _percent(x.headroom["speed"], x.speed_limit), *power))
-        speed = "joint", "unit", "speed", "at t [s]", "limit", "headroom"
-        heading = (*speed, "power [W]", "mean [W]", "energy [J]", "regenerated [J]")
-        return Table(heading, tuple(rows), digits=4, right=speed[4:])
-
-    def _causes(self, what: str, key: str) -> Table:
-        names = tuple(self.joints[0].of_peak) if self.joints else ()
-        rows = []
-        for x in self.joints:
-            parts = getattr(x, key)
-            values = without_rounding([sum(parts.values()), *parts.values()]).tolist()
-            at = (x.peak_at,) if key == "of_peak" else ()
-            rows.append((x.joint, of_joint("N m", x.type), *at, *values))
-        at = ("at t [s]",) if key == "of_peak" else ()
-        return Table(("joint", "unit", *at, what, *names), tuple(rows), digits=4)
+        yield from (f"finding: {finding}" for finding in self.findings)
 
 
 def case_of(motor_budget: MotorBudget, what: str) -> tuple[Plant, PiecewisePolynomial, Limits]:
@@ -156,3 +146,14 @@ def _known(x: float) -> str:
 
 def _percent(free: float, limit: float) -> str:
     return f"{round(free, 3) + 0.0:.1%}" if limit < inf else "—"
+
+
+def _by_cause(what: str, parts: Sequence[Mapping[str, float]]) -> dict[str, Iterable[Any]]:
+    """Return columns of the sum of the parts of each joint, and of its parts."""
+    rows = [without_rounding([sum(of.values()), *of.values()]).tolist() for of in parts]
+    return dict(zip((what, *parts[0]), zip(*rows, strict=True), strict=True)) if parts else {what: ()}
+
+
+def _table(columns: Mapping[str, Iterable[Any]]) -> Table:
+    """Return a table of columns, texts after those of joint and unit at the right."""
+    return Table(tuple(columns), tuple(zip(*columns.values(), strict=True)), digits=4, right=tuple(columns)[2:])
