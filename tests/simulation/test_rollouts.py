@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,23 +54,102 @@ def arrays(runs: rd.Rollouts) -> list[np.ndarray]:
     return [x for x in given if x is not None]
 
 
-@pytest.mark.parametrize("setup", [SETUP, PID, *long([replace(SETUP, integrator=rd.integrate.method("gauss_2"))])])
-def test_each_run_is_that_of_simulate(setup: rd.Setup) -> None:
-    """To rounding: B = 1, B of one tile and a bit more."""
-    for count in (1, 70):
-        q0 = starts(count)
-        runs = rd.rollouts(setup, q0, record=EVERYTHING)
-        assert len(runs) == count and not runs.diverged.any()
-        for i in {0, count // 2, count - 1}:
-            alone = rd.simulate(setup, q0=q0[i], estimate_error=False)
-            np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
-            pairs = [(runs.q, alone.q), (runs.v, alone.v), (runs.u, alone.u)]
-            pairs += [(runs.kinetic, alone.ledger.kinetic), (runs.potential, alone.ledger.potential)]
-            pairs += [(runs.work[name], work) for name, work in alone.ledger.work.items()]
-            for ours, theirs in pairs:
-                assert ours[i].shape == theirs.shape
-                np.testing.assert_allclose(ours[i], theirs, rtol=0, atol=1e-11 * (1 + np.abs(theirs).max()))
-            assert runs.outcome(i) == alone.outcome
+def loaded(mass: float = 1.0, **edits: Any) -> rd.Robot:
+    return ARM.with_(payload=rd.Payload(ARM_TIP, mass, (0.05, 0.02, 0.0), INERTIA), **edits)
+
+
+def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
+    """Setups with the starts and the values of their runs."""
+    rng, free = np.random.default_rng(5), replace(SETUP, plant=rd.Plant(loaded()), controller=None)
+    weightless, far = ARM.with_(gravity=(0.0, 0.0, 0.0)), starts(3)
+    far[1] = 2e5, 0.3  # [rad]: the sine of a tile is no longer exact there, and the run is made alone
+    gains = {"kp": rng.uniform(20, 60, 5), "kd": rng.uniform(2, 5, (5, 2))}
+    gains |= {"viscous_friction.damping": rng.uniform(0, 1, (5, 2)), "effort_limit.limit": rng.uniform(5, 30, 5)}
+    masses = {f"payload_mass:{ARM_TIP}": rng.uniform(0, 3, 70), "viscous_friction.damping": rng.uniform(0, 1, 70)}
+    known = rd.control.PDGravity(NOMINAL, REFERENCE, 40.0, 4.0)
+    stops = rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 0.0, 0.0)
+    levels = {"joint_stops.stiffness": [0.0, 1e4, 1e4], "joint_stops.upper": [[0.5, 1.0], [0.5, 1.0], [0.45, 0.6]]}
+    body = rd.effects.CarriedPayload(rd.Payload(ARM_TIP, 0.7), 0.05, 0.12)
+    resting = rd.effects.LuGreFriction(1.0, 1.0, 0.1, 0.2, 0.3, 0.1)  # pushed away from v = 0: no reversal
+    push = rd.control.PD(rd.control.hold(Q + 3.0), [20.0, 0.8], 0.0)
+    bristles = rd.effects.LuGreFriction(100.0, 1.0, 0.05, 0.2, 0.3, 0.05)  # steps in (q, p) end nowhere for them
+    odd = {"duration_s": 0.123, "record_period_s": 0.0101}  # the run does not hold it a whole number of times
+    gauss = rd.integrate.method("gauss_4")
+    return {
+        "one": (SETUP, {"q0": starts(1)}),
+        "a tile and a bit more": (SETUP, {"q0": starts(70)}),
+        "sampled": (PID, {"q0": starts(70)}),
+        "far": (free, {"q0": far, "params": {f"payload_mass:{ARM_TIP}": [0.5, 1.5, 2.5]}}),
+        "gains and friction": (SETUP, {"params": gains}),
+        "masses": (replace(SETUP, plant=rd.Plant(loaded(), PLANT.effects)), {"params": masses}),
+        "masses unknown to the model": (
+            replace(SETUP, plant=rd.Plant(loaded(), PLANT.effects), controller=known), {"params": masses},
+        ),
+        "levels": (
+            rd.Setup(rd.Plant(weightless, stops), Q, V, 0.5, integrator="rk4", record_period_s=0.1), {"params": levels},
+        ),
+        "payloads come and go": (
+            replace(SETUP, plant=rd.Plant(ARM, [body]), controller=None),
+            {"params": {"gravity": [[0.0, 0.0, -9.8], [1.0, 0.0, -1.6]]}},
+        ),
+        "bristles": (
+            rd.Setup(rd.Plant(weightless, [resting]), Q, None, 0.2, push, integrator="rk4"), {"q0": starts(3, 0.01)},
+        ),
+        "tons": (rd.Setup(rd.Plant(ARM.with_(mass_scale=2000.0)), [1.5, 0.2], duration_s=0.2, integrator="rk4"), {}),
+        **{f"every {x} s": (replace(SETUP, record_period_s=x), {"q0": starts(2)}) for x in (0.0, 0.005, 0.03, 0.5)},
+        "between cut steps": (replace(SETUP, **odd), {"q0": starts(2)}),
+        "between steps": (replace(SETUP, plant=rd.Plant(ARM, PLANT.effects[:2]), **odd), {"q0": starts(2)}),
+        "between steps in (q, p)": (
+            replace(SETUP, plant=rd.Plant(ARM, [bristles]), integrator=gauss, **odd), {"q0": starts(2)},
+        ),
+        "Gauss": (replace(SETUP, integrator=rd.integrate.method("gauss_2")), {"q0": starts(70)}),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*(name for name in batches() if name != "Gauss"), *long(["Gauss"])])
+def test_each_run_is_that_of_simulate(name: str) -> None:
+    """To rounding: samples, energies, works and outcome; run i of the batch is that of `setup_of(i)`."""
+    setup, given = batches()[name]
+    runs = rd.rollouts(setup, record=EVERYTHING, **given)
+    atol = 1e-8 if name == "far" else 1e-12  # 1 ulp of 2e5 rad is 3e-11
+    for i in {0, len(runs) // 2, len(runs) - 1}:
+        alone = rd.simulate(runs.setup_of(i), estimate_error=False)
+        m = len(alone.t)
+        np.testing.assert_allclose(runs.t[:m], alone.t, rtol=1e-15)
+        pairs = [(runs.q, alone.q), (runs.v, alone.v), (runs.u, alone.u)]
+        pairs += [(runs.kinetic, alone.ledger.kinetic), (runs.potential, alone.ledger.potential)]
+        pairs += [(runs.work[source], work) for source, work in alone.ledger.work.items()]
+        for ours, theirs in pairs:
+            np.testing.assert_allclose(ours[i][:m], theirs, rtol=0, atol=atol * (1 + np.abs(theirs).max()))
+            assert np.isnan(ours[i][m:]).all()
+        assert runs.outcome(i) == alone.outcome
+        assert (runs.outcome(i).ending == "diverged") is (name == "between steps in (q, p)")
+    assert name != "bristles" or "repeated" not in runs.statistics.engine
+
+
+def test_the_setup_of_a_run_has_its_values() -> None:
+    """Gains, coefficients of effects, levels, gravity and masses; the model of a controller keeps its own."""
+    for name, parts in {
+        "gains and friction": lambda x: {
+            "kp": x.controller.kp, "kd": x.controller.kd, "viscous_friction.damping": x.plant.effects[0].damping,
+            "effort_limit.limit": x.plant.effects[2].limit,
+        },
+        "masses unknown to the model": lambda x: {
+            f"payload_mass:{ARM_TIP}": x.plant.dynamics.edits.payloads[0].mass,
+            "viscous_friction.damping": x.plant.effects[0].damping,
+        },
+        "levels": lambda x: {
+            "joint_stops.stiffness": x.plant.effects[0].stiffness, "joint_stops.upper": x.plant.effects[0].upper,
+        },
+        "payloads come and go": lambda x: {"gravity": x.plant.dynamics.edits.gravity},
+    }.items():  # fmt: skip
+        setup, given = batches()[name]
+        runs = rd.rollouts(setup, record=(), **given)
+        for i in range(len(runs)):
+            own = runs.setup_of(i)
+            for key, value in parts(own).items():
+                np.testing.assert_array_equal(value, np.broadcast_to(given["params"][key][i], np.shape(value)))
+            assert not name.endswith("model") or own.controller.model == NOMINAL
 
 
 def test_threads_change_nothing() -> None:
@@ -119,82 +199,10 @@ def test_a_run_that_overflows_ends_at_the_step_at_which_simulate_ends_it(engine:
         assert (alone.outcome.ending, alone.outcome.t) == (runs.outcome(i).ending, runs.outcome(i).t)
 
 
-def test_a_run_beyond_the_range_of_a_tile_is_done_by_itself() -> None:
-    """A free joint that starts at 2e5 rad: the tile's sine is no longer exact there, the C library's is."""
-    spinner = replace(SETUP, plant=rd.Plant(ARM), controller=None)
-    q0 = starts(3)
-    q0[1] = 2e5, 0.3
-    runs = rd.rollouts(spinner, q0, record=EVERYTHING)
-    alone = rd.simulate(spinner, q0=q0[1], estimate_error=False)
-    np.testing.assert_allclose(runs.q[1], alone.q, rtol=0, atol=1e-8)  # 1 ulp of 2e5 rad is 3e-11
-    np.testing.assert_allclose(runs.kinetic[1], alone.ledger.kinetic, rtol=0, atol=1e-8)
-
-
-def test_values_that_differ_from_run_to_run() -> None:
-    """Each run with its own gains and friction is the run of a setup with these."""
-    rng = np.random.default_rng(5)
-    params = {"kp": rng.uniform(20, 60, 5), "kd": rng.uniform(2, 5, (5, 2))}
-    params |= {"viscous_friction.damping": rng.uniform(0, 1, (5, 2)), "effort_limit.limit": rng.uniform(5, 30, 5)}
-    runs = rd.rollouts(SETUP, params=params, record=EVERYTHING)
-    for i in range(5):
-        kp, kd, damping, limit = (x[i] for x in params.values())
-        effects = [rd.effects.ViscousFriction(damping), PLANT.effects[1], rd.effects.EffortLimit(limit)]
-        setup = replace(
-            SETUP, plant=rd.Plant(ARM, effects), controller=rd.control.PD(REFERENCE, kp, kd), estimate_error=False
-        )
-        alone = rd.simulate(setup)
-        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(runs.u[i], alone.u, rtol=0, atol=1e-11)
-        for name, work in alone.ledger.work.items():
-            np.testing.assert_allclose(runs.work[name][i], work, rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("model", [False, True])
-def test_masses_of_payloads_that_differ_from_run_to_run(model: bool) -> None:
-    """Each run is that of a plant whose robot carries this mass; the controller's model keeps what it was given."""
-
-    def setup(mass: float) -> rd.Setup:
-        loaded = ARM.with_(payload=rd.Payload(ARM_TIP, mass, (0.05, 0.02, 0.0), INERTIA))
-        controller = rd.control.PDGravity(NOMINAL, REFERENCE, 40.0, 4.0) if model else SETUP.controller
-        return replace(SETUP, plant=rd.Plant(loaded, PLANT.effects), controller=controller, estimate_error=False)
-
-    rng = np.random.default_rng(6)
-    params = {f"payload_mass:{ARM_TIP}": rng.uniform(0, 3, 70), "viscous_friction.damping": rng.uniform(0, 1, 70)}
-    runs = rd.rollouts(setup(1.0), params=params, record=EVERYTHING)
-    for i in (0, 40, 69):
-        mass, damping = (x[i] for x in params.values())
-        alone = setup(mass)
-        plant = rd.Plant(alone.plant.dynamics, [rd.effects.ViscousFriction(damping), *PLANT.effects[1:]])
-        alone = rd.simulate(replace(alone, plant=plant))
-        for ours, theirs in ((runs.q, alone.q), (runs.u, alone.u), (runs.potential, alone.ledger.potential)):
-            np.testing.assert_allclose(ours[i], theirs, rtol=0, atol=1e-11 * (1 + np.abs(theirs).max()))
-
-
-def test_a_mass_beyond_the_range_of_the_tile() -> None:
-    """A run that turns too far for the sine of a tile is run by itself, with the mass that is its own."""
-    loaded = ARM.with_(payload=rd.Payload(ARM_TIP, 1.0))
-    q0, masses = starts(3), np.array([0.5, 1.5, 2.5])
-    q0[1, 0] += 2 * np.pi * 40_000
-    free = replace(SETUP, plant=rd.Plant(loaded), controller=None, estimate_error=False)
-    runs = rd.rollouts(free, q0, params={f"payload_mass:{ARM_TIP}": masses})
-    for i in range(3):
-        own = rd.Plant(ARM.with_(payload=rd.Payload(ARM_TIP, masses[i])))
-        alone = rd.simulate(replace(free, plant=own), q0=q0[i])
-        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-8)  # 1 ulp of 2e5 rad is 3e-11
-
-
 def test_only_what_is_asked_for_is_recorded() -> None:
     runs = rd.rollouts(SETUP, starts(2), record=["v"])
     assert runs.q is None and runs.u is None and runs.kinetic is None and runs.work is None
     np.testing.assert_array_equal(runs.v, rd.rollouts(SETUP, starts(2)).v)
-
-
-@pytest.mark.parametrize("period", [0.0, 0.005, 0.03, 0.5])
-def test_samples_lie_where_those_of_simulate_do(period: float) -> None:
-    setup = replace(SETUP, record_period_s=period, estimate_error=False)
-    runs, alone = rd.rollouts(setup, starts(2)), rd.simulate(setup, q0=starts(2)[1])
-    np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
-    np.testing.assert_allclose(runs.q[1], alone.q, rtol=0, atol=1e-12)
 
 
 def assert_alike(ours: np.ndarray, theirs: np.ndarray) -> None:
@@ -441,40 +449,6 @@ def test_a_joint_strikes_its_stops_in_a_batch_as_it_does_alone() -> None:
     assert "cuts=False: no step ends at lower stop, upper stop" in uncut.summary and "cuts" not in runs.summary
 
 
-def test_a_joint_that_starts_from_rest_has_not_reversed() -> None:
-    """Bristles under a steady push, away from v = 0: lock step makes these runs, and they are those of simulate."""
-    plant = rd.Plant(ARM.with_(gravity=(0.0, 0.0, 0.0)), [rd.effects.LuGreFriction(1.0, 1.0, 0.1, 0.2, 0.3, 0.1)])
-    push = rd.control.PD(rd.control.hold(Q + 3.0), [20.0, 0.8], 0.0)
-    setup = rd.Setup(plant, Q, duration_s=0.2, controller=push, integrator="rk4", estimate_error=False)
-    runs = rd.rollouts(setup, starts(3, 0.01))
-    assert "repeated" not in runs.statistics.engine
-    np.testing.assert_allclose(runs.q[2], rd.simulate(setup, q0=starts(3, 0.01)[2]).q, rtol=0, atol=1e-13)
-
-
-def test_levels_that_differ_from_run_to_run() -> None:
-    """Also where a run has none, and where the setup has none: each run is cut at its own."""
-    arm, stops = ARM.with_(gravity=(0.0, 0.0, 0.0)), rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 0.0, 0.0)
-    setup = rd.Setup(rd.Plant(arm, stops), Q, V, 0.5, integrator="rk4", record_period_s=0.1, estimate_error=False)
-    stiffness, upper = np.array([0.0, 1e4, 1e4]), np.array([[0.5, 1.0], [0.5, 1.0], [0.45, 0.6]])
-    runs = rd.rollouts(setup, params={"joint_stops.stiffness": stiffness, "joint_stops.upper": upper})
-    for i in range(3):
-        plant = rd.Plant(arm, rd.effects.joint_stops([-1.0, -1.0], upper[i], stiffness[i], 0.0))
-        alone = rd.simulate(setup, plant=plant)
-        assert bool(alone.events) is bool(stiffness[i])
-        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-11)
-
-
-def test_samples_between_the_ends_of_steps_are_those_of_simulate() -> None:
-    """A period that the run does not hold a whole number of times: where steps are cut at its multiples, else not."""
-    bristles = rd.effects.LuGreFriction(100.0, 1.0, 0.05, 0.2, 0.3, 0.05)  # steps in (q, p) end nowhere for them
-    for effects, method in ((PLANT.effects, "rk4"), (PLANT.effects[:2], "rk4"), ([bristles], "gauss_4")):
-        of = {"duration_s": 0.123, "record_period_s": 0.0101, "integrator": rd.integrate.method(method)}
-        setup = replace(SETUP, plant=rd.Plant(ARM, effects), **of)
-        runs, alone = rd.rollouts(setup, starts(2)), rd.simulate(setup, q0=starts(2)[1], estimate_error=False)
-        np.testing.assert_allclose(runs.t, alone.t, rtol=1e-15)
-        np.testing.assert_allclose(runs.q[1], alone.q, rtol=0, atol=1e-12)
-
-
 def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) -> None:
     """A terminal event: the time to rounding, samples up to it, and the words; also from a file."""
     down = rd.Event(lambda t, q, v: q[0] - 0.35, name="down", terminal=True)
@@ -493,28 +467,6 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
             assert np.isnan(runs.q[i, ~before]).all()
         assert "'down'" in runs.outcome(0).advice and not runs.outcome(2).advice
         assert "; 0 diverged, 0 stopped, 2 ended by an event" in runs.summary
-
-
-def test_payloads_come_and_go_in_a_batch_as_they_do_alone() -> None:
-    """By RK4, which ends steps there: to rounding, gravity swept."""
-    body = rd.effects.CarriedPayload(rd.Payload(ARM_TIP, 0.7), 0.05, 0.12)
-    setup = rd.Setup(rd.Plant(ARM, [body]), Q, V, 0.2, integrator="rk4", record_period_s=0.01, estimate_error=False)
-    g = np.array([[0.0, 0.0, -9.8], [1.0, 0.0, -1.6]])
-    runs = rd.rollouts(setup, params={"gravity": g}, record=EVERYTHING)
-    for i in range(2):
-        alone = rd.simulate(setup, plant=rd.Plant(ARM.with_(gravity=tuple(g[i])), [body]))
-        np.testing.assert_allclose(runs.q[i], alone.q, rtol=0, atol=1e-12)
-        for name, work in alone.ledger.work.items():
-            np.testing.assert_allclose(runs.work[name][i], work, rtol=0, atol=1e-10)
-
-
-def test_a_heavy_arm_gains_no_energy_where_it_starts() -> None:
-    """An arm of tons at 6e4 J: its potential at the start is no gain, in lock step as in simulate."""
-    heavy = ARM.with_(mass_scale=2000.0)
-    setup = rd.Setup(rd.Plant(heavy), [1.5, 0.2], duration_s=0.2, integrator="rk4", estimate_error=False)
-    runs = rd.rollouts(setup, record=EVERYTHING)
-    assert runs.potential[0, 0] > 1e4 and not runs.diverged.any()
-    assert runs.outcome(0) == rd.simulate(setup).outcome
 
 
 @pytest.mark.parametrize("effects", [PLANT.effects[:2], PLANT.effects])
