@@ -469,23 +469,23 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
         assert "; 0 diverged, 0 stopped, 2 ended by an event" in runs.summary
 
 
+def interrupt_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let Ctrl-C come at the first look at the threads."""
+
+    def interrupted(*_: Any, **__: Any) -> Any:
+        monkeypatch.undo()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pool, "wait", interrupted)
+
+
 @pytest.mark.parametrize("effects", [PLANT.effects[:2], PLANT.effects])
 def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatch) -> None:
     """Also of runs that were to be made again: theirs are kept up to the step in which they may pass a threshold."""
-
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
     short = replace(SETUP, plant=rd.Plant(ARM, effects))
     setup = replace(short, duration_s=100.0, record_period_s=10.0)
     rd.rollouts(short, starts(1))  # compiled before
-    wait, calls = pool.wait, []
-
-    def once(*args, **options):
-        calls.append(1)
-        return interrupted() if len(calls) == 1 else wait(*args, **options)
-
-    monkeypatch.setattr(pool, "wait", once)
+    interrupt_once(monkeypatch)
     runs = rd.rollouts(setup, starts(200), threads=2)
     assert runs.stopped.any() and not runs.diverged.any()
     i = int(np.flatnonzero(runs.stopped)[-1])
@@ -497,17 +497,9 @@ def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatc
 
 def test_a_run_that_was_not_begun_has_its_start(monkeypatch) -> None:
     """An interrupt before the first of runs that are made one after the other: each is a trajectory of one sample."""
-    wait, calls = pool.wait, []
-
-    def once(*args, **options):
-        calls.append(1)
-        if len(calls) == 1:
-            raise KeyboardInterrupt
-        return wait(*args, **options)
-
     setup = replace(SETUP, integrator=rd.integrate.method("DOP853"), step_s=None)
     rd.rollouts(setup, starts(1))  # compiled before
-    monkeypatch.setattr(pool, "wait", once)
+    interrupt_once(monkeypatch)
     runs = rd.rollouts(setup, starts(200), record=EVERYTHING, threads=2)
     idle = np.flatnonzero(runs.stopped & (runs.ended == 0.0))
     assert len(idle)
