@@ -21,11 +21,10 @@ from robot_dyn.foundations import UNREPORTED, Answer, Block, PlanError, reported
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.budget import budget
-from robot_dyn.tools.motors.motor_budget.cells import at_rest_exactly
 from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
 from robot_dyn.tools.motors.motor_budget.pace import Pace, at_pace, least_pace
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
-from robot_dyn.tools.motors.planning.geometric_path import through
+from robot_dyn.tools.motors.planning.geometric_path import at_rest_exactly, through
 from robot_dyn.tools.motors.planning.path_at_limits import path
 
 _RESTS = 1e-3  # of the largest velocity of a joint: slower is a stop
