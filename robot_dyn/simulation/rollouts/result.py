@@ -57,7 +57,7 @@ class Rollouts(RolloutsData):
         uncut: Names of the thresholds at which steps do not end, with `cuts=False`.
         q0, v0: Initial positions and velocities, (B, n).
         observed: Extremes, limits passed and chatter of each run, over all steps except for u of continuous control
-            (see `remarks`); None in files of older versions.
+            (see `remarks`).
         saved: Overview stored with runs read from a file; None otherwise.
         numbers: Number of each run, which determines its noise, (B,): those that were given, or of a slice those in
             the original batch; None for a batch numbered from 0 on, and for runs read from a file.
@@ -174,7 +174,7 @@ class Rollouts(RolloutsData):
             lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}")
         counted = len(self) > 1
         remarks = [each if counted else replace(each, runs=()) for each in self.remarks]
-        lines += lines_of(remarks) if self.observed is not None else ["between samples: not observed"]
+        lines += lines_of(remarks)
         errors = self.tracking_error
         if errors is not None and np.isfinite(errors).any():
             most = int(np.nanargmax(errors))

@@ -56,11 +56,11 @@ class RolloutsData(RunData):
     evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
     sources: tuple[str, ...]
     params: dict[str, Annotated[np.ndarray, Layout(("B", None))]]
+    q0: Annotated[np.ndarray, Layout(("B", "n"))]
+    v0: Annotated[np.ndarray, Layout(("B", "n"))]
+    observed: Observed
     setup: Annotated[Setup | None, NOT_STORED] = None
     uncut: tuple[str, ...] = ()
-    q0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
-    v0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
-    observed: Observed | None = None
     saved: Overview | None = None
     numbers: Annotated[np.ndarray | None, NOT_STORED] = None
 
@@ -86,8 +86,8 @@ class RolloutsData(RunData):
             raise QueryError("runs that were read from a file have no setup; run rd.rollouts again, and use its result")
         run = integer("run", run, least=-len(self), most=len(self) - 1) % len(self)
         plant, controller = self._parts(setup, run)
-        starts = {name: x[run] for name, x in (("q0", self.q0), ("v0", self.v0)) if x is not None}
-        return replace(setup, plant=plant, controller=controller, estimate_error=True, **starts)
+        start = {"q0": self.q0[run], "v0": self.v0[run]}
+        return replace(setup, plant=plant, controller=controller, estimate_error=True, **start)
 
     def _parts(self, setup: Setup, run: int) -> tuple[Plant, Controller | None]:
         """Return plant and controller of a run, with its parameters and noise."""

@@ -54,7 +54,7 @@ def trajectory(runs: RolloutsData, run: int) -> Trajectory:
         ledger=Ledger(energy[:, 0], energy[:, 1], work), desired=tracking.desired, deviation=tracking.deviation,
         outcome=runs.outcome(run), statistics=replace(runs.statistics, **counts), about=about, wrenches=loads,
         at_stop=stops, acting=acts, remarks=remarks_of(runs, run, setup, t, q),
-        extremes=None if runs.observed is None else runs.observed.extremes[run],
+        extremes=runs.observed.extremes[run],
         desired_velocity=tracking.desired_velocity,
     )  # fmt: skip
 
