@@ -69,6 +69,9 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
     known = rd.control.PDGravity(NOMINAL, REFERENCE, 40.0, 4.0)
     stops = rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 0.0, 0.0)
     levels = {"joint_stops.stiffness": [0.0, 1e4, 1e4], "joint_stops.upper": [[0.5, 1.0], [0.5, 1.0], [0.45, 0.6]]}
+    walls = {"joint_stops.upper": [[0.4, 1.0], [0.3, 0.8], [0.35, 0.9]], "kp": [20.0, 30.0, 40.0]}
+    hard = rd.Plant(ARM, [rd.effects.ViscousFriction(0.5), *rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 1e4)])
+    chosen = {"integrator": rd.integrate.Adaptive(), "step_s": None, "record_period_s": 0.05, "engine": "compiled"}
     body = rd.effects.CarriedPayload(rd.Payload(ARM_TIP, 0.7), 0.05, 0.12)
     resting = rd.effects.LuGreFriction(1.0, 1.0, 0.1, 0.2, 0.3, 0.1)  # pushed away from v = 0: no reversal
     push = rd.control.PD(rd.control.hold(Q + 3.0), [20.0, 0.8], 0.0)
@@ -88,6 +91,7 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
         "levels": (
             rd.Setup(rd.Plant(weightless, stops), Q, V, 0.5, integrator="rk4", record_period_s=0.1), {"params": levels},
         ),
+        "chosen steps": (replace(SETUP, plant=hard, **chosen), {"q0": starts(3), "params": walls}),
         "payloads come and go": (
             replace(SETUP, plant=rd.Plant(ARM, [body]), controller=None),
             {"params": {"gravity": [[0.0, 0.0, -9.8], [1.0, 0.0, -1.6]]}},
@@ -125,6 +129,7 @@ def test_each_run_is_that_of_simulate(name: str) -> None:
         assert runs.outcome(i) == alone.outcome
         assert (runs.outcome(i).ending == "diverged") is (name == "between steps in (q, p)")
     assert name != "bristles" or "repeated" not in runs.statistics.engine
+    assert name != "chosen steps" or "one after the other" in runs.statistics.engine
 
 
 def test_the_setup_of_a_run_has_its_values() -> None:
@@ -138,6 +143,7 @@ def test_the_setup_of_a_run_has_its_values() -> None:
             f"payload_mass:{ARM_TIP}": x.plant.dynamics.edits.payloads[0].mass,
             "viscous_friction.damping": x.plant.effects[0].damping,
         },
+        "chosen steps": lambda x: {"kp": x.controller.kp, "joint_stops.upper": x.plant.effects[1].upper},
         "levels": lambda x: {
             "joint_stops.stiffness": x.plant.effects[0].stiffness, "joint_stops.upper": x.plant.effects[0].upper,
         },
@@ -161,28 +167,36 @@ def test_threads_change_nothing() -> None:
             np.testing.assert_array_equal(x, y)
 
 
+@pytest.mark.parametrize("effects", [PLANT.effects, PLANT.effects[:2]])
 @pytest.mark.parametrize("method", ["rk4", *long(["gauss_2"])])
-def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str) -> None:
-    """Bit for bit; its own samples are those of simulate up to its end, then nan."""
-    setup = replace(SETUP, integrator=rd.integrate.method(method), record_period_s=0.0)
+def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str, effects: list[Any]) -> None:
+    """Bit for bit; its own samples are those of simulate up to its end, then nan.
+
+    It names the joint that moved fastest in its last sample, its time and what to do.
+    """
+    plant = rd.Plant(ARM, effects)
+    setup = replace(SETUP, plant=plant, integrator=rd.integrate.method(method), record_period_s=0.0)
     q0, v0 = starts(40), np.broadcast_to(V, (40, 2)).copy()
     wild = [3, 17]
     quiet = rd.rollouts(setup, q0, v0, record=EVERYTHING)
-    v0[wild] = 1e5, 3e7
+    v0[wild] = [[1e5, 3e7], [3e7, 1e4]]
     runs = rd.rollouts(setup, q0, v0, record=EVERYTHING)
     others = np.setdiff1d(np.arange(40), wild)
     np.testing.assert_array_equal(runs.q[others], quiet.q[others])
     np.testing.assert_array_equal(runs.v[others], quiet.v[others])
     assert sorted(np.flatnonzero(runs.diverged)) == wild and not quiet.diverged.any()
     for i in wild:
-        alone = rd.simulate(setup, q0=q0[i], v0=v0[i], estimate_error=False)
-        assert alone.outcome.ending == runs.outcome(i).ending == "diverged"
+        alone, outcome = rd.simulate(setup, q0=q0[i], v0=v0[i], estimate_error=False), runs.outcome(i)
+        assert alone.outcome.ending == outcome.ending == "diverged" and runs[i].outcome == outcome
         assert runs.ended[i] == pytest.approx(alone.outcome.t, abs=0.01)
         later = runs.t > runs.ended[i] + 1e-9
         assert later.any() and np.isnan(runs.q[i, later]).all() and np.isnan(runs.u[i, later]).all()
-        assert np.isnan(runs.kinetic[i, later]).all() and np.isfinite(runs.q[i, 0]).all()
-        assert runs.ended[i] < 0.2 and "smaller step" in runs.outcome(i).advice
-    assert "2 diverged" in runs.summary
+        assert np.isnan(runs.kinetic[i, later]).all() and np.isfinite(runs[i].q).all()
+        assert runs.ended[i] < 0.2 and "take a smaller step than 0.002 s" in outcome.advice
+        fastest = ARM.joint_names[np.argmax(np.abs(runs[i].v[-1]))]
+        assert len(effects) == 3 or f"the fastest joint is '{fastest}'" in outcome.advice
+    assert "2 diverged" in runs.summary and f"run 3 diverged at t = {runs.ended[3]:g} s; " in runs.summary
+    assert not runs.outcome(0).advice
 
 
 @pytest.mark.parametrize("engine", ["interpreted", "compiled"])
@@ -267,24 +281,6 @@ def test_a_run_of_a_slice_has_the_noise_that_it_had() -> None:
         for i in range(3):
             alone = rd.simulate(some.setup_of(i), estimate_error=False, engine="compiled")
             np.testing.assert_allclose(alone.q, some.q[i], rtol=0, atol=1e-12)  # other noise moves q by 1e-3
-
-
-@pytest.mark.parametrize("method", ["rk4", *long(["gauss_2"])])
-def test_a_diverged_run_names_its_joint_its_time_and_what_to_do(method: str) -> None:
-    """The joint that moved fastest in its last sample; each run its own. Nothing cuts their steps."""
-    plant = rd.Plant(ARM, PLANT.effects[:2])
-    setup = replace(SETUP, plant=plant, integrator=rd.integrate.method(method), record_period_s=0.0)
-    v0 = np.array([V, [1e5, 3e7], V, [3e7, 1e4]])
-    runs = rd.rollouts(setup, starts(4), v0)
-    for i in (1, 3):
-        advice, fastest = runs.outcome(i).advice, np.argmax(np.abs(runs[i].v[-1]))
-        assert (
-            f"the fastest joint is '{ARM.joint_names[fastest]}'" in advice
-            and "take a smaller step than 0.002 s" in advice
-        )
-        assert runs[i].outcome == runs.outcome(i)
-        assert np.isfinite(runs[i].q).all() and runs[i].t[-1] <= runs.ended[i] + 1e-12
-    assert not runs.outcome(0).advice and f"run 1 diverged at t = {runs.ended[1]:g} s; " in runs.summary
 
 
 @pytest.mark.parametrize("command", [("replay", "--html", "page.html"), ("plot",)], ids=lambda command: command[0])
@@ -387,30 +383,6 @@ def test_what_has_no_meaning_is_refused() -> None:
             rd.rollouts(SETUP, **options)
     with pytest.raises(TraceError, match="effect table"):
         rd.rollouts(replace(SETUP, plant=rd.Plant(ARM, [Table()])))
-
-
-def test_runs_of_chosen_steps_are_those_of_simulate() -> None:
-    """One after the other on each thread: gains and stops that differ, events included, to rounding of two engines."""
-    stops = rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 1e4)
-    setup = replace(
-        SETUP, plant=rd.Plant(ARM, [rd.effects.ViscousFriction(0.5), *stops]), integrator=rd.integrate.Adaptive(),
-        step_s=None,
-        record_period_s=0.05,
-    )  # fmt: skip
-    upper, kp, q0 = np.array([[0.4, 1.0], [0.3, 0.8], [0.35, 0.9]]), np.array([20.0, 30.0, 40.0]), starts(3)
-    params = {"joint_stops.upper": upper, "kp": kp}
-    runs = rd.rollouts(setup, q0, params=params, record=("q", "v", "u", "energy", "work"), threads=2)
-    for i in range(3):
-        stops = rd.effects.joint_stops([-1.0, -1.0], upper[i], 1e4)
-        plant, law = rd.Plant(ARM, [rd.effects.ViscousFriction(0.5), *stops]), replace(setup.controller, kp=kp[i])
-        own = replace(setup, plant=plant, controller=law, q0=q0[i], estimate_error=False, engine="interpreted")
-        theirs = rd.simulate(own)
-        np.testing.assert_array_equal(runs.t, theirs.t)
-        np.testing.assert_allclose(runs.q[i], theirs.q, atol=1e-9)  # steps differ where errors are near the tolerance
-        np.testing.assert_allclose(runs.u[i], theirs.u, atol=1e-6)
-        np.testing.assert_allclose(runs.kinetic[i], theirs.ledger.kinetic, atol=1e-7)
-        assert runs.work["joint_stops"][i] == pytest.approx(theirs.ledger.work["joint_stops"], abs=1e-7)
-    assert not runs.diverged.any() and "one after the other" in runs.statistics.engine
 
 
 def test_a_batch_of_the_engine_that_is_named_is_that_of_simulate() -> None:
