@@ -2,7 +2,7 @@
 
 measured                            from_samples: the whole way
 spline                              the spline through samples
-sources, csv_file, joint_states     tables of CSV files, data frames, dicts, arrays and logs
+sources, joint_states               tables of CSV files, data frames, dicts, arrays and logs
 table                               columns by heading, and units of headings
 recorded                            samples in SI units: which column is the time and which a joint
 turns                               whole turns of continuous joints

@@ -1,18 +1,25 @@
-"""Sources of samples as tables: CSV files, MCAP logs, data frames, dicts and arrays."""
+"""Sources of samples as tables: CSV files, MCAP logs, data frames, dicts and arrays.
+
+In a CSV file the first line names the columns, commas separate them, and decimals have a point.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from robot_dyn.control.samples.csv_file import read_csv
 from robot_dyn.control.samples.joint_states import SUFFIX, TIMES, read_joint_states
 from robot_dyn.control.samples.table import TIME_NAMES, Table, name_of
 from robot_dyn.foundations.errors import PlanError, shorten, shown
+from robot_dyn.foundations.files import csv_rows
 from robot_dyn.foundations.validate import numbers
+
+_MOST_BYTES = 2**28
+_REMEDY = "give a CSV file in UTF-8 of at most 256 MiB, with columns t and the joints"
 
 
 def table_of(source: Any, joint_names: tuple[str, ...], joints: Mapping[str, Any], topic: Any, time: Any) -> Table:
@@ -28,7 +35,7 @@ def table_of(source: Any, joint_names: tuple[str, ...], joints: Mapping[str, Any
     if topic is not None:
         raise PlanError(f"topic={shown(topic)} is of an MCAP log, and the samples are not of one; leave it out")
     if is_file:
-        return Table(read_csv(source))
+        return Table(_of_csv(source))
     if hasattr(source, "columns") and hasattr(source, "to_numpy"):
         columns = _of_frame(source, indexed=by_name)
     elif isinstance(source, Mapping):
@@ -62,3 +69,48 @@ def _values(column: Any) -> np.ndarray:
     if str(column.dtype).startswith("datetime64[ns, "):
         return column.to_numpy("datetime64[ns]")
     return column.to_numpy()
+
+
+def _of_csv(path: str | Path) -> dict[str, np.ndarray]:
+    """Return the columns of a CSV file by heading.
+
+    Raises:
+        PlanError: If it cannot be read, has no samples, or an entry is not a number; it names file and line.
+    """
+    lines, rows = csv_rows(path, _MOST_BYTES, PlanError, _REMEDY), list[list[float | None]]()
+    _, heads = next(lines)
+    if wrong := _wrong_headings(heads):
+        raise PlanError(f"{path}: {wrong}")
+    for where, texts in lines:
+        row = list(map(_number, texts))
+        if None in row:
+            k = row.index(None)
+            what = f"column {shorten(heads[k])!r} holds {shorten(texts[k])!r}"
+            raise PlanError(f"{where}: {what}, not a number; correct it")
+        rows.append(row)
+    if not rows:
+        raise PlanError(f"{path}: has no samples below its first line")
+    return dict(zip(heads, np.array(rows, float).T, strict=True))
+
+
+def _wrong_headings(heads: list[str]) -> str:
+    """Return why a first line does not name columns that commas separate; empty if it does."""
+    if not any(map(str.strip, heads)):
+        return f"is empty, or its first line is; {_REMEDY}"
+    if len(heads) == 1 and re.search(r"[;\t| ]", name_of(heads[0]).strip()):
+        return (
+            f"has one column, {shorten(heads[0])!r}; separate columns by commas and write decimal points, or give"
+            " the data frame of pandas.read_csv(path, sep=…, decimal=…)"
+        )
+    if None not in map(_number, heads):
+        return f"its first line holds numbers, {shorten(', '.join(heads))}; name the columns there"
+    twice = next((head for k, head in enumerate(heads) if head in heads[:k]), None)
+    return "" if twice is None else f"column {shorten(twice)!r} is there twice; keep one"
+
+
+def _number(text: str) -> float | None:
+    """Return the number that a text states, without the underscores that Python allows; None if it states none."""
+    try:
+        return None if "_" in text else float(text)
+    except ValueError:
+        return None

@@ -24,10 +24,9 @@ from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import Detecting
 from robot_dyn.simulation.observation.observation import observations_of, observed
 from robot_dyn.simulation.results.statistics import Statistics
-from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.batch import Batch, Record, Single
 from robot_dyn.simulation.rollouts.one_by_one import singles
 from robot_dyn.simulation.rollouts.pool import in_threads
-from robot_dyn.simulation.rollouts.record import Record, Single
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
 from robot_dyn.simulation.run.fixed_step import samples_at_most
 from robot_dyn.simulation.run.outcome import Ending, Outcome

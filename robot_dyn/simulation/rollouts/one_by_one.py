@@ -15,9 +15,8 @@ from robot_dyn.simulation.observation.guard_levels import GuardLevels
 from robot_dyn.simulation.observation.observation import Observation, observation_of, observed
 from robot_dyn.simulation.results.samples import columns
 from robot_dyn.simulation.results.statistics import Statistics
-from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.batch import Batch, Record, Single
 from robot_dyn.simulation.rollouts.pool import in_threads
-from robot_dyn.simulation.rollouts.record import Record, Single
 from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.recording import Recording
