@@ -71,7 +71,7 @@ class Batch:
 
     @property
     def extras(self) -> tuple[str, ...]:
-        """Recorded quantities that are no part of the state; machine code computes them at samples."""
+        """Recorded quantities beyond the state, which machine code computes at samples."""
         extras = ("u", "v", "energy") if self.setup.equation.canonical else ("u", "energy")
         return tuple(name for name in extras if name in self.recorded)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial, extreme_values
-from robot_dyn.effects import EffortLimit
+from robot_dyn.effects import EffortLimit, RigidStops
 from robot_dyn.foundations import EffectError, PlanError, check_coefficients, coefficient, declared, instance
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.motors_file import Motors
@@ -96,14 +96,14 @@ def _stated(robot: Any, kind: str) -> Any:
 
 
 def outside_positions(
-    robot: Any, motion: PiecewisePolynomial, stops: Any = None, at: str = "{:.4g} s"
+    robot: Any, motion: PiecewisePolynomial, stops: RigidStops | None = None, at: str = "{:.4g} s"
 ) -> Iterator[str]:
     """Yield, for each joint that a motion takes outside its position limits, where and when.
 
     Args:
         robot: The arm.
         motion: Its motion.
-        stops: Limits that replace those of the robot's file, an object with `lower` and `upper`.
+        stops: Stops whose limits replace those of the robot's file.
         at: Format of a time, or of a place along a path.
     """
     found, n = extreme_values(motion), robot.n
@@ -118,7 +118,7 @@ def outside_positions(
             yield f"{name} is at {where}, outside its limits {lower[i]:.6g} to {upper[i]:.6g}"
 
 
-def check_motors(motors: Any) -> None:
+def check_motors(motors: object) -> None:
     """Raise a PlanError if `motors` are not those of a file."""
     if motors is not None:
         instance("motors", motors, Motors, "read them with rd.tools.motors.read_motors(path)", error=PlanError)
