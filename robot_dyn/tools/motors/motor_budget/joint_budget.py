@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
 from operator import itemgetter
@@ -106,7 +106,9 @@ def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozense
     given, taken = (demand.duration * demand.mean(x.clip(0.0)) for x in (power, -power))
     at_peak, strongest = (np.abs(x).argmax(axis=0) for x in (split.tau, power))
     parts = {cause: demand.mean(torque * split.tau) for cause, torque in split.torques.items()}
-    values = {
+    by_joint = [[(abs(tau), t) for joint, t, tau in zip(*demand.starts, strict=True) if joint == i] for i in row]
+    starts = [max(of, key=itemgetter(0), default=(nan, nan)) for of in by_joint]
+    values: dict[str, Sequence[float] | np.ndarray] = {
         "peak": demand.peak,
         "peak_at": split.t[at_peak],
         "rms": rms,
@@ -118,15 +120,13 @@ def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozense
         "energy": given,
         "regenerated": taken,
         "static_friction": demand.friction,
-        "breakaway": np.zeros(len(row)),
-        "breakaway_at": np.zeros(len(row)),
+        "breakaway": [torque for torque, _ in starts],
+        "breakaway_at": [t for _, t in starts],
         "peak_limit": limits.effort,
         "continuous_limit": limits.continuous,
         "speed_limit": limits.velocity,
     }
     for i, (name, kind) in enumerate(zip(split.joints, split.types, strict=True)):
-        starts = [(abs(tau), t) for joint, t, tau in zip(*demand.starts, strict=True) if joint == i]
-        values["breakaway"][i], values["breakaway_at"][i] = max(starts, key=itemgetter(0), default=(nan, nan))
         numbers = {key: float(x[i]) for key, x in values.items()}
         yield JointBudget(
             joint=name,
