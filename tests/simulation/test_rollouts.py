@@ -355,31 +355,36 @@ class Table(Active):
 
 
 def test_what_has_no_meaning_is_refused() -> None:
-    bad = starts(4)
+    """Before anything runs: also a coefficient that the effect itself refuses, or one of two effects alike."""
+    bad, ones = starts(4), np.ones(3)
     bad[2, 1] = np.nan
+    two = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3), rd.effects.ViscousFriction(0.1)])
     for message, options in {
         "q0 must be finite, got nan for joint": {"q0": bad},
         r"q0 must have shape \(2,\)": {"q0": np.zeros((4, 3))},
         "one number of runs": {"q0": starts(4), "v0": np.zeros((3, 2))},
-        r"one number of runs, .*'kp': \(3,\)": {"q0": starts(4), "params": {"kp": np.ones(3)}},
+        r"one number of runs, .*'kp': \(3,\)": {"q0": starts(4), "params": {"kp": ones}},
         "one number of runs, B ≥ 1: ": {"q0": np.zeros((0, 2))},
         r"mass_scale must have shape \(B,\) or \(B, 1\), got \(\)": {"params": {"mass_scale": 1.1}},
-        "params: no 'kq'; nearest: k": {"params": {"kq": np.ones(3)}},
-        "params: no 'viscous_friction.damp'; nearest: viscous_friction.damping": {
-            "params": {"viscous_friction.damp": np.ones(3)}
+        "no 'kq'; nearest: k": {"params": {"kq": ones}},
+        "no 'viscous_friction.damp'; nearest: viscous_friction.damping": {"params": {"viscous_friction.damp": ones}},
+        "kp must not be negative": {"params": {"kp": [-1.0]}},
+        r"no 'payload_mass:elbow': the arm carries no payload; add one, as robot.with_\(payload=": {
+            "params": {"payload_mass:elbow": ones}
         },
-        "params: kp must not be negative": {"params": {"kp": [-1.0]}},
-        r"params: no 'payload_mass:elbow': the arm carries no payload; add one, as robot.with_\(payload=": {
-            "params": {"payload_mass:elbow": np.ones(3)}
+        "velocity_scale": {"params": {"regularised_coulomb_friction.velocity_scale": np.zeros(2)}},
+        r"several effects of the plant; give 'viscous_friction 1\.damping' and 'visc": {
+            "plant": two, "params": {"viscous_friction.damping": ones},
         },
+        "params must give values by name, such as": {"params": [1]},
+        "params must give values by name, .*3": {"params": {3: ones}},
         "no record 'torque'": {"record": ("torque",)},
         "threads .* must be a whole number, from 1": {"threads": 0},
         r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_period_s": {
-            "q0": starts(4),
-            "most_bytes": 100,
+            "q0": starts(4), "most_bytes": 100,
         },
-    }.items():
-        with pytest.raises(QueryError, match=message):
+    }.items():  # fmt: skip
+        with pytest.raises(rd.RobotDynError, match=message):
             rd.rollouts(SETUP, **options)
     with pytest.raises(TraceError, match="effect table"):
         rd.rollouts(replace(SETUP, plant=rd.Plant(ARM, [Table()])))
@@ -478,15 +483,3 @@ def test_a_run_that_was_not_begun_has_its_start(monkeypatch) -> None:
     run = runs[int(idle[-1])]
     np.testing.assert_array_equal(run.q, starts(200)[idle[-1:]])
     assert run.summary.startswith("stopped at t = 0 s, 1 samples; interrupted")
-
-
-def test_params_are_held_to_what_their_effect_takes() -> None:
-    """A coefficient that the effect itself refuses, or one of two effects alike, is refused before anything runs."""
-    with pytest.raises(rd.RobotDynError, match="velocity_scale"):
-        rd.rollouts(SETUP, starts(2), params={"regularised_coulomb_friction.velocity_scale": np.zeros(2)})
-    two = replace(SETUP, plant=rd.Plant(ARM, [rd.effects.ViscousFriction(0.3), rd.effects.ViscousFriction(0.1)]))
-    with pytest.raises(QueryError, match=r"several effects of the plant; give 'viscous_friction 1\.damping' and 'visc"):
-        rd.rollouts(two, starts(2), params={"viscous_friction.damping": np.ones(2)})
-    for params in ([1], {3: np.ones(2)}):
-        with pytest.raises(QueryError, match="params must give values by name"):
-            rd.rollouts(SETUP, starts(2), params=params)
