@@ -192,9 +192,11 @@ def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str, effects:
         later = runs.t > runs.ended[i] + 1e-9
         assert later.any() and np.isnan(runs.q[i, later]).all() and np.isnan(runs.u[i, later]).all()
         assert np.isnan(runs.kinetic[i, later]).all() and np.isfinite(runs[i].q).all()
-        assert runs.ended[i] < 0.2 and "take a smaller step than 0.002 s" in outcome.advice
-        fastest = ARM.joint_names[np.argmax(np.abs(runs[i].v[-1]))]
-        assert len(effects) == 3 or f"the fastest joint is '{fastest}'" in outcome.advice
+        assert runs.ended[i] < 0.2 and "take a smaller step" in outcome.advice
+        if len(effects) == 2:  # nothing cuts their steps
+            assert "take a smaller step than 0.002 s" in outcome.advice
+            fastest = ARM.joint_names[np.argmax(np.abs(runs[i].v[-1]))]
+            assert f"the fastest joint is '{fastest}'" in outcome.advice
     assert "2 diverged" in runs.summary and f"run 3 diverged at t = {runs.ended[3]:g} s; " in runs.summary
     assert not runs.outcome(0).advice
 
