@@ -18,7 +18,6 @@ from tests.wrong_arguments import EXTREME, LAX, LONG, NOT_TEXT, Example, public,
 
 LIMIT_S = 20  # of one call; the machine may be busy
 MEASURE = {
-    "MotorBudget.max_payload",
     "advise",
     "budget",
     "certify",
@@ -27,6 +26,7 @@ MEASURE = {
     "cost",
     "fastest",
     "from_scene",
+    "max_payload",
     "path",
     "prove",
     "save_plot",

@@ -323,7 +323,7 @@ def examples(folder: Path) -> dict[str, Example]:
             {"motion": rd.control.quintic(q, v, 1.0), "plant": plant, "payload": rd.Payload("pole", 0.5),
              "motors": None, "effort": 50.0, "velocity": 4.0, "continuous": u},
         ),
-        "MotorBudget.max_payload": (needs.max_payload, {"link": "pole", "com": [0.1, 0.2, 0.3]}),
+        "max_payload": (rd.tools.motors.max_payload, {"motor_budget": needs, "link": "pole", "com": [0.1, 0.2, 0.3]}),
         "fastest": (rd.tools.motors.fastest, {"motor_budget": needs, "share": 0.9}),
         "read_motors": (rd.tools.motors.read_motors, {"path": motors}),
         "point_to_point": (

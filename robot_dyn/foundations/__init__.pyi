@@ -54,6 +54,7 @@ from robot_dyn.foundations.extras import needs as needs
 from robot_dyn.foundations.extras import version_of as version_of
 from robot_dyn.foundations.files import FileKind as FileKind
 from robot_dyn.foundations.files import check_folder as check_folder
+from robot_dyn.foundations.files import csv_rows as csv_rows
 from robot_dyn.foundations.files import file_path as file_path
 from robot_dyn.foundations.files import read as read
 from robot_dyn.foundations.files import reading as reading

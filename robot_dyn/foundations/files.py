@@ -6,6 +6,7 @@ after a power loss. Links are followed, permissions are kept, and leftovers of k
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator
@@ -235,6 +236,26 @@ def read(path: str | Path, most: int, error: type[RobotDynError], remedy: str) -
     if len(data) > most:
         raise error(f"{path}: is larger than {most / 2**20:.3g} MiB; {remedy}")
     return data
+
+
+def csv_rows(path: str | Path, most: int, error: type[RobotDynError], remedy: str) -> Iterator[tuple[str, list[str]]]:
+    """Yield the lines of a CSV file, each with its place in words, the first of which names the columns.
+
+    Raises:
+        RobotDynError: Of type `error`, if it cannot be read, or a line has not one entry for each column.
+    """
+    data = read(path, most, error, remedy)
+    try:
+        lines = csv.reader(data.decode("utf-8-sig").splitlines(), strict=True)
+        heads = next(lines, [])
+        yield str(path), heads
+        for row in filter(None, lines):
+            if len(row) != len(heads):
+                counts = f"{len(row)} entries for {len(heads)} columns"
+                raise error(f"{path}: line {lines.line_num} has {counts}; correct it")
+            yield f"{path}: line {lines.line_num}", row
+    except (UnicodeDecodeError, csv.Error) as cause:
+        raise error(f"{path}: is not a CSV file in UTF-8 ({cause}); write it again") from None
 
 
 def read_start(path: str | Path, count: int, error: type[RobotDynError], remedy: str) -> bytes:

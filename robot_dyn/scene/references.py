@@ -9,9 +9,9 @@ import numpy as np
 
 from robot_dyn.control.cartesian import CartesianReference, circle, line
 from robot_dyn.control.reference import PiecewisePolynomial, hold, quintic, via_points
-from robot_dyn.control.samples.columns import columns
 from robot_dyn.control.samples.findings import refuse_other_units, turned
 from robot_dyn.control.samples.measured import from_samples
+from robot_dyn.control.samples.recorded import recorded
 from robot_dyn.control.samples.turns import joined_turns
 from robot_dyn.foundations.errors import PlanWarning, SceneError
 from robot_dyn.model.robot import Robot
@@ -90,14 +90,14 @@ class ViaPoints(Reference):
             raise SceneError("reference: give times_s and points, or a file of both")
         if self.file is None:
             return list(self.times_s), list(self.points)
-        table = columns(robot, self.file, joints=self.joints, unit=self.unit, least=1)
-        refuse_other_units(robot, table)
+        table = recorded(robot, self.file, joints=self.joints, unit=self.unit, least=1)
+        refuse_other_units(table)
         if table.more:
             raise SceneError(f"{self.file}: columns of v are for kind = 'samples'; leave them out")
         if table.t[0] < 0:
             raise SceneError(f"{self.file}: the first time is {table.t[0]:g} s; start at 0 s or later")
-        turns = joined_turns(robot, table)
-        if said := [each for i in range(robot.n) for each in turned(robot, turns, i)]:
+        turns = joined_turns(table)
+        if said := [each for i in range(robot.n) for each in turned(turns, i)]:
             warnings.warn(f"{self.file}: {'; '.join(said)}", PlanWarning, stacklevel=2)
         return table.t.tolist(), turns.table.q.tolist()
 

@@ -23,7 +23,6 @@ from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from robot_dyn.simulation.run.watch import Watch
-from robot_dyn.simulation.setup.setup import MOST_BYTES
 
 
 def parameters(effort: Effort) -> None:
@@ -80,7 +79,7 @@ def _many(setup: rd.Setup, made: MachineCode) -> Any:
     starts = np.tile(READY, (8 * LANES, 1))
 
     def run() -> float:
-        batch = Tiles(Batch(setup, starts, 0 * starts, {}, ("q",)), made, (), MOST_BYTES)
+        batch = Tiles(Batch(setup, starts, 0 * starts, {}, ("q",)), made)
         return seconds(lambda: batch.run(1))
 
     return run

@@ -135,7 +135,6 @@ def changed(k: int, **fields: Any) -> list[Message]:
         (changed(5, position=[np.nan] * 6), {}, "sample 6 is nan"),
         (changed(5, header=FIRST), {}, r"times must increase: sample 6 is at 0 s.*time='log'"),
         ([each._replace(header=0) for each in measured()], {"time": "header"}, "times must increase: sample 2 is at 0"),
-        (measured(q=np.degrees(Q)), {}, "angles look like degrees"),
         (measured(), {"topic": "/joint_state"}, "/joint_state: there is no such topic .*nearest: /joint_states"),
         (measured(), {"topic": "/x"}, "/x is of std_msgs/msg/Float64, not sensor_msgs/msg/JointState"),
         (measured(), {"time": "t"}, "time of a log is 'header' or 'log', got 't'"),

@@ -282,6 +282,8 @@ def test_the_public_functions_replace_their_own_kind_and_no_other(run, tmp_path:
 def test_only_regular_files_are_read(what, message: str) -> None:
     with pytest.raises(QueryError, match=message):
         files.read(what, 10, QueryError, "help")
+    with pytest.raises(RobotDynError, match=message.partition(";")[0]):
+        rd.load_run(what)
 
 
 def test_reads_are_bounded(old: Path) -> None:

@@ -32,7 +32,7 @@ from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.watch import Watch
-from robot_dyn.simulation.setup.setup import MOST_BYTES, Setup
+from robot_dyn.simulation.setup.setup import Setup
 
 RUNS = 4096  # side by side
 PER_STEP, PER_RUN = "step of RK4", "step of RK4 and run"
@@ -110,7 +110,7 @@ def side_by_side(setup: Setup) -> Pair:
     starts = np.tile(short.q0, (RUNS, 1)), np.tile(short.v0, (RUNS, 1))
 
     def run() -> float:
-        batch = Tiles(Batch(short, *starts), made, (), MOST_BYTES)
+        batch = Tiles(Batch(short, *starts), made)
         began = process_time()
         batch.run(1)
         return (process_time() - began) / (RUNS * short.steps)

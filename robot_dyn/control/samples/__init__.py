@@ -2,8 +2,9 @@
 
 measured                            from_samples: the whole way
 spline                              the spline through samples
-sources, csv_table, joint_states    columns by heading: of CSV files, data frames, dicts, arrays and logs
-columns, headings                   which column is the time and which a joint, in which unit
+sources, joint_states               tables of CSV files, data frames, dicts, arrays and logs
+table                               columns by heading, and units of headings
+recorded                            samples in SI units: which column is the time and which a joint
 turns                               whole turns of continuous joints
 findings                            doubtful samples
 """

@@ -8,12 +8,14 @@ that nothing of them is lost.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 import numpy as np
 
+from robot_dyn.control.samples.table import Table
 from robot_dyn.foundations.errors import PlanError, nearest, shorten, shown
 from robot_dyn.foundations.extras import needs
 from robot_dyn.foundations.files import reading
@@ -26,22 +28,8 @@ _LARGEST = 2**30  # bytes of a record
 needs_data = partial(needs, extra="data")
 
 
-class JointStates(NamedTuple):
-    """Positions by name of joint, each (m,), with times in [s] from the first message, and where they are from."""
-
-    t: np.ndarray
-    columns: dict[str, np.ndarray]
-    note: str
-
-
-class _Message(NamedTuple):
-    log: int  # its time, in [ns]
-    header: int  # likewise
-    position: dict[str, float]
-
-
-def read_joint_states(path: str | Path, joint_names: tuple[str, ...], topic: str | None, time: Any) -> JointStates:
-    """The joint states of a topic of an MCAP log.
+def read_joint_states(path: str | Path, joint_names: tuple[str, ...], topic: str | None, time: Any) -> Table:
+    """Return positions by name of joint from a topic of an MCAP log, with times from the first message.
 
     Args:
         path: The log.
@@ -57,26 +45,25 @@ def read_joint_states(path: str | Path, joint_names: tuple[str, ...], topic: str
         raise PlanError(f"{path}: time of a log is 'header' or 'log', got {shown(time)}")
     for package in ("mcap", "mcap_ros2"):
         needs_data(package)
+    with _opened(path) as stream:
+        topic = _topic(path, dict(_topics(stream)), topic)
+        messages = list(_decoded(stream, topic))
+    times, rows, others = _of_joints(path, topic, messages, set(joint_names))
+    of = time or ("header" if any(times["header"]) else "log")
+    ns, where = times[of], "headers" if of == "header" else "the log" if time else "the log, as the headers have none"
+    note = f"topic {topic}, times of {where}, from {ns[0] // 10**9}.{ns[0] % 10**9:09d} s" + others
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return Table(columns, np.array([x - ns[0] for x in ns]) / 1e9, note)
+
+
+@contextmanager
+def _opened(path: str | Path) -> Iterator[BinaryIO]:
+    """Open an MCAP file; whatever mcap raises of a broken one becomes a PlanError."""
     with reading(path, PlanError, _REMEDY) as stream:
         if stream.read(len(_MAGIC)) != _MAGIC:
             raise PlanError(f"{path}: is not an MCAP file; {_REMEDY}")
-        topic = _topic(path, _guarded(path, _topics(stream)), topic)
-        messages, others = _of_joints(path, topic, list(_guarded(path, _decoded(stream, topic))), set(joint_names))
-    of_header = time == "header" or (time is None and any(each.header for each in messages))
-    ns = [each.header if of_header else each.log for each in messages]
-    where = "headers" if of_header else "the log" if time else "the log, as the headers have none"
-    note = f"topic {topic}, times of {where}, from {ns[0] // 10**9}.{ns[0] % 10**9:09d} s" + others
-    columns = {name: np.array([each.position[name] for each in messages]) for name in messages[0].position}
-    return JointStates(np.array([each - ns[0] for each in ns]) / 1e9, columns, note)
-
-
-def _guarded(path: str | Path, items: Iterator[Any]) -> Iterator[Any]:
-    """What an iterator yields; whatever mcap raises of a broken file becomes a PlanError."""
-    while True:
         try:
-            yield next(items)
-        except StopIteration:
-            return
+            yield stream
         except PlanError:
             raise
         except Exception as error:  # of mcap, its decompressors, or struct
@@ -108,9 +95,8 @@ def _decoded(stream: BinaryIO, topic: str) -> Iterator[tuple[int, Any]]:
         yield message.log_time, decoded
 
 
-def _topic(path: str | Path, found: Iterator[tuple[str, str]], topic: str | None) -> str:
-    """The topic that was asked for, or the only one of joint states."""
-    types = dict(found)
+def _topic(path: str | Path, types: dict[str, str], topic: str | None) -> str:
+    """Return the requested topic, or the only one of joint states, from the types of all."""
     known = [each for each, kind in types.items() if kind == _TYPE]
     if topic is not None:
         if topic not in known:
@@ -126,36 +112,38 @@ def _topic(path: str | Path, found: Iterator[tuple[str, str]], topic: str | None
 
 
 def _of_joints(
-    path: str | Path, topic: str, found: list[tuple[int, Any]], wanted: set[str]
-) -> tuple[list[_Message], str]:
-    """The messages that name joints of the arm, each with the same ones; and what is left out, for the note."""
-    kept: list[_Message] = []
+    path: str | Path, topic: str, messages: list[tuple[int, Any]], wanted: set[str]
+) -> tuple[dict[str, list[int]], list[dict[str, float]], str]:
+    """Return times in [ns] of headers and log, positions by joint, and a note on names that are left out."""
+    times: dict[str, list[int]] = {"header": [], "log": []}
+    rows: list[dict[str, float]] = []
     left_out: dict[str, None] = {}
-    for k, (log, message) in enumerate(found):
+    for k, (log, message) in enumerate(messages):
         where = f"{path}: message {k + 1} of {topic}"
         try:
-            names, position = [str(each) for each in message.name], [float(each) for each in message.position]
+            names, position = [str(name) for name in message.name], [float(x) for x in message.position]
             header = int(message.header.stamp.sec) * 10**9 + int(message.header.stamp.nanosec)
         except (AttributeError, TypeError, ValueError) as error:
             raise PlanError(
                 f"{where} has not the header, names and positions of {_TYPE} ({shorten(str(error))}); the log"
                 " defines another message by that name: write it again"
             ) from None
+        left_out |= dict.fromkeys(name for name in names if name not in wanted)
         if not wanted & set(names):
-            left_out |= dict.fromkeys(names)
             continue
         if len(position) != len(names) or len(set(names)) < len(names):
             raise PlanError(f"{where} has {len(position)} positions for {len(set(names))} different names")
-        here = {name: x for name, x in zip(names, position, strict=True) if name in wanted}
-        if kept and here.keys() != kept[0].position.keys():
-            odd = sorted(here.keys() ^ kept[0].position.keys())
-            raise PlanError(f"{where} has not the joints of the ones before it: {', '.join(odd)}; split the log")
-        left_out |= dict.fromkeys(name for name in names if name not in wanted)
-        kept.append(_Message(log, header, here))
-    if len(kept) < 2:
+        row = {name: x for name, x in zip(names, position, strict=True) if name in wanted}
+        if rows and row.keys() != rows[0].keys():
+            odd = ", ".join(sorted(row.keys() ^ rows[0].keys()))
+            raise PlanError(f"{where} has not the joints of the ones before it: {odd}; split the log")
+        rows.append(row)
+        times["header"].append(header)
+        times["log"].append(log)
+    if len(rows) < 2:
         named = ", ".join(left_out) or "none"
         raise PlanError(
-            f"{path}: {len(kept)} messages of {topic} name joints of the arm, 2 are the least; names:"
+            f"{path}: {len(rows)} messages of {topic} name joints of the arm, 2 are the least; names:"
             f" {shorten(named, 200)}; give joints={{joint: name}}"
         )
-    return kept, f"; without {shorten(', '.join(left_out), 120)}" if left_out else ""
+    return times, rows, f"; without {shorten(', '.join(left_out), 120)}" if left_out else ""

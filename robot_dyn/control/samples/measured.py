@@ -8,8 +8,8 @@ import numpy as np
 
 from robot_dyn.control.plan import Plan
 from robot_dyn.control.reference import PiecewisePolynomial
-from robot_dyn.control.samples.columns import columns
 from robot_dyn.control.samples.findings import DENSE, findings, refuse_moving_ends, refuse_other_units
+from robot_dyn.control.samples.recorded import recorded
 from robot_dyn.control.samples.spline import Samples, spline
 from robot_dyn.control.samples.turns import joined_turns
 from robot_dyn.foundations.errors import PlanError
@@ -70,12 +70,12 @@ def from_samples(
     instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=PlanError)
     if ends is not None:
         choice("ends", ends, ("rest", "measured"), error=PlanError)
-    table = columns(arm, source, time, joints, unit, q0, topic)
-    refuse_other_units(arm, table)
-    turns = joined_turns(arm, table)
+    samples = recorded(arm, source, time, joints, unit, q0, topic)
+    refuse_other_units(samples)
+    turns = joined_turns(samples)
     table, t, q = turns.table, turns.table.t, turns.table.q
     if ends is None:
-        refuse_moving_ends(arm, table)
+        refuse_moving_ends(table)
         ends = "rest"
     if start_s is not None:
         t = _shifted(t, number("start_s", start_s, error=PlanError))
@@ -84,7 +84,7 @@ def from_samples(
     method = "; ".join([_method(arm, t, q, ends), *([table.note] if table.note else [])])
     return Plan(
         *(arm.name, arm.joint_names, arm.joint_types, reference, method),
-        *({"velocity": arm.velocity_limit}, tuple(findings(arm, turns, reference, ends))),
+        *({"velocity": arm.velocity_limit}, tuple(findings(turns, reference, ends))),
     )
 
 

@@ -1,68 +1,62 @@
-"""Sources of samples as columns by heading: CSV files, MCAP logs, data frames, dicts and arrays."""
+"""Sources of samples as tables: CSV files, MCAP logs, data frames, dicts and arrays.
+
+In a CSV file the first line names the columns, commas separate them, and decimals have a point.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from robot_dyn.control.samples.csv_table import read_csv
-from robot_dyn.control.samples.headings import name_of
 from robot_dyn.control.samples.joint_states import SUFFIX, TIMES, read_joint_states
+from robot_dyn.control.samples.table import TIME_NAMES, Table, name_of
 from robot_dyn.foundations.errors import PlanError, shorten, shown
+from robot_dyn.foundations.files import csv_rows
 from robot_dyn.foundations.validate import numbers
 
-TIME_NAMES = "t", "time", "timestamp", "stamp"
-
-
-class Table(NamedTuple):
-    """Columns by heading; of a log its times, (m,), in [s], and a note of where they are from."""
-
-    columns: dict[str, np.ndarray]
-    t: np.ndarray | None = None
-    note: str = ""
+_MOST_BYTES = 2**28
+_REMEDY = "give a CSV file in UTF-8 of at most 256 MiB, with columns t and the joints"
 
 
 def table_of(source: Any, joint_names: tuple[str, ...], joints: Mapping[str, Any], topic: Any, time: Any) -> Table:
-    """The columns of a source; of an array without headings, those of the joints.
+    """Return the columns of a source; of an array without headings, those of the joints.
 
     Raises:
         PlanError: If it cannot be read, or a column is there twice.
     """
-    is_file = isinstance(source, str | Path)
+    is_file, by_name = isinstance(source, str | Path), time is None or isinstance(time, str)
     if is_file and Path(source).suffix.lower() == SUFFIX:
-        names = tuple(each for each in joints.values() if isinstance(each, str)) or joint_names
-        states = read_joint_states(source, names, topic, time)
-        return Table(states.columns, states.t, states.note)
-    if topic is not None or (isinstance(time, str) and time in TIMES and not is_file):
-        what = f"topic={shown(topic)}" if topic is not None else f"time={time!r}"
-        if topic is not None or not _has(source, time):
-            raise PlanError(f"{what} is of an MCAP log, and the samples are not of one; leave it out")
+        names = tuple(name for name in joints.values() if isinstance(name, str)) or joint_names
+        return read_joint_states(source, names, topic, time)
+    if topic is not None:
+        raise PlanError(f"topic={shown(topic)} is of an MCAP log, and the samples are not of one; leave it out")
     if is_file:
-        return Table(read_csv(source))
+        return Table(_of_csv(source))
     if hasattr(source, "columns") and hasattr(source, "to_numpy"):
-        return Table(_of_frame(source, indexed=time is None or isinstance(time, str)))
-    if isinstance(source, Mapping):
+        columns = _of_frame(source, indexed=by_name)
+    elif isinstance(source, Mapping):
         try:
-            return Table({str(head): np.asarray(x) for head, x in source.items()})
+            columns = {str(head): np.asarray(x) for head, x in source.items()}
         except Exception:  # a ragged list, or whatever an object's conversion raises
             raise PlanError(f"samples: columns must be arrays of one length, got {shown(source)}") from None
-    rows = numbers("samples", source, ("m", len(joint_names)), error=PlanError)
-    return Table(dict(zip(joint_names, rows.T, strict=True)))
-
-
-def _has(source: Any, column: str) -> bool:
-    return column in getattr(source, "columns", source if isinstance(source, Mapping) else ())
+    else:
+        rows = numbers("samples", source, ("m", len(joint_names)), error=PlanError)
+        columns = dict(zip(joint_names, rows.T, strict=True))
+    if by_name and time in TIMES and time not in columns:
+        raise PlanError(f"time={time!r} is of an MCAP log, and the samples are not of one; leave it out")
+    return Table(columns)
 
 
 def _of_frame(frame: Any, *, indexed: bool) -> dict[str, np.ndarray]:
-    """The columns of a data frame, and, if times are looked for, its index if that is named as they are."""
+    """Return the columns of a data frame and, if times are sought, its index if that is named as they are."""
     heads = list(map(str, frame.columns))
-    if twice := next((each for k, each in enumerate(heads) if each in heads[:k]), None):
+    if twice := next((head for k, head in enumerate(heads) if head in heads[:k]), None):
         raise PlanError(f"samples: column {shorten(twice)!r} is there twice; keep one")
-    columns = {head: _values(frame[of]) for head, of in zip(heads, frame.columns, strict=True)}
+    columns = {head: _values(frame[name]) for head, name in zip(heads, frame.columns, strict=True)}
     index = getattr(frame, "index", None) if indexed else None  # of pandas
     name = getattr(index, "name", None)
     if name is not None and name_of(str(name)).lower() in TIME_NAMES and str(name) not in columns:
@@ -71,7 +65,52 @@ def _of_frame(frame: Any, *, indexed: bool) -> dict[str, np.ndarray]:
 
 
 def _values(column: Any) -> np.ndarray:
-    """A column as an array; stamps with a time zone, which to_numpy leaves as objects, as stamps of UTC."""
+    """Return a column as an array; stamps with a time zone, which to_numpy leaves as objects, as stamps of UTC."""
     if str(column.dtype).startswith("datetime64[ns, "):
         return column.to_numpy("datetime64[ns]")
     return column.to_numpy()
+
+
+def _of_csv(path: str | Path) -> dict[str, np.ndarray]:
+    """Return the columns of a CSV file by heading.
+
+    Raises:
+        PlanError: If it cannot be read, has no samples, or an entry is not a number; it names file and line.
+    """
+    lines, rows = csv_rows(path, _MOST_BYTES, PlanError, _REMEDY), list[list[float | None]]()
+    _, heads = next(lines)
+    if wrong := _wrong_headings(heads):
+        raise PlanError(f"{path}: {wrong}")
+    for where, texts in lines:
+        row = list(map(_number, texts))
+        if None in row:
+            k = row.index(None)
+            what = f"column {shorten(heads[k])!r} holds {shorten(texts[k])!r}"
+            raise PlanError(f"{where}: {what}, not a number; correct it")
+        rows.append(row)
+    if not rows:
+        raise PlanError(f"{path}: has no samples below its first line")
+    return dict(zip(heads, np.array(rows, float).T, strict=True))
+
+
+def _wrong_headings(heads: list[str]) -> str:
+    """Return why a first line does not name columns that commas separate; empty if it does."""
+    if not any(map(str.strip, heads)):
+        return f"is empty, or its first line is; {_REMEDY}"
+    if len(heads) == 1 and re.search(r"[;\t| ]", name_of(heads[0]).strip()):
+        return (
+            f"has one column, {shorten(heads[0])!r}; separate columns by commas and write decimal points, or give"
+            " the data frame of pandas.read_csv(path, sep=…, decimal=…)"
+        )
+    if None not in map(_number, heads):
+        return f"its first line holds numbers, {shorten(', '.join(heads))}; name the columns there"
+    twice = next((head for k, head in enumerate(heads) if head in heads[:k]), None)
+    return "" if twice is None else f"column {shorten(twice)!r} is there twice; keep one"
+
+
+def _number(text: str) -> float | None:
+    """Return the number that a text states, without the underscores that Python allows; None if it states none."""
+    try:
+        return None if "_" in text else float(text)
+    except ValueError:
+        return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import final
@@ -46,53 +46,38 @@ def differing_settings(a: TrajectoryData, b: TrajectoryData) -> tuple[DifferingS
 
 
 def run_names(*runs: TrajectoryData) -> tuple[str, ...]:
-    """Names of runs: their robots, if these differ; else their files, or what differs in settings; else numbers.
+    """Return names of runs: their robots, if these differ; else their files, or settings that differ; else numbers.
 
     One or two settings name them; of more, one does, and "…" says that there are others. All differ from each other.
     """
-    robots, files = ([run.about.get(key, "") for run in runs] for key in ("robot", "file"))
-    if len(runs) == 1 or _all_differ(robots):
-        return tuple(each or "run" for each in robots)
-    stems = [
-        " run ".join(filter(None, (Path(f).stem, run.about.get("run")))) for f, run in zip(files, runs, strict=True)
-    ]
-    if all(files) and _all_differ(stems):
-        return tuple(stems)
-    pairs = [differing_settings(runs[0], other) for other in runs[1:]]
-    of_first = {each.name: each.a for pair in pairs for each in pair}
-    values = {
-        name: [a, *(next((each.b for each in pair if each.name == name), a) for pair in pairs)]
-        for name, a in of_first.items()
-    }
-    short = {name: each for name, each in values.items() if max(map(len, (name, *each))) <= _NAMED}
+    if len(runs) == 1:
+        return (runs[0].about.get("robot", "run"),)
+    return next(names for names in _names(runs) if len(set(names)) == len(runs))
+
+
+def _names(runs: tuple[TrajectoryData, ...]) -> Iterator[tuple[str, ...]]:
+    """Yield names of several runs, the best first; the last ones differ."""
+    yield tuple(run.about.get("robot", "run") for run in runs)
+    if all("file" in run.about for run in runs):
+        stems = ((Path(run.about["file"]).stem, run.about.get("run")) for run in runs)
+        yield tuple(" run ".join(filter(None, parts)) for parts in stems)
+    pairs = [{x.name: x for x in differing_settings(runs[0], run)} for run in runs[1:]]
+    first = {name: setting.a for pair in pairs for name, setting in pair.items()}
+    values = {name: [a, *(pair[name].b if name in pair else a for pair in pairs)] for name, a in first.items()}
+    short = {name: of for name, of in values.items() if max(map(len, (name, *of))) <= _NAMED}
     if len(values) == len(short) == 2:
         last = {name: name.rpartition(".")[2] for name in short}  # with units and paths two do not fit a legend
-        called = last if _all_differ(last.values()) else {name: name for name in short}
-        both = tuple(
-            ", ".join(_by(called[name], _UNIT.sub(r"\1", each[k])) for name, each in short.items())
-            for k in range(len(runs))
-        )
-        if _all_differ(both):
-            return both
-    others = ", …" if len(values) > 1 else ""
-    for name, each in short.items():
-        if _all_differ(each):
-            return tuple(f"{_by(name, value)}{others}" for value in each)
-    return tuple(f"run {number}" for number in range(1, len(runs) + 1))
+        called = last if len(set(last.values())) == 2 else {name: name for name in short}
+        both = ([_by(called[name], _UNIT.sub(r"\1", x)) for x in of] for name, of in short.items())
+        yield tuple(map(", ".join, zip(*both, strict=True)))
+    for name, of in short.items():
+        yield tuple(f"{_by(name, value)}{', …' * (len(values) > 1)}" for value in of)
+    yield tuple(f"run {number}" for number in range(1, len(runs) + 1))
 
 
 def _by(name: str, value: str) -> str:
-    """A run by a setting and its value."""
-    return f"{'without ' if value == ABSENT else ''}{name}{_unless_absent(value)}"
-
-
-def _all_differ(names: Iterable[str]) -> bool:
-    names = list(names)
-    return len(set(names)) == len(names)
-
-
-def _unless_absent(value: str) -> str:
-    return "" if value in (ABSENT, "acts") else f" {value}"
+    """Return a name of a run by a setting and its value."""
+    return {ABSENT: f"without {name}", "acts": name}.get(value, f"{name} {value}")
 
 
 def unknown_settings(a: TrajectoryData, b: TrajectoryData) -> tuple[str, ...]:

@@ -1,8 +1,9 @@
 """Many runs of one setup, side by side.
 
 - rollouts: the function `rollouts`, its arguments, and the choice between the two ways of running a batch.
-- batch: starts and values that differ from run to run; lock_step: 64 runs per tile in machine code; thresholds: where
-  such runs would need cut steps; one_by_one: runs one after the other on each thread; pool: the threads.
+- batch: starts and values that differ from run to run, and the record of the runs; thresholds: where runs in lock step
+  would need cut steps.
+- lock_step: 64 runs per tile in machine code; one_by_one: runs one after the other on each thread; pool: the threads.
 - rollouts_data: the fields of `Rollouts`; result: `Rollouts`; run: one of its runs as a `Trajectory`; overview:
   remarks, tracking errors, causes of divergence; table: its table.
 - sweepable: the parameters that may differ from run to run; file: files of rollouts.

@@ -1,9 +1,10 @@
-"""A batch: the starts and the values that differ from run to run, and the rollouts that its runs become."""
+"""A batch: a setup, with the starts and the values that differ from run to run; and what its runs recorded."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple, final
 
 import numpy as np
@@ -12,24 +13,12 @@ from robot_dyn.codegen.parameters import over_runs
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.simulation.observation.guard_levels import GuardLevels, guard_levels
-from robot_dyn.simulation.observation.observation import Observed
-from robot_dyn.simulation.results.provenance import origin
+from robot_dyn.simulation.observation.observation import Observation, Observed
 from robot_dyn.simulation.results.statistics import Statistics
-from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.sweepable import parts_of_run
+from robot_dyn.simulation.rollouts.thresholds import Thresholds, thresholds
 from robot_dyn.simulation.run.outcome import Ending, Outcome
-from robot_dyn.simulation.setup.setup import Setup, check_batch
-
-
-class Ends(NamedTuple):
-    """How the runs ended; attributes as of `Rollouts`."""
-
-    ended: np.ndarray
-    diverged: np.ndarray
-    stopped: np.ndarray
-    advice: tuple[str, ...]
-    steps: np.ndarray
-    evaluations: np.ndarray
+from robot_dyn.simulation.setup.setup import Setup
 
 
 @final
@@ -38,11 +27,11 @@ class Batch:
     """B runs of a setup.
 
     Attributes:
-        setup: Of all runs.
+        setup: Setup of all runs.
         q0, v0: Starts, (B, n).
         sweep: Values that differ from run to run, (B, size) by name.
-        recorded: Names of what is recorded: "q", "v", "u", "energy", "work".
-        numbers: Of the runs, of which their noise is, (B,); 0 to B − 1 unless given.
+        recorded: Names of the recorded quantities: "q", "v", "u", "energy", "work".
+        numbers: Number of each run, which determines its noise, (B,); 0 to B − 1 unless given.
     """
 
     setup: Setup
@@ -56,60 +45,113 @@ class Batch:
         return len(self.q0)
 
     def some(self, runs: np.ndarray) -> Batch:
-        """The runs of these numbers."""
+        """Return the batch of the runs at these places."""
         sweep = {name: x[runs] for name, x in self.sweep.items()}
         return Batch(self.setup, self.q0[runs], self.v0[runs], sweep, self.recorded, self.number_of(runs))
 
     def number_of(self, runs: np.ndarray) -> np.ndarray:
-        """Of runs at these places of the batch, the numbers of which their noise is."""
+        """Return the numbers of the runs at these places."""
         return runs if self.numbers is None else self.numbers[runs]
 
     def parts(self, run: int) -> tuple[Plant, Controller | None]:
-        """Plant and controller of a run."""
+        """Return plant and controller of a run."""
         values = {name: x[run] for name, x in self.sweep.items()}
         return parts_of_run(self.setup, values, run if self.numbers is None else int(self.numbers[run]))
 
     def levels(self, plant: Plant, controller: Controller | None) -> GuardLevels:
-        """The levels of all runs, of a plant and a controller without their values."""
+        """Return the levels of all runs; values that differ replace those of `plant` and `controller`."""
         return guard_levels(plant.dynamics, *over_runs(plant, controller, self.sweep), len(self))
 
     @property
     def sizes(self) -> dict[str, int]:
-        """How many numbers of a sample are recorded, by name."""
+        """Number of entries of each recorded quantity at a sample, by name."""
         n = self.setup.plant.dynamics.n
         sizes = {"q": n, "v": n, "u": n, "work": len(self.setup.equation.sources), "energy": 2}
         return {name: sizes[name] for name in self.recorded}
 
-    def check_size(self, most: int) -> None:
-        """Raise a QueryError if its record takes more bytes than `most`."""
-        check_batch(self.setup, len(self), sum(self.sizes.values()), most)
+    @property
+    def extras(self) -> tuple[str, ...]:
+        """Recorded quantities beyond the state, which machine code computes at samples."""
+        extras = ("u", "v", "energy") if self.setup.equation.canonical else ("u", "energy")
+        return tuple(name for name in extras if name in self.recorded)
 
-    def rollouts(
-        self, setup: Setup, t: np.ndarray, columns: Mapping[str, np.ndarray], ends: Ends, statistics: Statistics,
-        observed: Observed,
-    ) -> Rollouts:  # fmt: skip
-        """Return the result of the batch.
+    @property
+    def why_one_by_one(self) -> str:
+        """Why the runs do not go in lock step; empty if they do."""
+        setup, method = self.setup, self.setup.integrator
+        motion = setup.plant.equation_of_motion
+        if method.controls_error:
+            return f"{method.name} chooses its steps"
+        if setup.engine == "interpreted":
+            return "the engine is interpreted"
+        if motion.set_valued and not method.nonsmooth:
+            return f"{motion.set_valued[0].name} holds joints and lets them go, where steps must end"
+        if motion.payloads:
+            return f"{motion.payloads[0].name} comes and goes, where steps must end"
+        return "steps end at events" if setup.events else ""
 
-        Args:
-            setup: Whose equations ran.
-            t: Times of the samples, (m,).
-            columns: What was recorded, (B, m, size) by name.
-            ends: Of the runs.
-            statistics: Of all.
-            observed: Of the runs.
-        """
-        sources, energy, work = tuple(self.setup.equation.sources), columns.get("energy"), columns.get("work")
-        K, V = (None, None) if energy is None else (energy[..., 0], energy[..., 1])
-        return Rollouts(
-            joint_names=self.setup.plant.dynamics.joint_names, t=t, q=columns.get("q"), v=columns.get("v"),
-            u=columns.get("u"), kinetic=K, potential=V,
-            work=None if work is None else dict(zip(sources, np.moveaxis(work, -1, 0), strict=True)),
-            **ends._asdict(), statistics=statistics, sources=sources,
-            about=origin(self.setup.plant.dynamics) | self.setup.about, params=dict(self.sweep), setup=setup,
-            q0=self.q0, v0=self.v0, observed=observed, numbers=self.numbers,
-        )  # fmt: skip
+    @cached_property
+    def thresholds(self) -> Thresholds | None:
+        """Thresholds at which `simulate` would cut the steps of runs in lock step; None without any."""
+        return None if self.why_one_by_one else thresholds(self.setup, self.sweep, len(self))
 
 
-def advice_of(outcome: Outcome) -> str:
-    """The advice of an outcome that a batch records."""
-    return "" if outcome.ending is Ending.STOPPED else outcome.advice
+class Single(NamedTuple):
+    """The record of one run.
+
+    Attributes:
+        t: Times of its samples, (k,), in [s].
+        columns: Recorded quantities, (k, …) by name.
+        outcome: How it ended.
+        steps, evaluations: Their numbers.
+        observation: Observations of all steps.
+    """
+
+    t: np.ndarray
+    columns: dict[str, np.ndarray]
+    outcome: Outcome
+    steps: int
+    evaluations: int
+    observation: Observation
+
+
+@final
+@dataclass(eq=False)
+class Record:
+    """What a batch recorded, and how its runs ended; both ways of running write into its arrays.
+
+    Attributes:
+        setup: Setup whose equations ran.
+        t: Times of the samples, (m,), in [s].
+        columns: Recorded quantities, (B, m, size) by name; nan after the end of a run.
+        ended, diverged, stopped, advice, steps, evaluations: See `Rollouts`.
+        statistics: Statistics of the batch.
+        observed: Observations of all runs.
+    """
+
+    setup: Setup
+    t: np.ndarray
+    columns: dict[str, np.ndarray]
+    ended: np.ndarray
+    diverged: np.ndarray
+    stopped: np.ndarray
+    advice: list[str]
+    steps: np.ndarray
+    evaluations: np.ndarray
+    statistics: Statistics
+    observed: Observed
+
+    def write(self, run: int, single: Single) -> None:
+        """Write the record of a run."""
+        self.cut(run, len(single.t), single.outcome)
+        for name, x in self.columns.items():
+            x[run, : len(single.t)] = single.columns[name]
+        self.steps[run], self.evaluations[run] = single.steps, single.evaluations
+
+    def cut(self, run: int, rows: int, outcome: Outcome) -> None:
+        """End a run after some of its samples."""
+        for x in self.columns.values():
+            x[run, rows:] = np.nan
+        self.ended[run] = outcome.t
+        self.diverged[run], self.stopped[run] = (outcome.ending is x for x in (Ending.DIVERGED, Ending.STOPPED))
+        self.advice[run] = "" if outcome.ending is Ending.STOPPED else outcome.advice

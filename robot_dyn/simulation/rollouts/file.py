@@ -47,7 +47,7 @@ def _check(runs: Rollouts, found: Found) -> None:
     if not all(map(are_times, runs.ended[:, None])) or (runs.diverged & runs.stopped).any():
         raise StoreError("members 'ended', 'diverged' and 'stopped' are not those of runs")
     numbered = (number for each in (() if runs.saved is None else runs.saved.remarks) for number in each.runs)
-    if runs.observed is not None and len(runs.observed.levels) != runs.observed.limits.shape[1]:
+    if len(runs.observed.levels) != runs.observed.limits.shape[1]:
         raise StoreError("'observed/levels' are not those of member 'observed/limits'")
     if not all(0 <= number < len(runs) for number in (*numbered, 0 if runs.saved is None else runs.saved.worst)):
         raise StoreError(f"'saved' is about a run that is not one of the {len(runs)}")

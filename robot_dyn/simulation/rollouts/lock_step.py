@@ -1,12 +1,11 @@
 """A batch of runs in tiles of 64 in lock step, each tile run by one thread from beginning to end.
 
 Records are arrays over time, row and run, in this order, so that a tile writes whole vectors. Where `simulate` cuts
-steps at thresholds, the runs that may pass one are repeated by themselves, and replace those of lock step.
+steps at thresholds, the runs that may pass one are repeated one by one, and replace those of lock step.
 """
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
@@ -20,15 +19,14 @@ from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.model.right_angles import robot_of
 from robot_dyn.simulation.compiled.machine_code import MachineCode
-from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Runs, Why, rules_of, runs_of
+from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Why, rules_of, runs_of
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import Detecting
 from robot_dyn.simulation.observation.observation import observations_of, observed
 from robot_dyn.simulation.results.statistics import Statistics
-from robot_dyn.simulation.rollouts.batch import Batch, Ends, advice_of
-from robot_dyn.simulation.rollouts.one_by_one import OneByOne, Single
+from robot_dyn.simulation.rollouts.batch import Batch, Record, Single
+from robot_dyn.simulation.rollouts.one_by_one import singles
 from robot_dyn.simulation.rollouts.pool import in_threads
-from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
 from robot_dyn.simulation.run.fixed_step import samples_at_most
 from robot_dyn.simulation.run.outcome import Ending, Outcome
@@ -54,52 +52,43 @@ class Tiles:
 
     Args:
         batch: The runs.
-        code: Their state equation.
-        extras: What machine code records beside the state, as in `machine_code`.
-        most: Number of bytes to record at most.
-        thresholds: At which `simulate` cuts steps; None if it cuts none, or cuts are not requested.
+        code: Their state equation, with the extras of the batch.
+        thresholds: Thresholds at which steps are cut; None without any, or if cuts are not requested.
     """
 
-    def __init__(
-        self, batch: Batch, code: MachineCode, extras: tuple[str, ...], most: int,
-        thresholds: Thresholds | None = None,
-    ) -> None:  # fmt: skip
-        setup, recorded = batch.setup, batch.recorded
-        equation, n = code.compiled_form, code.compiled_form.plant.dynamics.n
-        self.batch, self.setup, self.code, self.extras = batch, setup, code, extras
-        self.y, self.thresholds = _starts(equation, batch.q0, batch.v0), thresholds
+    def __init__(self, batch: Batch, code: MachineCode, thresholds: Thresholds | None = None) -> None:
+        setup, equation, n = batch.setup, code.compiled_form, code.compiled_form.plant.dynamics.n
+        self.batch, self.setup, self.code, self.thresholds = batch, setup, code, thresholds
+        self.y = _starts(equation, batch.q0, batch.v0)
         self.levels = batch.levels(equation.plant, equation.controller)
         places = {
             "q": range(n),
             "v": range(n, 2 * n),
             "work": range(equation.size - len(equation.sources), equation.size),
         }
-        self.states = [name for name in places if name in recorded and name not in extras]
-        self.columns = [column for name in self.states for column in places[name]]
+        self.states = [name for name in places if name in batch.recorded and name not in batch.extras]
+        self.rows = np.array([row for name in self.states for row in places[name]], np.int64)
         tiles = -(-len(batch) // LANES)
-        width, more = tiles * LANES, sum(batch.sizes[name] for name in extras)
-        batch.check_size(most)
+        width = tiles * LANES
+        self.numbers = np.minimum(np.arange(width), len(batch) - 1)  # a tile that is not full repeats a run
         self.table, self.apart = segment_table(setup), 0
-        steps = int(self.table.counts[:-1].sum())
+        self.steps = int(self.table.counts[:-1].sum())
         if "actuation" in code.code.programs:
-            self.apart = 1 if equation.sampled else max(1, steps // _INSTANTS)
-        self.instants = steps // self.apart if self.apart > 1 else 0
-        rows = samples_at_most(setup, self.table.counts)
-        self.out_y, self.out_extras = np.empty((rows, len(self.columns), width)), np.empty((rows, more, width))
-        numbers = np.minimum(np.arange(width), len(batch) - 1)
-        start = np.vstack([batch.q0[numbers].T, batch.v0[numbers].T, np.full((n, width), np.nan)])
-        self.observations = observations_of(start, self.levels.of_runs(numbers), tiles)
-        self.t = np.zeros(0)  # of the samples of the tile that has most, in [s]
-        self.lock = threading.Lock()
+            self.apart = 1 if equation.sampled else max(1, self.steps // _INSTANTS)
+        most, more = samples_at_most(setup, self.table.counts), sum(batch.sizes[name] for name in batch.extras)
+        self.out_y, self.out_extras = np.empty((most, len(self.rows), width)), np.empty((most, more, width))
+        q0, v0 = batch.q0[self.numbers].T, batch.v0[self.numbers].T
+        start = np.vstack([q0, v0, np.full((n, width), np.nan)])
+        self.observations = observations_of(start, self.levels.of_runs(self.numbers), tiles)
+        self.t = [np.zeros(0)] * tiles  # times of the samples of each tile, in [s]
         self.unfinished = np.ones(tiles, dtype=bool)
         self.why, self.last = np.zeros(width, np.int64), np.zeros((equation.size, width))
         self.ended, self.until = np.full(width, setup.duration_s), np.full(width, np.inf)
-        self.again: dict[int, Single | None] = {}  # runs repeated by themselves; None where Ctrl-C came first
         self.clocks = np.tile([0.0, setup.record_period_s, ON_STEP * setup.nominal_step_s], (tiles, 1))
         self.evaluations, self.stop = np.zeros(tiles, np.int64), np.zeros(1, np.int64)
 
-    def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Rollouts:
-        """All tiles, each by one thread; Ctrl-C ends them at their next step, and an error of `on_progress`."""
+    def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Record:
+        """Run all tiles, each on one thread; Ctrl-C ends them at their next step, and an error of `on_progress`."""
         began, end, reached = perf_counter(), self.setup.duration_s, 0.0
 
         def report(t: float) -> None:
@@ -108,56 +97,36 @@ class Tiles:
             if on_progress is not None:
                 on_progress(reached)
 
-        in_threads(self._tile, len(self.unfinished), threads, self.stop, lambda: report(self._reached()))
-        self._make_again(threads, report)
-        result = self._result()
+        in_threads(self._tile, len(self.t), threads, self.stop, lambda: report(self._reached()))
+        result = self._record(self._repeated(threads, report), began)
         if on_progress is not None and not result.stopped.any():
             report(end)
-        return replace(result, statistics=replace(result.statistics, wall_s=perf_counter() - began))
+        return result
 
     def _reached(self) -> float:
-        """The time reached, in [s], the mean over the runs: that of the next sample of each that goes on."""
+        """Return the mean time reached, in [s], of the runs that are not to be repeated."""
         end, left = self.setup.duration_s, np.isinf(self.until).reshape(-1, LANES).mean(axis=1)
         return float((left * np.where(self.unfinished, np.minimum(self.clocks[:, 0], end), end)).mean())
 
-    def _make_again(self, threads: int, report: Callable[[float], object]) -> None:
-        """Make those runs by themselves that may have passed a threshold, or diverged, where steps are cut."""
-        if self.thresholds is None:
-            return
+    def _repeated(self, threads: int, report: Callable[[float], object]) -> dict[int, Single | None]:
+        """Repeat the runs that may have passed a threshold, or diverged, with cuts; None where Ctrl-C came first."""
+        B, end = len(self.batch), self.setup.duration_s
         passed = np.isfinite(self.until) | (self.why > 0)
-        numbers = np.flatnonzero(passed[: len(self.batch)])
-        self.again = dict.fromkeys(numbers.tolist())
-        if not len(numbers) or self.stop[0]:
-            return
-        runs = OneByOne(self.batch.some(numbers), self.levels.of_runs(numbers))
-        part = len(numbers) / len(self.batch)
-        runs.run(threads, lambda t: report((1 - part) * self.setup.duration_s + part * t))
-        self.again = dict(zip(numbers.tolist(), runs.records, strict=True))
-
-    def _write_again(self, t: np.ndarray) -> None:
-        """What these runs recorded, in place of what lock step gave; without them, that up to their thresholds."""
-        for run, single in self.again.items():
-            if single is None:
-                rows = int(np.searchsorted(t, self.until[run], side="right"))
-            else:
-                rows = len(single.t)
-                for array, of in ((self.out_y, self.states), (self.out_extras, self.extras)):
-                    array[:rows, :, run] = np.hstack([*(single.columns[name] for name in of), np.empty((rows, 0))])
-            self.out_y[rows:, :, run], self.out_extras[rows:, :, run] = np.nan, np.nan
-
-    def _runs(self, tile: int) -> Runs:
-        """The runs of a tile at their start; a tile that is not full repeats a run."""
-        equation, index = self.code.compiled_form, self._numbers(tile)
-        run_parameters = self.code.run_parameters({name: x[index] for name, x in self.batch.sweep.items()})
-        return runs_of(equation, self.y[index].T, run_parameters, self.out_extras.shape[1], self.batch.number_of(index))
-
-    def _numbers(self, tile: int) -> np.ndarray:
-        """The numbers of the runs in a tile."""
-        return np.minimum(np.arange(tile * LANES, (tile + 1) * LANES), len(self.batch) - 1)
+        runs = np.flatnonzero(passed[:B] & (self.thresholds is not None))
+        records: list[Single | None] = [None] * len(runs)
+        if len(runs) and not self.stop[0]:
+            part = len(runs) / B
+            levels = self.levels.of_runs(runs)
+            records, _ = singles(self.batch.some(runs), levels, threads, lambda t: report((1 - part) * end + part * t))
+        return dict(zip(runs.tolist(), records, strict=True))
 
     def _tile(self, tile: int) -> None:
         equation, n = self.code.compiled_form, self.setup.plant.dynamics.n
-        lanes, runs = slice(tile * LANES, (tile + 1) * LANES), self._runs(tile)
+        lanes = slice(tile * LANES, (tile + 1) * LANES)
+        numbers = self.numbers[lanes]
+        run_parameters = self.code.run_parameters({name: x[numbers] for name, x in self.batch.sweep.items()})
+        noise, more = self.batch.number_of(numbers), self.out_extras.shape[1]
+        runs = runs_of(equation, self.y[numbers].T, run_parameters, more, noise)
         method = cast(PlainMethod, self.setup.integrator)
         assert self.code.machine_loop is not None
         advance = self.code.machine_loop.calls()
@@ -167,23 +136,20 @@ class Tiles:
         now[Now.BUDGET] = np.iinfo(np.int64).max
         none = np.empty((0, equation.size))
         records = records_of(
-            np.array(self.columns, np.int64), self.out_y, self.out_extras, none, none, np.empty((1 + 3 * n, 0)),
-            self.observations[tile],
-        )  # fmt: skip
+            self.rows, self.out_y, self.out_extras, none, none, np.empty((1 + 3 * n, 0)), self.observations[tile]
+        )
         rules = rules_of(equation, False, LARGEST, base=lanes.start, apart=self.apart)
         work = stepper.work
         if self.thresholds is not None:
             positions = 0 if equation.canonical else n
-            switches = self.thresholds.lanes(self._numbers(tile), equation.size, positions)
+            switches = self.thresholds.lanes(numbers, equation.size, positions)
             self.until[lanes] = switches.until
             work = Detecting(work, work.K, switches._replace(until=self.until[lanes]))
         ended = advance(
             functions, self.table, runs, records, rules, stepper.coefficients, work, now, self.clocks[tile], self.stop
         )
         self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, now[Now.EVALUATIONS]
-        with self.lock:
-            if now[Now.ROW] > len(self.t):
-                self.t = records.t[: now[Now.ROW]]
+        self.t[tile] = records.t[: now[Now.ROW]]
         self.why[lanes], self.last[:, lanes] = runs.why, runs.last
         self.ended[lanes] = np.where(runs.why > 0, runs.ended, self.setup.duration_s)
         if ended != Ended.DONE:
@@ -192,68 +158,59 @@ class Tiles:
             for array in (self.out_y, self.out_extras):
                 array[int(now[Now.ROW]) :, :, lanes] = np.nan
 
-    def _result(self) -> Rollouts:
-        B, t = len(self.batch), self.t
-        self._write_again(t)
+    def _record(self, repeated: dict[int, Single | None], began: float) -> Record:
+        """Return the record of lock step, with repeated runs in place of those that passed a threshold."""
+        B, setup, t = len(self.batch), self.setup, max(self.t, key=len)
         why, ended = self.why[:B], self.ended[:B].copy()
-        diverged, advice, steps = why > 0, self._advice(why), self._steps(ended)
-        stopped = np.repeat(self.unfinished, LANES)[:B] & ~diverged
-        evaluations = np.repeat(self.evaluations, LANES)[:B]
-        for run, single in self.again.items():
-            outcome = Outcome(Ending.STOPPED, min(self.until[run], ended[run])) if single is None else single.outcome
-            ended[run], advice[run] = outcome.t, advice_of(outcome)
-            diverged[run], stopped[run] = (outcome.ending is each for each in (Ending.DIVERGED, Ending.STOPPED))
-            if single is not None:
-                steps[run], evaluations[run] = single.steps, single.evaluations
-        alone = {run: single.observation for run, single in self.again.items() if single is not None}
-        recorded, sizes = dict[str, np.ndarray](), self.batch.sizes
-        for array, names in ((self.out_y, self.states), (self.out_extras, self.extras)):
-            by_run = np.moveaxis(array[: len(t), :, :B], -1, 0)
-            ends = np.cumsum([0, *(sizes[name] for name in names)])
-            recorded |= {name: by_run[..., a:b] for name, a, b in zip(names, ends, ends[1:], strict=False)}
-        return self.batch.rollouts(
-            self._setup_compiled(), t, recorded,
-            Ends(ended, diverged, stopped, tuple(advice), steps, evaluations), self._statistics(),
-            observed(self.observations, self.levels, alone, self.instants)[:B],
-        )  # fmt: skip
-
-    def _setup_compiled(self) -> Setup:
-        """The setup whose equations were compiled: right angles of the file written out in full."""
-        plant, controller = self.setup.plant, self.setup.controller
-        if controller is not None:
-            models = {name: robot_of(each) or each for name, each in controller.models.items()}
-            controller = with_values(controller, models)
-        plant = Plant(robot_of(plant.dynamics) or plant.dynamics, plant.effects)
-        return replace(self.setup, plant=plant, controller=controller)
-
-    def _advice(self, why: np.ndarray) -> list[str]:
-        """Why runs diverged and what to do; nothing for the others."""
-        advice, equation = [""] * len(why), self.code.compiled_form
+        advice = [""] * B
         for run in np.flatnonzero(why).tolist():
-            fastest = equation.fastest_joint(self.last[:, run])
-            advice[run] = diverged_advice(_REASONS[Why(why[run])], fastest, self.setup)
-        return advice
+            fastest = self.code.compiled_form.fastest_joint(self.last[:, run])
+            advice[run] = diverged_advice(_REASONS[Why(why[run])], fastest, setup)
+        columns, sizes = dict[str, np.ndarray](), self.batch.sizes
+        for array, names in ((self.out_y, self.states), (self.out_extras, self.batch.extras)):
+            by_run = np.moveaxis(array[: len(t), :, :B], -1, 0)
+            parts = np.split(by_run, np.cumsum([sizes[name] for name in names]), axis=-1)
+            columns |= dict(zip(names, parts, strict=False))
+        label = f"compiled, {B} runs side by side"
+        if repeated:
+            label += f", {len(repeated)} of them repeated with steps cut at thresholds"
+        step, most = setup.duration_s / self.steps, int(self.evaluations.max())
+        alone = {run: single.observation for run, single in repeated.items() if single is not None}
+        instants = self.steps // self.apart if self.apart > 1 else 0
+        result = Record(
+            _compiled(setup), t, columns, ended, why > 0, np.repeat(self.unfinished, LANES)[:B] & (why == 0), advice,
+            self._steps(ended), np.repeat(self.evaluations, LANES)[:B],
+            Statistics(setup.integrator.name, step, self.steps, most, perf_counter() - began, engine=label),
+            observed(self.observations, self.levels, alone, instants)[:B],
+        )  # fmt: skip
+        for run, single in repeated.items():
+            if single is not None:
+                result.write(run, single)
+            else:
+                rows = int(np.searchsorted(t, self.until[run], side="right"))
+                result.cut(run, rows, Outcome(Ending.STOPPED, min(self.until[run], ended[run])))
+        return result
 
     def _steps(self, ended: np.ndarray) -> np.ndarray:
-        """Number of steps of each run up to its end."""
+        """Return the number of steps of each run up to its end."""
         table = self.table
         lengths = np.where(table.lengths > 0, table.lengths, 1.0)
         segment = np.maximum(np.searchsorted(table.starts[:-1], ended, side="right") - 1, 0)
         before = np.cumsum(table.counts) - table.counts
         return before[segment] + np.rint((ended - table.starts[segment]) / lengths[segment]).astype(np.int64)
 
-    def _statistics(self) -> Statistics:
-        """Of the batch; its steps and evaluations are those of one run to the end."""
-        method, steps = self.setup.integrator, int(self.table.counts[:-1].sum())
-        runs = f"compiled, {len(self.batch)} runs side by side"
-        if self.again:
-            runs += f", {len(self.again)} of them repeated with steps cut at thresholds"
-        most = int(self.evaluations.max())
-        return Statistics(method.name, self.setup.duration_s / steps, steps, most, 0.0, engine=runs)
+
+def _compiled(setup: Setup) -> Setup:
+    """Return the setup whose equations were compiled: right angles of the file are written out in full."""
+    plant, controller = setup.plant, setup.controller
+    if controller is not None:
+        controller = with_values(controller, {name: robot_of(x) or x for name, x in controller.models.items()})
+    plant = Plant(robot_of(plant.dynamics) or plant.dynamics, plant.effects)
+    return replace(setup, plant=plant, controller=controller)
 
 
 def _starts(equation: StateEquation, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """The states at the starts of runs, (B, m)."""
+    """Return the states at the starts of runs, (B, m)."""
     if equation.canonical or equation.equation_of_motion.drives:
-        return np.stack([equation.start(*each) for each in zip(q, v, strict=True)])
+        return np.stack([equation.start(*start) for start in zip(q, v, strict=True)])
     return np.column_stack([q, v, np.zeros((len(q), equation.size - 2 * q.shape[1]))])

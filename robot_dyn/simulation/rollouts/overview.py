@@ -14,11 +14,10 @@ from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, ju
 from robot_dyn.simulation.diagnostics.step_remarks import KINDS, Units, against, of_reference, of_steps, units_of
 from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.chatter import Episode
-from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_square, tracking_of
-from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData, parts_of
+from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 from robot_dyn.simulation.setup.setup import Setup
 
 OF_REFERENCES = RemarkKind.JUMPS, RemarkKind.HELD
@@ -26,24 +25,27 @@ _JUDGED = 8  # runs that diverged: each loop is linearised about a start of its 
 
 
 def overview(runs: RolloutsData) -> Overview:
-    """Of runs with their setup."""
+    """Return the overview of runs with their setup."""
 
     def remedy(run: int) -> Callable[[Episode], str]:
         setup = runs.setup_of(run)
         return against(setup, runs.t, np.tile(setup.q0, (len(runs.t), 1)) if runs.q is None else runs.q[run])
 
-    errors = tracking_errors(runs)
-    remarks = () if runs.observed is None else tuple(counted(runs, runs.observed, remedy))
+    errors, remarks = tracking_errors(runs), tuple(_remarks(runs, remedy))
     worst = worst_of(runs, remarks, errors)
-    if runs.setup is not None:
-        remarks = (*remarks, *_of_references(runs, runs.setup), *_linearised(runs, worst))
-    return Overview(worst, remarks, errors)
+    return Overview(worst, (*remarks, *_linearised(runs, worst)), errors)
 
 
 def remarks_on_each(runs: RolloutsData) -> tuple[Remark, ...]:
-    """The remarks that a run has whatever the others of its batch are, without remedies."""
-    found = () if runs.observed is None else tuple(counted(runs, runs.observed, lambda _: lambda _: ""))
-    return found if runs.setup is None else (*found, *_of_references(runs, runs.setup))
+    """Return the remarks that a run has whatever the others of its batch are, without remedies."""
+    return tuple(_remarks(runs, lambda _: lambda _: ""))
+
+
+def _remarks(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], str]]) -> Iterator[Remark]:
+    """Yield remarks on what was observed, and on the reference, with a remedy for the chatter of a run."""
+    yield from _counted(runs, remedy)
+    if runs.setup is not None:
+        yield from _of_references(runs, runs.setup)
 
 
 def texts_by_run(remarks: Iterable[Remark], count: int) -> list[str]:
@@ -59,19 +61,14 @@ def of_some(runs: RolloutsData, numbers: range, whole: Overview) -> Overview:
     """Of runs without their setup that were these of a larger batch."""
     errors = None if whole.tracking_error is None else whole.tracking_error[numbers]
     remedies = {each.kind: each.remedy for each in whole.remarks}
-    remarks: list[Remark] = []
-    if runs.observed is not None:
-        remarks += counted(runs, runs.observed, lambda _: lambda _: remedies[RemarkKind.CHATTER])
-    remarks += _of_whole(whole, numbers)
-    alone = (each for each in whole.remarks if each.looked == 1 != len(numbers) and each.runs[0] in numbers)
-    remarks += (replace(each, runs=(numbers.index(each.runs[0]),)) for each in alone)
-    return Overview(worst_of(runs, tuple(remarks), errors), tuple(remarks), errors)
+    remarks = *_counted(runs, lambda _: lambda _: remedies[RemarkKind.CHATTER]), *_of_whole(whole, numbers)
+    alone = (remark for remark in whole.remarks if remark.looked == 1 != len(numbers) and remark.runs[0] in numbers)
+    remarks += tuple(replace(remark, runs=(numbers.index(remark.runs[0]),)) for remark in alone)
+    return Overview(worst_of(runs, remarks, errors), remarks, errors)
 
 
 def remarks_of(runs: RolloutsData, run: int, setup: Setup | None, t: np.ndarray, q: np.ndarray) -> tuple[Remark, ...]:
     """On what was observed of one run, with positions q (m, n) at times t (m,)."""
-    if runs.observed is None:
-        return ()
     visits, episodes = runs.observed.visits_of(run), runs.observed.episodes_of(run)
     remedy = (lambda _: "") if setup is None else against(setup, t, q)
     instants = int(runs.observed.instants[run])
@@ -99,14 +96,9 @@ def units(runs: RolloutsData) -> Units:
     return [(unit("q", each), unit("v", each), unit("u", each)) for each in joint_types(runs)]
 
 
-def counted(runs: RolloutsData, of: Observed, remedy: Callable[[int], Callable[[Episode], str]]) -> Iterator[Remark]:
-    """For each kind, joint and quantity the remark on the worst run, and which runs have one.
-
-    Args:
-        runs: All.
-        of: What was observed of them.
-        remedy: Against the chatter of a run.
-    """
+def _counted(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], str]]) -> Iterator[Remark]:
+    """Yield, for each kind, joint and quantity, the remark on the worst run, and which runs have one."""
+    of = runs.observed
     named = runs.joint_names, units(runs)
     amplitudes = of.episodes[:, :, 2]
     for joint in np.argsort(-amplitudes.max(axis=0)):
@@ -131,16 +123,14 @@ def counted(runs: RolloutsData, of: Observed, remedy: Callable[[int], Callable[[
 
 def _of_references(runs: RolloutsData, setup: Setup) -> Iterator[Remark]:
     """Remarks on the reference, which all runs share: where it jumps from their starts, which joints friction holds."""
-    q0 = np.tile(setup.q0, (len(runs), 1)) if runs.q0 is None else runs.q0
-    v0 = np.tile(setup.v0, (len(runs), 1)) if runs.v0 is None else runs.v0
-    for remark, gaps in jumps(setup, q0, v0, units(runs)):
+    for remark, gaps in jumps(setup, runs.q0, runs.v0, units(runs)):
         yield _in_runs(remark, int(gaps.argmax()), gaps > 0)
-    if runs.observed is None or not any(isinstance(each, DryFriction) for each in setup.plant.effects):
+    if not any(isinstance(effect, DryFriction) for effect in setup.plant.effects):
         return
     extremes, of = runs.observed.extremes, dict[str, list[tuple[int, Remark]]]()
     for run in map(int, np.flatnonzero(at_rest(extremes).any(axis=1))):
-        plant, controller = parts_of(runs, setup, run)
-        of_run = with_values(setup, {"plant": plant, "controller": controller, "q0": q0[run]})  # all was checked
+        plant, controller = runs._parts(setup, run)
+        of_run = with_values(setup, {"plant": plant, "controller": controller, "q0": runs.q0[run]})  # all was checked
         for remark in held(of_run, extremes[run], runs.t[runs.t <= runs.ended[run]], units(runs)):
             of.setdefault(remark.joint, []).append((run, remark))
     for each in of.values():

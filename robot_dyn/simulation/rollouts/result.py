@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import fields, replace
 from functools import cached_property
 from operator import index
-from typing import final, overload
+from typing import Any, final, overload
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from robot_dyn.simulation.columns import Column, Variable
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.observation.remarks import remark_lines as lines_of
 from robot_dyn.simulation.results.provenance import about_the_robot, joint_types
-from robot_dyn.simulation.results.run_data import taken
 from robot_dyn.simulation.results.summary import of_tracking
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.rollouts.overview import of_some, overview
@@ -58,7 +57,7 @@ class Rollouts(RolloutsData):
         uncut: Names of the thresholds at which steps do not end, with `cuts=False`.
         q0, v0: Initial positions and velocities, (B, n).
         observed: Extremes, limits passed and chatter of each run, over all steps except for u of continuous control
-            (see `remarks`); None in files of older versions.
+            (see `remarks`).
         saved: Overview stored with runs read from a file; None otherwise.
         numbers: Number of each run, which determines its noise, (B,): those that were given, or of a slice those in
             the original batch; None for a batch numbered from 0 on, and for runs read from a file.
@@ -89,11 +88,8 @@ class Rollouts(RolloutsData):
             chosen = range(len(self))[run]
             if not chosen:
                 raise QueryError(f"there is no run in {run}: runs are numbered from 0 to {len(self) - 1}")
-            numbers = np.arange(len(self)) if self.numbers is None else self.numbers
-            by_run = {x.name: taken(getattr(self, x.name), run) for x in fields(self) if x.name not in _SHARED}
-            some = replace(self, **by_run, numbers=numbers[run], saved=None)
-            whole = None if self.saved is None else of_some(some, chosen, self.saved)
-            return replace(some, saved=whole)
+            some = self._some(run)
+            return some if self.saved is None else replace(some, saved=of_some(some, chosen, self.saved))
         try:
             number = range(len(self))[index(None if isinstance(run, bool) else run)]  # type: ignore[arg-type]
         except TypeError:
@@ -101,6 +97,18 @@ class Rollouts(RolloutsData):
         except IndexError:
             raise IndexError(f"there is no run {run}: runs are numbered from 0 to {len(self) - 1}") from None
         return trajectory(self, number)
+
+    def _some(self, runs: slice) -> Rollouts:
+        """Return the runs of a slice, without the `saved` overview, which is of all."""
+
+        def of(x: Any) -> Any:
+            if isinstance(x, dict):
+                return {name: values[runs] for name, values in x.items()}
+            return None if x is None else x[runs]
+
+        by_run = {field.name: of(getattr(self, field.name)) for field in fields(self) if field.name not in _SHARED}
+        numbers = np.arange(len(self)) if self.numbers is None else self.numbers
+        return replace(self, **by_run, numbers=numbers[runs], saved=None)
 
     @cached_property
     def overview(self) -> Overview:
@@ -166,7 +174,7 @@ class Rollouts(RolloutsData):
             lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}")
         counted = len(self) > 1
         remarks = [each if counted else replace(each, runs=()) for each in self.remarks]
-        lines += lines_of(remarks) if self.observed is not None else ["between samples: not observed"]
+        lines += lines_of(remarks)
         errors = self.tracking_error
         if errors is not None and np.isfinite(errors).any():
             most = int(np.nanargmax(errors))

@@ -15,7 +15,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from robot_dyn.codegen.parameters import CONTROLLER, names_of, parameters, sweepable_parameters, with_parameters
+from robot_dyn.codegen.parameters import CONTROLLER, Parameter, names_of, parameters, sweepable_parameters
 from robot_dyn.codegen.threads import thread_count
 from robot_dyn.description.edits import Edits
 from robot_dyn.effects.effect import Effect
@@ -30,23 +30,19 @@ from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.cache import machine_code
 from robot_dyn.simulation.compiled.choice import checked
 from robot_dyn.simulation.results.acting import frame_of, rotors_of
-from robot_dyn.simulation.results.provenance import edits_of_machine_code
+from robot_dyn.simulation.results.provenance import edits_of_machine_code, origin
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.rollouts.one_by_one import one_by_one
 from robot_dyn.simulation.rollouts.overview import causes
 from robot_dyn.simulation.rollouts.result import Rollouts
-from robot_dyn.simulation.rollouts.thresholds import Thresholds, thresholds
+from robot_dyn.simulation.rollouts.thresholds import Thresholds
 from robot_dyn.simulation.setup.checks import check_stops
 from robot_dyn.simulation.setup.options import Options, setup_of, takes_options
-from robot_dyn.simulation.setup.setup import MOST_BYTES, Setup
+from robot_dyn.simulation.setup.setup import MOST_BYTES, Setup, check_batch
 
 LARGEST_NUMBER = 2**53  # of a run
 RECORDS = ("q", "v", "u", "energy", "work")
-_WITHOUT_EFFECT = {
-    "estimate_error": "simulate one of the runs for that",
-    "accuracy": "simulate one of the runs for that",
-}
 
 
 @takes_options
@@ -123,22 +119,37 @@ def rollouts(
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
     batch = batch_of(setup, q0, v0, params or {}, record, numbers)
-    passed = None if _why_one_by_one(setup) else thresholds(setup, batch.sweep, len(batch))
-    runs = run_batch(batch, passed, truth("cuts", cuts), thread_count(threads), most_bytes, on_progress)
+    runs = run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), most_bytes, on_progress)
     return replace(runs, advice=causes(replace(runs, setup=setup)))
 
 
 def batch_of(
     setup: Setup, q0: Any, v0: Any, params: Mapping[str, Any], record: Iterable[str], numbers: Any = None
 ) -> Batch:
-    """The runs of a setup; arguments and errors as of `rollouts`."""
-    recorded = _recorded(record)
-    q, v, sweep = _starts(setup, q0, v0, params)
-    return Batch(setup, q, v, sweep, recorded, None if numbers is None else _numbers(numbers, len(q)))
+    """Return the runs of a setup; arguments and errors as in `rollouts`."""
+    if (recorded := several(record)) is None:
+        raise QueryError(f"record: give names of {', '.join(RECORDS)}, got {shown(record)}")
+    recorded = tuple(choice("record", name, RECORDS) for name in recorded)
+    names = setup.plant.dynamics.joint_names
+    q = joint_values("q0", setup.q0 if q0 is None else q0, names)
+    v = joint_values("v0", setup.v0 if v0 is None else v0, names)
+    sweep = {name: _values(setup, name, x) for name, x in params.items()}
+    counts, n = {len(x) for x in (q, v, *sweep.values()) if x.ndim > 1} or {1}, len(names)
+    if len(counts) > 1 or max(q.ndim, v.ndim) > 2 or counts == {0}:
+        shapes = {"q0": q.shape, "v0": v.shape} | {name: np.shape(x) for name, x in params.items()}
+        rows = f"starts ({n},) or (B, {n}), params (B,) or (B, …)"
+        raise QueryError(f"starts and params must be of one number of runs, B ≥ 1: {rows}; got {shapes}")
+    B = counts.pop()
+    q, v = (np.broadcast_to(x, (B, n)) for x in (q, v))
+    batch = Batch(setup, q, v, sweep, recorded, None if numbers is None else _numbers(numbers, B))
+    if any(isinstance(effect, RigidStops) for effect in setup.plant.effects):
+        for run in range(B):
+            check_stops(batch.parts(run)[0], q[run], f"q0 of run {run}")
+    return batch
 
 
 def _numbers(given: Any, count: int) -> np.ndarray:
-    """Numbers of runs, (B,)."""
+    """Return numbers of runs, (B,)."""
     array = numbers("numbers", given, ("B",), least=0)
     if array.shape != (count,) or (array != np.floor(array)).any() or array.max() > LARGEST_NUMBER:
         raise QueryError(f"numbers: give a whole number of each of the {count} runs, 0 to {LARGEST_NUMBER:g}")
@@ -146,13 +157,12 @@ def _numbers(given: Any, count: int) -> np.ndarray:
 
 
 def manners(batch: Batch) -> list[tuple[np.ndarray, Thresholds | None]]:
-    """The runs of a batch in groups of which each is run in one manner whatever runs are beside it, with thresholds.
+    """Return the runs of a batch in groups that go alike, with thresholds.
 
     A batch in which some run has a threshold detects what passes it; its runs without any go apart from it, as they go
     in a batch of such runs alone.
     """
-    runs = np.arange(len(batch))
-    passed = None if _why_one_by_one(batch.setup) else thresholds(batch.setup, batch.sweep, len(batch))
+    runs, passed = np.arange(len(batch)), batch.thresholds
     if passed is None or passed.some.all():
         return [(runs, passed)]
     with_some = runs[passed.some]
@@ -163,131 +173,92 @@ def run_batch(
     batch: Batch, passed: Thresholds | None, cuts: bool, threads: int, most_bytes: int,
     on_progress: Callable[[float], object] | None = None,
 ) -> Rollouts:  # fmt: skip
-    """The runs of a batch with thresholds `passed`, as of `rollouts`, but for the causes of their divergence."""
-    setup = batch.setup
-    why = _why_one_by_one(setup)
+    """Return the rollouts of a batch with thresholds `passed`, without the causes of their divergence."""
+    setup, why = batch.setup, batch.why_one_by_one
     if not cuts and why:
         raise QueryError(f"cuts=False: {why}, and so the runs go one after the other; leave it out")
+    check_batch(setup, len(batch), sum(batch.sizes.values()), most_bytes)
     cut = passed is not None or setup.finds_events  # samples are then interpolated within steps, which lock step cannot
     if why or (cuts and cut and not setup.samples_on_steps):
-        runs = one_by_one(batch, most_bytes, threads, on_progress)
+        record = one_by_one(batch, threads, on_progress)
     else:
-        runs = _side_by_side(batch, passed if cuts else None, most_bytes).run(threads, on_progress)
-        if passed is not None and not cuts:
-            runs = replace(runs, uncut=passed.names)
-    return replace(runs, about=frame_of(setup) | rotors_of(setup) | edits_of_machine_code(setup) | runs.about)
-
-
-def _why_one_by_one(setup: Setup) -> str:
-    """Why runs of a setup do not go in lock step; "" if they do."""
-    motion, method = setup.plant.equation_of_motion, setup.integrator
-    if method.controls_error:
-        return f"{method.name} chooses its steps"
-    if setup.engine == "interpreted":
-        return "the engine is interpreted"
-    if motion.set_valued and not method.nonsmooth:
-        return f"{motion.set_valued[0].name} holds joints and lets them go, where steps must end"
-    if motion.payloads:
-        return f"{motion.payloads[0].name} comes and goes, where steps must end"
-    return "steps end at events" if setup.events else ""
-
-
-def _side_by_side(batch: Batch, passed: Thresholds | None, most: int) -> Tiles:
-    """The runs in lock step, of which those that pass a threshold are repeated one by one."""
-    setup, recorded = batch.setup, batch.recorded
-    equation = setup.equation
-    from_code = ("u", "v", "energy") if equation.canonical else ("u", "energy")
-    extras = tuple(name for name in from_code if name in recorded)
-    build = partial(
-        machine_code, equation, setup.integrator, lanes=LANES, extras=extras, swept=tuple(batch.sweep),
-        detects=passed is not None,
+        build = partial(
+            machine_code, setup.equation, setup.integrator, lanes=LANES, extras=batch.extras,
+            swept=tuple(batch.sweep), detects=passed is not None and cuts,
+        )  # fmt: skip
+        record = Tiles(batch, checked(setup, build), passed if cuts else None).run(threads, on_progress)
+    columns, sources = record.columns, tuple(setup.equation.sources)
+    energy, work = columns.get("energy"), columns.get("work")
+    about = frame_of(setup) | rotors_of(setup) | edits_of_machine_code(setup) | origin(setup.plant.dynamics)
+    return Rollouts(
+        joint_names=setup.plant.dynamics.joint_names, t=record.t, q=columns.get("q"), v=columns.get("v"),
+        u=columns.get("u"), kinetic=None if energy is None else energy[..., 0],
+        potential=None if energy is None else energy[..., 1],
+        work=None if work is None else dict(zip(sources, np.moveaxis(work, -1, 0), strict=True)),
+        ended=record.ended, diverged=record.diverged, stopped=record.stopped, advice=tuple(record.advice),
+        steps=record.steps, evaluations=record.evaluations, statistics=record.statistics, sources=sources,
+        about=about | setup.about, params=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
+        observed=record.observed, numbers=batch.numbers, uncut=() if cuts or passed is None else passed.names,
     )  # fmt: skip
-    return Tiles(batch, checked(setup, build), extras, most, passed)
-
-
-def _recorded(record: Any) -> tuple[str, ...]:
-    """Names of what is to be recorded."""
-    if (names := several(record)) is None:
-        raise QueryError(f"record: give names of {', '.join(RECORDS)}, got {shown(record)}")
-    return tuple(choice("record", name, RECORDS) for name in names)
 
 
 def _setup(what: Setup | Plant | Dynamics, q0: Any, options: Mapping[str, Any]) -> Setup:
-    """The setup of all runs; of a plant or robot, with the first start as its own."""
-    for name in options.keys() & _WITHOUT_EFFECT.keys():
-        raise QueryError(f"rollouts: {name} has no effect, {_WITHOUT_EFFECT[name]}; leave it out")
+    """Return the setup of all runs; of a plant or robot, with the first start as its own."""
     start = {}
     if not isinstance(what, Setup):
         what = what if isinstance(what, Plant) else Plant(what)
         if q0 is not None:
             q = joint_values("q0", q0, what.dynamics.joint_names)
             start = {"q0": q.reshape(-1, q.shape[-1])[0] if q.size else np.zeros(q.shape[-1])}
-    setup = setup_of("rollouts", what, {**start, **options})
-    if setup.accuracy is not None:
-        without = "give the setup without it, as dataclasses.replace(setup, accuracy=None)"
-        raise QueryError(f"rollouts: accuracy has no effect, {_WITHOUT_EFFECT['accuracy']}; {without}")
-    return setup
-
-
-def _starts(
-    setup: Setup, q0: Any, v0: Any, params: Mapping[str, Any]
-) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Starts (B, n) and values (B, n), of one number of runs."""
-    names = setup.plant.dynamics.joint_names
-    n = len(names)
-    q = joint_values("q0", setup.q0 if q0 is None else q0, names)
-    v = joint_values("v0", setup.v0 if v0 is None else v0, names)
-    sweep = {name: _values(setup, name, x) for name, x in params.items()}
-    counts = {len(x) for x in (q, v, *sweep.values()) if x.ndim > 1} or {1}
-    if len(counts) > 1 or max(q.ndim, v.ndim) > 2 or counts == {0}:
-        shapes = {"q0": q.shape, "v0": v.shape} | {name: np.shape(x) for name, x in params.items()}
-        rows = f"starts ({n},) or (B, {n}), params (B,) or (B, …)"
-        raise QueryError(f"starts and params must be of one number of runs, B ≥ 1: {rows}; got {shapes}")
-    B = counts.pop()
-    q = np.broadcast_to(q, (B, n))
-    if any(isinstance(each, RigidStops) for each in setup.plant.effects):
-        for run in range(B):
-            plant, _ = with_parameters(setup.plant, setup.controller, {name: x[run] for name, x in sweep.items()})
-            check_stops(plant, q[run], f"q0 of run {run}")
-    return q, np.broadcast_to(v, (B, n)), sweep
+    for name in ("estimate_error", "accuracy"):
+        if name in options or (name == "accuracy" and isinstance(what, Setup) and what.accuracy is not None):
+            without = "give the setup without it, as dataclasses.replace(setup, accuracy=None)"
+            remedy = "leave it out" if name in options else without
+            raise QueryError(f"rollouts: {name} has no effect, simulate one of the runs for that; {remedy}")
+    return setup_of("rollouts", what, {**start, **options})
 
 
 def _values(setup: Setup, name: str, values: Any) -> np.ndarray:
-    """The values of a parameter, (B, size)."""
-    plant = setup.plant
-    known = parameters(plant.dynamics, plant.effects, setup.controller, (name, "armature", "mass_scale"))
-    swept = [each for each in known if each.declared.swept]
-    mine = [each for each in swept if each.name == name]
+    """Return the values of a parameter, (B, size)."""
+    plant, controller = setup.plant, setup.controller
+    known = parameters(plant.dynamics, plant.effects, controller, (name, "armature", "mass_scale"))
+    mine = [parameter for parameter in known if parameter.declared.swept and parameter.name == name]
     if not mine:
-        part, _, key = name.rpartition(".")
-        several = [each for each in names_of(plant.effects) if re.fullmatch(rf"{re.escape(part)} \d+", each)]
-        if several:
-            both = " and ".join(repr(f"{each}.{key}") for each in dict.fromkeys(several))
-            raise QueryError(f"params: {name} names a coefficient of several effects of the plant; give {both}")
-        if name.startswith("payload_") and not any(each.name.startswith("payload_") for each in swept):
-            payload = f"rd.Payload({name.partition(':')[2] or 'link'!r}, 1.0)"
-            raise QueryError(
-                f"params: no {name!r}: the arm carries no payload; add one, as robot.with_(payload={payload})"
-            )
-        known = sweepable_parameters(plant.dynamics, plant.effects, setup.controller)
-        raise QueryError(f"params: no {name!r}; {nearest(name, dict.fromkeys(each.name for each in known))}")
-    n, declared = mine[0].size, mine[0].declared
-    shapes = (("B",), ("B", 1), ("B", n)) if declared.of_joints or n == 1 else (("B", *mine[0].value.shape),)
+        raise QueryError(f"params: {_unknown(setup, name)}")
+    size, shape, declared = mine[0].size, mine[0].value.shape, mine[0].declared
+    shapes = (("B",), ("B", 1), ("B", size)) if declared.of_joints or size == 1 else (("B", *shape),)
     array = numbers(
         f"params: {name}", values, *shapes,
         least=declared.least, above=declared.above, infinite=declared.infinite,
     )  # fmt: skip
-    rows = np.ascontiguousarray(np.broadcast_to(array.reshape(len(array), -1), (len(array), n)))
-    for part in (each for each in mine if each.key.startswith("inertia ")):
-        for inertia in rows.reshape(-1, 3, 3):
-            Edits().with_((), inertias={part.key.partition(" ")[2]: inertia})  # refuses what no body has
-    for part in {each.part for each in mine if each.part[0] == "effect"}:
-        effect = plant.effects[part[1]]
-        if type(effect).__post_init__ is Effect.__post_init__:
-            continue  # it asks no more of its coefficients than was asked above
+    rows = np.ascontiguousarray(np.broadcast_to(array.reshape(len(array), -1), (len(array), size)))
+    for parameter in mine:
         for row in np.unique(rows, axis=0):
-            replace(effect, **{mine[0].key: row.reshape(mine[0].value.shape)})  # refuses what has no meaning
-    for part in (each for each in mine if each.part == CONTROLLER and "." in each.key):
-        for row in np.unique(rows, axis=0):
-            rebuilt(setup.controller, {part.key: row.reshape(part.value.shape)})
+            _check(setup, parameter, row.reshape(shape))
     return rows
+
+
+def _check(setup: Setup, parameter: Parameter, value: np.ndarray) -> None:
+    """Build the part of a parameter with a value: it raises an error for one that has no meaning."""
+    place, key = parameter.part, parameter.key
+    if key.startswith("inertia "):
+        Edits().with_((), inertias={key.partition(" ")[2]: value})
+    elif place == CONTROLLER and "." in key:
+        rebuilt(setup.controller, {key: value})
+    elif place[0] == "effect":
+        effect = setup.plant.effects[place[1]]
+        if type(effect).__post_init__ is not Effect.__post_init__:  # it checks more than single coefficients
+            replace(effect, **{key: value})
+
+
+def _unknown(setup: Setup, name: str) -> str:
+    """Return why a name is not that of a parameter, and the remedy."""
+    effects, (part, _, key) = setup.plant.effects, name.rpartition(".")
+    known = [parameter.name for parameter in sweepable_parameters(setup.plant.dynamics, effects, setup.controller)]
+    if alike := [other for other in names_of(effects) if re.fullmatch(rf"{re.escape(part)} \d+", other)]:
+        both = " and ".join(repr(f"{other}.{key}") for other in dict.fromkeys(alike))
+        return f"{name} names a coefficient of several effects of the plant; give {both}"
+    if name.startswith("payload_") and not any(other.startswith("payload_") for other in known):
+        payload = f"rd.Payload({name.partition(':')[2] or 'link'!r}, 1.0)"
+        return f"no {name!r}: the arm carries no payload; add one, as robot.with_(payload={payload})"
+    return f"no {name!r}; {nearest(name, dict.fromkeys(known))}"

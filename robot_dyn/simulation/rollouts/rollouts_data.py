@@ -56,11 +56,11 @@ class RolloutsData(RunData):
     evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
     sources: tuple[str, ...]
     params: dict[str, Annotated[np.ndarray, Layout(("B", None))]]
+    q0: Annotated[np.ndarray, Layout(("B", "n"))]
+    v0: Annotated[np.ndarray, Layout(("B", "n"))]
+    observed: Observed
     setup: Annotated[Setup | None, NOT_STORED] = None
     uncut: tuple[str, ...] = ()
-    q0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
-    v0: Annotated[np.ndarray, Layout(("B", "n"))] | None = None
-    observed: Observed | None = None
     saved: Overview | None = None
     numbers: Annotated[np.ndarray | None, NOT_STORED] = None
 
@@ -70,12 +70,10 @@ class RolloutsData(RunData):
     def outcome(self, run: int) -> Outcome:
         """Return how a run ended; raises QueryError if no run has that number."""
         run = integer("run", run, least=-len(self), most=len(self) - 1)
-        ended = float(self.ended[run])
         if self.stopped[run]:
-            return Outcome(Ending.STOPPED, ended, "interrupted; all samples up to here are kept")
-        if not self.diverged[run]:
-            return Outcome(Ending.FINISHED, ended, self.advice[run])
-        return Outcome(Ending.DIVERGED, ended, self.advice[run])
+            return Outcome(Ending.STOPPED, float(self.ended[run]), "interrupted; all samples up to here are kept")
+        ending = Ending.DIVERGED if self.diverged[run] else Ending.FINISHED
+        return Outcome(ending, float(self.ended[run]), self.advice[run])
 
     def setup_of(self, run: int) -> Setup:
         """Return the setup of a single run: `rd.simulate(runs.setup_of(17))` repeats the run with an error estimate.
@@ -87,13 +85,11 @@ class RolloutsData(RunData):
         if setup is None:
             raise QueryError("runs that were read from a file have no setup; run rd.rollouts again, and use its result")
         run = integer("run", run, least=-len(self), most=len(self) - 1) % len(self)
-        plant, controller = parts_of(self, setup, run)
-        q0 = setup.q0 if self.q0 is None else self.q0[run]
-        v0 = setup.v0 if self.v0 is None else self.v0[run]
-        return replace(setup, plant=plant, controller=controller, q0=q0, v0=v0, estimate_error=True)
+        plant, controller = self._parts(setup, run)
+        start = {"q0": self.q0[run], "v0": self.v0[run]}
+        return replace(setup, plant=plant, controller=controller, estimate_error=True, **start)
 
-
-def parts_of(runs: RolloutsData, setup: Setup, run: int) -> tuple[Plant, Controller | None]:
-    """Plant and controller of a run, with its parameters and noise."""
-    number = run if runs.numbers is None else int(runs.numbers[run])
-    return parts_of_run(setup, {name: x[run] for name, x in runs.params.items()}, number)
+    def _parts(self, setup: Setup, run: int) -> tuple[Plant, Controller | None]:
+        """Return plant and controller of a run, with its parameters and noise."""
+        number = run if self.numbers is None else int(self.numbers[run])
+        return parts_of_run(setup, {name: x[run] for name, x in self.params.items()}, number)

@@ -32,46 +32,41 @@ def trajectory(runs: RolloutsData, run: int) -> Trajectory:
         raise QueryError("a run of rollouts is a trajectory if q and v were recorded: add them to record")
     known = ~np.isnan(runs.q[run]).all(axis=1)  # a run that ended early has nan after its end
     t, q, v = runs.t[known], runs.q[run, known], runs.v[run, known]
-    unknown = np.full_like(q, np.nan)
-    u = unknown if runs.u is None else runs.u[run, known]
-    a, power, energy = unknown, np.full((len(t), len(runs.sources)), np.nan), np.full((len(t), 2), np.nan)
     setup = None if runs.setup is None else runs.setup_of(run)
-    if setup is not None:
-        a, u, power, energy = _follows(setup, t, q, v, None if runs.u is None else u)
+    a, u, power, energy = _follows(setup, runs.sources, t, q, v, None if runs.u is None else runs.u[run, known])
     if runs.kinetic is not None and runs.potential is not None:
         energy = np.column_stack([runs.kinetic[run, known], runs.potential[run, known]])
     work = {name: np.full(len(t), np.nan) for name in runs.sources}
     if runs.work is not None:
         work = {name: x[run, known] for name, x in runs.work.items()}
-    tracking, loads, stops, acts, settings = Tracking(), {}, None, None, {}
+    about, of_setup = runs.about | {"run": f"{run} of {len(runs)}"}, Tracking()._asdict()
     if setup is not None:
-        tracking, settings = tracking_of(setup, t, q), settings_text(setup)
-        loads, stops, acts = wrenches(setup.plant, t, q), at_stop(setup.plant, q), acting(setup)
+        about |= settings_text(setup)
+        of_setup = tracking_of(setup, t, q)._asdict() | {
+            "wrenches": wrenches(setup.plant, t, q), "at_stop": at_stop(setup.plant, q), "acting": acting(setup),
+        }  # fmt: skip
     counts = {"steps": int(runs.steps[run]), "evaluations": int(runs.evaluations[run])}
-    about = runs.about | settings | {"run": f"{run} of {len(runs)}"}
     return Trajectory(
         joint_names=runs.joint_names, t=t, q=q, v=v, a=a, u=u, power=dict(zip(runs.sources, power.T, strict=True)),
-        ledger=Ledger(energy[:, 0], energy[:, 1], work), desired=tracking.desired, deviation=tracking.deviation,
-        outcome=runs.outcome(run), statistics=replace(runs.statistics, **counts), about=about, wrenches=loads,
-        at_stop=stops, acting=acts, remarks=remarks_of(runs, run, setup, t, q),
-        extremes=None if runs.observed is None else runs.observed.extremes[run],
-        desired_velocity=tracking.desired_velocity,
+        ledger=Ledger(energy[:, 0], energy[:, 1], work), outcome=runs.outcome(run),
+        statistics=replace(runs.statistics, **counts), about=about, remarks=remarks_of(runs, run, setup, t, q),
+        extremes=runs.observed.extremes[run], **of_setup,
     )  # fmt: skip
 
 
 def _follows(
-    setup: Setup, t: np.ndarray, q: np.ndarray, v: np.ndarray, u: np.ndarray | None
+    setup: Setup | None, sources: tuple[str, ...], t: np.ndarray, q: np.ndarray, v: np.ndarray, u: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Compute acceleration, torque, powers and energies at the samples."""
-    equation = StateEquation(setup.plant, setup.controller)
-    if equation.equation_of_motion.state_size:  # torques depend on states that are not recorded
-        nothing, energies = np.full_like(q, np.nan), np.column_stack(equation.energies(0.0, q, v))
-        return nothing, nothing if u is None else u, np.full((len(t), len(equation.sources)), np.nan), energies
+    """Return acceleration, torque, powers and energies at the samples; nan where they are not known."""
+    unknown, energy = np.full_like(q, np.nan), np.full((len(t), 2), np.nan)
+    equation = None if setup is None else StateEquation(setup.plant, setup.controller)
+    if equation is None or equation.equation_of_motion.state_size:  # torques depend on states that are not recorded
+        energy = energy if equation is None else np.column_stack(equation.energies(0.0, q, v))
+        return unknown, unknown if u is None else u, np.full((len(t), len(sources)), np.nan), energy
     if u is None and (equation.sampled or equation.states):
-        u = np.full_like(q, np.nan)  # it depends on earlier states
+        u = unknown  # it depends on earlier states
     derived = np.full((len(t), equation.size + q.shape[1] + 2), np.nan)
-    rest = np.zeros((len(t), equation.size - 2 * q.shape[1]))
-    y = np.hstack([q, v, rest])
+    y = np.hstack([q, v, np.zeros((len(t), equation.size - 2 * q.shape[1]))])
     for i in range(len(t)):
         sample(equation, float(t[i]), y[i], None if u is None else u[i], derived[i])
     _, _, a, u, _, power, energy = columns(equation, t, y, derived)

@@ -24,8 +24,7 @@ def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
     yield Column("run", np.arange(len(runs)))
     yield from _of_parameters(runs, types)
     for key, start in (("q", runs.q0), ("v", runs.v0)):
-        if start is not None:
-            yield from of_joints(f"start {key}", start, key, types)
+        yield from of_joints(f"start {key}", start, key, types)
     yield Column("ended", runs.ended, "s")
     yield Column("outcome", np.array([runs.outcome(i).ending.value for i in range(len(runs))]))
     yield Column("steps", runs.steps)
@@ -39,10 +38,9 @@ def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
     for key in ("v", "u"):
         if (x := getattr(runs, key)) is not None:
             yield from of_joints(f"rms {key}", root_mean_squares(x), key, types)
-    if runs.observed is not None:
-        for row, key in enumerate(("q", "v", "u")):
-            for side, which in enumerate(("least", "largest")):
-                yield from of_joints(f"{which} {key}", runs.observed.extremes[:, row, side], key, types)
+    for row, key in enumerate(("q", "v", "u")):
+        for side, which in enumerate(("least", "largest")):
+            yield from of_joints(f"{which} {key}", runs.observed.extremes[:, row, side], key, types)
 
 
 def samples(runs: RolloutsData) -> dict[str, Variable]:

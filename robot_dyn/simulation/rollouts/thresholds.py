@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -68,25 +68,21 @@ def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thr
     """
     if setup.steps > MOST_CUT or setup.integrator.nonsmooth:
         return None
-    equation = setup.equation
-    of_runs = _of_runs(equation, sweep, count)
-    others = np.array([each.equation.limited != equation.limited for each, _ in of_runs])
-    known = [(each, runs) for (each, runs), other in zip(of_runs, others, strict=True) if not other]
-    names = tuple(dict.fromkeys(threshold.name for each, _ in of_runs for threshold in each.thresholds))
+    equation, names = setup.equation, dict[str, None]()
+    levels, others = dict[tuple[bool, int, int], np.ndarray](), np.zeros(count, bool)
+    for switching, runs in _of_runs(equation, sweep, count):
+        names |= dict.fromkeys(threshold.name for threshold in switching.thresholds)
+        if switching.equation.limited != equation.limited:
+            others[runs] = True
+            continue
+        for place, level in zip(_places(switching), switching.levels, strict=True):
+            levels.setdefault(place, np.full(count, np.inf))[runs] = level
     if not names:
         return None
-    places = [_places(each) for each, _ in known]
-    union = sorted({place for each in places for place in each})
-    levels = np.full((len(union), count), np.inf)
-    for (each, runs), places_of_runs in zip(known, places, strict=True):
-        for place, level in zip(places_of_runs, each.levels, strict=True):
-            levels[union.index(place), runs] = level
-    unknown = np.zeros(count, bool)
-    for (_, runs), other in zip(of_runs, others, strict=True):
-        unknown[runs] = other
-    rows = np.array([row for _, row, _ in union], np.int64)
-    coordinates = sum(not function for function, _, _ in union)
-    return Thresholds(rows, coordinates, levels, len(equation.limited) * equation.plant.dynamics.n, unknown, names)
+    places = sorted(levels)
+    rows, coordinates = np.array([row for _, row, _ in places], np.int64), sum(not of for of, _, _ in places)
+    functions, stacked = len(equation.limited) * equation.plant.dynamics.n, [levels[place] for place in places]
+    return Thresholds(rows, coordinates, np.reshape(stacked, (-1, count)), functions, others, tuple(names))
 
 
 def _places(switching: Switching) -> list[tuple[bool, int, int]]:
@@ -100,31 +96,26 @@ def _places(switching: Switching) -> list[tuple[bool, int, int]]:
 
 def _of_runs(
     equation: StateEquation, sweep: Mapping[str, np.ndarray], count: int
-) -> list[tuple[Switching, np.ndarray]]:
-    """The thresholds of the runs, with the numbers of those that have them, (k,)."""
+) -> Iterator[tuple[Switching, np.ndarray]]:
+    """Yield the thresholds of the runs, with the numbers of those that have them, (k,)."""
     plant, controller = equation.plant, equation.controller
     known = parameters(plant.dynamics, plant.effects, controller, sweep)
-    parts = {each.part for each in known if each.name in sweep and each.part[0] in ("effect", *CONTROLLER)}
-    parts = {part for part in parts if not _always_smooth(controller if part == CONTROLLER else plant.effects[part[1]])}
-    known = [each for each in known if each.part in parts]
-    of = {part: controller if part == CONTROLLER else plant.effects[part[1]] for part in parts}
-    values, places = joined(known), {each.name: rows(known, each.name) for each in known if each.name in sweep}
+    of = {("effect", i): effect for i, effect in enumerate(plant.effects)} | {CONTROLLER: controller}
+    parts = {x.part for x in known if x.name in sweep and x.part in of and not _always_smooth(of[x.part])}
+    known = [x for x in known if x.part in parts]
+    values, places = joined(known), {x.name: rows(known, x.name) for x in known if x.name in sweep}
     groups: dict[Any, tuple[dict[Part, Any], list[int]]] = {}
     for run in range(count if parts else 1):
         for name, place in places.items():
             values[place] = sweep[name][run]
         swept = {part: with_values(of[part], given) for part, given in split(known, values).items()}
-        declared = tuple(
-            each.thresholds() if part == CONTROLLER else each.thresholds(plant.dynamics.n)
-            for part, each in swept.items()
-        )
+        n = plant.dynamics.n
+        declared = tuple(x.thresholds() if part == CONTROLLER else x.thresholds(n) for part, x in swept.items())
         groups.setdefault(declared, (swept, []))[1].append(run)
-    found = []
     for swept, runs in groups.values():
-        effects = [swept.get(("effect", i), each) for i, each in enumerate(plant.effects)]
+        effects = [swept.get(("effect", i), effect) for i, effect in enumerate(plant.effects)]
         state = StateEquation(Plant(plant.dynamics, effects), swept.get(CONTROLLER, controller), equation.canonical)
-        found.append((Switching(state), np.array(runs if parts else range(count))))
-    return found
+        yield Switching(state), np.array(runs if parts else range(count))
 
 
 def _always_smooth(part: Any) -> bool:

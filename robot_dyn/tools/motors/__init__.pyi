@@ -1,6 +1,7 @@
 # The public names of this tool and where they live: type checkers read this file, and __init__.py does.
 from robot_dyn.tools.motors.motor_budget.budget import budget as budget
 from robot_dyn.tools.motors.motor_budget.fastest import fastest as fastest
+from robot_dyn.tools.motors.motor_budget.largest_payload import max_payload as max_payload
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget as MotorBudget
 from robot_dyn.tools.motors.motors_file import Motors as Motors
 from robot_dyn.tools.motors.motors_file import read_motors as read_motors

@@ -111,7 +111,8 @@ def budget(
             raise QueryError(f"{what}: give its motion as well, a CSV file with a column t [s] and one for each joint")
         robot = options.load(what)
         times = time if period is None else period
-        motion = rd.control.from_samples(robot, plan, time=times, joints=_columns(joint), unit=unit, ends=ends)
+        columns = dict(arguments.pair("--joint", text, "JOINT=COLUMN") for text in joint) if joint else None
+        motion = rd.control.from_samples(robot, plan, time=times, joints=columns, unit=unit, ends=ends)
         bodies = [arguments.payload(each) for each in payload or ()] or None
         with bar(what="asking for the torque"):
             found = rd.tools.motors.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)
@@ -120,11 +121,6 @@ def budget(
     results.give(found, paths, judged[-1], **more)
     if not all(each.fits for each in judged):
         raise typer.Exit(1)
-
-
-def _columns(texts: list[str] | None) -> dict[str, str] | None:
-    """Headings by joint."""
-    return dict(arguments.pair("--joint", each, "JOINT=COLUMN") for each in texts) if texts else None
 
 
 def _run(path: str) -> Trajectory:
@@ -141,7 +137,9 @@ def _more(found: MotorBudget, max_payload: str | None, fastest: bool, share: flo
     more: dict[str, Any] = {}
     if max_payload is not None:
         with bar(what="looking for the largest payload"):
-            more["max_payload"] = found.max_payload(*arguments.link_and_place("--max-payload", max_payload))
+            more["max_payload"] = rd.tools.motors.max_payload(
+                found, *arguments.link_and_place("--max-payload", max_payload)
+            )
     if fastest:
         with bar(what="looking for the fastest motion"):
             more["fastest"] = rd.tools.motors.fastest(found, share)

@@ -1,19 +1,23 @@
-"""Limits of joints: effort, velocity and acceleration, of the robot's file, of its motors, or given."""
+"""Limits of joints: torque, velocity and acceleration, of the robot's file, of its motors, or given."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn import Plant
-from robot_dyn.effects import EffortLimit
+from robot_dyn.control import PiecewisePolynomial, extreme_values
+from robot_dyn.effects import EffortLimit, RigidStops
 from robot_dyn.foundations import EffectError, PlanError, check_coefficients, coefficient, declared, instance
+from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.motors_file import Motors
 
 _SAME_ROTOR = 0.01  # difference of inertias, in their size
+_BEYOND = 1e-9  # [rad] or [m] of a position limit, which rounding may pass
 
 
 @final
@@ -22,52 +26,64 @@ class Limits:
     """Limits of joints, each one number, by joint name or (n,), positive; inf for none.
 
     Attributes:
-        effort: |τ|, in [N m] or [N].
+        effort: Peak |τ|, in [N m] or [N].
         velocity: |q̇|, in [rad/s] or [m/s].
         acceleration: |q̈|, in [rad/s²] or [m/s²].
+        continuous: Root mean square of τ, in [N m] or [N].
     """
 
     effort: Any = field(default=inf, metadata=coefficient("N m", above=0, infinite=True, elsewhere=inf))
     velocity: Any = field(default=inf, metadata=coefficient("rad/s", above=0, infinite=True, elsewhere=inf))
     acceleration: Any = field(default=inf, metadata=coefficient("rad/s^2", above=0, infinite=True, elsewhere=inf))
+    continuous: Any = field(default=inf, metadata=coefficient("N m", above=0, infinite=True, elsewhere=inf))
 
     def __post_init__(self) -> None:
         check_coefficients(self, PlanError, resolved=True)
 
     def on(self, dynamics: Any) -> Limits:
-        """The limits of each joint of an arm, (n,).
+        """Return the limits of each joint of an arm, (n,).
 
         Raises:
             PlanError: If a joint is unknown, or the number of joints differs.
         """
         try:
-            found = {name: each.on(name, getattr(self, name), dynamics) for name, each in declared(Limits).items()}
+            by_joint = {name: known.on(name, getattr(self, name), dynamics) for name, known in declared(Limits).items()}
         except EffectError as error:
             raise PlanError(str(error)) from None
-        return Limits(**{name: np.broadcast_to(each, dynamics.n) for name, each in found.items()})
+        return Limits(**{name: np.broadcast_to(x, dynamics.n) for name, x in by_joint.items()})
+
+    def times(self, torque: float, rates: float = 1.0) -> Limits:
+        """Return the limits with peak torques, and velocities and accelerations, times a factor."""
+        return replace(
+            self, effort=torque * self.effort, velocity=rates * self.velocity, acceleration=rates * self.acceleration
+        )
 
 
-def limits_of(plant: Plant, motors: Motors | None, effort: Any, velocity: Any, acceleration: Any) -> Limits:
-    """The limits of a plant: those given, else of its motors, else of its file; never above its `EffortLimit`s.
+def limits_of(
+    plant: Plant, motors: Motors | None = None, effort: Any = None, velocity: Any = None, acceleration: Any = None,
+    continuous: Any = None,
+) -> Limits:  # fmt: skip
+    """Return the limits of a plant: those given, else of its motors, else of its file; at most its `EffortLimit`s.
 
     Raises:
         PlanError: If a joint is unknown, a limit is not positive, or a motor's rotor is not a part of the arm.
     """
     robot: Any = plant.dynamics
     if motors is not None:
-        instance("motors", motors, Motors, "read them with rd.tools.motors.read_motors(path)", error=PlanError)
         _check_rotors(motors, robot)
         effort = motors.peak if effort is None else effort
         velocity = (motors.speed or None) if velocity is None else velocity
+        continuous = (motors.continuous or None) if continuous is None else continuous
     effort = _stated(robot, "effort") if effort is None else effort
     velocity = _stated(robot, "velocity") if velocity is None else velocity
-    given = Limits(effort, velocity, inf if acceleration is None else acceleration).on(robot)
-    saturates = [np.broadcast_to(each.limit, robot.n) for each in plant.effects if isinstance(each, EffortLimit)]
-    return Limits(np.minimum.reduce([given.effort, *saturates]), given.velocity, given.acceleration)
+    acceleration, continuous = (inf if x is None else x for x in (acceleration, continuous))
+    limits = Limits(effort, velocity, acceleration, continuous).on(robot)
+    saturates = [np.broadcast_to(effect.limit, robot.n) for effect in plant.effects if isinstance(effect, EffortLimit)]
+    return replace(limits, effort=np.minimum.reduce([limits.effort, *saturates]))
 
 
 def _stated(robot: Any, kind: str) -> Any:
-    """The limits in the file of a robot; inf for other dynamics."""
+    """Return the limits in the file of a robot; inf for other dynamics."""
     limits = getattr(robot, f"{kind}_limit", inf)
     if zero := [
         name for name, limit in zip(robot.joint_names, np.broadcast_to(limits, robot.n), strict=True) if not limit
@@ -77,6 +93,35 @@ def _stated(robot: Any, kind: str) -> Any:
             f" {kind}={{{zero[0]!r}: 10.0}}: joints left out have none"
         )
     return limits
+
+
+def outside_positions(
+    robot: Any, motion: PiecewisePolynomial, stops: RigidStops | None = None, at: str = "{:.4g} s"
+) -> Iterator[str]:
+    """Yield, for each joint that a motion takes outside its position limits, where and when.
+
+    Args:
+        robot: The arm.
+        motion: Its motion.
+        stops: Stops whose limits replace those of the robot's file.
+        at: Format of a time, or of a place along a path.
+    """
+    found, n = extreme_values(motion), robot.n
+    limits = robot if stops is None else stops
+    lower, upper = (np.broadcast_to(getattr(limits, x, y), n) for x, y in (("lower", -inf), ("upper", inf)))
+    types = getattr(robot, "joint_types", (None,) * n)
+    for i, name in enumerate(robot.joint_names):
+        below, above = lower[i] - found.least[i], found.greatest[i] - upper[i]
+        if max(below, above) > _BEYOND:
+            q, t = (found.least, found.at_least) if below > above else (found.greatest, found.at_greatest)
+            where = f"{q[i]:.6g} {of_joint('rad', types[i])} at {at.format(t[i])}"
+            yield f"{name} is at {where}, outside its limits {lower[i]:.6g} to {upper[i]:.6g}"
+
+
+def check_motors(motors: object) -> None:
+    """Raise a PlanError if `motors` are not those of a file."""
+    if motors is not None:
+        instance("motors", motors, Motors, "read them with rd.tools.motors.read_motors(path)", error=PlanError)
 
 
 def same_rotor(one: float, other: float) -> bool:

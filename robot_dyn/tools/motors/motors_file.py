@@ -10,7 +10,6 @@ inertia ratio² · rotor_inertia. [Siciliano et al. 2009, sec. 5.2]
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,7 +17,7 @@ from math import inf, pi
 from pathlib import Path
 from typing import Any, final
 
-from robot_dyn.foundations import PlanError, nearest, read, shorten
+from robot_dyn.foundations import PlanError, csv_rows, nearest, shorten
 
 _MOST_BYTES = 2**20
 _HEAD = re.compile(r"\s*([a-z_ ]+?)\s*(?:\[(.*?)\])?\s*")
@@ -27,6 +26,8 @@ _TORQUE = {"N m": 1.0, "Nm": 1.0, "N": 1.0}
 _SPEED = {"rad/s": 1.0, "m/s": 1.0, "rpm": pi / 30, "deg/s": pi / 180}
 _INERTIA = {"kg m^2": 1.0, "kg m²": 1.0, "kg": 1.0, "kg cm^2": 1e-4, "kg cm²": 1e-4, "g cm^2": 1e-7, "g cm²": 1e-7}
 _UNITS: Mapping[str, Mapping[str, float]] = {
+    "joint": {"": 1.0},
+    "at": {"": 1.0},
     "peak": _TORQUE,
     "continuous": _TORQUE,
     "speed": _SPEED,
@@ -65,69 +66,58 @@ def read_motors(path: str | Path) -> Motors:
     Raises:
         PlanError: If it cannot be read, a column or unit is unknown, or an entry is not a positive number.
     """
-    data = read(path, _MOST_BYTES, PlanError, "give a CSV file with columns joint, peak [N m] …")
-    try:
-        lines = csv.reader(data.decode("utf-8-sig").splitlines(), strict=True)
-        heads = _heads(path, next(lines, []))
-        rows = [_row(path, lines.line_num, heads, line) for line in lines if any(each.strip() for each in line)]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise PlanError(f"{path}: is not a CSV file in UTF-8 ({error}); write it again") from None
+    lines = csv_rows(path, _MOST_BYTES, PlanError, "give a CSV file with columns joint, peak [N m] …")
+    heads = _heads(path, next(lines)[1])
+    rows = [_row(where, heads, line) for where, line in lines if any(map(str.strip, line))]
     if not rows:
         raise PlanError(f"{path}: names no motor; write a line for each joint")
     names = [row["joint"] for row in rows]
     if twice := next((name for k, name in enumerate(names) if name in names[:k]), None):
         raise PlanError(f"{path}: joint {shorten(twice)!r} is there twice; keep one line")
     columns = {
-        key: {row["joint"]: row[key] for row in rows if row.get(key) is not None}
-        for key in ("peak", "continuous", "speed")
+        key: {row["joint"]: row[key] for row in rows if row.get(key)}
+        for key in ("peak", "continuous", "speed", "armature")
     }
-    armature = {row["joint"]: row["armature"] for row in rows if row["armature"]}
-    return Motors(**columns, armature=armature, source=str(path))
+    return Motors(**columns, source=str(path))
 
 
-def _heads(path: str | Path, heads: Sequence[str]) -> list[tuple[str, float]]:
-    """Name and factor of each column."""
-    found: list[tuple[str, float]] = []
+def _heads(path: str | Path, heads: Sequence[str]) -> dict[str, float]:
+    """Return the factor of each column, by name."""
+    factors: dict[str, float] = {}
     for head in heads:
         match = _HEAD.fullmatch(head)
-        name, unit = (match[1].replace(" ", "_"), match[2]) if match else (head, None)
-        if name not in (*_UNITS, "joint", "at") or name in (each for each, _ in found):
-            known = nearest(name, (*_UNITS, "joint", "at"))
-            raise PlanError(f"{path}: column {shorten(head)!r} is unknown or there twice; {known}")
-        units = _UNITS.get(name, {"": 1.0})
-        if (unit or "") not in units:
-            listed = ", ".join(f"[{each}]" for each in units)
+        name, unit = (match[1].replace(" ", "_"), match[2] or "") if match else (head, "")
+        if name not in _UNITS or name in factors:
+            raise PlanError(f"{path}: column {shorten(head)!r} is unknown or there twice; {nearest(name, _UNITS)}")
+        if unit not in _UNITS[name]:
+            listed = ", ".join(f"[{known}]" for known in _UNITS[name])
             raise PlanError(f"{path}: the unit of {name} must be one of {listed}, got {shorten(head)!r}")
-        found.append((name, units[unit or ""]))
-    names = [name for name, _ in found]
-    for needed in ("joint", "peak", *(("at",) if "gear_ratio" in names else ())):
-        if needed not in names:
+        factors[name] = _UNITS[name][unit]
+    for needed in ("joint", "peak", *(("at",) if "gear_ratio" in factors else ())):
+        if needed not in factors:
             why = " (joint or motor: where torques and speeds are meant)" if needed == "at" else ""
             raise PlanError(f"{path}: there is no column {needed!r}{why}; name the columns in the first line")
-    return found
+    return factors
 
 
-def _row(path: str | Path, number: int, heads: list[tuple[str, float]], line: list[str]) -> dict[str, Any]:
-    """Torques and speed at the joint, and the inertia of the rotor there."""
-    if len(line) != len(heads):
-        raise PlanError(f"{path}: line {number} has {len(line)} entries for {len(heads)} columns; correct it")
-    texts = {name: text.strip() for (name, _), text in zip(heads, line, strict=True)}
-    row: dict[str, Any] = {"joint": texts["joint"]}
-    for name, factor in heads:
-        if name in _UNITS and texts[name]:
-            row[name] = factor * _positive(f"{path}: line {number}: {name}", texts[name])
-    at, ratio = texts.get("at", "") or "joint", row.get("gear_ratio", 1.0)
+def _row(where: str, factors: Mapping[str, float], line: Sequence[str]) -> dict[str, Any]:
+    """Return torques and speed at the joint, and the inertia of the rotor there."""
+    texts = {name: text.strip() for name, text in zip(factors, line, strict=True)}
+    row: dict[str, Any] = {"joint": texts.pop("joint")}
+    at = texts.pop("at", "") or "joint"
     if at not in ("joint", "motor"):
-        raise PlanError(f"{path}: line {number}: at must be joint or motor, got {shorten(at)!r}")
-    if at == "motor" and "gear_ratio" not in row:
-        raise PlanError(f"{path}: line {number}: values at the motor need its gear_ratio")
-    if "rotor_inertia" in row and "gear_ratio" not in row:
-        raise PlanError(f"{path}: line {number}: a rotor_inertia needs its gear_ratio, 1 without a gear")
+        raise PlanError(f"{where}: at must be joint or motor, got {shorten(at)!r}")
+    for name, text in texts.items():
+        if text:
+            row[name] = factors[name] * _positive(f"{where}: {name}", text)
+    if "gear_ratio" not in row and (at == "motor" or "rotor_inertia" in row):
+        what = "values at the motor need" if at == "motor" else "a rotor_inertia needs"
+        raise PlanError(f"{where}: {what} its gear_ratio, 1 without a gear")
+    ratio = row.get("gear_ratio", 1.0)
     for name, power in (("peak", 1), ("continuous", 1), ("speed", -1)):
         if at == "motor" and name in row:
             row[name] *= ratio**power
-    row["armature"] = ratio**2 * row.get("rotor_inertia", 0.0)
-    return row
+    return row | {"armature": ratio**2 * row.get("rotor_inertia", 0.0)}
 
 
 def _positive(what: str, text: str) -> float:

@@ -213,7 +213,7 @@ def test_what_depends_on_time_or_has_states_is_refused_by_name(effect: rd.effect
         ("ur5", [[0.1] * 5] * 2, {}, "shape"),
         ("ur5", [[0.1] * 6, [0.1] * 6, [0.3] * 6], {}, "equal"),
         ("planar_2r", [[0.3, -0.4], [0.7, 1e308]], {}, r"points must be within 1e\+100 rad or m, got 1e\+308"),
-        ("ur5", [[0.1] * 6, [9.0] * 6], {}, "beyond its limits"),
+        ("ur5", [[0.1] * 6, [9.0] * 6], {}, "outside its limits"),
         ("ur5", [[0.1] * 6, [0.5] * 6], {"share": 1.2}, "at most 1"),
         ("ur5", [[0.1] * 6, [0.5] * 6], {"effort": {"elbow": 3.0}}, "elbow"),
         ("ur5", [[0.1] * 6, [0.5] * 6], {"effort": 3.0}, "'shoulder_lift_joint' needs"),
@@ -225,18 +225,19 @@ def test_a_path_that_cannot_be_planned_says_why(name: str, points: list[list[flo
         rd.tools.motors.path(rd.load(name), np.array(points), **options)
 
 
-def test_without_its_extra_it_says_the_line_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in [each for each in sys.modules if each.partition(".")[0] == "toppra"]:
+@pytest.mark.parametrize("package", ["toppra", "ruckig"])
+def test_without_its_extra_a_motion_says_the_line_that_installs_it(package: str, monkeypatch) -> None:
+    for name in [name for name in sys.modules if name.startswith("toppra.")]:
         monkeypatch.delitem(sys.modules, name)
-
-    class Nothing:
-        def find_spec(self, name: str, *_: object) -> None:
-            if name.partition(".")[0] == "toppra":
-                raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-
-    monkeypatch.setattr(sys, "meta_path", [Nothing(), *sys.meta_path])
-    with pytest.raises(MissingExtraError, match=r"pip install 'robot-dyn\[plan\]'"):
-        rd.tools.motors.path(rd.load("ur5"), np.array([[0.1] * 6, [0.5] * 6]))
+    monkeypatch.setitem(sys.modules, package, None)
+    arm, (q0, q1) = rd.load("ur5"), np.array([[0.1] * 6, [0.5] * 6])
+    needed = rd.tools.motors.budget(rd.control.quintic(q0, q1, 1.0), arm)
+    for motion in {
+        "toppra": (lambda: rd.tools.motors.path(arm, [q0, q1]), lambda: rd.tools.motors.fastest(needed)),
+        "ruckig": (lambda: rd.tools.motors.point_to_point(arm, q0, q1, acceleration=3.0, jerk=20.0),),
+    }[package]:
+        with pytest.raises(MissingExtraError, match=rf"{package}.* is not installed: pip install 'robot-dyn\[plan\]'"):
+            motion()
 
 
 @toppra

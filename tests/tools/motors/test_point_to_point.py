@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import socket
-import sys
 from typing import Any
 
 import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations import MissingExtraError, PlanError
+from robot_dyn.foundations import PlanError
 
 ARM = rd.load("ur5")
 
@@ -114,7 +113,7 @@ def test_a_run_follows_it() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"q1": np.full(6, 7.0)}, "shoulder_pan_joint would be at 7 rad at .* s, above its limit 6.28319 rad"),
+        ({"q1": np.full(6, 7.0)}, "shoulder_pan_joint is at 7 rad at .* s, outside its limits -6.28319 to 6.28319"),
         ({"v0": np.full(6, 9.0)}, "v0: shoulder_pan_joint moves at 9 rad/s, beyond its limit 3.15"),
         ({"q1": np.zeros(6)}, "nothing moves"),
         ({"acceleration": np.inf}, "acceleration must be finite"),
@@ -127,9 +126,3 @@ def test_what_cannot_be_planned_is_told(change: dict[str, Any], message: str) ->
         rd.tools.motors.point_to_point(
             **{"arm": ARM, "q0": np.zeros(6), "q1": np.ones(6), "acceleration": 3.0, "jerk": 20.0} | change
         )
-
-
-def test_without_ruckig_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "ruckig", None)
-    with pytest.raises(MissingExtraError, match=r"ruckig is not installed: pip install 'robot-dyn\[plan\]'"):
-        rd.tools.motors.point_to_point(ARM, np.zeros(6), np.ones(6), acceleration=3.0, jerk=20.0)

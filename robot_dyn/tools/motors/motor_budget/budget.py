@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from math import inf, nan
-from typing import Any, NamedTuple
-
-import numpy as np
+from math import inf
+from typing import Any
 
 from robot_dyn import Plant, Robot, Trajectory
-from robot_dyn.control import PiecewisePolynomial, Plan, extreme_values
+from robot_dyn.control import PiecewisePolynomial, Plan
 from robot_dyn.effects import EffortLimit
 from robot_dyn.foundations import PlanError, QueryError, instance, shown
-from robot_dyn.queries import of_joint
 from robot_dyn.report import processor_and_versions
 from robot_dyn.simulation import Ending, RemarkKind, remark_lines, robot_of
-from robot_dyn.tools.motors.limits import Limits, limits_of, same_rotor
-from robot_dyn.tools.motors.motor_budget.breakaway import breakaway, static_friction
+from robot_dyn.tools.motors.limits import check_motors, limits_of, outside_positions, same_rotor
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, of_run
 from robot_dyn.tools.motors.motor_budget.joint_budget import JointBudget, joint_budgets
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget
@@ -26,7 +22,6 @@ from robot_dyn.tools.motors.motors_file import Motors
 from robot_dyn.tools.motors.planning.path_plan import PathPlan
 
 _DRIVES = "series_elastic", "rigid_backlash"  # whose motors turn at other speeds than their joints
-_BEYOND = 1e-9  # of a position limit, that rounding may pass
 
 
 def budget(
@@ -66,56 +61,40 @@ def budget(
 
     Source: Siciliano et al. 2009, sec. 5.2; Armstrong-Hélouvry 1991 for breaking away.
     """
-    if motors is not None:
-        instance("motors", motors, Motors, "read them with rd.tools.motors.read_motors(path)", error=PlanError)
-    given = _Given(motors, effort, velocity, continuous)
+    check_motors(motors)
+    given = {"effort": effort, "velocity": velocity, "continuous": continuous}
     if isinstance(motion, Trajectory):
         if plant is not None or payload is not None:
             raise QueryError(
                 f"a run has its own {'plant' if plant is not None else 'payload'}: leave it out and simulate again, or"
                 " give its motion, budget(rd.control.from_samples(arm, run.table(), ends='measured'), plant, payload=…)"
             )
-        return _of_run(motion, given)
+        return _of_run(motion, motors, given)
     if not isinstance(motion, PiecewisePolynomial | Plan | PathPlan):
         raise QueryError(f"motion: give a plan, a PiecewisePolynomial, or a run of rd.simulate, got {shown(motion)}")
     if plant is None:
         raise QueryError(
             "plant: a plan does not know its arm; give it, rd.tools.motors.budget(plan, arm), or a plant with effects"
         )
-    return _of_plan(motion, _loaded(plant, payload, motors), given)
+    return _of_plan(motion, _loaded(plant, payload, motors), motors, given)
 
 
-class _Given(NamedTuple):
-    """Limits as they were given."""
-
-    motors: Motors | None
-    effort: Any
-    velocity: Any
-    continuous: Any
-
-    def limits(self, plant: Plant) -> tuple[Limits, np.ndarray]:
-        """Peak torques and speeds of a plant, and continuous torques, (n,)."""
-        stated = (self.motors.continuous if self.motors is not None else None) or inf
-        lasting = Limits(effort=stated if self.continuous is None else self.continuous).on(plant.dynamics).effort
-        return limits_of(plant, self.motors, self.effort, self.velocity, None), lasting
-
-    @property
-    def words(self) -> str:
-        """Where they are from."""
-        file, motors = "the robot's file", self.motors
-        stated = {
-            "continuous torque": (self.continuous, motors.source if motors and motors.continuous else "not known")
-        }
-        stated["peak torque"] = self.effort, motors.source if motors else file
-        stated["speed"] = self.velocity, motors.source if motors and motors.speed else file
-        sources: dict[str, list[str]] = {}
-        for name, (given, otherwise) in stated.items():
-            sources.setdefault(otherwise if given is None else "given", []).append(name)
-        return "; ".join(f"{', '.join(names)}: {source}" for source, names in sources.items())
+def _sources(motors: Motors | None, given: Mapping[str, Any]) -> str:
+    """Return where limits come from, in words."""
+    stated = [
+        ("continuous torque", "continuous", motors and motors.continuous, "not known"),
+        ("peak torque", "effort", motors, "the robot's file"),
+        ("speed", "velocity", motors and motors.speed, "the robot's file"),
+    ]
+    names: dict[str, list[str]] = {}
+    for name, key, of_motors, otherwise in stated:
+        source = "given" if given[key] is not None else motors.source if motors and of_motors else otherwise
+        names.setdefault(source, []).append(name)
+    return "; ".join(f"{', '.join(of)}: {source}" for source, of in names.items())
 
 
 def _loaded(plant: Any, payload: Any, motors: Motors | None) -> Plant:
-    """The plant with a payload, and with the rotors of motors where the arm has none."""
+    """Return the plant with a payload, and with the rotors of motors where the arm has none."""
     plant = plant if isinstance(plant, Plant) else Plant(plant)
     robot = instance("plant", plant.dynamics, Robot, "give that of a robot, such as rd.Plant(rd.load('ur5'))")
     if payload is not None:
@@ -126,7 +105,9 @@ def _loaded(plant: Any, payload: Any, motors: Motors | None) -> Plant:
     return plant if robot is plant.dynamics else replace(plant, dynamics=robot)
 
 
-def _of_plan(motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, given: _Given) -> MotorBudget:
+def _of_plan(
+    motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, motors: Motors | None, given: Mapping[str, Any]
+) -> MotorBudget:
     robot: Any = plant.dynamics
     plan = motion.plan if isinstance(motion, PathPlan) else motion if isinstance(motion, Plan) else None
     reference = motion if isinstance(motion, PiecewisePolynomial) else motion.reference
@@ -136,25 +117,27 @@ def _of_plan(motion: PiecewisePolynomial | Plan | PathPlan, plant: Plant, given:
             f"the motion is of {reference.n} joints{'' if plan is None else ', ' + ', '.join(joints)}; {robot.name} has"
             f" {robot.n}, {', '.join(robot.joint_names)}"
         )
-    limits, continuous = given.limits(plant)
-    demand = of_motion(reference, plant)
-    assert demand.cells is not None
-    found = joint_budgets(demand, limits, continuous, static_friction(plant), breakaway(demand.cells, plant))
-    findings = (*robot.findings, *(() if plan is None else plan.findings), *_outside(reference, robot))
-    what = f"{'motion' if plan is None else plan.method}, {demand.duration:.6g} s"
-    if any(isinstance(each, EffortLimit) for each in plant.effects):
-        findings += ("peak torques are never above the EffortLimit of the plant; leave it out for those of the motors",)
-    return _result(robot, what, demand, tuple(found), given, findings, (), (plant, reference, limits, continuous))
+    limits, demand = limits_of(plant, motors, **given), of_motion(reference, plant)
+    outside = (f"{where}; check the motion" for where in outside_positions(robot, reference))
+    findings = [*robot.findings, *(() if plan is None else plan.findings), *outside]
+    if any(isinstance(effect, EffortLimit) for effect in plant.effects):
+        findings.append(
+            "peak torques are never above the EffortLimit of the plant; leave it out for those of the motors"
+        )
+    return _budget(
+        robot, "motion" if plan is None else plan.method, demand, tuple(joint_budgets(demand, limits)),
+        _sources(motors, given), findings, [], (plant, reference, limits),
+    )  # fmt: skip
 
 
-def _of_run(run: Trajectory, given: _Given) -> MotorBudget:
+def _of_run(run: Trajectory, motors: Motors | None, given: Mapping[str, Any]) -> MotorBudget:
     demand, robot = of_run(run), robot_of(run)
     simulated = _simulated_rotors(run, robot)
-    given = given._replace(motors=_with_rotors(given.motors, simulated))
-    limits, continuous = given.limits(Plant(robot))
-    cut = frozenset(each.joint for each in run.remarks if each.kind == RemarkKind.EFFORT_REACHED)
-    found = joint_budgets(demand, limits, continuous, np.full(robot.n, nan), None, cut)
-    findings = remark_lines(each for each in run.remarks if each.kind in (RemarkKind.EFFORT_REACHED, RemarkKind.COARSE))
+    motors = _with_rotors(motors, simulated)
+    cut = frozenset(remark.joint for remark in run.remarks if remark.kind == RemarkKind.EFFORT_REACHED)
+    joints = tuple(joint_budgets(demand, limits_of(Plant(robot), motors, **given), cut))
+    told = RemarkKind.EFFORT_REACHED, RemarkKind.COARSE
+    findings = remark_lines(remark for remark in run.remarks if remark.kind in told)
     if run.outcome.ending == Ending.STOPPED:
         findings.append(f"the run was stopped at {run.outcome.t:.6g} s; the budget is of what was simulated")
     left = ["torque at which joints break away: a run does not hold its static friction"]
@@ -162,8 +145,7 @@ def _of_run(run: Trajectory, given: _Given) -> MotorBudget:
         left.append(f"power at the motors of {', '.join(driven)}, which turn at other speeds than their joints")
     if simulated:
         findings.append(f"the rotors of {', '.join(simulated)} are those of the run, which simulates its gears")
-    what = f"run of {demand.duration:.6g} s"
-    return _result(robot, what, demand, tuple(found), given, tuple(findings), tuple(left), None)
+    return _budget(robot, "run of", demand, joints, _sources(motors, given), findings, left, None)
 
 
 def _simulated_rotors(run: Trajectory, robot: Robot) -> dict[str, float]:
@@ -199,46 +181,32 @@ def _with_rotors(motors: Motors | None, simulated: Mapping[str, float]) -> Motor
     return replace(motors, armature={name: x for name, x in motors.armature.items() if name not in simulated})
 
 
-def _result(
-    robot: Robot, what: str, demand: Demand, joints: tuple[JointBudget, ...], given: _Given, findings: tuple[str, ...],
-    left_out: tuple[str, ...], case: Any,
+def _budget(
+    robot: Robot, what: str, demand: Demand, joints: tuple[JointBudget, ...], limits: str, findings: Iterable[str],
+    left_out: Iterable[str], case: Any,
 ) -> MotorBudget:  # fmt: skip
-    carried = ", ".join(f"{each.mass:g} kg on {each.frame}" for each in robot.edits.payloads)
+    what = f"{what}{'' if case is None else ','} {demand.duration:.6g} s"
+    carried = ", ".join(f"{payload.mass:g} kg on {payload.frame}" for payload in robot.edits.payloads)
+    unknown = {
+        "peak torque": [x.joint for x in joints if x.peak_limit == inf and x.peak > 0],
+        "speed": [x.joint for x in joints if x.speed_limit == inf and x.speed > 0],
+    }
+    not_judged = (
+        f"no limit of {kind} is known of {', '.join(names)}, so it is not judged; give motors or limits"
+        for kind, names in unknown.items()
+        if names
+    )
     return MotorBudget(
         robot=robot.name,
         motion=f"{what}, carrying {carried}" if carried else what,
         duration=demand.duration,
         joints=joints,
-        limits=given.words,
+        limits=limits,
         resolution=demand.resolution,
         error=demand.error,
-        findings=(*findings, *_unknown(joints)),
-        left_out=left_out,
+        findings=(*findings, *not_judged),
+        left_out=tuple(left_out),
         environment=processor_and_versions(("robot-dyn", "pin", "numpy")),
         demand=demand,
         case=case,
     )
-
-
-def _unknown(joints: tuple[JointBudget, ...]) -> Iterator[str]:
-    """Limits that are not known of joints that move or bear a load."""
-    for what, names in {
-        "peak torque": [x.joint for x in joints if x.peak_limit == inf and x.peak > 0],
-        "speed": [x.joint for x in joints if x.speed_limit == inf and x.speed > 0],
-    }.items():
-        if names:
-            yield f"no limit of {what} is known of {', '.join(names)}, so it is not judged; give motors or limits"
-
-
-def _outside(motion: PiecewisePolynomial, robot: Robot) -> Iterator[str]:
-    """Positions beyond the limits of the joints."""
-    found = extreme_values(motion)
-    for i, name in enumerate(robot.joint_names):
-        low, high = robot.lower[i] - found.least[i], found.greatest[i] - robot.upper[i]
-        if max(low, high) > _BEYOND:
-            q, t = (found.least, found.at_least) if low > high else (found.greatest, found.at_greatest)
-            unit = of_joint("rad", robot.joint_types[i])
-            yield (
-                f"{name} is at {q[i]:.5g} {unit} at {t[i]:.4g} s, outside its limits {robot.lower[i]:.5g} to"
-                f" {robot.upper[i]:.5g}; check the motion"
-            )

@@ -15,13 +15,12 @@ import numpy as np
 
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial, polynomial
-from robot_dyn.tools.motors.planning.geometric_path import turning_points
+from robot_dyn.tools.motors.planning.geometric_path import at_rest_exactly, turning_points
 
 FEWEST = 400  # cells of a motion
 _NEAR = 1e-12  # of a cell: places at its ends are as far inside, where friction has its sign
 _RESTS, _NOTHING = 1e-9, 1e-300  # of the largest velocity: its sign may be rounding; a velocity with a sign alone
 _CLOSE = 1e-6  # of a piece: a reversal so near its end is that of the end, where the velocity has a multiple root
-_NOISE = 1e-13  # of the largest position: what moves less within a piece rests
 _HALF = np.array([0.9604912687080202, 0.7745966692414834, 0.4342437493468026])
 X = np.array([-1.0, *-_HALF, 0.0, *_HALF[::-1], 1.0])
 """Places in a cell from −1 to 1: both ends, which no rule counts, and the 7 points."""
@@ -99,13 +98,3 @@ def _ends(breaks: np.ndarray, inner: np.ndarray) -> np.ndarray:
     piece = np.diff(breaks)[k]
     apart = np.minimum(inner - breaks[k], breaks[k + 1] - inner) > _CLOSE * piece
     return np.unique(np.concatenate([breaks, inner[apart]]))
-
-
-def at_rest_exactly(motion: PiecewisePolynomial) -> PiecewisePolynomial:
-    """The motion without what rounding moves of joints at rest: friction takes the sign of their velocity."""
-    h = np.diff(motion.breaks)[:, None, None] ** np.arange(motion.coefficients.shape[1])[:, None]
-    moved = np.abs(motion.coefficients[:, 1:] * h[:, 1:]).sum(axis=1)  # (k, n)
-    table = motion.coefficients.copy()
-    size = max(float(np.abs(table[:, 0]).max()), float(moved.max(initial=0.0)))
-    table[:, 1:] = np.where((moved <= _NOISE * size)[:, None], 0.0, table[:, 1:])
-    return PiecewisePolynomial(motion.breaks, table)

@@ -17,6 +17,7 @@ from robot_dyn.control import PiecewisePolynomial, extreme_values
 from robot_dyn.effects import Causes, Stateful, exerted_torques, torques_by_cause
 from robot_dyn.foundations import EffectError, QueryError
 from robot_dyn.simulation import Ending
+from robot_dyn.tools.motors.motor_budget.breakaway import NO_BREAKAWAY, Breakaway, breakaway, static_friction
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, Cells, X, cells
 
 _PEAKS = 4  # local maxima of a quantity that are refined
@@ -36,6 +37,8 @@ class Demand:
         peak: Largest |τ| of each joint, (n,), in [N m] or [N].
         speed: Largest |v|, (n,), and when, (n,).
         resolution: What it was taken at, in words.
+        friction: Static friction f_s of dry friction, (n,), in [N m] or [N]; nan of a run.
+        starts: Torques at which joints break away; none of a run.
         cells, cell, x: Of a plan: its cells, and in which and where in it each time is, (k,); else None.
     """
 
@@ -46,6 +49,8 @@ class Demand:
     peak: np.ndarray
     speed: tuple[np.ndarray, np.ndarray]
     resolution: str
+    friction: np.ndarray
+    starts: Breakaway = NO_BREAKAWAY
     cells: Cells | None = None
     cell: Any = None
     x: Any = None
@@ -106,7 +111,7 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant) -> Demand:
     return Demand(
         split, v, rules[0][order], rules[1][order], np.abs(split.tau).max(axis=0), (fastest.largest, at),
         f"peaks are the largest of {len(t)} times, at most {gap:.2g} s apart, and closer around the {_PEAKS} largest of"
-        " each joint", made, cell, x,
+        " each joint", static_friction(plant), breakaway(made, plant), made, cell, x,
     )  # fmt: skip
 
 
@@ -168,7 +173,7 @@ def of_run(run: Trajectory) -> Demand:
         peak, speed = (np.fmax(x, y) for x, y in ((peak, largest[2]), (speed, largest[1])))
         resolution += "; peaks of torque and speed are those of all steps"
     coarse = _trapezoidal(run.t, every_other)
-    return Demand(split, run.v, weights, coarse, peak, (speed, run.t[row]), resolution)
+    return Demand(split, run.v, weights, coarse, peak, (speed, run.t[row]), resolution, np.full(len(peak), np.nan))
 
 
 def _trapezoidal(t: np.ndarray, at: np.ndarray) -> np.ndarray:

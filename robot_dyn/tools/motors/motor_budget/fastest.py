@@ -17,15 +17,14 @@ import numpy as np
 
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial, Plan
-from robot_dyn.foundations import UNREPORTED, Answer, Block, PlanError, instance, reported
+from robot_dyn.foundations import UNREPORTED, Answer, Block, PlanError, reported
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.budget import budget
-from robot_dyn.tools.motors.motor_budget.cells import at_rest_exactly
 from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
 from robot_dyn.tools.motors.motor_budget.pace import Pace, at_pace, least_pace
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
-from robot_dyn.tools.motors.planning.geometric_path import through
+from robot_dyn.tools.motors.planning.geometric_path import at_rest_exactly, through
 from robot_dyn.tools.motors.planning.path_at_limits import path
 
 _RESTS = 1e-3  # of the largest velocity of a joint: slower is a stop
@@ -101,11 +100,10 @@ def fastest(motor_budget: MotorBudget, share: float = 1.0) -> FastestMotion:
         PlanError: If an effect depends on time, or no motion is within the limits.
         MissingExtraError: Without toppra.
     """
-    instance("motor_budget", motor_budget, MotorBudget, "give that of a plan, as rd.tools.motors.budget(plan, arm)")
-    plant, motion, limits, continuous = case_of(motor_budget, "the fastest motion")
+    plant, motion, limits = case_of(motor_budget, "the fastest motion")
     plan, strokes, distance = _planned(plant, at_rest_exactly(motion), limits, share)
-    bounds = {"effort": limits.effort, "velocity": limits.velocity, "continuous": continuous}
-    before, pace = motion.end - motion.start, least_pace(plan.reference, plant, continuous)
+    bounds = {"effort": limits.effort, "velocity": limits.velocity, "continuous": limits.continuous}
+    before, pace = motion.end - motion.start, least_pace(plan.reference, plant, limits.continuous)
     if pace.fits and pace.factor > 1:
         method = f"{plan.method}, slowed down by {pace.factor:.4g}"
         plan = replace(plan, reference=at_pace(plan.reference, pace.factor), method=method)
@@ -113,7 +111,7 @@ def fastest(motor_budget: MotorBudget, share: float = 1.0) -> FastestMotion:
     if _fits(motor_budget, share) and (not of_it.fits or plan.duration >= before):
         given = replace(plan, reference=motion, method="the given motion", findings=motor_budget.findings)
         return FastestMotion(before, strokes, 0.0, 1.0, "", True, share, motor_budget, given)
-    slowed, no_pace = (pace.factor, "") if pace.fits else (1.0, _no_pace(pace, of_it, continuous))
+    slowed, no_pace = (pace.factor, "") if pace.fits else (1.0, _no_pace(pace, of_it))
     return FastestMotion(before, strokes, distance, slowed, no_pace, False, share, of_it, plan)
 
 
@@ -122,9 +120,10 @@ def _fits(found: MotorBudget, share: float) -> bool:
     return found.fits and all(each.shares["peak"] <= share * (1 + TOLERANCE) for each in found.joints)
 
 
-def _no_pace(pace: Pace, found: MotorBudget, continuous: np.ndarray) -> str:
+def _no_pace(pace: Pace, found: MotorBudget) -> str:
     """What is passed at the best pace, in words."""
-    joint, limit = found.joints[pace.joint], continuous[pace.joint]
+    joint = found.joints[pace.joint]
+    limit = joint.continuous_limit
     return (
         f"no pace fits: {joint.joint} needs {pace.share * limit:.4g} of {limit:.4g} {of_joint('N m', joint.type)} rms"
         f" at the best, {pace.factor:.4g} times as slow"

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
-from typing import Any, final
+from operator import itemgetter
+from typing import final
 
 import numpy as np
 
 from robot_dyn.foundations import reported
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import Limits
-from robot_dyn.tools.motors.motor_budget.breakaway import Breakaway
 from robot_dyn.tools.motors.motor_budget.demand import Demand
 
 TOLERANCE = 1e-3  # of a limit, by which plans at their limits may pass it
+_DIGITS = 12  # of times in [s]: places at the ends of cells are a little inside
 KINDS: Mapping[str, str] = {"peak": "peak torque", "continuous": "continuous torque", "speed": "speed"}
 
 
@@ -98,47 +99,41 @@ class JointBudget:
         return f"{need:.4g} of {self.peak_limit:.4g} {unit} at {at:.4g} s{more or _most(self.of_peak)}"
 
 
-def joint_budgets(
-    demand: Demand, limits: Limits, continuous: np.ndarray, friction: np.ndarray, starts: Breakaway | None,
-    cut: frozenset[str] = frozenset(),
-) -> Iterator[JointBudget]:  # fmt: skip
-    """The budget of each joint.
-
-    Args:
-        demand: What the motion asks for.
-        limits: Peak torques and speeds, (n,).
-        continuous: Continuous torques, (n,).
-        friction: Static friction, (n,).
-        starts: Torques at which joints break away; None of a run.
-        cut: Joints whose actuation was cut at an effort limit.
-    """
-    split, power = demand.split, demand.power
+def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozenset()) -> Iterator[JointBudget]:
+    """Yield the budget of each joint; `cut` names joints whose actuation was cut at an effort limit."""
+    split, power, row = demand.split, demand.power, np.arange(len(demand.peak))
     rms = np.sqrt(demand.mean(split.tau**2))
-    given, taken = (demand.duration * demand.mean(each.clip(0.0)) for each in (power, -power))
+    given, taken = (demand.duration * demand.mean(x.clip(0.0)) for x in (power, -power))
+    at_peak, strongest = (np.abs(x).argmax(axis=0) for x in (split.tau, power))
+    parts = {cause: demand.mean(torque * split.tau) for cause, torque in split.torques.items()}
+    by_joint = [[(abs(tau), t) for joint, t, tau in zip(*demand.starts, strict=True) if joint == i] for i in row]
+    starts = [max(of, key=itemgetter(0), default=(nan, nan)) for of in by_joint]
+    values: dict[str, Sequence[float] | np.ndarray] = {
+        "peak": demand.peak,
+        "peak_at": split.t[at_peak],
+        "rms": rms,
+        "speed": demand.speed[0],
+        "speed_at": demand.speed[1],
+        "power": np.abs(power[strongest, row]),
+        "power_at": split.t[strongest],
+        "mean_power": demand.mean(power),
+        "energy": given,
+        "regenerated": taken,
+        "static_friction": demand.friction,
+        "breakaway": [torque for torque, _ in starts],
+        "breakaway_at": [t for _, t in starts],
+        "peak_limit": limits.effort,
+        "continuous_limit": limits.continuous,
+        "speed_limit": limits.velocity,
+    }
     for i, (name, kind) in enumerate(zip(split.joints, split.types, strict=True)):
-        row, strongest = (int(np.abs(each[:, i]).argmax()) for each in (split.tau, power))
-        breakaway, since = _largest(starts, i)
+        numbers = {key: float(x[i]) for key, x in values.items()}
         yield JointBudget(
             joint=name,
             type=kind,
-            peak=float(demand.peak[i]),
-            peak_at=_time(split.t[row]),
-            rms=float(rms[i]),
-            speed=float(demand.speed[0][i]),
-            speed_at=_time(demand.speed[1][i]),
-            power=float(abs(power[strongest, i])),
-            power_at=_time(split.t[strongest]),
-            mean_power=float(demand.mean(power[:, i])),
-            energy=float(given[i]),
-            regenerated=float(taken[i]),
-            static_friction=float(friction[i]),
-            breakaway=breakaway,
-            breakaway_at=since,
-            peak_limit=float(limits.effort[i]),
-            continuous_limit=float(continuous[i]),
-            speed_limit=float(limits.velocity[i]),
-            of_peak={cause: float(torque[row, i]) for cause, torque in split.torques.items()},
-            of_rms={cause: _part(demand, torque[:, i], split.tau[:, i]) for cause, torque in split.torques.items()},
+            **{key: round(x, _DIGITS) if key.endswith("_at") else x for key, x in numbers.items()},
+            of_peak={cause: float(torque[at_peak[i], i]) for cause, torque in split.torques.items()},
+            of_rms={cause: float(part[i] / rms[i]) if rms[i] else 0.0 for cause, part in parts.items()},
             cut=name in cut,
         )
 
@@ -148,23 +143,3 @@ def _most(parts: Mapping[str, float]) -> str:
     sign = 1.0 if sum(parts.values()) >= 0 else -1.0
     cause = max(parts, key=lambda name: sign * parts[name])
     return f", {sign * parts[cause]:.4g} for {cause}"
-
-
-def _largest(starts: Breakaway | None, i: int) -> tuple[float, float]:
-    """The largest torque at which a joint breaks away, and when; nan if it never does."""
-    of_joint = np.flatnonzero(starts.joint == i) if starts is not None else np.zeros(0, int)
-    if starts is None or not len(of_joint):
-        return nan, nan
-    k = of_joint[np.abs(starts.torque[of_joint]).argmax()]
-    return float(abs(starts.torque[k])), _time(starts.t[k])
-
-
-def _time(t: Any) -> float:
-    """A time in [s], to a picosecond: places at the ends of cells are a little inside."""
-    return round(float(t), 12)
-
-
-def _part(demand: Demand, torque: np.ndarray, tau: np.ndarray) -> float:
-    """The part of the rms of τ that a torque in it asks for."""
-    rms = float(np.sqrt(demand.mean(tau**2)))
-    return float(demand.mean(torque * tau)) / rms if rms else 0.0

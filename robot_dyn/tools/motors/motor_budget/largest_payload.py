@@ -12,19 +12,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import count
 from math import inf, nan
 from typing import Any, NamedTuple, final
 
 import numpy as np
 
 from robot_dyn import Payload, Plant
-from robot_dyn.control import PiecewisePolynomial
 from robot_dyn.description import LARGEST
 from robot_dyn.foundations import Answer, Block, QueryError
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.breakaway import breakaway
 from robot_dyn.tools.motors.motor_budget.demand import Demand, of_motion, torques
 from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
+from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
 
 _ROUNDS = 12
 _CLOSE = 1e-9  # of a limit, by which a peak between the times may pass it
@@ -83,53 +84,62 @@ class _Bound(NamedTuple):
 
     least: float
     most: float
-    joint: int
-    limit: str
-    at: float
+    joint: int = 0
+    limit: str = ""
+    at: float = nan
 
 
-def largest_payload(
-    plant: Plant, motion: PiecewisePolynomial, limits: Limits, continuous: np.ndarray, *, link: Any, com: Any
-) -> LargestPayload:
-    """As of `MotorBudget.max_payload`."""
+def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)) -> LargestPayload:
+    """Return the largest point mass on a link with which the motors of a budget suffice, besides what the arm carries.
+
+    Torque is affine in it, so the masses that fit are an interval, in closed form at each time; where the torque
+    peaks between times is found again with that mass, until no limit is passed.
+
+    Args:
+        motor_budget: The budget of a plan.
+        link: The link that carries it.
+        com: Where, in the axes of the link, (3,), in [m].
+
+    Raises:
+        QueryError: If the budget is of a run, whose control would change as well.
+        EditError: If there is no such link.
+    """
+    plant, motion, limits = case_of(motor_budget, "the largest payload")
     robot: Any = plant.dynamics
-    carried = float(sum(each.mass for each in robot.edits.payloads))
     unit, bare = Payload(link, 1.0, com), of_motion(motion, plant)
-    names, loaded, where = plant.dynamics.joint_names, _carrying(plant, unit), (unit.frame, unit.com)
+    carried = float(sum(payload.mass for payload in robot.edits.payloads))
+
+    def carrying(mass: float) -> Plant:
+        return replace(plant, dynamics=robot.with_(payload=replace(unit, mass=mass)))
+
+    def answer(mass: float | None, least: float, bound: _Bound, share: float, of: Demand = bare) -> LargestPayload:
+        joint = robot.joint_names[bound.joint] if bound.limit else ""
+        held = joint, bound.limit, bound.at
+        return LargestPayload(unit.frame, unit.com, mass, least, *held, share, of.resolution, carried)
+
+    loaded, none = carrying(1.0), _Bound(-inf, inf)
     if (fast := bare.speed[0] > limits.velocity * (1 + TOLERANCE)).any():
         i = int(np.argmax(fast))
-        return LargestPayload(
-            *where, None, 0.0, names[i], "speed", float(bare.speed[1][i]), inf, bare.resolution, carried
-        )
-    bounds = [_Bound(-inf, inf, 0, "", nan), *_of_means(bare, loaded, continuous)]
-    bounds += [*_of_starts(bare, plant, loaded, limits), *_of_times(bare, plant, loaded, limits, 0.0)]
-    turn = 0
-    while True:
-        turn += 1
+        return answer(None, 0.0, _Bound(nan, nan, i, "speed", float(bare.speed[1][i])), inf)
+    bounds = [none, *_of_means(bare, loaded, limits), *_of_starts(bare, loaded, limits)]
+    bounds += _of_times(bare, plant, loaded, limits, 0.0)
+    for turn in count(1):
         low, high = max(bounds, key=lambda x: x.least), min(bounds, key=lambda x: x.most)
         least, most = max(0.0, low.least), high.most
         if most > LARGEST:
-            return LargestPayload(*where, inf, least, "", "", nan, 0.0, bare.resolution, carried)
+            return answer(inf, least, none, 0.0)
         if most < least:
-            holds = high if most < 0 else low
-            held = names[holds.joint], holds.limit, holds.at
-            return LargestPayload(*where, None, 0.0, *held, inf, bare.resolution, carried)
-        heavy = _carrying(plant, replace(unit, mass=most))
-        there = of_motion(motion, heavy)
-        share = _share(there, heavy, limits, continuous)
+            return answer(None, 0.0, high if most < 0 else low, inf)
+        there = of_motion(motion, carrying(most))
+        share = _share(there, limits)
         if share <= 1 + _CLOSE or turn == _ROUNDS:
-            held = names[high.joint], high.limit, high.at
-            return LargestPayload(*where, most, least, *held, share, there.resolution, carried)
+            return answer(most, least, high, share, there)
         bounds += _of_times(there, plant, loaded, limits, most)
-
-
-def _carrying(plant: Plant, payload: Payload) -> Plant:
-    robot: Any = plant.dynamics
-    return replace(plant, dynamics=robot.with_(payload=payload))
+    raise AssertionError
 
 
 def _of_times(there: Demand, plant: Plant, loaded: Plant, limits: Limits, mass: float) -> Iterator[_Bound]:
-    """Of peak torque at the times that were looked at with a mass: for each joint the narrowest ones.
+    """Yield the bounds of peak torque at the times of a demand with a mass.
 
     Raises:
         QueryError: If the torque at that mass is not the affine one.
@@ -143,53 +153,52 @@ def _of_times(there: Demand, plant: Plant, loaded: Plant, limits: Limits, mass: 
             "the torque is not affine in the mass of the payload: an effect depends on the dynamics of the arm; give"
             " budgets with payload= instead"
         )
-    for i in np.flatnonzero(np.isfinite(limits.effort)):
-        least, most = _interval(bare[:, i], per_mass[:, i], float(limits.effort[i]), float(np.abs(per_mass).max()))
-        low, high = int(np.argmax(least)), int(np.argmin(most))
-        yield _Bound(float(least[low]), inf, int(i), "peak torque", float(there.split.t[low]))
-        yield _Bound(-inf, float(most[high]), int(i), "peak torque", float(there.split.t[high]))
+    m, n = bare.shape
+    joints, t = np.tile(np.arange(n), m), np.repeat(there.split.t, n)
+    yield from _of_torques("peak torque", joints, t, bare.ravel(), per_mass.ravel(), limits)
 
 
-def _of_starts(there: Demand, plant: Plant, loaded: Plant, limits: Limits) -> Iterator[_Bound]:
-    """Of the torque at which joints break away, at each time at which one does."""
-    assert there.cells is not None
-    bare, one = (breakaway(there.cells, each) for each in (plant, loaded))
-    per_mass = one.torque - bare.torque
-    for i, t, tau, slope in zip(bare.joint, bare.t, bare.torque, per_mass, strict=True):
-        limit, size = float(limits.effort[i]), float(np.abs(per_mass).max())
-        if limit < inf:
-            least, most = _interval(np.array([tau]), np.array([slope]), limit, size)
-            yield _Bound(float(least[0]), float(most[0]), int(i), "break-away torque", float(t))
+def _of_starts(bare: Demand, loaded: Plant, limits: Limits) -> Iterator[_Bound]:
+    """Yield the bounds of the torque at which joints break away."""
+    assert bare.cells is not None
+    joints, t, tau = bare.starts
+    yield from _of_torques("break-away torque", joints, t, tau, breakaway(bare.cells, loaded).torque - tau, limits)
 
 
-def _of_means(there: Demand, loaded: Plant, continuous: np.ndarray) -> Iterator[_Bound]:
-    """Of continuous torque, a quadratic inequality in the mass for each joint."""
-    assert there.cells is not None
-    bare = there.split.tau
-    per_mass = torques(there.cells, loaded, there.cell, there.x)[0] - bare
-    A, B, C = (there.mean(x * y) for x, y in ((bare, bare), (bare, per_mass), (per_mass, per_mass)))
-    for i in np.flatnonzero(np.isfinite(continuous)):
-        over, root = A[i] - continuous[i] ** 2, B[i] ** 2 - C[i] * (A[i] - continuous[i] ** 2)
+def _of_torques(
+    name: str, joints: np.ndarray, t: np.ndarray, tau: np.ndarray, slope: np.ndarray, limits: Limits
+) -> Iterator[_Bound]:
+    """Yield, for each joint, the narrowest bounds of |τ + m slope| ≤ limit; all arrays are (k,)."""
+    flat = np.abs(slope) <= _NONE * np.abs(slope).max(initial=0.0)
+    limit, steep = limits.effort[joints], np.where(flat, 1.0, slope)
+    none = np.where(np.abs(tau) > limit, inf, -inf)
+    ends = (-limit - tau) / steep, (limit - tau) / steep
+    least, most = np.where(flat, none, np.minimum(*ends)), np.where(flat, -none, np.maximum(*ends))
+    for i in np.unique(joints):
+        of_joint = np.flatnonzero(joints == i)
+        low, high = of_joint[np.argmax(least[of_joint])], of_joint[np.argmin(most[of_joint])]
+        yield _Bound(float(least[low]), inf, int(i), name, float(t[low]))
+        yield _Bound(-inf, float(most[high]), int(i), name, float(t[high]))
+
+
+def _of_means(bare: Demand, loaded: Plant, limits: Limits) -> Iterator[_Bound]:
+    """Yield the bounds of continuous torque, a quadratic inequality in the mass for each joint."""
+    assert bare.cells is not None
+    tau = bare.split.tau
+    per_mass = torques(bare.cells, loaded, bare.cell, bare.x)[0] - tau
+    A, B, C = (bare.mean(x * y) for x, y in ((tau, tau), (tau, per_mass), (per_mass, per_mass)))
+    for i in np.flatnonzero(np.isfinite(limits.continuous)):
+        over = A[i] - limits.continuous[i] ** 2
+        root = B[i] ** 2 - C[i] * over
         if C[i] <= _NONE**2 * C.max():
             least, most = (inf, -inf) if over > 0 else (-inf, inf)
         else:
-            ends = (-B[i] + np.array([-1, 1]) * np.sqrt(root)) / C[i] if root >= 0 else (inf, -inf)
-            least, most = float(ends[0]), float(ends[1])
-        yield _Bound(least, most, int(i), "continuous torque", nan)
+            least, most = (-B[i] + np.array([-1, 1]) * np.sqrt(root)) / C[i] if root >= 0 else (inf, -inf)
+        yield _Bound(float(least), float(most), int(i), "continuous torque")
 
 
-def _interval(tau: np.ndarray, slope: np.ndarray, limit: float, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """The masses at which |τ + m slope| ≤ limit, from the least to the most, (k,) each; (inf, −inf) for none."""
-    flat = np.abs(slope) <= _NONE * size
-    steep = np.where(flat, 1.0, slope)
-    ends = (-limit - tau) / steep, (limit - tau) / steep
-    none = np.where(np.abs(tau) > limit, inf, -inf)
-    return np.where(flat, none, np.minimum(*ends)), np.where(flat, -none, np.maximum(*ends))
-
-
-def _share(demand: Demand, plant: Plant, limits: Limits, continuous: np.ndarray) -> float:
-    """Largest share of a limit of torque."""
-    assert demand.cells is not None
-    rms, starts = np.sqrt(demand.mean(demand.split.tau**2)), breakaway(demand.cells, plant)
-    broken = np.abs(starts.torque) / limits.effort[starts.joint]
-    return float(max((demand.peak / limits.effort).max(), (rms / continuous).max(), broken.max(initial=0.0)))
+def _share(demand: Demand, limits: Limits) -> float:
+    """Return the largest share of a limit of torque."""
+    rms = np.sqrt(demand.mean(demand.split.tau**2))
+    broken = np.abs(demand.starts.torque) / limits.effort[demand.starts.joint]
+    return float(max((demand.peak / limits.effort).max(), (rms / limits.continuous).max(), broken.max(initial=0.0)))

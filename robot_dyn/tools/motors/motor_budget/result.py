@@ -1,23 +1,20 @@
-"""What a motion asks of the motors of an arm, as text, tables and JSON, and the payload that still fits."""
+"""What a motion asks of the motors of an arm, as text, tables and JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Any, ClassVar, final
+from typing import Any, ClassVar, final
 
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial
-from robot_dyn.foundations import UNREPORTED, Block, QueryError, Table, number_or_dash, reported
+from robot_dyn.foundations import UNREPORTED, Block, QueryError, Table, instance, number_or_dash, reported
 from robot_dyn.queries import of_joint, without_rounding
 from robot_dyn.report import Result
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.demand import Demand
 from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
-
-if TYPE_CHECKING:
-    from robot_dyn.tools.motors.motor_budget.largest_payload import LargestPayload
 
 
 @final
@@ -35,7 +32,7 @@ class MotorBudget(Result):
         error: Largest difference of two rules of integration, as a part of the mean τ² or |τ v|; the better one counts.
         findings: What is doubtful, each with its remedy.
         demand: Torque by cause and velocity at the times that were looked at.
-        case: The plant, the motion and the limits of torque and speed, and of continuous torque, of a plan; else None.
+        case: The plant, the motion and the limits of a plan; else None.
     """
 
     diagram: ClassVar[str] = "robot_dyn.tools.motors.motor_budget.diagram"
@@ -54,7 +51,7 @@ class MotorBudget(Result):
     left_out: tuple[str, ...]
     environment: dict[str, str]
     demand: Demand = field(metadata=UNREPORTED)
-    case: tuple[Plant, PiecewisePolynomial, Limits, Any] | None = field(metadata=UNREPORTED)
+    case: tuple[Plant, PiecewisePolynomial, Limits] | None = field(metadata=UNREPORTED)
     interrupted: bool = False
 
     @reported
@@ -92,82 +89,55 @@ class MotorBudget(Result):
         return (vars(each) | {"unit": of_joint("N m", each.type)} for each in self.joints)
 
     def tables(self) -> Iterator[Block]:
+        joints = self.joints
+        torque = {"joint": [x.joint for x in joints], "unit": [of_joint("N m", x.type) for x in joints]}
+        speed = torque | {"unit": [of_joint("rad/s", x.type) for x in joints]}
+        at_peak, starts = {"at t [s]": [x.peak_at for x in joints]}, [x.breakaway for x in joints]
         yield f"limits: {self.limits}"
         yield f"{self.resolution}; integrals by two rules differ by {self.error:.1g} of them"
         yield ""
-        yield self._torques()
+        needs = torque | {"peak": [x.peak for x in joints]} | at_peak
+        needs |= {"break-away": map(_known, starts)} if any(x > 0 for x in starts) else {}
+        needs |= {
+            "limit": [_known(x.peak_limit) for x in joints],
+            "headroom": [_percent(x.headroom["peak"], x.peak_limit) for x in joints],
+            "rms": [x.rms for x in joints],
+            "continuous": [_known(x.continuous_limit) for x in joints],
+            "left of it": [_percent(x.headroom["continuous"], x.continuous_limit) for x in joints],
+        }
+        yield _table(needs)
         yield ""
         yield "at the joint, without losses of motor and gear:"
-        yield self._speeds()
+        speed |= {
+            "speed": [x.speed for x in joints],
+            "at t [s]": [x.speed_at for x in joints],
+            "limit": [_known(x.speed_limit) for x in joints],
+            "headroom": [_percent(x.headroom["speed"], x.speed_limit) for x in joints],
+            "power [W]": [x.power for x in joints],
+            "mean [W]": [x.mean_power for x in joints],
+            "energy [J]": [x.energy for x in joints],
+            "regenerated [J]": [x.regenerated for x in joints],
+        }
+        yield _table(speed)
         yield ""
         yield "torque by cause at the peak:"
-        yield self._causes("torque", "of_peak")
+        yield _table(torque | at_peak | _by_cause("torque", [x.of_peak for x in joints]))
         yield ""
         yield "rms torque, and the part of it that each cause asks for:"
-        yield self._causes("rms", "of_rms")
+        yield _table(torque | _by_cause("rms", [x.of_rms for x in joints]))
         yield ""
-        yield from (f"finding: {each}" for each in self.findings)
-
-    def _torques(self) -> Table:
-        starts = any(each.breakaway > 0 for each in self.joints)
-        peak = "joint", "unit", "peak", "at t [s]", *(("break-away",) if starts else ()), "limit", "headroom"
-        rows = []
-        for x in self.joints:
-            needs = (x.joint, of_joint("N m", x.type), x.peak, x.peak_at, *((_known(x.breakaway),) if starts else ()))
-            of_peak = _known(x.peak_limit), _percent(x.headroom["peak"], x.peak_limit)
-            lasting = x.rms, _known(x.continuous_limit), _percent(x.headroom["continuous"], x.continuous_limit)
-            rows.append((*needs, *of_peak, *lasting))
-        heading = (*peak, "rms", "continuous", "left of it")
-        return Table(heading, tuple(rows), digits=4, right=(*peak[4:], *heading[-2:]))
-
-    def _speeds(self) -> Table:
-        rows = []
-        for x in self.joints:
-            speed = x.joint, of_joint("rad/s", x.type), x.speed, x.speed_at, _known(x.speed_limit)
-            power = x.power, x.mean_power, x.energy, x.regenerated
-            rows.append((*speed, _percent(x.headroom["speed"], x.speed_limit), *power))
-        speed = "joint", "unit", "speed", "at t [s]", "limit", "headroom"
-        heading = (*speed, "power [W]", "mean [W]", "energy [J]", "regenerated [J]")
-        return Table(heading, tuple(rows), digits=4, right=speed[4:])
-
-    def _causes(self, what: str, key: str) -> Table:
-        names = tuple(self.joints[0].of_peak) if self.joints else ()
-        rows = []
-        for x in self.joints:
-            parts = getattr(x, key)
-            values = without_rounding([sum(parts.values()), *parts.values()]).tolist()
-            at = (x.peak_at,) if key == "of_peak" else ()
-            rows.append((x.joint, of_joint("N m", x.type), *at, *values))
-        at = ("at t [s]",) if key == "of_peak" else ()
-        return Table(("joint", "unit", *at, what, *names), tuple(rows), digits=4)
-
-    def max_payload(self, link: str, com: Any = (0.0, 0.0, 0.0)) -> LargestPayload:
-        """The largest point mass on a link with which the motors suffice, besides what the arm carries.
-
-        Torque is affine in it, so the masses that fit are an interval, in closed form at each time; where the torque
-        peaks between times is found again with that mass, until no limit is passed.
-
-        Args:
-            link: The link that carries it.
-            com: Where, in the axes of the link, (3,), in [m].
-
-        Raises:
-            QueryError: If the budget is of a run, whose control would change as well.
-            EditError: If there is no such link.
-        """
-        from robot_dyn.tools.motors.motor_budget.largest_payload import largest_payload
-
-        return largest_payload(*case_of(self, "the largest payload"), link=link, com=com)
+        yield from (f"finding: {finding}" for finding in self.findings)
 
 
-def case_of(found: MotorBudget, what: str) -> tuple[Plant, PiecewisePolynomial, Limits, Any]:
-    """The case of a plan; QueryError for a run, of which what is asked for is not known."""
-    if found.case is None:
+def case_of(motor_budget: MotorBudget, what: str) -> tuple[Plant, PiecewisePolynomial, Limits]:
+    """Return the plant, the motion and the limits of the budget of a plan; QueryError for that of a run."""
+    instance("motor_budget", motor_budget, MotorBudget, "give that of a plan, as rd.tools.motors.budget(plan, arm)")
+    if motor_budget.case is None:
         raise QueryError(
             f"{what} is of a plan, this budget is of a run: give its motion,"
             " rd.tools.motors.budget(rd.control.from_samples(arm, run.table(), ends='measured'), plant)"
         )
-    return found.case
+    return motor_budget.case
 
 
 def _known(x: float) -> str:
@@ -176,3 +146,14 @@ def _known(x: float) -> str:
 
 def _percent(free: float, limit: float) -> str:
     return f"{round(free, 3) + 0.0:.1%}" if limit < inf else "—"
+
+
+def _by_cause(what: str, parts: Sequence[Mapping[str, float]]) -> dict[str, Iterable[Any]]:
+    """Return columns of the sum of the parts of each joint, and of its parts."""
+    rows = [without_rounding([sum(of.values()), *of.values()]).tolist() for of in parts]
+    return dict(zip((what, *parts[0]), zip(*rows, strict=True), strict=True)) if parts else {what: ()}
+
+
+def _table(columns: Mapping[str, Iterable[Any]]) -> Table:
+    """Return a table of columns, texts after those of joint and unit at the right."""
+    return Table(tuple(columns), tuple(zip(*columns.values(), strict=True)), digits=4, right=tuple(columns)[2:])

@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.control import PiecewisePolynomial
+from robot_dyn.control import PiecewisePolynomial, polynomial
 from robot_dyn.foundations import PlanError
 from robot_dyn.foundations import numbers as checked_numbers
 
 _MOST_POINTS = 2000
 _SLOWEST = 1e-3  # of |q'|, in the path's mean: where it vanishes, s is no measure of the way
 _CORNER = 1e-9  # jump of q', in |q'|
+_NOISE = 1e-13  # of the largest position: what moves less within a piece rests
 _FARTHEST = 1e100  # [rad] or [m]: squares do not overflow
 numbers = partial(checked_numbers, error=PlanError)
 
@@ -35,7 +36,7 @@ def geometric_path(given: Any, joint_names: tuple[str, ...]) -> PiecewisePolynom
         return through(numbers("points", given, ("m", n)))
     if given.n != n:
         raise PlanError(f"the path is of {given.n} joints, the arm has {n}")
-    path, (first, last) = _without_rounding(given), given.breaks[[0, -1]]
+    path, (first, last) = at_rest_exactly(given), given.breaks[[0, -1]]
     s = np.unique(np.concatenate([given.breaks, np.linspace(first, last, 1000)]))
     speed = np.linalg.norm(path.at(s)[1], axis=-1)
     if speed.min() <= _SLOWEST * speed.mean():
@@ -44,10 +45,9 @@ def geometric_path(given: Any, joint_names: tuple[str, ...]) -> PiecewisePolynom
             " give points on it, such as path.at(times)[0]"
         )
     inner = given.breaks[1:-1]
-    before = path.coefficients[:-1], np.diff(given.breaks)[:-1]
+    ends = polynomial(path.coefficients[:-1], np.diff(given.breaks)[:-1, None]), path.at(inner)
     for k, name in enumerate(("a jump", "a corner")):
-        left = _derivative(before[0], k, before[1])
-        jump = np.abs(left - path.at(inner)[k]).max(axis=-1, initial=0.0)
+        jump = np.abs(ends[0][k] - ends[1][k]).max(axis=-1, initial=0.0)
         if jump.size and jump.max() > _CORNER * (1.0 if k == 0 else speed.max()):
             raise PlanError(f"the path has {name} at {inner[np.argmax(jump)]:.6g}: no motion follows it without a stop")
     return path
@@ -72,16 +72,17 @@ def through(points: np.ndarray) -> PiecewisePolynomial:
         raise PlanError(f"points {int(np.argmin(length))} and {int(np.argmin(length)) + 1} are equal; leave one out")
     s = np.concatenate([[0.0], np.cumsum(length)])
     spline = CubicSpline(s, points, bc_type="natural")
-    return _without_rounding(PiecewisePolynomial(s, np.moveaxis(spline.c[::-1], 0, 1)))
+    return at_rest_exactly(PiecewisePolynomial(s, np.moveaxis(spline.c[::-1], 0, 1)))
 
 
-def _without_rounding(path: PiecewisePolynomial) -> PiecewisePolynomial:
-    """The path with joints that do not move exactly at rest: friction takes the sign of their velocity."""
-    moves = np.ptp(path.at(path.breaks)[0], axis=0) > 0
-    moves |= (np.abs(path.coefficients[:, 1:]).max(axis=(0, 1), initial=0.0)) > 1e-12 * np.abs(path.coefficients).max()
-    table = path.coefficients.copy()
-    table[:, 1:, ~moves] = 0.0
-    return PiecewisePolynomial(path.breaks, table)
+def at_rest_exactly(motion: PiecewisePolynomial) -> PiecewisePolynomial:
+    """The motion without what rounding moves of joints at rest: friction takes the sign of their velocity."""
+    h = np.diff(motion.breaks)[:, None, None] ** np.arange(motion.coefficients.shape[1])[:, None]
+    moved = np.abs(motion.coefficients[:, 1:] * h[:, 1:]).sum(axis=1)  # (k, n)
+    table = motion.coefficients.copy()
+    size = max(float(np.abs(table[:, 0]).max()), float(moved.max(initial=0.0)))
+    table[:, 1:] = np.where((moved <= _NOISE * size)[:, None], 0.0, table[:, 1:])
+    return PiecewisePolynomial(motion.breaks, table)
 
 
 def turning_points(path: PiecewisePolynomial) -> np.ndarray:
@@ -118,9 +119,3 @@ def in_time(path: PiecewisePolynomial, s: np.ndarray, x: np.ndarray) -> Piecewis
         made = product
         made[:, 0] += table[:, j]
     return PiecewisePolynomial(np.concatenate([[0.0], np.cumsum(h)]), made)
-
-
-def _derivative(table: np.ndarray, order: int, s: np.ndarray) -> np.ndarray:
-    from robot_dyn.control import polynomial
-
-    return polynomial(table, s[:, None])[order]

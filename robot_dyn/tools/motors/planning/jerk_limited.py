@@ -8,27 +8,20 @@ states, 2021]
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from robot_dyn import Robot
-from robot_dyn.control import PiecewisePolynomial, Plan, extreme_values
+from robot_dyn.control import PiecewisePolynomial, Plan
 from robot_dyn.foundations import PlanError, instance, needs, number, numbers, one_state
 from robot_dyn.queries import of_joint
+from robot_dyn.tools.motors.limits import outside_positions
 
 _SAME = 1e-12  # of the duration: breaks of two joints that differ by their rounding
-_BEYOND = 1e-9  # of a position limit [rad, m] that rounding may pass
 
 
-class _Segment(NamedTuple):
-    """A piece of one joint: from time `start`, with the state there and the jerk."""
-
-    start: float
-    p: float
-    v: float
-    a: float
-    j: float
+_Segment = tuple[float, ...]  # of one joint: the time at which it starts, position, velocity, acceleration, jerk
 
 
 def point_to_point(
@@ -76,24 +69,9 @@ def point_to_point(
         raise PlanError("acceleration must be finite: the file of a robot states none, motors have one")
     _check_ends(arm, ends, rates, limits["velocity"])
     reference = _merged([list(_segments(each)) for each in _profiles(ends, rates, limits)], start_s)
-    check_positions(arm, reference)
+    for where in outside_positions(arm, reference):
+        raise PlanError(f"{where}; change the ends or their velocities")
     return Plan(arm.name, arm.joint_names, arm.joint_types, reference, "from point to point, by ruckig", limits)
-
-
-def check_positions(arm: Robot, reference: PiecewisePolynomial) -> None:
-    """Raise PlanError, with joint, time and value, if a motion leaves the position limits."""
-    found = extreme_values(reference)
-    for low, bounds, values, times in (
-        (True, arm.lower, found.least, found.at_least),
-        (False, arm.upper, found.greatest, found.at_greatest),
-    ):
-        beyond = (bounds - values if low else values - bounds) > _BEYOND
-        for i in np.flatnonzero(beyond)[:1]:
-            unit = of_joint("rad", arm.joint_types[i])
-            raise PlanError(
-                f"{arm.joint_names[i]} would be at {values[i]:.6g} {unit} at {times[i]:.4g} s, "
-                f"{'below' if low else 'above'} its limit {bounds[i]:.6g} {unit}; change the ends or their velocities"
-            )
 
 
 def _of_joints(name: str, values: Any, shape: tuple[int], *, limit: bool = False) -> np.ndarray:
@@ -137,22 +115,19 @@ def _profiles(ends: list[np.ndarray], rates: list[np.ndarray], limits: dict[str,
 
 
 def _segments(profile: Any) -> Iterator[_Segment]:
-    """The pieces of a joint: what brings its start within the limits, then seven of constant jerk; then its end."""
+    """Yield the pieces of a joint: what brings its start within the limits, seven of constant jerk, and its end."""
     t = 0.0
-    for duration, *state in zip(*(getattr(profile.brake, key) for key in "tpvaj"), strict=True):
-        if duration > 0:
-            yield _Segment(t, *state)
-            t += duration
-    for duration, *state in zip(profile.t, *(getattr(profile, key) for key in "pvaj"), strict=False):
-        if duration > 0:
-            yield _Segment(t, *state)
-            t += duration
-    yield _Segment(t, profile.pf, profile.vf, profile.af, 0.0)
+    for times, of in ((profile.brake.t, profile.brake), (profile.t, profile)):
+        for duration, *state in zip(times, of.p, of.v, of.a, of.j, strict=False):
+            if duration > 0:
+                yield t, *state
+                t += duration
+    yield t, profile.pf, profile.vf, profile.af, 0.0
 
 
 def _merged(joints: list[list[_Segment]], start_s: float) -> PiecewisePolynomial:
     """The pieces of all joints between all their breaks."""
-    times = np.unique([each.start for joint in joints for each in joint])
+    times = np.unique([segment[0] for joint in joints for segment in joint])
     kept = times[np.concatenate([[True], np.diff(times) > _SAME * times[-1]])]
     middles = (kept[1:] + kept[:-1]) / 2
     coefficients = np.zeros((len(middles), 4, len(joints)))

@@ -10,7 +10,7 @@ import numpy as np
 from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial, Plan, hold
 from robot_dyn.foundations import PlanError, number
-from robot_dyn.tools.motors.limits import Limits, limits_of
+from robot_dyn.tools.motors.limits import Limits, check_motors, limits_of
 from robot_dyn.tools.motors.motors_file import Motors
 from robot_dyn.tools.motors.planning.geometric_path import geometric_path, in_time, turning_points
 from robot_dyn.tools.motors.planning.path_plan import (
@@ -80,8 +80,8 @@ def path(
     share = number("share", share, error=PlanError, above=0.0)
     if share > 1:
         raise PlanError(f"share must be at most 1, got {share:g}")
-    limits = limits_of(plant, motors, effort, velocity, acceleration)
-    limits = Limits(limits.effort * share, limits.velocity, limits.acceleration)
+    check_motors(motors)
+    limits = limits_of(plant, motors, effort, velocity, acceleration).times(share)
     geometry = geometric_path(points, plant.dynamics.joint_names)
     check_effects(plant)
     check_positions(plant, geometry)
@@ -114,7 +114,7 @@ def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[Pi
     """The fastest motion that the judgement finds within limits, and its judgement."""
     allowed, largest, error = 1.0, inf, inf
     for _ in range(_TIGHTER):
-        motion, error = _fastest_motion(plant, _scaled(limits, allowed), path)
+        motion, error = _fastest_motion(plant, limits.times(allowed, allowed), path)
         found = judged(plant, limits, motion, judged_times(motion.end))
         largest = float(found.most.max())
         if largest <= _REFUSED and error <= _ERROR:
@@ -124,10 +124,6 @@ def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[Pi
         f"no motion was found within the limits: the best one takes {largest:.5f} of them, and the torque of its"
         f" effects is known to {error:.2g} of the limits; take a smoother path or smoother effects"
     )
-
-
-def _scaled(limits: Limits, factor: float) -> Limits:
-    return Limits(limits.effort * factor, limits.velocity * factor, limits.acceleration * factor)
 
 
 def _fastest_motion(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[PiecewisePolynomial, float]:
@@ -160,7 +156,7 @@ def _solved(
     Also the error of what was linearised, as a share of the effort limits.
     """
     places = imposed(grid).ravel()
-    known = np.maximum(last.at(places), _REST * last.x.max())
+    known = np.maximum(np.interp(places, *last), _REST * last.x.max())
     for slower in 4.0 ** np.arange(6 if plant.forces else 1):
         effects = Effects.about(plant, path, places, known / slower) if plant.forces else None
         made = cells(plant, limits, path, grid, effects)
@@ -169,7 +165,7 @@ def _solved(
                 speed = Speed(grid, x)
                 if effects is None:
                     return speed, 0.0
-                return speed, float(np.abs(effects.error(plant, path, speed.at(places)) / limits.effort).max())
+                return speed, float(np.abs(effects.error(plant, path, np.interp(places, *speed)) / limits.effort).max())
     raise PlanError(why_not(plant, limits, path))
 
 

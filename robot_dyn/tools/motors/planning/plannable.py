@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from robot_dyn import Plant
-from robot_dyn.control import PiecewisePolynomial, extreme_values
+from robot_dyn.control import PiecewisePolynomial
 from robot_dyn.effects import Bound, CarriedPayload, EffortLimit, Force, RigidStops, Stateful
 from robot_dyn.foundations import PlanError
-from robot_dyn.tools.motors.limits import Limits
+from robot_dyn.tools.motors.limits import Limits, outside_positions
 
 _TIMES = 0.1234, 7.891  # at which torques must be the same
-_ROUNDING = 1e-9
 _LEAST, _MOST = 1e-100, 1e100  # of limits, whose squares and ratios must not overflow
 
 
@@ -40,19 +37,9 @@ def check_effects(plant: Plant) -> None:
 
 def check_positions(plant: Plant, path: PiecewisePolynomial) -> None:
     """Refuse a path that leaves the joint limits or passes rigid stops."""
-    robot: Any = plant.dynamics
-    found = extreme_values(path)
-    stops = [(each.lower, each.upper) for each in plant.effects if isinstance(each, RigidStops)]
-    for lower, upper in ((getattr(robot, "lower", -np.inf), getattr(robot, "upper", np.inf)), *stops):
-        lower, upper = np.broadcast_to(lower, robot.n), np.broadcast_to(upper, robot.n)
-        beyond = np.maximum(lower - found.least, found.greatest - upper)
-        i = int(np.argmax(beyond))
-        if beyond[i] > _ROUNDING:
-            far = found.least[i] if found.least[i] < lower[i] else found.greatest[i]
-            raise PlanError(
-                f"the path takes joint {robot.joint_names[i]!r} to {far:.6g}, beyond its limits {lower[i]:.6g} …"
-                f" {upper[i]:.6g}; move the points, or give more of them where the spline swings out"
-            )
+    for stops in (None, *(effect for effect in plant.effects if isinstance(effect, RigidStops))):
+        for where in outside_positions(plant.dynamics, path, stops, "s = {:.4g}"):
+            raise PlanError(f"{where}; move the points, or give more of them where the spline swings out")
 
 
 def check_limited(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> None:

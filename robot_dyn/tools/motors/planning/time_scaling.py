@@ -10,9 +10,9 @@ Parameterization Based on Reachability Analysis, 2018]
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
-from typing import Any, final
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,22 +28,14 @@ _BEND = 1e-4  # step of the difference quotient ∂h/∂x, in x
 needs_plan = partial(needs, extra="plan")
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Speed:
+class Speed(NamedTuple):
     """ṡ² = x at the points s of a grid, each (m + 1,), and linear between them: s̈ is constant there."""
 
     s: np.ndarray
     x: np.ndarray
 
-    def at(self, places: np.ndarray) -> np.ndarray:
-        """ṡ² at places within the grid."""
-        return np.interp(places, self.s, self.x)
 
-
-@final
-@dataclass(frozen=True, eq=False)
-class Cells:
+class Cells(NamedTuple):
     """What limits the motion in the cells of a grid, at some places of each: |A s̈ + B x + C| ≤ 1, with x at its start.
 
     Attributes:
@@ -62,9 +54,7 @@ class Cells:
         return float(2 * np.sqrt(length * per_acceleration) + length * np.sqrt(per_squared_speed))
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Effects:
+class Effects(NamedTuple):
     """The torque of effects along a path, h ≈ h₀ + slope (x − x₀) at places s, all of shape (m,) or (m, n)."""
 
     s: np.ndarray
@@ -116,7 +106,7 @@ def cells(plant: Plant, limits: Limits, path: PiecewisePolynomial, grid: np.ndar
 
 
 def fastest(grid: Cells, duration: float) -> np.ndarray | None:
-    """The greatest ṡ² at the points of the grid, (m + 1,), from rest to rest; None if there is no such motion.
+    """Return the greatest ṡ² at the points of the grid, (m + 1,), from rest to rest; None if there is no such motion.
 
     Args:
         grid: The limits.
@@ -125,7 +115,8 @@ def fastest(grid: Cells, duration: float) -> np.ndarray | None:
     algorithm, constraint = needs_plan("toppra.algorithm"), _constraint(grid, duration)
     unit = duration / (grid.s[-1] - grid.s[0])
     scaled = (grid.s - grid.s[0]) * unit
-    solver = algorithm.TOPPRA([constraint], _Interval(scaled), gridpoints=scaled, solver_wrapper="seidel")
+    path = SimpleNamespace(path_interval=scaled[[0, -1]], dof=1, waypoints=None)  # its limits are computed already
+    solver = algorithm.TOPPRA([constraint], path, gridpoints=scaled, solver_wrapper="seidel")
     _, speed, _ = solver.compute_parameterization(0.0, 0.0)
     if speed is None or not np.isfinite(speed).all():
         return None
@@ -134,41 +125,15 @@ def fastest(grid: Cells, duration: float) -> np.ndarray | None:
     return x if (x[1:-1] > 0).all() else None
 
 
-@final
-@dataclass(frozen=True)
-class _Interval:
-    """What toppra asks of a path whose limits are computed already."""
-
-    grid: np.ndarray
-    dof: int = 1
-    waypoints: Any = None
-
-    @property
-    def path_interval(self) -> np.ndarray:
-        return self.grid[[0, -1]]
-
-
 def _constraint(grid: Cells, duration: float) -> Any:
-    linear = needs_plan("toppra.constraint").LinearConstraint
+    """Return the rows of the cells in toppra's form, F (A s̈ + B x + C) ≤ g."""
     unit = duration / (grid.s[-1] - grid.s[0])
-    A, B, C = (np.concatenate([each, each[-1:]]) for each in grid.rows)  # toppra asks for a last row, and ignores it
+    A, B, C = (np.concatenate([x, x[-1:]]) for x in grid.rows)  # toppra asks for a last row, and ignores it
     used = np.any(A, axis=0) | np.any(B, axis=0) | np.any(C, axis=0)  # those without a limit are 0
-    A, B, C = (each[:, used] for each in (A / unit, B / unit**2, C))
+    A, B, C = (x[:, used] for x in (A / unit, B / unit**2, C))
     both = np.concatenate([np.eye(A.shape[1]), -np.eye(A.shape[1])])
-
-    class Limited(linear):
-        """The rows of the cells in toppra's form, F (A s̈ + B x + C) ≤ g."""
-
-        identical = True
-
-        def __init__(self) -> None:
-            super().__init__()
-            self.identical = True
-
-        def compute_constraint_params(self, path: Any, gridpoints: Any, *_: Any) -> tuple[Any, ...]:
-            return A, B, C, both, np.ones(len(both)), None, None
-
-        def get_dof(self) -> int:
-            return 1
-
-    return Limited()
+    constraint = needs_plan("toppra.constraint").LinearConstraint()
+    constraint.identical = True
+    constraint.get_dof = lambda: 1
+    constraint.compute_constraint_params = lambda *_: (A, B, C, both, np.ones(len(both)), None, None)
+    return constraint

@@ -1,8 +1,9 @@
-"""Headings of columns: a name, and a unit in brackets or parentheses, as "elbow_joint [deg]" or "t (ms)"."""
+"""Tables: columns by heading, a name with a unit in brackets or parentheses, as "elbow_joint [deg]" or "t (ms)"."""
 
 from __future__ import annotations
 
 import re
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,16 @@ UNITS = {
     "angle": {"rad": 1.0, "deg": np.pi / 180, "°": np.pi / 180},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
 }
+
+TIME_NAMES = "t", "time", "timestamp", "stamp"
+
+
+class Table(NamedTuple):
+    """Columns by heading; of a log also its times, (m,), in [s], and a note on their origin."""
+
+    columns: dict[str, np.ndarray]
+    t: np.ndarray | None = None
+    note: str = ""
 
 
 def name_of(heading: str) -> str:
