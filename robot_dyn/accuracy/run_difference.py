@@ -68,7 +68,6 @@ class RunDifference(Result):
         settings: The settings that differ.
         left_out: What is not compared.
         environment: Versions that the first run was made with.
-        interrupted: False.
     """
 
     diagram: ClassVar[str] = "robot_dyn.accuracy.run_difference_figure"
@@ -88,7 +87,6 @@ class RunDifference(Result):
     settings: tuple[DifferingSetting, ...]
     left_out: tuple[str, ...]
     environment: dict[str, str]
-    interrupted: bool = False
     runs: tuple[TrajectoryData, TrajectoryData] | None = field(default=None, metadata=UNREPORTED)
     difference: Difference | None = field(default=None, metadata=UNREPORTED)
 

@@ -90,7 +90,6 @@ class Certificate(Result):
         left_out: What was left out, and why.
         environment: Versions and processor.
         seed: Seed of the random states.
-        interrupted: Whether the user interrupted the computation.
     """
 
     diagram: ClassVar[str] = "robot_dyn.accuracy.certificate.diagram"
@@ -108,7 +107,6 @@ class Certificate(Result):
     left_out: tuple[str, ...]
     environment: dict[str, str]
     seed: int
-    interrupted: bool = False
 
     def tables(self) -> Iterator[Block]:
         """A line for each quantity and implementation, and what it rests on."""

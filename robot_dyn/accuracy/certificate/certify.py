@@ -30,6 +30,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import M
 from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
 from robot_dyn.report.environment import processor_and_versions
+from robot_dyn.report.result import INTERRUPTED
 from robot_dyn.report.timing import in_turns, repeatable
 
 _AT_LEAST_S = 1e-3  # of a loop that is timed
@@ -79,7 +80,7 @@ def certify(
     states = random_states(robot, samples, rng)
     report(0.0, "machine code")
     found, left_out = implementations(robot)
-    digit_count, held, interrupted = DigitCount(robot, states, given, rng), list[Held](), False
+    digit_count, held = DigitCount(robot, states, given, rng), list[Held]()
     quantities = [each for each in QUANTITIES.values() if each in found[0].quantities]
     try:
         for k, quantity in enumerate(quantities):
@@ -88,12 +89,10 @@ def certify(
                 lambda part, what, k=k: report((k + part) / len(quantities), what),
             )  # fmt: skip
     except KeyboardInterrupt:
-        interrupted = True
-        left_out.append("what was to come when it was interrupted")
+        left_out.append(INTERRUPTED)
     return Certificate(
         robot.name, robot.joint_names, tuple(held), digit_count.decimals, digit_count.right_angles,
         _condition(robot, states, given, rng), digit_count.bits, tuple(left_out), processor_and_versions(), seed,
-        interrupted,
     )  # fmt: skip
 
 

@@ -50,15 +50,13 @@ def _caption(result: Cost) -> str:
 
 def _parts(result: Cost) -> list[tuple[str, int, str]]:
     """What a step is made of: names, instructions, and times as texts."""
-    alternatives = [each for each in result.alternatives if each.group == "parts"]
     rows = []
-    for each in alternatives:
-        on, off = each.first, each.second
-        if each.what == EVERYTHING:
-            rows.append(("rigid bodies", off.instructions, _time(off.time_s)))
-        else:
-            time = ", within noise" if each.within_noise else _time(each.time_between_s)
-            rows.append((each.what, on.instructions - off.instructions, time))
+    for pair in result.alternatives:
+        if pair.group == "parts" and pair.what == EVERYTHING:
+            rows.append(("rigid bodies", pair.second.instructions, _time(pair.second.time_s)))
+        elif pair.group == "parts":
+            time = ", within noise" if pair.within_noise else _time(pair.time_between_s)
+            rows.append((pair.what, pair.added, time))
     return rows + ([("of several", result.shared, "")] if result.shared else [])
 
 

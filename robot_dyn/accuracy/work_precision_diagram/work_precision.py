@@ -32,7 +32,7 @@ from robot_dyn.integrate.methods import METHODS, as_method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import format_duration, joint_units
 from robot_dyn.report.environment import processor_and_versions
-from robot_dyn.report.result import Result
+from robot_dyn.report.result import INTERRUPTED, Result
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.results.acting import acting
@@ -65,7 +65,6 @@ class WorkPrecision(Result):
         environment: Versions and processor.
         budget_s: That was allowed, in [s].
         spent_s: That was spent, without compiling, in [s].
-        interrupted: Whether it was ended by the user.
         past_horizon: Of chaotic motion, energy and the way back over all of the duration, by method; else nothing.
     """
 
@@ -84,7 +83,6 @@ class WorkPrecision(Result):
     environment: dict[str, str]
     budget_s: float
     spent_s: float
-    interrupted: bool = False
     past_horizon: tuple[PastHorizon, ...] = ()
 
     def tables(self) -> Iterator[Block]:
@@ -239,14 +237,14 @@ def work_precision(
     walks, interrupted = measure(candidates, exact, budget, repeats)
     ladders = tuple(walk.ladder(exact.error) for walk in walks if walk.rungs)
     left_out += unable + refused + [f"{walk.method.name}: {walk.ended}" for walk in walks if not walk.rungs]
-    left_out += ["what was to come when it was interrupted"] * interrupted
+    left_out += [INTERRUPTED] * interrupted
     cut = exact.parted_s is not None and not interrupted
     later = past_horizon(everything, exact.horizon_s, ladders, {x.name: x for x in integrators}, budget) if cut else ()
     dynamics: Any = setup.plant.dynamics
     types = getattr(dynamics, "joint_types", (None,))
     return WorkPrecision(
         getattr(dynamics, "name", type(dynamics).__name__), acting(setup), joint_units("q", types), requested, exact,
-        ladders, tuple(left_out), processor_and_versions(), budget.seconds, budget.spent, interrupted, later,
+        ladders, tuple(left_out), processor_and_versions(), budget.seconds, budget.spent, later,
     )  # fmt: skip
 
 

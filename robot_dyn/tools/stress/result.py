@@ -156,7 +156,6 @@ class Stress(Result):
         environment: Versions and processor.
         samples, seed: Number of random states; of the random generator.
         spent_s: Time that it took, in [s].
-        interrupted: Whether it was ended by the user.
     """
 
     robot: str
@@ -170,7 +169,6 @@ class Stress(Result):
     samples: int
     seed: int
     spent_s: float
-    interrupted: bool = False
 
     def tables(self) -> Iterator[Block]:
         """What it fails at, and a line for each finding."""

@@ -11,7 +11,7 @@ import numpy as np
 from robot_dyn import Robot
 from robot_dyn.accuracy import random_states, warn_below
 from robot_dyn.foundations import function, instance, integer, number
-from robot_dyn.report import Budget, processor_and_versions
+from robot_dyn.report import INTERRUPTED, Budget, processor_and_versions
 from robot_dyn.tools.stress.limits import gain_limit, held, payload_limit, speed_limit, step_limits
 from robot_dyn.tools.stress.result import Finding, JudgedRun, Limit, Stress, WorstCase
 from robot_dyn.tools.stress.runs import judged_runs
@@ -63,20 +63,19 @@ def stressed(
     seconds = number("budget_s", budget_s, above=0)
     budget = Budget(seconds, function("on_progress", on_progress, "(spent, what)"), clock)
     work = Work(budget, seconds / _PIECES)
-    robot, findings, interrupted = warn_below(robot, None), list[Finding | None](), False
+    robot, findings = warn_below(robot, None), list[Finding | None]()
     try:
         for finding in _findings(robot, samples, runs, seed, work):
             findings.append(finding)
     except KeyboardInterrupt:
-        interrupted = True
-        work.left_out.append("what was to come when it was interrupted")
+        work.left_out.append(INTERRUPTED)
 
     def of(kind: type) -> tuple[Any, ...]:
         return tuple(finding for finding in findings if isinstance(finding, kind))
 
     return Stress(
         robot.name, robot.joint_names, of(WorstCase), of(Limit), of(JudgedRun), (*_unlimited(robot), *work.left_out),
-        tuple(work.out_of_time), processor_and_versions(), samples, seed, budget.spent, interrupted,
+        tuple(work.out_of_time), processor_and_versions(), samples, seed, budget.spent,
     )  # fmt: skip
 
 

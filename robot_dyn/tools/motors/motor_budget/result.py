@@ -55,7 +55,6 @@ class MotorBudget(Result):
     environment: dict[str, str]
     demand: Demand = field(metadata=UNREPORTED)
     case: tuple[Plant, PiecewisePolynomial, Limits, Any] | None = field(metadata=UNREPORTED)
-    interrupted: bool = False
 
     @reported
     def fits(self) -> bool:
