@@ -120,7 +120,7 @@ class Certificate(Result):
         given = any(each.given is not None for each in self.digits)
         counts = ("typical", "worst of", "random", "searched", "time")
         headings = ("quantity", "implementation", *["given"] * given, *counts)
-        yield Table(headings, tuple(map(tuple, _digit_rows(self, given))), right=headings[2:])
+        yield Table(headings, tuple(self._digit_rows(given)), digits=3, right=headings[2:])
         of = self.condition
         lose = f": up to {of.digits:.1f} digits for forward dynamics to lose" if isfinite(of.digits) else ""
         yield (
@@ -193,16 +193,11 @@ class Certificate(Result):
     def _of(self, quantity: str) -> Iterator[Held]:
         return (each for each in self.digits if each.quantity == quantity)
 
-
-def _digit_rows(result: Certificate, given: bool) -> Iterator[list[str]]:
-    """A row for each implementation, and one for the decimals of the file, by quantity."""
-    for quantity in result.quantities:
-        for k, each in enumerate(each for each in result.digits if each.quantity == quantity):
-            yield [quantity if not k else "", *_held(each, given)]
-        yield ["", DECIMALS, *[""] * (3 + given), f"{result.decimals[quantity]:.1f}", ""]
-
-
-def _held(each: Held, given: bool) -> list[str]:
-    own = ["—" if each.given is None else f"{each.given:.1f}"] if given else []
-    worst = [f"{each.random:.1f}", f"{each.searched:.1f}"]
-    return [each.implementation, *own, f"{each.typical:.1f}", str(each.samples), *worst, format_duration(each.time_s)]
+    def _digit_rows(self, given: bool) -> Iterator[tuple[str | float, ...]]:
+        """A row for each implementation, and one for the decimals of the file, by quantity."""
+        for quantity in self.quantities:
+            for held in self._of(quantity):
+                own = [nan if held.given is None else held.given] * given
+                worst, time = (held.random, held.searched), format_duration(held.time_s)
+                yield quantity, held.implementation, *own, held.typical, str(held.samples), *worst, time
+            yield quantity, DECIMALS, *[""] * (3 + given), self.decimals[quantity], ""

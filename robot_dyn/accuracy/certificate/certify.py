@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -121,20 +122,24 @@ def _quantity(
         report(k / len(found), f"{quantity.name}: {implementation.name}")
         try:
             held.append(digit_count.count(implementation, quantity))
-            calls[implementation.name] = implementation.call(quantity, state)
+            calls[implementation.name] = _call(implementation.engine, quantity, state)
         except QueryError as error:
             left_out.append(str(error))
-    balls = Lagrangian(digit_count.robot, Ball(digit_count.truth(digit_count.robot, quantity, state).bits))
-    proven = Implementation(f"balls, {balls.dtype.bits} bits", digit_count.robot, balls, (quantity,))
-    calls[proven.name] = proven.call(quantity, state)
-    most = float(MOST_DIGITS)
+    bits = digit_count.truth(digit_count.robot, quantity, state).bits
+    name, most = f"balls, {bits} bits", float(MOST_DIGITS)
+    calls[name] = _call(Lagrangian(digit_count.robot, Ball(bits)), quantity, state)
     given = None if digit_count.given is None else most
     at = {key: state[key].tolist() for key in quantity.arguments}
-    held.append(Held(quantity.name, proven.name, given, most, most, most, 1, state=at))
+    held.append(Held(quantity.name, name, given, most, most, most, 1, state=at))
     report(1.0, f"{quantity.name}: times")
     times = in_turns(calls, repeats, _AT_LEAST_S)
     timed = {name: {"time_s": min(of), "repeatable": repeatable(of)} for name, of in times.items()}
     return [replace(each, **timed[each.implementation], repeats=repeats) for each in held]
+
+
+def _call(engine: Any, quantity: Quantity, state: dict[str, np.ndarray]) -> Callable[[], object]:
+    """A query of one state, ready to be timed."""
+    return partial(getattr(engine, quantity.name), *(state[name] for name in quantity.arguments))
 
 
 def _condition(robot: Robot, states: Batch, given: dict[str, np.ndarray] | None, rng: np.random.Generator) -> Condition:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache, partial
 from typing import final
 
 import numpy as np
@@ -39,10 +40,9 @@ class DigitCount:
         self.decimals: dict[str, float] = {}
         self.right_angles: dict[str, float] = {}
         self.bits = 0
-        self._exact, self._rounded = {robot: Exact(robot)}, Exact(robot, rounded=True)
-        self._own = Lagrangian(robot)
-        self._sizes: dict[Quantity, float] = {}
-        self._fine: dict[tuple[Robot, Quantity], np.ndarray] = {}
+        self._exact, self._rounded, self._own = cache(Exact), Exact(robot, rounded=True), Lagrangian(robot)
+        self._fine = cache(lambda engine, quantity: evaluate(engine, quantity, states))
+        self._typical = cache(partial(_typical, self._own, states))
 
     def count(
         self, implementation: Implementation, quantity: Quantity, check: Callable[[], object] = lambda: None
@@ -83,34 +83,25 @@ class DigitCount:
 
     def truth(self, robot: Robot, quantity: Quantity, state: dict[str, np.ndarray]) -> Truth:
         """True values at a state."""
-        exact = self._exact.setdefault(robot, Exact(robot))
-        truth = exact.at(quantity, state, self._typical(quantity))
+        truth = self._exact(robot).at(quantity, state, self._typical(quantity))
         self.bits = max(self.bits, truth.bits)
         return truth
 
     def judged(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
         """The error at a state, by balls."""
         several = {name: np.tile(x, (_SIDE_BY_SIDE, 1)) for name, x in state.items()}
-        return self.truth(implementation.robot, quantity, state).error(implementation.evaluate(quantity, several)[0])
+        answer = evaluate(implementation.engine, quantity, several)[0]
+        return self.truth(implementation.robot, quantity, state).error(answer)
 
     def _errors(self, implementation: Implementation, quantity: Quantity, states: Batch) -> np.ndarray:
         """Errors at states (S, n); NaN where there is no answer."""
-        if implementation.fine is None:
-            answers = implementation.evaluate(quantity, states)
-            rows = (row(states, k) for k in range(len(answers)))
-            return np.array(
-                [self.truth(implementation.robot, quantity, x).error(y) for x, y in zip(rows, answers, strict=True)]
-            )
-        key = (implementation.robot, quantity)
-        if states is not self.states:
-            fine = evaluate(implementation.fine, quantity, states)
-        elif key in self._fine:
-            fine = self._fine[key]
-        else:
-            fine = self._fine[key] = evaluate(implementation.fine, quantity, states)
-        error = (implementation.evaluate(quantity, states) - fine).astype(float)
-        relative = self._scale(quantity, states, fine).relative(error)
-        return relative.reshape(len(error), -1).max(axis=1)
+        answers = evaluate(implementation.engine, quantity, states)
+        if (engine := implementation.fine) is None:
+            truths = (self.truth(implementation.robot, quantity, row(states, k)) for k in range(len(answers)))
+            return np.array([truth.error(answer) for truth, answer in zip(truths, answers, strict=True)])
+        fine = self._fine(engine, quantity) if states is self.states else evaluate(engine, quantity, states)
+        relative = self._scale(quantity, states, fine).relative((answers - fine).astype(float))
+        return relative.reshape(len(answers), -1).max(axis=1)
 
     def _scale(self, quantity: Quantity, states: Batch, fine: np.ndarray) -> Scale:
         """Of errors at states, from fine answers; that of `truth`, but for rounding."""
@@ -123,18 +114,6 @@ class DigitCount:
         torques = (states["tau"], evaluate(self._own, CORIOLIS_TORQUE, states), evaluate(self._own, N, states))
         return Scale(solved_norm(inertia, torques), inertia)
 
-    def _typical(self, quantity: Quantity) -> float:
-        """The largest root mean square of an entry at random states, in the units of the joints; 1 if it is zero."""
-        if quantity.definite or quantity.solves:
-            return 0.0
-        if quantity not in self._sizes:
-            answers, inertia = evaluate(self._own, quantity, self.states), evaluate(self._own, M, self.states)
-            ratios = answers / entry_units(quantity, inertia)
-            largest = float(np.nanmax(np.abs(ratios))) or 1.0  # by which they are divided: squares may overflow
-            size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())
-            self._sizes[quantity] = size if size > NOTHING else 1.0
-        return self._sizes[quantity]
-
     def _of_file(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> None:
         """What the float64 of the file's decimals leaves at a state, and what right angles do."""
         truth = self.truth(self.robot, quantity, state)
@@ -143,3 +122,13 @@ class DigitCount:
             both.append((self.right_angles, self.truth(implementation.robot, quantity, state)))
         for table, other in both:
             table[quantity.name] = min(digits_of(truth.error(other.values)), table.get(quantity.name, np.inf))
+
+
+def _typical(own: Lagrangian, states: Batch, quantity: Quantity) -> float:
+    """The largest root mean square of an entry at random states, in the units of the joints; 1 if it is zero."""
+    if quantity.definite or quantity.solves:
+        return 0.0
+    ratios = evaluate(own, quantity, states) / entry_units(quantity, evaluate(own, M, states))
+    largest = float(np.nanmax(np.abs(ratios))) or 1.0  # by which they are divided: squares may overflow
+    size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())
+    return size if size > NOTHING else 1.0

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from types import SimpleNamespace
 from typing import Any, final
 
 import numpy as np
@@ -21,23 +21,6 @@ from robot_dyn.queries.dynamics import FORWARD_DYNAMICS
 from robot_dyn.queries.quantity import Quantity
 
 LONGDOUBLE = "Lagrangian, longdouble"
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class ArticulatedBody:
-    """Forward dynamics by articulated bodies, with the signature of `Dynamics`."""
-
-    own: Lagrangian
-
-    def forward_dynamics(self, q: Array, v: Array, tau: Array, *, errors: str = "raise") -> Array:
-        """As of `Dynamics`."""
-
-        def equation(q: Array, v: Array, tau: Array) -> Array:
-            return articulated_body(self.own.linkage, q, v, tau)
-
-        state = {"q": q, "v": v, "tau": tau}
-        return answered(equation, state, (self.own.n,), self.own.joint_names, errors, FLOAT64)
 
 
 @final
@@ -63,15 +46,6 @@ class Implementation:
         longdouble = np.finfo(np.longdouble).eps < np.finfo(np.float64).eps / 100
         return Lagrangian(self.robot, np.longdouble) if longdouble and self.name != LONGDOUBLE else None
 
-    def evaluate(self, quantity: Quantity, states: dict[str, np.ndarray]) -> np.ndarray:
-        """Answers at states (S, n); NaN where there is none."""
-        return evaluate(self.engine, quantity, states)
-
-    def call(self, quantity: Quantity, state: dict[str, np.ndarray]) -> Callable[[], object]:
-        """A query of one state, ready to be timed."""
-        method, arguments = getattr(self.engine, quantity.name), [state[name] for name in quantity.arguments]
-        return lambda: method(*arguments)
-
 
 def evaluate(engine: Any, quantity: Quantity, states: dict[str, np.ndarray]) -> np.ndarray:
     """Answers at states (S, n), some at a time, eight of machine code side by side; NaN where there is none."""
@@ -83,25 +57,35 @@ def evaluate(engine: Any, quantity: Quantity, states: dict[str, np.ndarray]) -> 
 
 def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
     """Return the implementations for a robot, and what is left out and why."""
-    every = tuple(QUANTITIES.values())
-    left_out: list[str] = []
+    left_out, quantities = list[str](), tuple(QUANTITIES.values())
     if robot.joint_without_inertia is not None:
         left_out.append(f"forward dynamics: joint {robot.joint_without_inertia!r} carries no inertia")
-        every = tuple(each for each in every if not each.solves)
-    found = [Implementation("Pinocchio", robot, robot, every)]
+        quantities = tuple(quantity for quantity in quantities if not quantity.solves)
+    options = [Implementation("Pinocchio", robot, robot, quantities)]
     for name in ("float32", "float64", "longdouble"):
-        found.append(Implementation(f"Lagrangian, {name}", robot, Lagrangian(robot, getattr(np, name)), every))
+        engine = Lagrangian(robot, getattr(np, name))
+        options.append(Implementation(f"Lagrangian, {name}", robot, engine, quantities))
     if not robot.couplings.trivial:
         left_out.append("articulated bodies: they take no coupled joints")
-    elif FORWARD_DYNAMICS in every:
-        found.append(Implementation("articulated body", robot, ArticulatedBody(Lagrangian(robot)), (FORWARD_DYNAMICS,)))
+    elif FORWARD_DYNAMICS in quantities:
+        options.append(Implementation("articulated body", robot, _articulated_body(robot), (FORWARD_DYNAMICS,)))
     try:
         compiled = CompiledDynamics(robot)
-        state = {name: np.full(robot.n, 0.3) for name in ("q", "v", "a", "tau")}
-        for each in every:
-            each.ask(compiled, state)
-        served = tuple(each for each in every if compiled.served_by(each.name) != "Pinocchio")
-        found.append(Implementation("machine code", compiled.robot, compiled, served))
+        for quantity in quantities:
+            quantity.ask(compiled, {name: np.full(robot.n, 0.3) for name in ("q", "v", "a", "tau")})
+        served = tuple(quantity for quantity in quantities if compiled.served_by(quantity.name) != "Pinocchio")
+        options.append(Implementation("machine code", compiled.robot, compiled, served))
     except (ImportError, RobotDynError) as error:
         left_out.append(f"machine code: {error}")
-    return found, left_out
+    return options, left_out
+
+
+def _articulated_body(robot: Robot) -> SimpleNamespace:
+    """Forward dynamics by articulated bodies, with the signature of `Dynamics`."""
+    own = Lagrangian(robot)
+    equation = partial(articulated_body, own.linkage)
+
+    def forward_dynamics(q: Array, v: Array, tau: Array, *, errors: str = "raise") -> Array:
+        return answered(equation, {"q": q, "v": v, "tau": tau}, (own.n,), own.joint_names, errors, FLOAT64)
+
+    return SimpleNamespace(forward_dynamics=forward_dynamics)
