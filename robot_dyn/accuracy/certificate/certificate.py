@@ -13,14 +13,15 @@ from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.validate import choice
 from robot_dyn.queries.units import format_duration
 from robot_dyn.report.result import Result
+from robot_dyn.report.timing import Repeated
 
 DECIMALS = "decimals of the file as float64"  # name of the implementation that computes exactly with these decimals
 
 
 @final
 @dataclass(frozen=True)
-class Held:
-    """The digits of one quantity by one implementation, from 0 to 20.
+class Held(Repeated):
+    """The digits of one quantity by one implementation, from 0 to 20, and times of one query from Python.
 
     Attributes:
         quantity: Its name.
@@ -30,9 +31,6 @@ class Held:
         random: Digits at the worst random state.
         searched: Digits at the worst state found.
         samples: Number of random states; 1 for balls, whose digits are proven.
-        time_s: Least time of one query from Python over the turns, in [s].
-        repeats: Number of turns.
-        repeatable: Whether there were at least five, the two least times of which differ by no more than 5 %.
         state: The worst state, q, v, a, tau by name.
     """
 
@@ -43,9 +41,6 @@ class Held:
     random: float
     searched: float
     samples: int
-    time_s: float = nan
-    repeats: int = 0
-    repeatable: bool = False
     state: dict[str, list[float]] = field(default_factory=dict, hash=False, repr=False)
 
 
@@ -153,7 +148,7 @@ class Certificate(Result):
 
     @property
     def rows(self) -> Iterator[Mapping[str, Any]]:
-        yield from map(vars, self.digits)
+        yield from ({name: getattr(held, name) for name in self.columns} for held in self.digits)
         for quantity, digits in self.decimals.items():
             yield {"quantity": quantity, "implementation": DECIMALS, "searched": digits}
 

@@ -32,7 +32,7 @@ from robot_dyn.queries.dynamics import M
 from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
 from robot_dyn.report.environment import processor_and_versions
 from robot_dyn.report.result import INTERRUPTED
-from robot_dyn.report.timing import in_turns, repeatable
+from robot_dyn.report.timing import in_turns
 
 _AT_LEAST_S = 1e-3  # of a loop that is timed
 _MOST_REPEATS, _LEAST_SAMPLES, _MOST_SAMPLES = 1000, 100, 10**6
@@ -133,8 +133,7 @@ def _quantity(
     held.append(Held(quantity.name, name, given, most, most, most, 1, state=at))
     report(1.0, f"{quantity.name}: times")
     times = in_turns(calls, repeats, _AT_LEAST_S)
-    timed = {name: {"time_s": min(of), "repeatable": repeatable(of)} for name, of in times.items()}
-    return [replace(each, **timed[each.implementation], repeats=repeats) for each in held]
+    return [replace(count, times=tuple(times[count.implementation])) for count in held]
 
 
 def _call(engine: Any, quantity: Quantity, state: dict[str, np.ndarray]) -> Callable[[], object]:

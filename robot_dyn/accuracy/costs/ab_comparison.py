@@ -16,40 +16,23 @@ from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.report import timing
 from robot_dyn.report.result import INTERRUPTED
 from robot_dyn.report.time_budget import Budget
-from robot_dyn.report.timing import Timed
+from robot_dyn.report.timing import Repeated, Timed
 
 
 @final
 @dataclass(frozen=True)
-class Version:
-    """One of two.
+class Version(Repeated):
+    """One of two; its times are those of the processor.
 
     Attributes:
         name: What sets it apart, such as "on".
         instructions: Of its program, exact.
-        times: Times of the processor in each turn, in [s].
         run: Runs it and returns the time it takes, in [s]; versions with the same function share its times.
     """
 
     name: str
     instructions: int
-    times: tuple[float, ...] = field(default=(), metadata=UNREPORTED)
     run: Callable[[], float] | None = field(default=None, compare=False, repr=False, metadata=UNREPORTED)
-
-    @reported
-    def time_s(self) -> float | None:
-        """Least of its times, in [s]; None if it was not timed."""
-        return min(self.times, default=None)
-
-    @reported
-    def repeats(self) -> int:
-        """Number of turns."""
-        return len(self.times)
-
-    @reported
-    def repeatable(self) -> bool:
-        """Whether there were at least five, the two least times of which differ by no more than 5 %."""
-        return timing.repeatable(self.times)
 
 
 @final

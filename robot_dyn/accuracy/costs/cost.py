@@ -103,7 +103,7 @@ class Cost(Result):
         if self._everything is None:
             return "no step was counted"
         on, off = self._everything.first, self._everything.second
-        time = "" if on.time_s is None else f", {format_duration(on.time_s)}"
+        time = f", {format_duration(on.time_s)}" if on.times else ""
         counts = {"rigid bodies": off.instructions, **self.parts}
         terms = [f"{name} {count}".replace(" -", " −") for name, count in counts.items()]
         terms += [f"several of these together {self.shared}"] * (self.shared > 0)
@@ -184,4 +184,4 @@ def cost_rows(result: Cost) -> Iterator[list[str]]:
 
 
 def _time(of: Version) -> str:
-    return "—" if of.time_s is None else f"{'~' * (not of.repeatable)}{format_duration(of.time_s)}"
+    return f"{'~' * (not of.repeatable)}{format_duration(of.time_s)}" if of.times else "—"

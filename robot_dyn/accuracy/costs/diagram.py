@@ -40,7 +40,7 @@ def draw(result: Cost, theme: str = "light") -> Figure:
 
 
 def _caption(result: Cost) -> str:
-    versions = [of for each in result.alternatives for of in (each.first, each.second) if of.time_s is not None]
+    versions = [of for each in result.alternatives for of in (each.first, each.second) if of.times]
     hollow = "" if all(each.repeatable for each in versions) else " Hollow: a time that did not repeat to 5 %."
     return (
         f"{result.robot}: {', '.join(result.acting) or 'no effects'}. Times of the processor: the least over turns."
@@ -53,7 +53,9 @@ def _parts(result: Cost) -> list[tuple[str, int, str]]:
     rows = []
     for pair in result.alternatives:
         if pair.group == "parts" and pair.what == EVERYTHING:
-            rows.append(("rigid bodies", pair.second.instructions, _time(pair.second.time_s)))
+            rows.append(
+                ("rigid bodies", pair.second.instructions, _time(pair.second.time_s if pair.second.times else None))
+            )
         elif pair.group == "parts":
             time = ", within noise" if pair.within_noise else _time(pair.time_between_s)
             rows.append((pair.what, pair.added, time))

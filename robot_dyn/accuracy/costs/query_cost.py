@@ -128,7 +128,7 @@ class QueryCost:
                 raise RobotDynError("its results at random states are doubtful")
             return seconds(lambda: kernel.many(inputs, y), _LEAST_S, process_time) / STATES
 
-        return Version(name, len(program), run=run)
+        return Version(name, len(program), run)
 
 
 _WITHOUT = {  # formulations of forward dynamics, with why an arm has none

@@ -114,7 +114,7 @@ def side_by_side(setup: Setup) -> ABComparison:
         batch.run(1)
         return (process_time() - began) / (RUNS * short.steps)
 
-    several = Version(f"{RUNS} side by side", instructions(made), run=run)
+    several = Version(f"{RUNS} side by side", instructions(made), run)
     return ABComparison("machine code", SIDE_BY_SIDE, PER_RUN, one_run("one", setup), several)
 
 
@@ -135,7 +135,7 @@ def one_run(name: str, setup: Setup, translate: Callable[..., MachineCode] = mac
             raise RobotDynError(f"a run of {short.duration_s:g} s from the start ends early: {record.outcome.advice}")
         return spent / short.steps
 
-    return Version(name, instructions(made), run=run)
+    return Version(name, instructions(made), run)
 
 
 def instructions(made: MachineCode) -> int:

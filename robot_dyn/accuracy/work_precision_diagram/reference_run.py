@@ -6,6 +6,7 @@ Their distance is the error of the reference. Where they part, as in chaotic mot
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import final
 
@@ -85,7 +86,7 @@ class Reference(Value):
 
 
 def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
-    """The setup up to the horizon, and its reference.
+    """Return the setup up to the horizon, and its reference.
 
     Raises:
         HorizonError: If there is none.
@@ -95,13 +96,13 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
     while True:
         setup = recorded(setup, setup.duration_s)
         first, run, q = _first(setup, budget)
+        size = max(1.0, float(np.abs(q).max()))
         if parted is None:
-            parted, lost = _rough_ends(setup, run, q, budget)
+            parted, lost = _rough_ends(setup, run, q, size, budget)
             if parted is not None:
                 setup = replace(setup, duration_s=parted, record_period_s=0.0)
                 continue
         other = _second(setup, run, q, budget)
-        size = max(1.0, float(np.abs(q).max()))
         end = _passes(other.t, other.distance, size * (_PARTED if other.refined else _COARSE))
         if end is None:
             error = max(float(other.distance.max()), _ULPS * np.finfo(float).eps * size)
@@ -117,33 +118,36 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
 
 def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
     """Words for the tightest run that ends in time, its records and its positions there."""
-    for each in _FIRST:
-        description = f"{each.name}, rtol {each.rtol:g}"
+    for tight in _FIRST:
+        description = f"{tight.name}, rtol {tight.rtol:g}"
         budget.report(f"reference: {description}")
-        try:
-            with budget.apart():
-                warmed(replace(setup, integrator=each))
-            run = timed(replace(setup, integrator=each), Limit(_longest(budget)))
-        except OvertimeError:
-            continue
-        if run.q is not None:
+        run = _in_time(replace(setup, integrator=tight), budget)
+        if run is not None and run.q is not None:
             return description, run.t, run.q
     raise HorizonError(
-        f"no run of {setup.duration_s:g} s ends by {' or '.join(each.name for each in _FIRST)} at tight tolerances:"
+        f"no run of {setup.duration_s:g} s ends by {' or '.join(tight.name for tight in _FIRST)} at tight tolerances:"
         " take a shorter run, a larger budget, or look at rd.simulate(…).summary"
     )
 
 
-def _rough_ends(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> tuple[float | None, float | None]:
+def _rough_ends(
+    setup: Setup, t: np.ndarray, q: np.ndarray, size: float, budget: Budget
+) -> tuple[float | None, float | None]:
     """When a run with a looser tolerance parts from the first one, and when nothing is left; None if it does not."""
-    try:
-        run = timed(replace(setup, integrator=Adaptive("DOP853", _ROUGH, _ROUGH)), Limit(_longest(budget)))
-    except OvertimeError:
-        return None, None
-    if run.q is None:
+    run = _in_time(replace(setup, integrator=Adaptive("DOP853", _ROUGH, _ROUGH)), budget)
+    if run is None or run.q is None:
         return None, None
     times, distance = _distance(t, q, run)
-    return _passes(times, distance, _ROUGHLY * max(1.0, float(np.abs(q).max()))), _passes(times, distance, _LOST)
+    return _passes(times, distance, _ROUGHLY * size), _passes(times, distance, _LOST)
+
+
+def _in_time(setup: Setup, budget: Budget) -> Run | None:
+    """Run a setup; None if it takes too long."""
+    with budget.apart():
+        warmed(setup)
+    with suppress(OvertimeError):
+        return timed(setup, Limit(_longest(budget)))
+    return None
 
 
 def _longest(budget: Budget) -> float:
@@ -179,19 +183,14 @@ def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> _Othe
 def _refined(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> Iterator[_Other]:
     """Runs with ever shorter steps, until these win nothing or take too long."""
     before, limit, late = np.inf, _longest(budget), 0
-    with budget.apart():
-        warmed(setup)
     for step in step_ladder(setup.record_period_s, 1):
         words = f"{setup.integrator.name}, step {step:.3g} s"
         budget.report(f"reference: {words}")
-        try:
-            run = timed(replace(setup, step_s=step), Limit(limit))
-        except OvertimeError:
-            late += 1
-            if late == _LATE:
-                return
-            continue  # steps that are too long may bring forth a motion that takes longer
-        if run.q is not None:
+        run = _in_time(replace(setup, step_s=step), budget)
+        late += run is None  # steps that are too long may bring forth a motion that takes longer
+        if late == _LATE:
+            return
+        if run is not None and run.q is not None:
             times, distance = _distance(t, q, run)
             size = float(np.log10(np.maximum(distance[1:], 1e-17)).mean())
             orderly = distance[1] < _ORDERLY

@@ -15,6 +15,8 @@ from typing import final
 import numpy as np
 
 from robot_dyn.foundations.result import UNREPORTED, reported
+from robot_dyn.queries.units import format_duration
+from robot_dyn.report.timing import Repeated
 
 COMPILED, INTERPRETED = "compiled", "interpreted"
 _RESOLVED = 0.1  # [rad] or [m]: runs with larger errors show no order
@@ -24,8 +26,8 @@ _ABOVE = 10.0  # times the reference error: below this, an error is partly that 
 
 @final
 @dataclass(frozen=True)
-class Point:
-    """One run.
+class Point(Repeated):
+    """One run; its times are those of the prepared run.
 
     Attributes:
         setting: Step, in [s], or relative tolerance.
@@ -34,10 +36,7 @@ class Point:
         error: Largest |q − q_ref| over joints and records, in [rad] or [m]; inf if the run diverged.
         energy: Largest residual of the energy ledger at the records, as a fraction of the energy exchanged; nan if
             unknown.
-        time_s: Least time of the prepared run over the turns, in [s].
-        repeats: Number of turns.
         believed: Whether the error is above that of the reference.
-        repeatable: Whether there were at least five turns, the two least times of which differ by no more than 5 %.
     """
 
     setting: float
@@ -45,10 +44,7 @@ class Point:
     evaluations: int | None
     error: float
     energy: float
-    time_s: float
-    repeats: int
     believed: bool
-    repeatable: bool
 
 
 @final
@@ -58,6 +54,9 @@ class Price:
 
     value: float
     extrapolated: bool
+
+    def __str__(self) -> str:
+        return format_duration(self.value)
 
 
 @dataclass(frozen=True)
