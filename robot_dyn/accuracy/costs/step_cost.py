@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from time import process_time
 from typing import Any
 
@@ -38,6 +39,7 @@ RUNS = 4096  # side by side
 PER_STEP, PER_RUN = "step of RK4", "step of RK4 and run"
 EVERYTHING, NUMBERS, SIDE_BY_SIDE = "everything", "numbers of the setup", "runs"
 _EVALUATIONS = 4  # of RK4, in a step
+_IN_LANES = partial(machine_code, extras=())
 _STEP_S, _STEPS, _STEPS_OF_MANY = 1e-7, 4000, 25
 
 
@@ -104,8 +106,14 @@ def numbers(setup: Setup) -> ABComparison:
 
 def side_by_side(setup: Setup) -> ABComparison:
     """One run, and many of them side by side on one thread."""
+    many = many_runs(f"{RUNS} side by side", setup)
+    return ABComparison("machine code", SIDE_BY_SIDE, PER_RUN, one_run("one", setup), many)
+
+
+def many_runs(name: str, setup: Setup, translate: Callable[..., MachineCode] = _IN_LANES) -> Version:
+    """A step and run of many side by side."""
     short = _short(setup, _STEPS_OF_MANY)
-    made = machine_code(_equation(short), short.integrator, lanes=LANES, extras=())
+    made = translate(_equation(short), short.integrator, lanes=LANES)
     starts = np.tile(short.q0, (RUNS, 1)), np.tile(short.v0, (RUNS, 1))
 
     def run() -> float:
@@ -114,8 +122,7 @@ def side_by_side(setup: Setup) -> ABComparison:
         batch.run(1)
         return (process_time() - began) / (RUNS * short.steps)
 
-    several = Version(f"{RUNS} side by side", instructions(made), run)
-    return ABComparison("machine code", SIDE_BY_SIDE, PER_RUN, one_run("one", setup), several)
+    return Version(name, instructions(made), run)
 
 
 def one_run(name: str, setup: Setup, translate: Callable[..., MachineCode] = machine_code) -> Version:
