@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from math import isfinite, log10, nan
+from math import isfinite, log10
 from typing import Any, ClassVar, final
 
 from robot_dyn.foundations.answer import Block, Table
@@ -115,7 +115,7 @@ class Certificate(Result):
         given = any(each.given is not None for each in self.digits)
         counts = ("typical", "worst of", "random", "searched", "time")
         headings = ("quantity", "implementation", *["given"] * given, *counts)
-        yield Table(headings, tuple(self._digit_rows(given)), digits=3, right=headings[2:])
+        yield Table(headings, tuple(self._digit_rows(given)), right=headings[2:])
         of = self.condition
         lose = f": up to {of.digits:.1f} digits for forward dynamics to lose" if isfinite(of.digits) else ""
         yield (
@@ -188,11 +188,11 @@ class Certificate(Result):
     def _of(self, quantity: str) -> Iterator[Held]:
         return (each for each in self.digits if each.quantity == quantity)
 
-    def _digit_rows(self, given: bool) -> Iterator[tuple[str | float, ...]]:
+    def _digit_rows(self, given: bool) -> Iterator[tuple[str, ...]]:
         """A row for each implementation, and one for the decimals of the file, by quantity."""
         for quantity in self.quantities:
             for held in self._of(quantity):
-                own = [nan if held.given is None else held.given] * given
-                worst, time = (held.random, held.searched), format_duration(held.time_s)
-                yield quantity, held.implementation, *own, held.typical, str(held.samples), *worst, time
-            yield quantity, DECIMALS, *[""] * (3 + given), self.decimals[quantity], ""
+                own = ["—" if held.given is None else f"{held.given:.1f}"] * given
+                worst, time = (f"{held.random:.1f}", f"{held.searched:.1f}"), format_duration(held.time_s)
+                yield quantity, held.implementation, *own, f"{held.typical:.1f}", str(held.samples), *worst, time
+            yield quantity, DECIMALS, *[""] * (3 + given), f"{self.decimals[quantity]:.1f}", ""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import floor, isfinite, log10, nan
+from math import floor, isfinite, log10
 from typing import Any, ClassVar, final
 
 from robot_dyn.accuracy.work_precision_diagram.measurement import measure
@@ -118,19 +118,19 @@ class WorkPrecision(Result):
             finest = min(ladder.points, key=lambda point: point.error)
             known = finest.error > self.reference.error
             error = number_or_dash(finest.error, 2) if known else f"< {self.reference.error:.0e}"
-            orders = [nan if order is None else order for order in (ladder.order, ladder.measured_order)]
+            orders = ["—" if order is None else f"{order:.2g}" for order in (ladder.order, ladder.measured_order)]
             rows.append((ladder.name, *orders, *cells, error, format_duration(finest.time_s)))
-        return Table(headings, tuple(rows), digits=2, right=headings[1:])
+        return Table(headings, tuple(rows), right=headings[1:])
 
     def _beyond_horizon(self) -> Iterator[Block]:
         """Energy and the way back where no error can be measured, a line for each method."""
         yield ""
         yield f"over all of {self.duration_s:g} s, where no error can be measured, the finest runs:"
-        rows = [
-            (run.name, run.setting, run.energy, nan if run.returned is None else run.returned)
-            for run in self.past_horizon
-        ]
-        yield Table(("method", "setting", "energy", "there and back"), tuple(rows), digits=3)
+        headings, rows = ("method", "setting", "energy", "there and back"), []
+        for run in self.past_horizon:
+            back = "—" if run.returned is None else f"{run.returned:.1e}"
+            rows.append((run.name, f"{run.setting:.3g}", f"{run.energy:.1e}", back))
+        yield Table(headings, tuple(rows), right=headings[1:])
         yield "energy: largest residual, as a part of the energy exchanged; there and back: |q − q₀|"
         yield f"in {self.unit} of a run that turns round at the end, where nothing drives it or takes energy"
 

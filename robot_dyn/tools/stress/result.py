@@ -10,7 +10,7 @@ from typing import final
 import numpy as np
 
 from robot_dyn import Setup
-from robot_dyn.foundations import UNREPORTED, Block, Table, reported
+from robot_dyn.foundations import UNREPORTED, Block, Table, number_or_dash, reported
 from robot_dyn.report import Result
 
 _TABLES = {  # by title, the findings in a table and their attributes
@@ -24,6 +24,7 @@ _TABLES = {  # by title, the findings in a table and their attributes
         ("what", "duration_s", "estimated", "true", "unsure", "report", "verdict"),
     ),
 }
+_NUMBERS = ("typical", "random", "searched", "minimal", "value", "duration_s", "estimated", "true", "unsure")
 
 
 @final
@@ -175,9 +176,10 @@ class Stress(Result):
         yield from (f"FAILURE: {failure}" for failure in self.failures)
         yield from [""] * bool(self.failures)
         for title, (part, columns) in _TABLES.items():
-            rows = [tuple(getattr(finding, name) for name in columns) for finding in getattr(self, part)]
-            if rows:
-                yield from (title, Table(columns, tuple(rows), digits=4, wrap=True), "")
+            rows = [[getattr(finding, name) for name in columns] for finding in getattr(self, part)]
+            cells = [tuple(number_or_dash(x, 4) if isinstance(x, float) else x for x in row) for row in rows]
+            if cells:
+                yield from (title, Table(columns, tuple(cells), right=_NUMBERS, wrap=True), "")
         yield from (f"not looked at for lack of time: {name}" for name in self.out_of_time)
 
     @reported
