@@ -20,11 +20,16 @@ import robot_dyn as rd
 from robot_dyn.accuracy import ArmMotion, PeerError, desired_motion
 from robot_dyn.accuracy.work_precision_diagram.diagram import most_precise
 from robot_dyn.accuracy.work_precision_diagram.measurement import Walk, measure
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest, own, recorded, whole
-from robot_dyn.accuracy.work_precision_diagram.past_horizon import past_horizon
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
+    MethodUnderTest,
+    Point,
+    ToleranceLadder,
+    own,
+    recorded,
+    whole,
+)
 from robot_dyn.accuracy.work_precision_diagram.peers import found
-from robot_dyn.accuracy.work_precision_diagram.reference_run import HorizonError, Reference, reference
-from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import Point, ToleranceLadder
+from robot_dyn.accuracy.work_precision_diagram.reference_run import HorizonError, Reference, past_horizon, reference
 from robot_dyn.accuracy.work_precision_diagram.work_precision import programs
 from robot_dyn.foundations import QueryError, json_text, plain
 from robot_dyn.integrate import ButcherTableau, ExplicitRungeKutta

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import INTERPRETED, ToleranceLadder
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import INTERPRETED, ToleranceLadder
 from robot_dyn.accuracy.work_precision_diagram.work_precision import WorkPrecision, program_of
 from robot_dyn.report.figure import Colours, ResultError, key, legend, programs, sheet, styled
 

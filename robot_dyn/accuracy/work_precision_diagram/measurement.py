@@ -7,9 +7,15 @@ from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import final
 
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest, Run
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
+    COMPILED,
+    INTERPRETED,
+    MethodUnderTest,
+    Point,
+    Run,
+    ToleranceLadder,
+)
 from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference
-from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import COMPILED, INTERPRETED, Point, ToleranceLadder
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.report.time_budget import Budget, Limit, OvertimeError
 from robot_dyn.report.timing import Timed, take_turns

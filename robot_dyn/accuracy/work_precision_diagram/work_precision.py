@@ -11,17 +11,19 @@ from math import floor, isfinite, log10
 from typing import Any, ClassVar, final
 
 from robot_dyn.accuracy.work_precision_diagram.measurement import measure
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import own, recorded, switches, whole
-from robot_dyn.accuracy.work_precision_diagram.past_horizon import PastHorizon, past_horizon
-from robot_dyn.accuracy.work_precision_diagram.peers import found
-from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference, reference
-from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import (
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
     COMPILED,
     INTERPRETED,
     Point,
     Price,
     ToleranceLadder,
+    own,
+    recorded,
+    switches,
+    whole,
 )
+from robot_dyn.accuracy.work_precision_diagram.peers import found
+from robot_dyn.accuracy.work_precision_diagram.reference_run import PastHorizon, Reference, past_horizon, reference
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.answer import Block, Table, number_or_dash
 from robot_dyn.foundations.errors import QueryError, RobotDynError
