@@ -237,16 +237,3 @@ def test_json_csv_and_figure_hold_the_alternatives(tmp_path) -> None:
         rows = list(csv.DictReader(file))
     assert [int(row["first_instructions"]) for row in rows] == [each.first.instructions for each in kept]
     assert rd.accuracy.save_result(result, tmp_path / "plot", theme="dark").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"budget_s": 0.0}, "budget_s must be"),
-        ({"repeats": 0}, "repeats must be"),
-        ({"q0": [0.1]}, "q0 must have shape"),
-    ],
-)
-def test_mistakes_are_told(wrong: dict[str, Any], message: str) -> None:
-    with pytest.raises(QueryError, match=message):
-        rd.accuracy.cost(setup(), **wrong)

@@ -31,7 +31,7 @@ from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
 from robot_dyn.accuracy.work_precision_diagram.peers import found
 from robot_dyn.accuracy.work_precision_diagram.reference_run import HorizonError, Reference, past_horizon, reference
 from robot_dyn.accuracy.work_precision_diagram.work_precision import programs
-from robot_dyn.foundations import QueryError, json_text, plain
+from robot_dyn.foundations import json_text, plain
 from robot_dyn.integrate import ButcherTableau, ExplicitRungeKutta
 from robot_dyn.queries import format_duration
 from robot_dyn.report import Budget
@@ -383,21 +383,6 @@ def test_a_budget_that_ends_says_what_was_left_out(smooth) -> None:
     setup, truth = smooth
     (walk,), _ = measure([own(setup, rd.integrate.method("rk4"), "interpreted")], truth, Budget(1e-9), 1)
     assert not walk.runs and walk.ended == "the budget of 1e-09 s ended"
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"methods": ["rk5"]}, "nearest: rk4"),
-        ({"methods": "rk4"}, "give a list"),
-        ({"budget_s": -1.0}, "budget_s"),
-        ({"repeats": 0}, "repeats"),
-        ({"peers": 1}, "peers"),
-    ],
-)
-def test_wrong_options_are_refused(wrong: dict[str, object], message: str) -> None:
-    with pytest.raises(QueryError, match=message):
-        rd.accuracy.work_precision(swing(0.1), **wrong)
 
 
 def test_each_program_is_named_with_its_cheapest_method_or_with_what_ended_it() -> None:
