@@ -17,7 +17,7 @@ from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
 )
 from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.report.time_budget import Budget, Limit, OvertimeError
+from robot_dyn.report.time_budget import Budget, OvertimeError
 from robot_dyn.report.timing import Timed, take_turns
 
 _PART = {COMPILED: 1 / 400, INTERPRETED: 1 / 150, "": 1 / 200}  # of the budget, for one run
@@ -40,7 +40,7 @@ class Walk:
         """Run a setting within a time."""
 
         def run() -> Run:
-            return self.method.run(setting, Limit(longest))
+            return self.method.run(setting, Budget(longest).check)
 
         first = run()
         error = reference.distance(first)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from itertools import pairwise
-from math import ceil, gcd, inf, isfinite, lcm
+from math import ceil, gcd, isfinite, lcm
 from statistics import median
 from time import perf_counter
 from typing import Any, final
@@ -24,7 +24,7 @@ from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.model.right_angles import completed, models_in_full
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import format_duration
-from robot_dyn.report.time_budget import Limit
+from robot_dyn.report.time_budget import Budget
 from robot_dyn.report.timing import Repeated
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.results.samples import ledger
@@ -34,6 +34,7 @@ from robot_dyn.simulation.setup.schedule import MOST_CUT
 from robot_dyn.simulation.setup.setup import Setup
 
 COMPILED, INTERPRETED = "compiled", "interpreted"
+Limit = Callable[[float], object]  # called during a run, with its time; raises OvertimeError if it takes too long
 _RESOLVED = 0.1  # [rad] or [m]: runs with larger errors show no order
 _MORE = 1.1  # ratio of steps: if smaller, stability rather than accuracy chose the steps
 _ABOVE = 10.0  # times the reference error: below this, an error is partly that of the reference
@@ -313,7 +314,7 @@ def warmed(setup: Setup) -> None:
     """Run one or a few steps to load the machine code that the setup needs."""
     step = setup.record_period_s / _WARM
     setup = setup if setup.integrator.controls_error else replace(setup, step_s=step)
-    timed(replace(setup, duration_s=2 * step, record_period_s=step), Limit(inf))
+    timed(replace(setup, duration_s=2 * step, record_period_s=step), Budget().check)
 
 
 def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:

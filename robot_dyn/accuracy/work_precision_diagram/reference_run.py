@@ -38,7 +38,7 @@ from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.methods import method
-from robot_dyn.report.time_budget import Budget, Limit, OvertimeError
+from robot_dyn.report.time_budget import Budget, OvertimeError
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
@@ -162,7 +162,7 @@ def _in_time(setup: Setup, budget: Budget) -> Run | None:
     with budget.apart():
         warmed(setup)
     with suppress(OvertimeError):
-        return timed(setup, Limit(_longest(budget)))
+        return timed(setup, Budget(_longest(budget)).check)
     return None
 
 
@@ -290,7 +290,7 @@ def _there_and_back(setup: Setup, longest: float) -> tuple[float, float | None]:
 
 
 def _run(setup: Setup, longest: float) -> Trajectory:
-    run = simulate(setup, on_progress=Limit(longest))
+    run = simulate(setup, on_progress=Budget(longest).check)
     if run.outcome.ending is Ending.STOPPED:
         raise KeyboardInterrupt
     if run.outcome.ending is not Ending.FINISHED:

@@ -15,14 +15,13 @@ from typing import Any, final
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import Run, switches
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import Limit, Run, switches
 from robot_dyn.control.independent_joint import PD
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring
 from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
 from robot_dyn.model.robot import Robot
-from robot_dyn.report.time_budget import Limit
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.setup.setup import Setup
 
