@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -49,21 +48,12 @@ def stress(
     Raises:
         QueryError: If an argument is wrong.
     """
-    robot = instance("robot", robot, Robot, "give one of rd.load")
-    return stressed(robot, samples, runs, seed, budget_s, on_progress)
-
-
-def stressed(
-    robot: Robot, samples: int, runs: int, seed: int, budget_s: float,
-    on_progress: Callable[[float, str], object] | None, clock: Callable[[], float] = perf_counter,
-) -> Stress:  # fmt: skip
-    """The same, by a clock."""
+    robot = warn_below(instance("robot", robot, Robot, "give one of rd.load"), None)
     samples = integer("samples", samples, least=_LEAST_SAMPLES, most=_MOST_SAMPLES)
     runs, seed = integer("runs", runs, most=_MOST_RUNS), integer("seed", seed, most=2**128 - 1)
     seconds = number("budget_s", budget_s, above=0)
-    budget = Budget(seconds, function("on_progress", on_progress, "(spent, what)"), clock)
-    work = Work(budget, seconds / _PIECES)
-    robot, findings = warn_below(robot, None), list[Finding | None]()
+    budget = Budget(seconds, function("on_progress", on_progress, "(spent, what)"))
+    work, findings = Work(budget, seconds / _PIECES), list[Finding | None]()
     try:
         for finding in _findings(robot, samples, runs, seed, work):
             findings.append(finding)

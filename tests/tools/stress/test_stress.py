@@ -17,7 +17,7 @@ from robot_dyn.accuracy import random_states
 from robot_dyn.integrate import FIXED_STEP
 from robot_dyn.report import Budget
 from robot_dyn.simulation import Ending
-from robot_dyn.tools.stress import limits, runs, stressed
+from robot_dyn.tools.stress import limits, runs
 from robot_dyn.tools.stress.result import JudgedRun, WorstCase
 from robot_dyn.tools.stress.runs import FAMILIES, scenes
 from robot_dyn.tools.stress.work import Work
@@ -245,7 +245,7 @@ def test_a_budget_looks_at_the_clock_within_each_piece() -> None:
     """So many looks, and few more: at most one for each name that is left."""
     looks = count()
     robot = rd.load("planar_2r")
-    stressed(robot, 100, 7, 2, 500, None, lambda: float(next(looks)))
+    short_stress(robot, 500, 7, 2, lambda: float(next(looks)))
     assert next(looks) < 500 + 200
 
 
