@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import nan
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -16,12 +16,12 @@ from robot_dyn.report import Result
 _TABLES = {  # by title, the findings in a table and their attributes
     "worst configurations": (
         "worst",
-        ("what", "joint", "typical", "random", "searched", "minimal", "unit", "note", "verdict"),
+        ("what", "joint", "typical", "random", "searched", "minimal", "unit", "note", "found"),
     ),
-    "limits": ("limits", ("of", "what", "joint", "value", "unit", "within", "beyond", "verdict")),
+    "limits": ("limits", ("of", "what", "joint", "value", "unit", "within", "beyond", "confirmed")),
     "random runs: errors of q in rad or m": (
         "runs",
-        ("what", "duration_s", "estimated", "true", "unsure", "report", "verdict"),
+        ("what", "duration_s", "estimated", "true", "unsure", "report", "misleads"),
     ),
 }
 _NUMBERS = ("typical", "random", "searched", "minimal", "value", "duration_s", "estimated", "true", "unsure")
@@ -66,11 +66,6 @@ class WorstCase:
         """Whether the search found a worse state than the random ones."""
         return self.searched > self.random
 
-    @property
-    def verdict(self) -> str:
-        """A word on the search, for a table."""
-        return "" if self.found else "none worse"
-
 
 @final
 @dataclass(frozen=True)
@@ -101,11 +96,6 @@ class Limit:
     state: dict[str, list[float]] = field(default_factory=dict, hash=False)
     setups: tuple[Setup, ...] = field(default=(), hash=False, repr=False, metadata=UNREPORTED)
 
-    @property
-    def verdict(self) -> str:
-        """A word on the runs, for a table."""
-        return {True: "confirmed", False: "REFUTED", None: ""}[self.confirmed]
-
 
 @final
 @dataclass(frozen=True)
@@ -131,11 +121,6 @@ class JudgedRun:
     report: str
     misleads: bool
     setup: Setup = field(hash=False, repr=False, metadata=UNREPORTED)
-
-    @property
-    def verdict(self) -> str:
-        """A word on the estimate, for a table."""
-        return "MISLEADS" * self.misleads
 
 
 Finding = WorstCase | Limit | JudgedRun
@@ -176,10 +161,9 @@ class Stress(Result):
         yield from (f"FAILURE: {failure}" for failure in self.failures)
         yield from [""] * bool(self.failures)
         for title, (part, columns) in _TABLES.items():
-            rows = [[getattr(finding, name) for name in columns] for finding in getattr(self, part)]
-            cells = [tuple(number_or_dash(x, 4) if isinstance(x, float) else x for x in row) for row in rows]
-            if cells:
-                yield from (title, Table(columns, tuple(cells), right=_NUMBERS, wrap=True), "")
+            rows = tuple(tuple(_cell(getattr(case, name)) for name in columns) for case in getattr(self, part))
+            if rows:
+                yield from (title, Table(columns, rows, right=_NUMBERS, wrap=True), "")
         yield from (f"not looked at for lack of time: {name}" for name in self.out_of_time)
 
     @reported
@@ -213,3 +197,7 @@ class Stress(Result):
         if late := len(self.out_of_time):
             parts.append(f"{late} not looked at for lack of time")
         return f"{self.robot}: {failed or 'no'} failure{'s' * (failed != 1)} in {checked} checks; {'; '.join(parts)}"
+
+
+def _cell(x: Any) -> str:
+    return number_or_dash(x, 4) if isinstance(x, float) else {True: "yes", False: "no", None: ""}.get(x, x)

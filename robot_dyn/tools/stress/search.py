@@ -99,8 +99,8 @@ def _findings(robot: Robot, samples: int, runs: int, seed: int, work: Work) -> I
 
 def _unlimited(robot: Robot) -> Iterator[str]:
     """What the file does not limit."""
-    for what, limit in (("effort", robot.effort_limit), ("velocity", robot.velocity_limit)):
+    taken = "; 1 rad/s or 1 m/s is taken"
+    for what, limit, instead in (("an effort", robot.effort_limit, ""), ("a velocity", robot.velocity_limit, taken)):
         without = [name for name, x in zip(robot.joint_names, limit, strict=True) if not (np.isfinite(x) and x > 0)]
         if without:
-            instead = "" if what == "effort" else "; 1 rad/s or 1 m/s is taken"
-            yield f"joints without an {what} limit: {', '.join(without)}{instead}".replace("an velocity", "a velocity")
+            yield f"joints without {what} limit: {', '.join(without)}{instead}"
