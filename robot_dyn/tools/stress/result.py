@@ -200,4 +200,5 @@ class Stress(Result):
 
 
 def _cell(x: Any) -> str:
-    return number_or_dash(x, 4) if isinstance(x, float) else {True: "yes", False: "no", None: ""}.get(x, x)
+    words: dict[Any, str] = {True: "yes", False: "no", None: ""}
+    return number_or_dash(x, 4) if isinstance(x, float) else words.get(x, str(x))
