@@ -17,6 +17,7 @@ from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
 )
 from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference
 from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.report.result import INTERRUPTED
 from robot_dyn.report.time_budget import Budget, OvertimeError
 from robot_dyn.report.timing import Timed, take_turns
 
@@ -58,12 +59,12 @@ class Walk:
 
 def measure(
     candidates: Iterable[MethodUnderTest], reference: Reference, budget: Budget, repeats: int
-) -> tuple[list[Walk], bool]:
-    """Run the ladders of all candidates and repeat their runs; return them, and whether Ctrl-C came.
+) -> tuple[tuple[ToleranceLadder, ...], list[str]]:
+    """Run the ladders of all candidates and repeat their runs; return them, and what was left out and why.
 
     A run is repeated until its time settles, and at most so often.
     """
-    walks = [Walk(candidate) for candidate in candidates]
+    walks, left_out = [Walk(candidate) for candidate in candidates], list[str]()
     try:
         for walk in walks:
             walk.ended = _walk(walk, reference, budget)
@@ -72,8 +73,9 @@ def measure(
             runs = [timed for walk in some for point, timed in walk.runs if isfinite(point.error)]
             take_turns(runs, repeats - 1, budget, kept * budget.seconds, until_settled=True)
     except KeyboardInterrupt:
-        return walks, True
-    return walks, False
+        left_out = [INTERRUPTED]
+    ladders = tuple(walk.ladder(reference.error) for walk in walks if walk.runs)
+    return ladders, [f"{walk.method.name}: {walk.ended}" for walk in walks if not walk.runs] + left_out
 
 
 def _walk(walk: Walk, reference: Reference, budget: Budget) -> str:

@@ -248,8 +248,7 @@ def work_precision(
     given = {"duration_s": duration_s, "controller": controller}
     setup = setup_of("work_precision", what, starts(q0, v0) | {k: x for k, x in given.items() if x is not None})
     if methods is None:
-        methods = sorted(METHODS, key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
-        methods.remove(AUTO)
+        methods = [*_FIRST, *(name for name in METHODS if name not in (*_FIRST, AUTO))]
     instance("methods", methods, tuple | list, "give a list of names or methods, such as ['DOP853', 'rk4']")
     integrators = [as_method(each) for k, each in enumerate(methods) if each not in methods[:k]]
     if any(each.name == AUTO for each in integrators):
@@ -267,11 +266,9 @@ def work_precision(
         others, refused = found(setup) if peers else ([], [])
     place = len(integrators)  # programs in machine code come before what is interpreted, which takes longest
     candidates[place:place] = others
-    walks, interrupted = measure(candidates, exact, budget, repeats)
-    ladders = tuple(walk.ladder(exact.error) for walk in walks if walk.runs)
-    left_out += unable + refused + [f"{walk.method.name}: {walk.ended}" for walk in walks if not walk.runs]
-    left_out += [INTERRUPTED] * interrupted
-    cut = exact.parted_s is not None and not interrupted
+    ladders, ended = measure(candidates, exact, budget, repeats)
+    left_out += unable + refused + ended
+    cut = exact.parted_s is not None and INTERRUPTED not in ended
     later = past_horizon(everything, exact.horizon_s, ladders, {x.name: x for x in integrators}, budget) if cut else ()
     dynamics: Any = setup.plant.dynamics
     types = getattr(dynamics, "joint_types", (None,))
