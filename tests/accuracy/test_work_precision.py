@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from dataclasses import replace
@@ -356,20 +355,14 @@ def test_a_program_that_cannot_be_imported_is_left_out(monkeypatch) -> None:
     assert found(setup) == ([], ["scipy: cannot be imported (no library)"])
 
 
-def test_json_and_csv_hold_the_runs(tmp_path) -> None:
+def test_json_holds_the_runs() -> None:
     result = rd.accuracy.work_precision(swing(0.1), methods=["rk4", "DOP853"], repeats=1, peers=False)
     read = json.loads(json_text(result))
     kept = [p for each in result.ladders for p in each.points]
     assert [{key: row[key] for key in plain(p)} for row, p in zip(read["rows"], kept, strict=True)] == plain(kept)
     assert {p.repeats for p in kept} == {1}
     assert read["sentence"] == result.sentence and read["reference"]["error"] == result.reference.error
-    with open(rd.accuracy.save_result(result, tmp_path / "runs.csv"), encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert [float(row["error"]) for row in rows] == [p.error for p in kept]
-    assert [int(row["evaluations"]) for row in rows] == [p.evaluations for p in kept]
-    marked = [row["on_front"] for row in read["rows"]]
-    assert [row["on_front"] == "True" for row in rows] == marked and any(marked)
-    assert rd.accuracy.save_result(result, tmp_path / "plot").read_bytes().startswith(b"\x89PNG")
+    assert any(row["on_front"] for row in read["rows"])
 
 
 def test_evaluations_are_counted_exactly() -> None:
