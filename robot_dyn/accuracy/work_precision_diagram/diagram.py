@@ -41,7 +41,9 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     """
     if not any(np.isfinite(p.error) for ladder in result.ladders for p in ladder.points):
         raise ResultError("no run ended, so there is nothing to draw; look at left_out")
-    figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), theme)
+    versions = programs(result.environment, "scipy", "mujoco", "drake", "heyoka")
+    caption = "\n".join([*result.basis, versions])
+    figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, caption, theme)
     grid = figure.add_gridspec(3, 2, width_ratios=(2.1, 1))
     first = [ladder for ladder in result.ladders if ladder.peer or (ladder.events and ladder.engine != INTERPRETED)]
     first = most_precise(first if any(not ladder.peer for ladder in first) else list(result.ladders))
@@ -73,18 +75,6 @@ def most_precise(ladders: list[ToleranceLadder]) -> list[ToleranceLadder]:
     soonest = {program_of(ladder): ladder for ladder in reversed(by_time)}.values()
     chosen = sorted(by_time, key=lambda ladder: ladder not in soonest)[:_MOST_METHODS]
     return [ladder for ladder in ladders if ladder in chosen]
-
-
-def _caption(result: WorkPrecision) -> str:
-    """The runs, and the reference for their errors."""
-    of = result.reference
-    cut = f" of {result.duration_s:g} s, where its references part" if of.parted_s is not None else ""
-    return (
-        f"{result.robot}: {', '.join(result.acting) or 'no effects'}; {of.horizon_s:g} s{cut}.  Error: largest"
-        f" |q − q_ref| over joints and {of.records} records, in {result.unit}.\n"
-        f"Reference: {of.methods[0]}, {of.error:.0e} {result.unit} from {of.methods[1]}: no error below that is"
-        f" believed.  {programs(result.environment, 'scipy', 'mujoco', 'drake', 'heyoka')}."
-    )
 
 
 def _panel(

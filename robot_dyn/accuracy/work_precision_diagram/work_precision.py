@@ -87,8 +87,9 @@ class WorkPrecision(Result):
     spent_s: float
     past_horizon: tuple[PastHorizon, ...] = ()
 
-    def tables(self) -> Iterator[Block]:
-        """What it rests on, and a line for each method."""
+    @property
+    def basis(self) -> Iterator[str]:
+        """What acts, what errors are measured against, and where the horizon is cut, a line each."""
         of = self.reference
         yield f"{self.robot}: {', '.join(self.acting) or 'no effects'}"
         yield (
@@ -101,7 +102,11 @@ class WorkPrecision(Result):
                 f"horizon: {of.horizon_s:g} s of {self.duration_s:g} s: beyond it runs at tight tolerances part from"
                 f" each other{lost}"
             )
-        yield self._table_of_ladders([digits for digits in _DIGITS if 10.0**-digits >= of.error])
+
+    def tables(self) -> Iterator[Block]:
+        """What it rests on, and a line for each method."""
+        yield from self.basis
+        yield self._table_of_ladders([digits for digits in _DIGITS if 10.0**-digits >= self.reference.error])
         yield "times of prepared runs, the least of runs that take turns; * the least; ( ) extrapolated by the order"
         if self.past_horizon:
             yield from self._beyond_horizon()
