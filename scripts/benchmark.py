@@ -37,7 +37,7 @@ from benchmarks.measure import Effort, command_line
 from robot_dyn.report.environment import processor_and_versions
 
 SUBJECTS: dict[str, tuple[Callable[[Effort], None], ...]] = {
-    "queries": (queries.queries, queries.lagrangian, queries.right_angles, queries.startup),
+    "queries": (queries.queries, queries.lagrangian, queries.startup),
     "first": (first_run.first_run,),
     "compiled": (kernels.kernels, kernels.from_python, kernels.threads, kernels.first_use),
     "rollouts": (rollouts.one_step, rollouts.thousands, rollouts.sticking),

@@ -1,6 +1,6 @@
 # The public names of this room and where they live: type checkers read this file, and __init__.py does.
 from robot_dyn.accuracy.advice import Advice as Advice
-from robot_dyn.accuracy.certificate.certificate import Certificate as Certificate
+from robot_dyn.accuracy.certificate.certify import Certificate as Certificate
 from robot_dyn.accuracy.certificate.certify import certify as certify
 from robot_dyn.accuracy.correct_digits import digits as digits
 from robot_dyn.accuracy.correct_digits import warn_below as warn_below
@@ -20,11 +20,11 @@ __all__: list[str]
 # Names that only tools and tests import.
 from robot_dyn.accuracy.advice import advice_about as advice_about
 from robot_dyn.accuracy.advice import at_rest as at_rest
-from robot_dyn.accuracy.certificate.certificate import Held as Held
 from robot_dyn.accuracy.certificate.digit_count import DigitCount as DigitCount
-from robot_dyn.accuracy.certificate.implementation import Implementation as Implementation
-from robot_dyn.accuracy.certificate.implementation import evaluate as evaluate
-from robot_dyn.accuracy.certificate.implementation import implementations as implementations
+from robot_dyn.accuracy.certificate.digit_count import Held as Held
+from robot_dyn.accuracy.certificate.digit_count import Implementation as Implementation
+from robot_dyn.accuracy.certificate.digit_count import evaluate as evaluate
+from robot_dyn.accuracy.certificate.digit_count import implementations as implementations
 from robot_dyn.accuracy.certificate.worst_case_search import Batch as Batch
 from robot_dyn.accuracy.certificate.worst_case_search import random_states as random_states
 from robot_dyn.accuracy.certificate.worst_case_search import worst_state as worst_state

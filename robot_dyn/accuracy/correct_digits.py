@@ -7,7 +7,6 @@ counted it is estimated, as 8 n u κ times the ratio of the terms of the answer 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log10
@@ -114,41 +113,34 @@ class DigitCheck:
         object.__setattr__(self, "digits", digits)
 
     def __call__(self, robot: Robot, quantity: str, state: tuple[ArrayLike, ...], answer: ArrayLike) -> None:
-        """Check the answer (..., *shape) to a query."""
-        if message := doubt(_unchecked(robot), quantity, state, answer, self.digits):
+        """Check the answer (..., *shape) to a query; nan is not checked.
+
+        Digits are counted only where the estimate is below the limit, at the worst state; for more than 64 joints the
+        estimate is reported.
+        """
+        requested, robot, answers = QUANTITIES.get(quantity), _unchecked(robot), np.asarray(answer)
+        if requested is None:
+            return
+        arrays = {name: shaped(name, x, robot.joint_names) for name, x in zip(requested.arguments, state, strict=True)}
+        batch = answers.shape[: answers.ndim - len(requested.axes)]
+        rows = list(np.ndindex(batch))
+        states = [{name: np.broadcast_to(x, (*batch, robot.n))[k] for name, x in arrays.items()} for k in rows]
+        bounds = [
+            _bound(robot, requested, at, answers[k]) if np.isfinite(answers[k]).all() else 0.0
+            for k, at in zip(rows, states, strict=True)
+        ]
+        if not bounds or digits_of(max(bounds)) >= self.digits:
+            return
+        worst, counts = int(np.argmax(bounds)), robot.n <= _COUNTED
+        held = _counted(robot, requested, states[worst]) if counts else digits_of(bounds[worst])
+        if held < self.digits:
+            has = "has" if counts else "is only certain to have"
+            where = f" in row {worst} of the batch" if batch else ""
+            message = (
+                f"{quantity} of {robot.name} {has} {held:.1f} digits{where}, fewer than {self.digits:g}; use"
+                " rd.Lagrangian(robot, np.longdouble), or rd.accuracy.Ball(bits) for digits that are proven"
+            )
             warnings.warn(message, PrecisionWarning, stacklevel=4)  # at the query
-
-
-def doubt(robot: Robot, quantity: str, state: Sequence[ArrayLike], answer: ArrayLike, least: float) -> str:
-    """Return the warning about answers (..., *shape) with fewer digits than `least`; "" if they have enough.
-
-    Digits are counted only where the estimate is below that, at the worst state; for more than 64 joints the estimate
-    is reported.
-    """
-    requested = QUANTITIES.get(quantity)
-    if requested is None:
-        return ""
-    answers = np.asarray(answer)
-    arrays = {name: shaped(name, x, robot.joint_names) for name, x in zip(requested.arguments, state, strict=True)}
-    batch = answers.shape[: answers.ndim - len(requested.axes)]
-    rows = [
-        ({name: np.broadcast_to(x, (*batch, robot.n))[k] for name, x in arrays.items()}, answers[k])
-        for k in np.ndindex(batch)
-    ]
-    bounds = [_bound(robot, requested, state, answer) if np.isfinite(answer).all() else 0.0 for state, answer in rows]
-    if not bounds or digits_of(max(bounds)) >= least:
-        return ""
-    worst = int(np.argmax(bounds))
-    counts = robot.n <= _COUNTED
-    held = _counted(robot, requested, rows[worst][0]) if counts else digits_of(bounds[worst])
-    if held >= least:
-        return ""
-    where = f" in row {worst} of the batch" if batch else ""
-    has = "has" if counts else "is only certain to have"
-    return (
-        f"{quantity} of {robot.name} {has} {held:.1f} digits{where}, fewer than {least:g}; use"
-        " rd.Lagrangian(robot, np.longdouble), or rd.accuracy.Ball(bits) for digits that are proven"
-    )
 
 
 def _bound(robot: Robot, quantity: Quantity, state: dict[str, np.ndarray], answer: np.ndarray) -> float:

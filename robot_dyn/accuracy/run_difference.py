@@ -68,7 +68,6 @@ class RunDifference(Result):
         settings: The settings that differ.
         left_out: What is not compared.
         environment: Versions that the first run was made with.
-        interrupted: False.
     """
 
     diagram: ClassVar[str] = "robot_dyn.accuracy.run_difference_figure"
@@ -88,9 +87,8 @@ class RunDifference(Result):
     settings: tuple[DifferingSetting, ...]
     left_out: tuple[str, ...]
     environment: dict[str, str]
-    interrupted: bool = False
-    runs: tuple[TrajectoryData, TrajectoryData] | None = field(default=None, metadata=UNREPORTED)
-    difference: Difference | None = field(default=None, metadata=UNREPORTED)
+    runs: tuple[TrajectoryData, TrajectoryData] = field(metadata=UNREPORTED)
+    difference: Difference = field(metadata=UNREPORTED)
 
     @property
     def sentence(self) -> str:
@@ -214,8 +212,7 @@ def _largest(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
 
 def _alone(a: TrajectoryData, b: TrajectoryData) -> Iterator[tuple[str, float, float]]:
     """Times that one run has and the other has not, by name."""
-    names = run_names(a, b)
-    for name, run, other in ((names[0], a, b), (names[1], b, a)):
+    for name, run, other in zip(run_names(a, b), (a, b), (b, a), strict=True):
         if run.t[0] < other.t[0]:
             yield name, float(run.t[0]), float(other.t[0])
         if run.t[-1] > other.t[-1]:

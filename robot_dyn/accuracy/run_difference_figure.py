@@ -25,13 +25,11 @@ def draw(result: RunDifference, theme: str = "light") -> Figure:
     """The figure.
 
     Raises:
-        ResultError: If there are too many joints, or the result was read from a file.
+        ResultError: If there are too many joints.
     """
     names = tuple(dict.fromkeys(each.joint for each in result.joints))
-    if result.runs is None or result.difference is None or len(names) > _MOST:
-        raise ResultError(
-            f"a difference of {len(names)} joints cannot be drawn: its runs are needed, and up to {_MOST}"
-        )
+    if len(names) > _MOST:
+        raise ResultError(f"a difference of {len(names)} joints cannot be drawn; a figure shows up to {_MOST}")
     across = 3 if len(names) in (5, 6, 9) else min(_ACROSS, len(names))
     rows = -(-len(names) // across)
     figure, colours = sheet(_WIDE, _PAIR * rows + _AROUND, result.sentence, _caption(result), theme)
@@ -69,7 +67,6 @@ def _over_each_other(axes: Any, runs: Any, i: int, of_q: str, colours: Colours, 
 
 def _difference(axes: Any, result: RunDifference, i: int, of_q: str, colours: Colours) -> None:
     found = result.difference
-    assert found is not None
     styled(axes, colours, "t [s]", "", f"b − a [{of_q}]")
     x = _finite(found.q[:, i])
     axes.plot(found.t, x, color=colours["ink"], linewidth=1.1)

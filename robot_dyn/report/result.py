@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from robot_dyn.foundations.answer import Answer, Block
 from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.result import reported
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+INTERRUPTED = "what was to come when it was interrupted"
 
 
 class Result(Answer):
@@ -21,14 +24,17 @@ class Result(Answer):
         diagram: Module whose function `draw(result, theme)` draws it; empty without a figure.
         left_out: What was left out, and why.
         environment: Versions and processor.
-        interrupted: Whether the study was ended by the user.
     """
 
     columns: ClassVar[tuple[str, ...]] = ()
     diagram: ClassVar[str] = ""
     left_out: tuple[str, ...]
     environment: dict[str, str]
-    interrupted: bool
+
+    @reported
+    def interrupted(self) -> bool:
+        """Whether the user ended the study."""
+        return INTERRUPTED in self.left_out
 
     @property
     def sentence(self) -> str:

@@ -62,21 +62,3 @@ class Budget:
         """Raise OvertimeError if it is over; can be passed to a run as its `on_progress`."""
         if self.left <= 0:
             raise OvertimeError
-
-
-@final
-class Limit:
-    """The longest time of one run: given to it as `on_progress`, it raises OvertimeError.
-
-    The clock starts at the second call: before that, machine code may be loaded.
-    """
-
-    def __init__(self, seconds: float) -> None:
-        self.seconds, self._calls, self._until = seconds, 0, 0.0
-
-    def __call__(self, t: float) -> None:
-        self._calls += 1
-        if self._calls == 2:
-            self._until = perf_counter() + self.seconds
-        elif self._calls > 2 and perf_counter() > self._until:
-            raise OvertimeError

@@ -5,15 +5,43 @@ from __future__ import annotations
 import timeit
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import nan
 from time import perf_counter
 from typing import final
 
 from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.report.time_budget import Budget, OvertimeError
 
 TURNS = 5
 _AGREE = 1.05  # ratio of the two least times
 _BRIEF_S, _OFTEN = 1e-3, 20  # shorter runs settle after so many turns: after five, some are 10 % off
+
+
+@dataclass(frozen=True, kw_only=True)
+class Repeated:
+    """The base of what was timed in turns.
+
+    Attributes:
+        times: Of its turns, in [s]; nothing if it was not timed.
+    """
+
+    times: tuple[float, ...] = field(default=(), metadata=UNREPORTED)
+
+    @reported
+    def time_s(self) -> float:
+        """Least of its times, in [s]; nan if it was not timed."""
+        return min(self.times, default=nan)
+
+    @reported
+    def repeats(self) -> int:
+        """Number of turns."""
+        return len(self.times)
+
+    @reported
+    def repeatable(self) -> bool:
+        """Whether there were at least five turns, the two least times of which differ by no more than 5 %."""
+        return repeatable(self.times)
 
 
 @final

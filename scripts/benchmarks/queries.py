@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
-from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 import robot_dyn as rd
 from benchmarks.measure import BATCH, Effort, alternate, arms, lowest, row, table
@@ -115,27 +114,6 @@ def lagrangian(effort: Effort) -> None:
             fewer = replace(effort, repeats=effort.repeats // 2 + 1)
             t |= alternate({"batch": partial(getattr(own, name), *batch[:arguments])}, fewer)
             row(arm, name, f"{t['one']:.0f}", f"{t['batch'] / BATCH:.2f}")
-
-
-def right_angles(effort: Effort) -> None:
-    """Machine code with right angles written out in full, and with those of the file: the same literals, longer."""
-    table("arm", "query", "instructions, off", "on", f"µs per state of {BATCH}, off", "on", "off/on")
-    robot = arms()["UR5"]
-    batch = np.random.default_rng(1).normal(size=(3, BATCH, robot.n))
-    sides = {"off": rd.Compiled(as_stated(robot)), "on": rd.Compiled(robot)}
-    for name, arguments in (("forward_dynamics", 3), ("inverse_dynamics", 3), ("M", 1)):
-        t = alternate({side: partial(getattr(each, name), *batch[:arguments]) for side, each in sides.items()}, effort)
-        counts = [min(each.instructions[name].values()) for each in sides.values()]
-        off, on = (t[side] / BATCH for side in sides)
-        row("UR5", name, *counts, f"{off:.4f}", f"{on:.4f}", f"{off / on:.2f}")
-
-
-def as_stated(robot: rd.Robot) -> rd.Robot:
-    """The robot with all decimals of its angles, zeros at the end, so that none is taken as a right angle."""
-    root = etree.fromstring(robot.description.xml)
-    for origin in root.iterfind("joint/origin"):
-        origin.set("rpy", " ".join(f"{float(x):.15f}" for x in origin.get("rpy", "0 0 0").split()))
-    return rd.Robot(replace(robot.description, xml=etree.tostring(root)), robot.edits)
 
 
 def startup(effort: Effort) -> None:

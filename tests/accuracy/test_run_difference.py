@@ -118,7 +118,7 @@ def test_one_motion_across_impacts_does_not_part(first: float, second: float) ->
     """Polynomials across an impact err by 0.02 rad; at common samples both are the same to 1e-15."""
     found = rd.compare_runs(bouncing(first), bouncing(second))
     assert found.parted is None and found.common > 1
-    errors = [run.error.largest for run in found.runs or () if run.error is not None]
+    errors = [run.error.largest for run in found.runs if run.error is not None]
     assert all(each.largest <= 2 * sum(errors) + found.interpolation for each in found.joints if each.quantity == "q")
     assert all(each.largest < 1e-9 for each in found.joints)  # v and u are those of common samples
 

@@ -43,6 +43,7 @@ class Odd(Result):
     robot: str
     inner: tuple[Inner, ...]
     by_name: dict[str, object]
+    left_out: tuple[str, ...] = ()
     columns = ("size", "double")
 
     @property
@@ -61,6 +62,7 @@ def test_json_holds_fields_and_reported_properties_and_no_number_that_it_lacks()
     assert read == plain(ODD) == {
         "robot": "ré\n", "inner": [{"size": 0.1, "double": 0.2}, {"size": None, "double": None}],
         "by_name": {"q": [[1.5, None]], "n": 3, "c": "red", "z": [1.0, 2.0], "no": None, "is": True},
+        "left_out": [], "interrupted": False,
     }  # fmt: skip
 
 

@@ -9,31 +9,189 @@ states if that is more: an answer that vanishes at a state does not count as los
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-from math import inf
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from math import inf, isfinite, log10
+from typing import Any, ClassVar, final
 
 import numpy as np
 
-from robot_dyn.accuracy.certificate.certificate import Certificate, Condition, Held
-from robot_dyn.accuracy.certificate.digit_count import DigitCount
-from robot_dyn.accuracy.certificate.implementation import Implementation, evaluate, implementations
+from robot_dyn.accuracy.certificate.digit_count import DigitCount, Held, Implementation, evaluate, implementations
 from robot_dyn.accuracy.certificate.worst_case_search import Batch, random_states, row, worst_state
 from robot_dyn.accuracy.correct_digits import QUANTITIES, warn_below
+from robot_dyn.foundations.answer import Block, Table
 from robot_dyn.foundations.arithmetic import Ball
 from robot_dyn.foundations.errors import QueryError
-from robot_dyn.foundations.validate import function, integer, joint_values
+from robot_dyn.foundations.result import reported
+from robot_dyn.foundations.validate import choice, function, integer, joint_values
 from robot_dyn.lagrange.lagrangian import Lagrangian
 from robot_dyn.lagrange.scale import unit_diagonal_conditions
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import M
 from robot_dyn.queries.quantity import MOST_DIGITS, Quantity
+from robot_dyn.queries.units import format_duration
 from robot_dyn.report.environment import processor_and_versions
-from robot_dyn.report.timing import in_turns, repeatable
+from robot_dyn.report.result import INTERRUPTED, Result
+from robot_dyn.report.timing import in_turns
 
 _AT_LEAST_S = 1e-3  # of a loop that is timed
 _MOST_REPEATS, _LEAST_SAMPLES, _MOST_SAMPLES = 1000, 100, 10**6
+DECIMALS = "decimals of the file as float64"  # name of the implementation that computes exactly with these decimals
+
+
+@final
+@dataclass(frozen=True)
+class Condition:
+    """κ of M scaled to a unit diagonal; inf where M is singular.
+
+    Attributes:
+        given: κ at the given state; None if none was given.
+        typical: Median over the random states.
+        random: Largest κ over the random states.
+        searched: Largest κ found.
+        q: Configuration of the largest κ found.
+    """
+
+    given: float | None
+    typical: float
+    random: float
+    searched: float
+    q: tuple[float, ...] = field(repr=False)
+
+    @property
+    def digits(self) -> float:
+        """log₁₀ of the largest κ: the digits that solving M a = τ may lose."""
+        return log10(self.searched)
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate(Result):
+    """True digits of a robot's dynamics.
+
+    Attributes:
+        robot: Name of the robot.
+        joints: Names of the joints.
+        digits: Digits of each quantity by each implementation.
+        decimals: By quantity, digits left after rounding the decimals of the file to float64, at the worst state.
+        right_angles: By quantity, digits left after machine code completes the rounded right angles of the file.
+        condition: Condition number of M.
+        bits: Highest precision of the balls used for the true values.
+        left_out: What was left out, and why.
+        environment: Versions and processor.
+        seed: Seed of the random states.
+    """
+
+    diagram: ClassVar[str] = "robot_dyn.accuracy.certificate.diagram"
+    columns: ClassVar[tuple[str, ...]] = (
+        "quantity", "implementation", "given", "typical", "samples", "random", "searched", "time_s", "repeats",
+        "repeatable",
+    )  # fmt: skip
+    robot: str
+    joints: tuple[str, ...]
+    digits: tuple[Held, ...]
+    decimals: dict[str, float]
+    right_angles: dict[str, float]
+    condition: Condition
+    bits: int
+    left_out: tuple[str, ...]
+    environment: dict[str, str]
+    seed: int
+
+    def tables(self) -> Iterator[Block]:
+        """A line for each quantity and implementation, and what it rests on."""
+        yield (
+            f"{self.robot}: decimal digits that hold, against balls of {self.bits} bits: error of M_ij relative to"
+            " √(M_ii M_jj); of C, N and inverse"
+        )
+        own = "or its rms at random states if that is more"
+        yield f"dynamics to the largest entry in the units √M_ii of the joints, {own};"
+        yield "of forward dynamics to M⁻¹τ, M⁻¹C v and M⁻¹N, in the norm of M"
+        given = any(each.given is not None for each in self.digits)
+        counts = ("typical", "worst of", "random", "searched", "time")
+        headings = ("quantity", "implementation", *["given"] * given, *counts)
+        yield Table(headings, tuple(self._digit_rows(given)), right=headings[2:])
+        of = self.condition
+        lose = f": up to {of.digits:.1f} digits for forward dynamics to lose" if isfinite(of.digits) else ""
+        yield (
+            f"κ of M scaled to a unit diagonal: typical {of.typical:.3g}, largest at random {of.random:.3g}, searched"
+            f" {of.searched:.3g}{lose}"
+        )
+        if lost := [f"{implementation} {digits:+.1f}" for implementation, digits in self.lost.items()]:
+            yield f"digits of inverse less those of forward dynamics, at the worst states: {', '.join(lost)}"
+        if self.right_angles:
+            yield (
+                "machine code writes right angles out in full, and is judged by these; of the file as it stands that"
+                f" leaves {min(self.right_angles.values()):.1f} digits"
+            )
+        yield "times of one query from Python, the least of calls that take turns; no more than 20 digits are counted"
+
+    def of(self, quantity: str, implementation: str) -> Held:
+        """The digits of one quantity by one implementation.
+
+        Raises:
+            QueryError: If they were not counted.
+        """
+        choice("quantity", quantity, self.quantities)
+        choice("implementation", implementation, self.implementations)
+        for each in self._of(quantity):
+            if each.implementation == implementation:
+                return each
+        raise QueryError(
+            f"{implementation!r} does not answer {quantity}; look at the quantities of each implementation in digits"
+        )
+
+    @property
+    def rows(self) -> Iterator[Mapping[str, Any]]:
+        yield from ({name: getattr(held, name) for name in self.columns} for held in self.digits)
+        for quantity, digits in self.decimals.items():
+            yield {"quantity": quantity, "implementation": DECIMALS, "searched": digits}
+
+    @reported
+    def lost(self) -> dict[str, float]:
+        """By implementation, digits of inverse dynamics minus those of forward dynamics, at the worst states."""
+        inverse, forward = (
+            {each.implementation: each.searched for each in self._of(quantity) if each.samples > 1}
+            for quantity in ("inverse_dynamics", "forward_dynamics")
+        )
+        return {
+            name: inverse[name] - forward[name] for name in self.implementations if name in inverse.keys() & forward
+        }
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities examined."""
+        return tuple(dict.fromkeys(each.quantity for each in self.digits))
+
+    @property
+    def implementations(self) -> tuple[str, ...]:
+        """Names of the implementations examined."""
+        return tuple(dict.fromkeys(each.implementation for each in self.digits))
+
+    @reported
+    def sentence(self) -> str:
+        """The digits of forward dynamics, or of the last quantity counted, in a sentence."""
+        if not self.digits:
+            return "no digits were counted"
+        quantity = "forward_dynamics" if "forward_dynamics" in self.quantities else self.quantities[-1]
+        parts = [
+            f"{each.implementation} {each.searched:.1f} in {format_duration(each.time_s)}"
+            for each in sorted(self._of(quantity), key=lambda each: each.time_s)
+        ]
+        return f"digits of {quantity} at the worst state found: {'; '.join(parts)}"
+
+    def _of(self, quantity: str) -> Iterator[Held]:
+        return (each for each in self.digits if each.quantity == quantity)
+
+    def _digit_rows(self, given: bool) -> Iterator[tuple[str, ...]]:
+        """A row for each implementation, and one for the decimals of the file, by quantity."""
+        for quantity in self.quantities:
+            for held in self._of(quantity):
+                own = ["—" if held.given is None else f"{held.given:.1f}"] * given
+                worst, time = (f"{held.random:.1f}", f"{held.searched:.1f}"), format_duration(held.time_s)
+                yield quantity, held.implementation, *own, f"{held.typical:.1f}", str(held.samples), *worst, time
+            yield quantity, DECIMALS, *[""] * (3 + given), f"{self.decimals[quantity]:.1f}", ""
 
 
 def certify(
@@ -79,7 +237,7 @@ def certify(
     states = random_states(robot, samples, rng)
     report(0.0, "machine code")
     found, left_out = implementations(robot)
-    digit_count, held, interrupted = DigitCount(robot, states, given, rng), list[Held](), False
+    digit_count, held = DigitCount(robot, states, given, rng), list[Held]()
     quantities = [each for each in QUANTITIES.values() if each in found[0].quantities]
     try:
         for k, quantity in enumerate(quantities):
@@ -88,12 +246,10 @@ def certify(
                 lambda part, what, k=k: report((k + part) / len(quantities), what),
             )  # fmt: skip
     except KeyboardInterrupt:
-        interrupted = True
-        left_out.append("what was to come when it was interrupted")
+        left_out.append(INTERRUPTED)
     return Certificate(
         robot.name, robot.joint_names, tuple(held), digit_count.decimals, digit_count.right_angles,
         _condition(robot, states, given, rng), digit_count.bits, tuple(left_out), processor_and_versions(), seed,
-        interrupted,
     )  # fmt: skip
 
 
@@ -122,20 +278,23 @@ def _quantity(
         report(k / len(found), f"{quantity.name}: {implementation.name}")
         try:
             held.append(digit_count.count(implementation, quantity))
-            calls[implementation.name] = implementation.call(quantity, state)
+            calls[implementation.name] = _call(implementation.engine, quantity, state)
         except QueryError as error:
             left_out.append(str(error))
-    balls = Lagrangian(digit_count.robot, Ball(digit_count.truth(digit_count.robot, quantity, state).bits))
-    proven = Implementation(f"balls, {balls.dtype.bits} bits", digit_count.robot, balls, (quantity,))
-    calls[proven.name] = proven.call(quantity, state)
-    most = float(MOST_DIGITS)
+    bits = digit_count.truth(digit_count.robot, quantity, state).bits
+    name, most = f"balls, {bits} bits", float(MOST_DIGITS)
+    calls[name] = _call(Lagrangian(digit_count.robot, Ball(bits)), quantity, state)
     given = None if digit_count.given is None else most
     at = {key: state[key].tolist() for key in quantity.arguments}
-    held.append(Held(quantity.name, proven.name, given, most, most, most, 1, state=at))
+    held.append(Held(quantity.name, name, given, most, most, most, 1, state=at))
     report(1.0, f"{quantity.name}: times")
     times = in_turns(calls, repeats, _AT_LEAST_S)
-    timed = {name: {"time_s": min(of), "repeatable": repeatable(of)} for name, of in times.items()}
-    return [replace(each, **timed[each.implementation], repeats=repeats) for each in held]
+    return [replace(count, times=tuple(times[count.implementation])) for count in held]
+
+
+def _call(engine: Any, quantity: Quantity, state: dict[str, np.ndarray]) -> Callable[[], object]:
+    """A query of one state, ready to be timed."""
+    return partial(getattr(engine, quantity.name), *(state[name] for name in quantity.arguments))
 
 
 def _condition(robot: Robot, states: Batch, given: dict[str, np.ndarray] | None, rng: np.random.Generator) -> Condition:

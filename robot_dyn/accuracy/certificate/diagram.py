@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from robot_dyn.accuracy.certificate.certificate import DECIMALS, Certificate, Held
+from robot_dyn.accuracy.certificate.certify import DECIMALS, Certificate, Held
 from robot_dyn.foundations.display import drawable
 from robot_dyn.report.figure import Colours, ResultError, key, legend, sheet, styled
 

@@ -1,26 +1,127 @@
-"""Count of digits: errors of an implementation against finer numbers at many states, and against balls at the worst."""
+"""Count of digits: errors of implementations against finer numbers at many states, and against balls at the worst."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import final
+from dataclasses import dataclass, field
+from functools import cache, cached_property, partial
+from types import SimpleNamespace
+from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.accuracy.certificate.certificate import Held
-from robot_dyn.accuracy.certificate.implementation import Implementation, evaluate
 from robot_dyn.accuracy.certificate.worst_case_search import Batch, row, worst_state
-from robot_dyn.accuracy.correct_digits import digits_of
-from robot_dyn.foundations.errors import QueryError
+from robot_dyn.accuracy.correct_digits import QUANTITIES, digits_of
+from robot_dyn.codegen.dynamics import CompiledDynamics
+from robot_dyn.foundations.arithmetic import FLOAT64, Array
+from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.lagrange.exact import NOTHING, Exact, Scale, Truth, entry_units, in_joint_units
 from robot_dyn.lagrange.lagrangian import Lagrangian
+from robot_dyn.lagrange.recursions.articulated_body import articulated_body
 from robot_dyn.lagrange.scale import diagonal_scale, floored, solved_norm
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, M, N
+from robot_dyn.queries.batch import answered
+from robot_dyn.queries.dynamics import CORIOLIS_TORQUE, FORWARD_DYNAMICS, M, N
 from robot_dyn.queries.quantity import Quantity
+from robot_dyn.report.timing import Repeated
 
 FEWER = 250  # random states for each one that balls judge, where no other numbers are fine enough; 8 at least
 _SIDE_BY_SIDE = 8  # states that machine code answers side by side, in the search and in the judgement
+LONGDOUBLE = "Lagrangian, longdouble"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Implementation:
+    """One implementation of the equations.
+
+    Attributes:
+        name: Of program or formulation, and numbers.
+        robot: Whose equations it has.
+        engine: Answers each quantity by the method of its name.
+        quantities: That it answers.
+    """
+
+    name: str
+    robot: Robot
+    engine: Any
+    quantities: tuple[Quantity, ...]
+
+    @cached_property
+    def fine(self) -> Lagrangian | None:
+        """The same equations in numbers that are finer by far; None if only balls are finer."""
+        longdouble = np.finfo(np.longdouble).eps < np.finfo(np.float64).eps / 100
+        return Lagrangian(self.robot, np.longdouble) if longdouble and self.name != LONGDOUBLE else None
+
+
+def evaluate(engine: Any, quantity: Quantity, states: dict[str, np.ndarray]) -> np.ndarray:
+    """Answers at states (S, n), some at a time, eight of machine code side by side; NaN where there is none."""
+    rows = [states[name] for name in quantity.arguments]
+    parts = [slice(k, k + 512) for k in range(0, len(rows[0]), 512)]
+    answer = getattr(engine, quantity.name)
+    return np.concatenate([answer(*(x[part] for x in rows), errors="nan") for part in parts])
+
+
+def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
+    """Return the implementations for a robot, and what is left out and why."""
+    left_out, quantities = list[str](), tuple(QUANTITIES.values())
+    if robot.joint_without_inertia is not None:
+        left_out.append(f"forward dynamics: joint {robot.joint_without_inertia!r} carries no inertia")
+        quantities = tuple(quantity for quantity in quantities if not quantity.solves)
+    options = [Implementation("Pinocchio", robot, robot, quantities)]
+    for name in ("float32", "float64", "longdouble"):
+        engine = Lagrangian(robot, getattr(np, name))
+        options.append(Implementation(f"Lagrangian, {name}", robot, engine, quantities))
+    if not robot.couplings.trivial:
+        left_out.append("articulated bodies: they take no coupled joints")
+    elif FORWARD_DYNAMICS in quantities:
+        options.append(Implementation("articulated body", robot, _articulated_body(robot), (FORWARD_DYNAMICS,)))
+    try:
+        compiled = CompiledDynamics(robot)
+        for quantity in quantities:
+            quantity.ask(compiled, {name: np.full(robot.n, 0.3) for name in ("q", "v", "a", "tau")})
+        served = tuple(quantity for quantity in quantities if compiled.served_by(quantity.name) != "Pinocchio")
+        options.append(Implementation("machine code", compiled.robot, compiled, served))
+    except (ImportError, RobotDynError) as error:
+        left_out.append(f"machine code: {error}")
+    return options, left_out
+
+
+def _articulated_body(robot: Robot) -> SimpleNamespace:
+    """Forward dynamics by articulated bodies, with the signature of `Dynamics`."""
+    own = Lagrangian(robot)
+    equation = partial(articulated_body, own.linkage)
+
+    def forward_dynamics(q: Array, v: Array, tau: Array, *, errors: str = "raise") -> Array:
+        return answered(equation, {"q": q, "v": v, "tau": tau}, (own.n,), own.joint_names, errors, FLOAT64)
+
+    return SimpleNamespace(forward_dynamics=forward_dynamics)
+
+
+@final
+@dataclass(frozen=True)
+class Held(Repeated):
+    """The digits of one quantity by one implementation, from 0 to 20, and times of one query from Python.
+
+    Attributes:
+        quantity: Its name.
+        implementation: Program or formulation, and numbers.
+        given: Digits at the given state; None if none was given.
+        typical: Median over the random states.
+        random: Digits at the worst random state.
+        searched: Digits at the worst state found.
+        samples: Number of random states; 1 for balls, whose digits are proven.
+        state: The worst state, q, v, a, tau by name.
+    """
+
+    quantity: str
+    implementation: str
+    given: float | None
+    typical: float
+    random: float
+    searched: float
+    samples: int
+    state: dict[str, list[float]] = field(default_factory=dict, hash=False, repr=False)
 
 
 @final
@@ -39,10 +140,9 @@ class DigitCount:
         self.decimals: dict[str, float] = {}
         self.right_angles: dict[str, float] = {}
         self.bits = 0
-        self._exact, self._rounded = {robot: Exact(robot)}, Exact(robot, rounded=True)
-        self._own = Lagrangian(robot)
-        self._sizes: dict[Quantity, float] = {}
-        self._fine: dict[tuple[Robot, Quantity], np.ndarray] = {}
+        self._exact, self._rounded, self._own = cache(Exact), Exact(robot, rounded=True), Lagrangian(robot)
+        self._fine = cache(lambda engine, quantity: evaluate(engine, quantity, states))
+        self._typical = cache(partial(_typical, self._own, states))
 
     def count(
         self, implementation: Implementation, quantity: Quantity, check: Callable[[], object] = lambda: None
@@ -83,34 +183,25 @@ class DigitCount:
 
     def truth(self, robot: Robot, quantity: Quantity, state: dict[str, np.ndarray]) -> Truth:
         """True values at a state."""
-        exact = self._exact.setdefault(robot, Exact(robot))
-        truth = exact.at(quantity, state, self._typical(quantity))
+        truth = self._exact(robot).at(quantity, state, self._typical(quantity))
         self.bits = max(self.bits, truth.bits)
         return truth
 
     def judged(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> float:
         """The error at a state, by balls."""
         several = {name: np.tile(x, (_SIDE_BY_SIDE, 1)) for name, x in state.items()}
-        return self.truth(implementation.robot, quantity, state).error(implementation.evaluate(quantity, several)[0])
+        answer = evaluate(implementation.engine, quantity, several)[0]
+        return self.truth(implementation.robot, quantity, state).error(answer)
 
     def _errors(self, implementation: Implementation, quantity: Quantity, states: Batch) -> np.ndarray:
         """Errors at states (S, n); NaN where there is no answer."""
-        if implementation.fine is None:
-            answers = implementation.evaluate(quantity, states)
-            rows = (row(states, k) for k in range(len(answers)))
-            return np.array(
-                [self.truth(implementation.robot, quantity, x).error(y) for x, y in zip(rows, answers, strict=True)]
-            )
-        key = (implementation.robot, quantity)
-        if states is not self.states:
-            fine = evaluate(implementation.fine, quantity, states)
-        elif key in self._fine:
-            fine = self._fine[key]
-        else:
-            fine = self._fine[key] = evaluate(implementation.fine, quantity, states)
-        error = (implementation.evaluate(quantity, states) - fine).astype(float)
-        relative = self._scale(quantity, states, fine).relative(error)
-        return relative.reshape(len(error), -1).max(axis=1)
+        answers = evaluate(implementation.engine, quantity, states)
+        if (engine := implementation.fine) is None:
+            truths = (self.truth(implementation.robot, quantity, row(states, k)) for k in range(len(answers)))
+            return np.array([truth.error(answer) for truth, answer in zip(truths, answers, strict=True)])
+        fine = self._fine(engine, quantity) if states is self.states else evaluate(engine, quantity, states)
+        relative = self._scale(quantity, states, fine).relative((answers - fine).astype(float))
+        return relative.reshape(len(answers), -1).max(axis=1)
 
     def _scale(self, quantity: Quantity, states: Batch, fine: np.ndarray) -> Scale:
         """Of errors at states, from fine answers; that of `truth`, but for rounding."""
@@ -123,18 +214,6 @@ class DigitCount:
         torques = (states["tau"], evaluate(self._own, CORIOLIS_TORQUE, states), evaluate(self._own, N, states))
         return Scale(solved_norm(inertia, torques), inertia)
 
-    def _typical(self, quantity: Quantity) -> float:
-        """The largest root mean square of an entry at random states, in the units of the joints; 1 if it is zero."""
-        if quantity.definite or quantity.solves:
-            return 0.0
-        if quantity not in self._sizes:
-            answers, inertia = evaluate(self._own, quantity, self.states), evaluate(self._own, M, self.states)
-            ratios = answers / entry_units(quantity, inertia)
-            largest = float(np.nanmax(np.abs(ratios))) or 1.0  # by which they are divided: squares may overflow
-            size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())
-            self._sizes[quantity] = size if size > NOTHING else 1.0
-        return self._sizes[quantity]
-
     def _of_file(self, implementation: Implementation, quantity: Quantity, state: dict[str, np.ndarray]) -> None:
         """What the float64 of the file's decimals leaves at a state, and what right angles do."""
         truth = self.truth(self.robot, quantity, state)
@@ -143,3 +222,13 @@ class DigitCount:
             both.append((self.right_angles, self.truth(implementation.robot, quantity, state)))
         for table, other in both:
             table[quantity.name] = min(digits_of(truth.error(other.values)), table.get(quantity.name, np.inf))
+
+
+def _typical(own: Lagrangian, states: Batch, quantity: Quantity) -> float:
+    """The largest root mean square of an entry at random states, in the units of the joints; 1 if it is zero."""
+    if quantity.definite or quantity.solves:
+        return 0.0
+    ratios = evaluate(own, quantity, states) / entry_units(quantity, evaluate(own, M, states))
+    largest = float(np.nanmax(np.abs(ratios))) or 1.0  # by which they are divided: squares may overflow
+    size = largest * float(np.sqrt(np.nanmean((ratios / largest) ** 2, axis=0)).max())
+    return size if size > NOTHING else 1.0

@@ -6,38 +6,33 @@ machine is that of both
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.result import reported
+from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.report import timing
+from robot_dyn.report.result import INTERRUPTED
 from robot_dyn.report.time_budget import Budget
-from robot_dyn.report.timing import Timed, repeatable
-
-_QUARTILES = (25, 75)
+from robot_dyn.report.timing import Repeated, Timed
 
 
 @final
 @dataclass(frozen=True)
-class Version:
-    """One of two.
+class Version(Repeated):
+    """One of two; its times are those of the processor.
 
     Attributes:
         name: What sets it apart, such as "on".
         instructions: Of its program, exact.
-        time_s: Least of its times of the processor, in [s]; None if it was not timed.
-        repeats: Number of turns.
-        repeatable: Whether there were at least five, the two least times of which differ by no more than 5 %.
+        run: Runs it and returns the time it takes, in [s]; versions with the same function share its times.
     """
 
     name: str
     instructions: int
-    time_s: float | None
-    repeats: int
-    repeatable: bool
+    run: Callable[[], float] | None = field(default=None, compare=False, repr=False, metadata=UNREPORTED)
 
 
 @final
@@ -50,10 +45,6 @@ class ABComparison:
         what: What differs.
         per: What instructions and time are of.
         first, second: The two.
-        time_ratio: Time of the first by that of the second; None if one was not timed.
-        time_ratio_spread: Half of the interquartile range of the ratios in each turn; likewise.
-        time_between_s: Time of the first less that of the second, in [s]; None if the middle half of the turns do not
-            agree with its sign.
     """
 
     group: str
@@ -61,84 +52,70 @@ class ABComparison:
     per: str
     first: Version
     second: Version
-    time_ratio: float | None = None
-    time_ratio_spread: float | None = None
-    time_between_s: float | None = None
 
     @property
-    def within_noise(self) -> bool:
-        """Whether both were timed, and the turns do not agree on which takes longer."""
-        return self.time_ratio is not None and self.time_between_s is None
+    def added(self) -> int:
+        """Instructions of the first less those of the second."""
+        return self.first.instructions - self.second.instructions
 
     @reported
     def instructions_ratio(self) -> float:
         """Instructions of the first by those of the second; inf if that has none."""
         return self.first.instructions / self.second.instructions if self.second.instructions else float("inf")
 
+    @reported
+    def time_ratio(self) -> float | None:
+        """Time of the first by that of the second; None if one was not timed."""
+        first, second = self._turns
+        return float(first.min() / second.min()) if len(first) else None
 
-@final
-@dataclass(frozen=True, eq=False)
-class Way:
-    """A version that can be run.
+    @reported
+    def time_ratio_spread(self) -> float | None:
+        """Half of the interquartile range of the ratios in each turn; None if one was not timed."""
+        first, second = self._turns
+        return float(np.subtract(*np.percentile(first / second, (75, 25)))) / 2 if len(first) else None
 
-    Attributes:
-        name: As of `Version`, as are instructions.
-        run: Gives the time it takes, in [s]; RobotDynError if it cannot be run.
-        factor: How many of these make what is compared.
-        times: Of the turns, in [s]; ways that differ in name and factor alone share them.
-    """
-
-    name: str
-    instructions: int
-    run: Callable[[], float]
-    factor: int = 1
-    times: list[float] = field(default_factory=list)
+    @reported
+    def time_between_s(self) -> float | None:
+        """Time of the first less that of the second, in [s]; None if the middle half of the turns disagrees."""
+        first, second = self._turns
+        if not len(first):
+            return None
+        low, high = np.percentile(first - second, (25, 75))
+        between = float(first.min() - second.min())
+        return between if low * between > 0 < high * between else None
 
     @property
-    def version(self) -> Version:
-        """What was found."""
-        least = self.factor * min(self.times) if self.times else None
-        return Version(self.name, self.factor * self.instructions, least, len(self.times), repeatable(self.times))
+    def within_noise(self) -> bool:
+        """Whether both were timed, and the turns do not agree on which takes longer."""
+        return self.time_ratio is not None and self.time_between_s is None
 
-    def named(self, name: str, factor: int = 1) -> Way:
-        """The same under another name, and so many of it."""
-        return replace(self, name=name, factor=factor)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """Two ways, to be measured; attributes as of `ABComparison`."""
-
-    group: str
-    what: str
-    per: str
-    first: Way
-    second: Way
-
-    def alternative(self) -> ABComparison:
-        """What was found."""
-        found = ABComparison(self.group, self.what, self.per, self.first.version, self.second.version)
+    @property
+    def _turns(self) -> np.ndarray:
+        """Times of both in the turns that both had, (2, k)."""
         turns = min(len(self.first.times), len(self.second.times))
-        if not turns:
-            return found
-        first, second = (way.factor * np.array(way.times[:turns]) for way in (self.first, self.second))
-        low, high = np.percentile(first - second, _QUARTILES)
-        narrow, wide = np.percentile(first / second, _QUARTILES)
-        between = float(first.min() - second.min())
-        return replace(
-            found, time_ratio=float(first.min() / second.min()), time_ratio_spread=float(wide - narrow) / 2,
-            time_between_s=between if low * between > 0 < high * between else None,
-        )  # fmt: skip
+        return np.array([self.first.times[:turns], self.second.times[:turns]])
 
 
-def take_turns(pairs: Iterable[Pair], budget: Budget, repeats: int) -> list[str]:
-    """Time all ways so often at most, one after the other, and return which were not timed, with the reason."""
-    runs: dict[int, Timed] = {}  # by the times that ways share
+def take_turns(
+    pairs: Sequence[ABComparison], budget: Budget, repeats: int
+) -> tuple[tuple[ABComparison, ...], list[str]]:
+    """Time all versions at most `repeats` times, one after the other; return them, and which were not timed and why."""
+    runs, left_out = dict[Any, Timed](), list[str]()
     for pair in pairs:
-        for way in (pair.first, pair.second):
-            runs.setdefault(id(way.times), Timed(f"{pair.what}, {way.name}", way.run, way.times))
-    failed = timing.take_turns(runs.values(), repeats, budget)
-    ended = f"the budget of {budget.seconds:g} s ended"
-    untimed = {each.name: ended for each in runs.values() if not each.times and budget.left <= 0}
-    return [f"time of {name}: {why}" for name, why in {**untimed, **failed}.items()]
+        for version in (pair.first, pair.second):
+            if version.run is not None:
+                runs.setdefault(version.run, Timed(f"{pair.what}, {version.name}", version.run))
+    try:
+        failed: dict[str, Any] = dict(timing.take_turns(runs.values(), repeats, budget))
+        if budget.left <= 0:
+            late = f"the budget of {budget.seconds:g} s ended"
+            failed = {timed.name: late for timed in runs.values() if not timed.times} | failed
+        left_out = [f"time of {name}: {why}" for name, why in failed.items()]
+    except KeyboardInterrupt:
+        left_out = [INTERRUPTED]
+
+    def timed(version: Version) -> Version:
+        return replace(version, run=None, times=tuple(runs[version.run].times))
+
+    return tuple(replace(pair, first=timed(pair.first), second=timed(pair.second)) for pair in pairs), left_out

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any, ClassVar, final
 
 from robot_dyn.accuracy.costs import step_cost
-from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Pair, Version, take_turns
+from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Version, take_turns
 from robot_dyn.accuracy.costs.query_cost import QueryCost
 from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.answer import Block, Table
+from robot_dyn.foundations.answer import Block, Table, number_or_dash
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.validate import choice, function, integer, number
@@ -19,13 +18,16 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import format_duration
 from robot_dyn.report.environment import processor_and_versions
-from robot_dyn.report.result import Result
+from robot_dyn.report.result import INTERRUPTED, Result
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.results.acting import acting
 from robot_dyn.simulation.setup.options import setup_of, starts
 from robot_dyn.simulation.setup.setup import Setup
 
 _MOST_REPEATS = 1000
+# Columns of a table: of two versions, and of each of them.
+_OF_BOTH = ("group", "what", "per", "instructions_ratio", "time_ratio", "time_ratio_spread", "time_between_s")
+_OF_ONE = ("name", "instructions", "time_s", "repeats", "repeatable")
 
 
 @final
@@ -41,13 +43,11 @@ class Cost(Result):
         environment: Versions and processor.
         budget_s: That was allowed, in [s].
         spent_s: That was spent, without compiling, in [s].
-        interrupted: Whether it was ended by the user.
     """
 
     diagram: ClassVar[str] = "robot_dyn.accuracy.costs.diagram"
     columns: ClassVar[tuple[str, ...]] = (
-        "group", "what", "per", *(f"{of}_{key}" for of in ("first", "second") for key in Version.__annotations__),
-        "instructions_ratio", "time_ratio", "time_ratio_spread", "time_between_s",
+        *_OF_BOTH[:3], *(f"{of}_{key}" for of in ("first", "second") for key in _OF_ONE), *_OF_BOTH[3:],
     )  # fmt: skip
     robot: str
     acting: tuple[str, ...]
@@ -56,7 +56,6 @@ class Cost(Result):
     environment: dict[str, str]
     budget_s: float
     spent_s: float
-    interrupted: bool = False
 
     def tables(self) -> Iterator[Block]:
         """A line for each alternative, by what they are of."""
@@ -77,27 +76,26 @@ class Cost(Result):
 
     @property
     def rows(self) -> Iterator[Mapping[str, Any]]:
-        for each in self.alternatives:
-            versions = {"first": each.first, "second": each.second}
-            yield {
-                **vars(each), "instructions_ratio": each.instructions_ratio,
-                **{f"{of}_{key}": x for of, version in versions.items() for key, x in vars(version).items()},
-            }  # fmt: skip
+        for pair in self.alternatives:
+            row = {name: getattr(pair, name) for name in _OF_BOTH}
+            for of, version in (("first", pair.first), ("second", pair.second)):
+                row |= {f"{of}_{name}": getattr(version, name) for name in _OF_ONE}
+            yield row
 
     @reported
     def parts(self) -> dict[str, int]:
         """Instructions in a step that each part of the setup adds to the others, by name."""
-        added = {each.what: _added(each) for each in self.alternatives if each.group == "parts"}
-        return {what: count for what, count in added.items() if what != step_cost.EVERYTHING}
+        pairs = (pair for pair in self.alternatives if pair.group == "parts" and pair.what != step_cost.EVERYTHING)
+        return {pair.what: pair.added for pair in pairs}
 
     @property
     def _everything(self) -> ABComparison | None:
-        return next((each for each in self.alternatives if each.what == step_cost.EVERYTHING), None)
+        return next((pair for pair in self.alternatives if pair.what == step_cost.EVERYTHING), None)
 
     @reported
     def shared(self) -> int:
         """Instructions in a step of all parts, less the sum of `parts`: negative where several count the same ones."""
-        return (_added(self._everything) if self._everything else 0) - sum(self.parts.values())
+        return (self._everything.added if self._everything else 0) - sum(self.parts.values())
 
     @reported
     def sentence(self) -> str:
@@ -105,17 +103,12 @@ class Cost(Result):
         if self._everything is None:
             return "no step was counted"
         on, off = self._everything.first, self._everything.second
-        time = "" if on.time_s is None else f", {format_duration(on.time_s)}"
+        time = f", {format_duration(on.time_s)}" if on.times else ""
         counts = {"rigid bodies": off.instructions, **self.parts}
         terms = [f"{name} {count}".replace(" -", " −") for name, count in counts.items()]
         terms += [f"several of these together {self.shared}"] * (self.shared > 0)
         terms += [f"less {-self.shared} that several of these count"] * (self.shared < 0)
         return f"a step of RK4 takes {on.instructions} instructions{time}: {', '.join(terms)}"
-
-
-def _added(part: ABComparison) -> int:
-    """Instructions that a part adds."""
-    return part.first.instructions - part.second.instructions
 
 
 def cost(
@@ -149,9 +142,7 @@ def cost(
     setup = setup_of("cost", what, given)
     integer("repeats", repeats, least=1, most=_MOST_REPEATS)
     budget = Budget(number("budget_s", budget_s, above=0), function("on_progress", on_progress, "(spent, what)"))
-    pairs: list[Pair] = []
-    left_out: list[str] = []
-    interrupted = False
+    pairs, left_out = list[ABComparison](), list[str]()
     try:
         with budget.apart():
             for name, make in _questions(setup):
@@ -160,19 +151,17 @@ def cost(
                     pairs += make()
                 except (ImportError, RobotDynError) as error:
                     left_out.append(f"{name}: {error}")
-        left_out += take_turns(pairs, budget, repeats)
     except KeyboardInterrupt:
-        interrupted = True
-        left_out.append("what was to come when it was interrupted")
-    dynamics: Any = setup.plant.dynamics
+        left_out.append(INTERRUPTED)
+        repeats = 0
+    alternatives, untimed = take_turns(pairs, budget, repeats)
+    name = getattr(setup.plant.dynamics, "name", type(setup.plant.dynamics).__name__)
     return Cost(
-        getattr(dynamics, "name", type(dynamics).__name__), acting(setup),
-        tuple(pair.alternative() for pair in pairs), tuple(left_out), processor_and_versions(), budget.seconds,
-        budget.spent, interrupted,
-    )  # fmt: skip
+        name, acting(setup), alternatives, (*left_out, *untimed), processor_and_versions(), budget.seconds, budget.spent
+    )
 
 
-def _questions(setup: Setup) -> Iterator[tuple[str, Callable[[], list[Pair]]]]:
+def _questions(setup: Setup) -> Iterator[tuple[str, Callable[[], list[ABComparison]]]]:
     """What is compared, by name."""
     yield "parts", lambda: list(step_cost.pairs_of_parts(setup))
     yield step_cost.NUMBERS, lambda: [step_cost.numbers(setup)]
@@ -184,21 +173,15 @@ def _questions(setup: Setup) -> Iterator[tuple[str, Callable[[], list[Pair]]]]:
 
 def cost_rows(result: Cost) -> Iterator[list[str]]:
     """A row for each alternative: per, what, versions, instructions and their ratio, times and theirs."""
-    for k, each in enumerate(result.alternatives):
-        again = k > 0 and result.alternatives[k - 1].per == each.per
-        yield ["" if again else each.per, *_cells(each)]
-
-
-def _cells(each: ABComparison) -> Iterator[str]:
-    first, second = each.first, each.second
-    yield each.what
-    yield f"{first.name} / {second.name}"
-    yield f"{first.instructions} / {second.instructions}"
-    yield f"{each.instructions_ratio:.3g}" if isfinite(each.instructions_ratio) else "—"
-    yield " / ".join(map(_time, (first, second)))
-    noise = ", within noise" * each.within_noise
-    yield "—" if each.time_ratio is None else f"{each.time_ratio:.2f} ± {each.time_ratio_spread:.2f}{noise}"
+    for k, pair in enumerate(result.alternatives):
+        again = k > 0 and result.alternatives[k - 1].per == pair.per
+        first, second, ratio = pair.first, pair.second, "—"
+        if pair.time_ratio is not None:
+            ratio = f"{pair.time_ratio:.2f} ± {pair.time_ratio_spread:.2f}{', within noise' * pair.within_noise}"
+        names, counts = f"{first.name} / {second.name}", f"{first.instructions} / {second.instructions}"
+        fewer, times = number_or_dash(pair.instructions_ratio, 3), f"{_time(first)} / {_time(second)}"
+        yield ["" if again else pair.per, pair.what, names, counts, fewer, times, ratio]
 
 
 def _time(of: Version) -> str:
-    return "—" if of.time_s is None else f"{'~' * (not of.repeatable)}{format_duration(of.time_s)}"
+    return f"{'~' * (not of.repeatable)}{format_duration(of.time_s)}" if of.times else "—"

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from robot_dyn.accuracy.costs.ab_comparison import ABComparison
 from robot_dyn.accuracy.costs.cost import Cost
@@ -40,7 +43,7 @@ def draw(result: Cost, theme: str = "light") -> Figure:
 
 
 def _caption(result: Cost) -> str:
-    versions = [of for each in result.alternatives for of in (each.first, each.second) if of.time_s is not None]
+    versions = [of for each in result.alternatives for of in (each.first, each.second) if of.times]
     hollow = "" if all(each.repeatable for each in versions) else " Hollow: a time that did not repeat to 5 %."
     return (
         f"{result.robot}: {', '.join(result.acting) or 'no effects'}. Times of the processor: the least over turns."
@@ -50,15 +53,15 @@ def _caption(result: Cost) -> str:
 
 def _parts(result: Cost) -> list[tuple[str, int, str]]:
     """What a step is made of: names, instructions, and times as texts."""
-    alternatives = [each for each in result.alternatives if each.group == "parts"]
     rows = []
-    for each in alternatives:
-        on, off = each.first, each.second
-        if each.what == EVERYTHING:
-            rows.append(("rigid bodies", off.instructions, _time(off.time_s)))
-        else:
-            time = ", within noise" if each.within_noise else _time(each.time_between_s)
-            rows.append((each.what, on.instructions - off.instructions, time))
+    for pair in result.alternatives:
+        if pair.group == "parts" and pair.what == EVERYTHING:
+            rows.append(
+                ("rigid bodies", pair.second.instructions, _time(pair.second.time_s if pair.second.times else None))
+            )
+        elif pair.group == "parts":
+            time = ", within noise" if pair.within_noise else _time(pair.time_between_s)
+            rows.append((pair.what, pair.added, time))
     return rows + ([("of several", result.shared, "")] if result.shared else [])
 
 
@@ -68,39 +71,36 @@ def _time(spent: float | None) -> str:
 
 def _draw_parts(axes: Any, parts: list[tuple[str, int, str]], colours: Colours) -> None:
     styled(axes, colours, "instructions", "A step of RK4, by part: with it less without it")
-    whole = sum(count for _, count, _ in parts) or 1
-    places = range(len(parts))
-    axes.barh(places, [count for _, count, _ in parts], 2 * _BAR, color=colours["lines"][0])
-    for place, (_, count, time) in enumerate(parts):
-        said = f" {count} ({100 * count / whole:.1f} %){time}".replace("-", "−")
-        axes.text(max(count, 0), place, said, va="center", fontsize=8, **ink(colours))
-    _named(axes, [name for name, _, _ in parts], colours)
-    axes.set_xlim(min(0, *(count for _, count, _ in parts)), 1.7 * max(count for _, count, _ in parts) or 1)
+    names, counts, times = zip(*parts, strict=True)
+    whole = sum(counts) or 1
+    bars = axes.barh(range(len(parts)), counts, 2 * _BAR, color=colours["lines"][0])
+    said = [f"{n} ({100 * n / whole:.1f} %){time}".replace("-", "−") for n, time in zip(counts, times, strict=True)]
+    axes.bar_label(bars, said, padding=3, fontsize=8, **ink(colours))
+    _named(axes, names, colours)
+    axes.set_xlim(min(0, *counts), 1.7 * max(counts) or 1)
 
 
 def _draw_ratios(axes: Any, others: list[ABComparison], colours: Colours) -> None:
     from matplotlib.ticker import NullFormatter
 
     styled(axes, colours, "ratio, first / second", "Alternatives: instructions in blue, time in orange")
-    ratios = [(each.instructions_ratio, each.time_ratio) for each in others]
-    known = [x for pair in ratios for x in pair if x is not None and 0 < x < float("inf")] or [1.0]
+    ratios = np.array([(pair.instructions_ratio, pair.time_ratio) for pair in others], float)
+    ratios[~(np.isfinite(ratios) & (ratios > 0))] = np.nan
     axes.set_xscale("log")
     axes.set_xticks(_TICKS, [f"{x:g}" for x in _TICKS])
     axes.xaxis.set_minor_formatter(NullFormatter())
     for k, colour in enumerate(colours["lines"][:2]):
-        for place, pair in enumerate(ratios):
-            x, y = pair[k], place + (k - 0.5) * _BAR
-            if x is None or not 0 < x < float("inf"):
-                continue
-            hollow = k and not (others[place].first.repeatable and others[place].second.repeatable)
-            axes.barh(y, x - 1, _BAR, left=1, edgecolor=colour, facecolor="none" if hollow else colour)
-            axes.text(max(x, 1.0), y, f" {x:.2g}", va="center", fontsize=8, **ink(colours))
+        hollow = [k and not (pair.first.repeatable and pair.second.repeatable) for pair in others]
+        faces, places = ["none" if x else colour for x in hollow], np.arange(len(others)) + (k - 0.5) * _BAR
+        bars = axes.barh(places, ratios[:, k] - 1, _BAR, left=1, edgecolor=colour, color=faces)
+        axes.bar_label(bars, [f"{x:.2g}" for x in ratios[:, k]], padding=3, fontsize=8, **ink(colours))
     axes.axvline(1, color=colours["ink"], linewidth=0.9)
-    _named(axes, [f"{each.what}:\n{each.first.name} / {each.second.name}" for each in others], colours)
-    axes.set_xlim(min(0.7, *(x / 1.2 for x in known)), 1.6 * max(2.0, *known))
+    _named(axes, [f"{pair.what}:\n{pair.first.name} / {pair.second.name}" for pair in others], colours)
+    least, most = (np.nanmin(ratios, initial=1.0), np.nanmax(ratios, initial=2.0))
+    axes.set_xlim(min(0.7, least / 1.2), 1.6 * most)
 
 
-def _named(axes: Any, names: list[str], colours: Colours) -> None:
+def _named(axes: Any, names: Sequence[str], colours: Colours) -> None:
     """Rows from above, by name."""
     axes.set_yticks(range(len(names)), [drawable(name) for name in names])
     axes.tick_params(axis="y", length=0)

@@ -7,15 +7,15 @@ full C(q, v) against C(q, v) v;   M = L D Lᵀ against articulated bodies;   C v
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from time import process_time
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
 
-from robot_dyn.accuracy.costs.ab_comparison import Pair, Way
+from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Version
 from robot_dyn.codegen.kernel import Kernel
 from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.program import Program
@@ -60,7 +60,7 @@ class QueryCost:
         programs = [(each, program_of(each)) for each in self._forward.values()]
         return min(programs, key=lambda each: len(each[1]))
 
-    def pairs(self) -> Iterator[tuple[str, Callable[[], Pair]]]:
+    def pairs(self) -> Iterator[tuple[str, Callable[[], ABComparison]]]:
         """What is compared, by name, each made when it is called; QueryError if it cannot be on this arm."""
         for group, what, ways in (
             ("algorithms", "Coriolis matrix", self._coriolis_matrix),
@@ -70,13 +70,13 @@ class QueryCost:
             ("machine code", "right angles of the file", self._right_angles),
             ("machine code", "numbers of forward dynamics", self._floats),
         ):
-            yield what, lambda group=group, what=what, ways=ways: Pair(group, what, PER_STATE, *ways())
+            yield what, lambda group=group, what=what, ways=ways: ABComparison(group, what, PER_STATE, *ways())
 
-    def _coriolis_matrix(self) -> tuple[Way, Way]:
+    def _coriolis_matrix(self) -> tuple[Version, Version]:
         full, alone = (self._quantity(name) for name in ("C", "coriolis_torque"))
         return self._way("full C", full), self._way("C v alone", alone)
 
-    def _forward_dynamics(self) -> tuple[Way, Way]:
+    def _forward_dynamics(self) -> tuple[Version, Version]:
         for name, why in _WITHOUT.items():
             if name not in self._forward:
                 raise QueryError(why)
@@ -90,27 +90,30 @@ class QueryCost:
         function, zero = self._best[0], ca.DM.zeros(self.given.n)
         return ca.Function("f", [q, v, tau], [ca.cse(ca.densify(function(q, zero, tau)))])
 
-    def _coriolis_torque(self) -> tuple[Way, Way]:
+    def _coriolis_torque(self) -> tuple[Version, Version]:
         return self._way("on", self._best[1]), self._way("off", program_of(self.at_rest))
 
-    def _derivatives(self) -> tuple[Way, Way]:
+    def _derivatives(self) -> tuple[Version, Version]:
         n, evaluations = self.given.n, 6 * self.given.n
-        differences = self._way("", self._best[1]).named(f"differences, {evaluations} evaluations", evaluations)
+        once = self._way(f"differences, {evaluations} evaluations", self._best[1])
+        run: Any = once.run
+        count = evaluations * once.instructions
+        differences = replace(once, instructions=count, run=lambda: evaluations * run())
         return differences, self._way("exact", self._quantity(_DERIVATIVES), (3, n, n))
 
-    def _right_angles(self) -> tuple[Way, Way]:
+    def _right_angles(self) -> tuple[Version, Version]:
         if not completed(self.given)[1]:
             raise QueryError("the file states none with too few digits, so nothing is written out")
         stated = program_of(Trace(self.given).quantity(_FORWARD).function)
         return self._way("as stated", stated), self._way("written out", self._best[1])
 
-    def _floats(self) -> tuple[Way, Way]:
+    def _floats(self) -> tuple[Version, Version]:
         return self._way("float64", self._best[1]), self._way("float32", self._best[1], dtype="float32")
 
     def _quantity(self, name: str) -> Program:
         return program_of(self._trace.quantity(name).function)
 
-    def _way(self, name: str, program: Program, shape: tuple[int, ...] = (), dtype: str = "float64") -> Way:
+    def _way(self, name: str, program: Program, shape: tuple[int, ...] = (), dtype: str = "float64") -> Version:
         """The time per state of a program."""
         outputs = shape or (len(program.outputs),)
         kernel = Kernel(program, outputs, dtype, store=default_store(), about=f"{self.given.name}: {name}, {dtype}")
@@ -125,7 +128,7 @@ class QueryCost:
                 raise RobotDynError("its results at random states are doubtful")
             return seconds(lambda: kernel.many(inputs, y), _LEAST_S, process_time) / STATES
 
-        return Way(name, len(program), run)
+        return Version(name, len(program), run)
 
 
 _WITHOUT = {  # formulations of forward dynamics, with why an arm has none

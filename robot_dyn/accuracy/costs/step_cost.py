@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from time import process_time
 from typing import Any
 
 import numpy as np
 
-from robot_dyn.accuracy.costs.ab_comparison import Pair, Way
+from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Version
 from robot_dyn.codegen.parameters import names_of
 from robot_dyn.control.digital_loop.loop import Loop
 from robot_dyn.effects.plant import Plant
@@ -38,6 +39,7 @@ RUNS = 4096  # side by side
 PER_STEP, PER_RUN = "step of RK4", "step of RK4 and run"
 EVERYTHING, NUMBERS, SIDE_BY_SIDE = "everything", "numbers of the setup", "runs"
 _EVALUATIONS = 4  # of RK4, in a step
+_IN_LANES = partial(machine_code, extras=())
 _STEP_S, _STEPS, _STEPS_OF_MANY = 1e-7, 4000, 25
 
 
@@ -85,28 +87,33 @@ def bare(setup: Setup) -> Setup:
     return setup
 
 
-def pairs_of_parts(setup: Setup) -> Iterator[Pair]:
+def pairs_of_parts(setup: Setup) -> Iterator[ABComparison]:
     """A step with everything on and off, then with each part off.
 
     Raises:
         TraceError: If a part cannot be compiled; names it.
     """
-    whole = one_run(setup)
-    yield Pair("parts", EVERYTHING, PER_STEP, whole.named("on"), one_run(bare(setup)).named("off"))
-    for name, without in parts(setup):
-        yield Pair("parts", name, PER_STEP, whole.named("on"), one_run(without).named("off"))
+    whole = one_run("on", setup)
+    for name, without in ((EVERYTHING, bare(setup)), *parts(setup)):
+        yield ABComparison("parts", name, PER_STEP, whole, one_run("off", without))
 
 
-def numbers(setup: Setup) -> Pair:
+def numbers(setup: Setup) -> ABComparison:
     """Numbers as inputs of machine code, and as constants."""
-    constants = one_run(setup, machine_code_of_constants)
-    return Pair("machine code", NUMBERS, PER_STEP, one_run(setup).named("inputs"), constants.named("constants"))
+    constants = one_run("constants", setup, machine_code_of_constants)
+    return ABComparison("machine code", NUMBERS, PER_STEP, one_run("inputs", setup), constants)
 
 
-def side_by_side(setup: Setup) -> Pair:
+def side_by_side(setup: Setup) -> ABComparison:
     """One run, and many of them side by side on one thread."""
+    many = many_runs(f"{RUNS} side by side", setup)
+    return ABComparison("machine code", SIDE_BY_SIDE, PER_RUN, one_run("one", setup), many)
+
+
+def many_runs(name: str, setup: Setup, translate: Callable[..., MachineCode] = _IN_LANES) -> Version:
+    """A step and run of many side by side."""
     short = _short(setup, _STEPS_OF_MANY)
-    made = machine_code(_equation(short), short.integrator, lanes=LANES, extras=())
+    made = translate(_equation(short), short.integrator, lanes=LANES)
     starts = np.tile(short.q0, (RUNS, 1)), np.tile(short.v0, (RUNS, 1))
 
     def run() -> float:
@@ -115,11 +122,10 @@ def side_by_side(setup: Setup) -> Pair:
         batch.run(1)
         return (process_time() - began) / (RUNS * short.steps)
 
-    several = Way(f"{RUNS} side by side", instructions(made), run)
-    return Pair("machine code", SIDE_BY_SIDE, PER_RUN, one_run(setup).named("one"), several)
+    return Version(name, instructions(made), run)
 
 
-def one_run(setup: Setup, translate: Callable[..., MachineCode] = machine_code) -> Way:
+def one_run(name: str, setup: Setup, translate: Callable[..., MachineCode] = machine_code) -> Version:
     """A step of one run."""
     short = _short(setup, _STEPS)
     made = translate(_equation(short), short.integrator)
@@ -136,7 +142,7 @@ def one_run(setup: Setup, translate: Callable[..., MachineCode] = machine_code) 
             raise RobotDynError(f"a run of {short.duration_s:g} s from the start ends early: {record.outcome.advice}")
         return spent / short.steps
 
-    return Way("", instructions(made), run)
+    return Version(name, instructions(made), run)
 
 
 def instructions(made: MachineCode) -> int:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import INTERPRETED, Point, ToleranceLadder
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import INTERPRETED, ToleranceLadder
 from robot_dyn.accuracy.work_precision_diagram.work_precision import WorkPrecision, program_of
 from robot_dyn.report.figure import Colours, ResultError, key, legend, programs, sheet, styled
 
@@ -27,6 +27,10 @@ _MOST_ERROR = 3.0  # [rad] or [m]; larger errors are meaningless and not drawn
 _MOST_METHODS, _SIX_DIGITS = 8, 1e-6  # in one panel; [rad] or [m]
 _WIDTH, _HEIGHT = 13.0, 8.0  # [inch]
 _DASHED = (0, (6, 3))  # of a line
+_LABELS = {  # of axes, by attribute of a point
+    "time_s": "time of the run [s]", "evaluations": "evaluations of the equation of motion", "steps": "steps",
+    "error": "error of q", "energy": "residual",
+}  # fmt: skip
 
 
 def draw(result: WorkPrecision, theme: str = "light") -> Figure:
@@ -37,34 +41,25 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     """
     if not any(np.isfinite(p.error) for ladder in result.ladders for p in ladder.points):
         raise ResultError("no run ended, so there is nothing to draw; look at left_out")
-    figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, _caption(result), theme)
+    versions = programs(result.environment, "scipy", "mujoco", "drake", "heyoka")
+    caption = "\n".join([*result.basis, versions])
+    figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, caption, theme)
     grid = figure.add_gridspec(3, 2, width_ratios=(2.1, 1))
     first = [ladder for ladder in result.ladders if ladder.peer or (ladder.events and ladder.engine != INTERPRETED)]
     first = most_precise(first if any(not ladder.peer for ladder in first) else list(result.ladders))
     ours = [ladder for ladder in first if not ladder.peer]
     slow = [ladder for ladder in result.ladders if ladder.engine == INTERPRETED and ladder not in first]
     names = {ladder.method for ladder in first}
-    without = [each for each in result.ladders if not each.events and not each.peer and each.method in names]
-    both = first + without
-    main = _panel(figure, grid[:, 0], result, colours, "time of the run [ms]", "Error over time: lower left is better")
+    without = [x for x in result.ladders if not x.events and not x.peer and x.method in names]
+    panel = partial(_panel, figure, result, colours)
+    main = panel(grid[:, 0], first + without, "time_s", "Error over time: lower left is better", size=1.0)
     _front(main, result, colours)
-    _curves(main, both, colours, _ms, _error, 1.0)
-    times = [_ms(p) for ladder in both for p in _shown(ladder)]
-    main.set_xlim(min(times) / 1.5, max(times) * 1.5)
-    x, title = "evaluations of the equation of motion", "Error over evaluations"
-    evaluations = _panel(figure, grid[0, 1], result, colours, x, title)
-    counted = [ladder for ladder in both if any(p.evaluations for p in ladder.points)]
-    _curves(evaluations, counted, colours, lambda p: p.evaluations, _error)
-    title = "Energy residual, as a part of what was exchanged"
-    energy = _panel(figure, grid[1, 1], result, colours, "error of q", title)
-    _curves(energy, ours, colours, _error, lambda p: p.energy)
-    energy.set(ylabel="residual", xlim=(_MOST_ERROR, result.reference.error / 3))
-    x, title = ("time [ms]", "Error over time, interpreted [ms]") if slow else ("steps", "Error over steps")
-    other = _panel(figure, grid[2, 1], result, colours, x, title)
-    _curves(other, slow or ours, colours, _ms if slow else _steps, _error)
-    for axes in (main, evaluations, other):
-        axes.set_ylim(result.reference.error / 10, _MOST_ERROR)
-        _believed(axes, result, colours)
+    panel(grid[0, 1], first + without, "evaluations", "Error over evaluations")
+    panel(grid[1, 1], ours, "error", "Energy residual, as a part of what was exchanged", "energy")
+    if slow:
+        panel(grid[2, 1], slow, "time_s", "Error over time, interpreted")
+    else:
+        panel(grid[2, 1], ours, "steps", "Error over steps")
     _legend(figure, first, without, colours)
     return figure.figure
 
@@ -82,62 +77,44 @@ def most_precise(ladders: list[ToleranceLadder]) -> list[ToleranceLadder]:
     return [ladder for ladder in ladders if ladder in chosen]
 
 
-def _ms(p: Point) -> float:
-    return 1e3 * p.time_s
+def _panel(
+    figure: Any, result: WorkPrecision, colours: Colours, cell: Any, ladders: list[ToleranceLadder], x: str, title: str,
+    y: str = "error", size: float = 0.6,
+) -> Any:  # fmt: skip
+    """Draw two quantities of the runs of ladders over each other, on logarithmic scales.
 
-
-def _error(p: Point) -> float:
-    return p.error
-
-
-def _steps(p: Point) -> float:
-    return float(p.steps or np.nan)
-
-
-def _caption(result: WorkPrecision) -> str:
-    """The runs, and the reference for their errors."""
-    of = result.reference
-    cut = f" of {result.duration_s:g} s, where its references part" if of.parted_s is not None else ""
-    return (
-        f"{result.robot}: {', '.join(result.acting) or 'no effects'}; {of.horizon_s:g} s{cut}.  Error: largest"
-        f" |q − q_ref| over joints and {of.records} records, in {result.unit}.\n"
-        f"Reference: {of.methods[0]}, {of.error:.0e} {result.unit} from {of.methods[1]}: no error below that is"
-        f" believed.  {programs(result.environment, 'scipy', 'mujoco', 'drake', 'heyoka')}."
-    )
-
-
-def _shown(ladder: ToleranceLadder) -> list[Point]:
-    return [p for p in ladder.points if p.error < _MOST_ERROR]
-
-
-def _panel(figure: Any, cell: Any, result: WorkPrecision, colours: Colours, x: str, title: str) -> Any:
-    """Axes with logarithmic scales."""
+    Errors have a line at that of the reference, with the range below it shaded.
+    """
     from matplotlib.ticker import NullFormatter
 
-    axes: Any = figure.add_subplot(cell)
+    axes, floor = figure.add_subplot(cell), result.reference.error
     axes.set(xscale="log", yscale="log")
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.yaxis.set_minor_formatter(NullFormatter())
-    styled(axes, colours, x, title, f"error of q [{result.unit}]")
+    styled(axes, colours, _LABELS[x], title, f"{_LABELS[y]} [{result.unit}]" if y == "error" else _LABELS[y])
+    for ladder in ladders:
+        _curve(axes, ladder, colours, x, y, size)
+    if y == "error":
+        axes.set_ylim(floor / 10, _MOST_ERROR)
+        axes.axhline(floor, color=colours["ink"], linestyle=_DASHED, linewidth=0.9)
+        axes.axhspan(floor / 10, floor, color=colours["veil"], zorder=0.5)
+    else:
+        axes.set_xlim(_MOST_ERROR, floor / 3)
     return axes
 
 
-def _curves(
-    axes: Any, ladders: list[ToleranceLadder], colours: Colours, x: Callable[[Point], Any],
-    y: Callable[[Point], float], size: float = 0.6,
-) -> None:  # fmt: skip
-    """Draw the runs of ladders, with hollow markers for those without a believed error or a repeatable time."""
-    for ladder in ladders:
-        colour, marker = _look(ladder, colours)
-        points = [p for p in _shown(ladder) if y(p) > 0]
-        style = "--" if ladder.peer else "-" if ladder.events else ":"
-        bold = 1.9 if ladder.method in ("DOP853", "Rosenbrock") else 1.1
-        axes.plot([x(p) for p in points], [y(p) for p in points], style, color=colour, linewidth=size * bold)
-        for measured, face in ((True, colour), (False, colours["paper"])):
-            marked = [p for p in points if (p.believed and p.repeatable) is measured]
-            shape = {"marker": marker, "s": 30 * size**2, "color": colour, "zorder": 3, "linewidths": 0.9}
-            faced = {} if marker in "x+1" else {"facecolors": face}
-            axes.scatter([x(p) for p in marked], [y(p) for p in marked], **shape, **faced)
+def _curve(axes: Any, ladder: ToleranceLadder, colours: Colours, x: str, y: str, size: float) -> None:
+    """Draw the runs of a ladder, with hollow markers for those without a believed error or a repeatable time."""
+    colour, marker = _look(ladder, colours)
+    points = [p for p in ladder.points if p.error < _MOST_ERROR and getattr(p, x) and getattr(p, y) > 0]
+    places = np.array([(getattr(p, x), getattr(p, y)) for p in points]).reshape(-1, 2)
+    style = "--" if ladder.peer else "-" if ladder.events else ":"
+    bold = 1.9 if ladder.method in ("DOP853", "Rosenbrock") else 1.1
+    axes.plot(*places.T, style, color=colour, linewidth=size * bold)
+    filled = np.array([p.believed and p.repeatable for p in points], bool)
+    for some, face in ((places[filled], colour), (places[~filled], colours["paper"])):
+        faced = {} if marker in "x+1" else {"facecolors": face}
+        axes.scatter(*some.T, s=30 * size**2, marker=marker, color=colour, zorder=3, linewidths=0.9, **faced)
 
 
 def _look(ladder: ToleranceLadder, colours: Colours) -> tuple[str, str]:
@@ -148,17 +125,10 @@ def _look(ladder: ToleranceLadder, colours: Colours) -> tuple[str, str]:
 
 
 def _front(axes: Any, result: WorkPrecision, colours: Colours) -> None:
-    front = [(1e3 * p.time_s, p.error) for _, p in result.front if p.error < _MOST_ERROR]
+    front = [(p.time_s, p.error) for _, p in result.front if p.error < _MOST_ERROR]
     if front:
         x, y = zip(*front, strict=True)
         axes.plot(x, y, color=colours["grid"], linewidth=9, solid_capstyle="round", solid_joinstyle="round", zorder=0.8)
-
-
-def _believed(axes: Any, result: WorkPrecision, colours: Colours) -> None:
-    """Draw the error of the reference as a line, and shade the range below it."""
-    error = result.reference.error
-    axes.axhline(error, color=colours["ink"], linestyle=_DASHED, linewidth=0.9)
-    axes.axhspan(axes.get_ylim()[0], error, color=colours["veil"], zorder=0.5)
 
 
 def _legend(figure: Any, first: list[ToleranceLadder], without: list[ToleranceLadder], colours: Colours) -> None:

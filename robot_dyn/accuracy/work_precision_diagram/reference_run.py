@@ -1,32 +1,48 @@
-"""The reference of a diagram: two runs by methods of different kind, tighter than all others.
+"""What errors are measured against: two runs by methods of different kind, tighter than all others.
 
-Their distance is the error of the reference. Where they part, as in chaotic motion, the horizon is cut.
+Their distance is the error of the reference. Where they part, as in chaotic motion, the horizon is cut. Beyond it
+energy judges, and the way back:
+
+    |q − q₀|   of a run to the end and, with its velocity turned round, back to the start
+
+A motion that is not driven and loses no energy returns to its start. Rounding grows on the way as
+the errors of the method do: a method with smaller errors returns nearer to it, until only rounding is left. [Hairer,
+Lubich, Wanner, Geometric Numerical Integration, 2nd ed., 2006, V.1]
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import final
+from math import isfinite
+from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
+    COMPILED,
+    INTERPRETED,
     Run,
+    ToleranceLadder,
+    at_setting,
     common,
     recorded,
     step_ladder,
     timed,
     warmed,
 )
-from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import COMPILED, INTERPRETED
+from robot_dyn.effects.effect import Conservative
 from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.methods import method
-from robot_dyn.report.time_budget import Budget, Limit, OvertimeError
+from robot_dyn.report.time_budget import Budget, OvertimeError
+from robot_dyn.simulation.results.trajectory import Trajectory
+from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import Setup
+from robot_dyn.simulation.simulate import simulate
 
 _PARTED = 1e-9  # of the positions: where references differ by more, nothing finer can be shown
 _COARSE = 1e-6  # the same where the second one could not be refined until only rounding is left
@@ -41,6 +57,7 @@ _ULPS = 4.0  # of rounding in any position
 _FIRST = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-12, 1e-14))
 _SECOND = ("gauss_6", "rosenbrock_5")
 _SHARE, _LEAST_S = 0.08, 0.5  # of the budget, for one run; and at least, in [s]
+_PART = 0.02  # of the budget, for one run
 
 
 class HorizonError(RobotDynError):
@@ -85,7 +102,7 @@ class Reference(Value):
 
 
 def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
-    """The setup up to the horizon, and its reference.
+    """Return the setup up to the horizon, and its reference.
 
     Raises:
         HorizonError: If there is none.
@@ -95,13 +112,13 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
     while True:
         setup = recorded(setup, setup.duration_s)
         first, run, q = _first(setup, budget)
+        size = max(1.0, float(np.abs(q).max()))
         if parted is None:
-            parted, lost = _rough_ends(setup, run, q, budget)
+            parted, lost = _rough_ends(setup, run, q, size, budget)
             if parted is not None:
                 setup = replace(setup, duration_s=parted, record_period_s=0.0)
                 continue
         other = _second(setup, run, q, budget)
-        size = max(1.0, float(np.abs(q).max()))
         end = _passes(other.t, other.distance, size * (_PARTED if other.refined else _COARSE))
         if end is None:
             error = max(float(other.distance.max()), _ULPS * np.finfo(float).eps * size)
@@ -117,33 +134,36 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
 
 def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
     """Words for the tightest run that ends in time, its records and its positions there."""
-    for each in _FIRST:
-        description = f"{each.name}, rtol {each.rtol:g}"
+    for tight in _FIRST:
+        description = f"{tight.name}, rtol {tight.rtol:g}"
         budget.report(f"reference: {description}")
-        try:
-            with budget.apart():
-                warmed(replace(setup, integrator=each))
-            run = timed(replace(setup, integrator=each), Limit(_longest(budget)))
-        except OvertimeError:
-            continue
-        if run.q is not None:
+        run = _in_time(replace(setup, integrator=tight), budget)
+        if run is not None and run.q is not None:
             return description, run.t, run.q
     raise HorizonError(
-        f"no run of {setup.duration_s:g} s ends by {' or '.join(each.name for each in _FIRST)} at tight tolerances:"
+        f"no run of {setup.duration_s:g} s ends by {' or '.join(tight.name for tight in _FIRST)} at tight tolerances:"
         " take a shorter run, a larger budget, or look at rd.simulate(…).summary"
     )
 
 
-def _rough_ends(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> tuple[float | None, float | None]:
+def _rough_ends(
+    setup: Setup, t: np.ndarray, q: np.ndarray, size: float, budget: Budget
+) -> tuple[float | None, float | None]:
     """When a run with a looser tolerance parts from the first one, and when nothing is left; None if it does not."""
-    try:
-        run = timed(replace(setup, integrator=Adaptive("DOP853", _ROUGH, _ROUGH)), Limit(_longest(budget)))
-    except OvertimeError:
-        return None, None
-    if run.q is None:
+    run = _in_time(replace(setup, integrator=Adaptive("DOP853", _ROUGH, _ROUGH)), budget)
+    if run is None or run.q is None:
         return None, None
     times, distance = _distance(t, q, run)
-    return _passes(times, distance, _ROUGHLY * max(1.0, float(np.abs(q).max()))), _passes(times, distance, _LOST)
+    return _passes(times, distance, _ROUGHLY * size), _passes(times, distance, _LOST)
+
+
+def _in_time(setup: Setup, budget: Budget) -> Run | None:
+    """Run a setup; None if it takes too long."""
+    with budget.apart():
+        warmed(setup)
+    with suppress(OvertimeError):
+        return timed(setup, Budget(_longest(budget)).check)
+    return None
 
 
 def _longest(budget: Budget) -> float:
@@ -179,19 +199,14 @@ def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> _Othe
 def _refined(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> Iterator[_Other]:
     """Runs with ever shorter steps, until these win nothing or take too long."""
     before, limit, late = np.inf, _longest(budget), 0
-    with budget.apart():
-        warmed(setup)
     for step in step_ladder(setup.record_period_s, 1):
         words = f"{setup.integrator.name}, step {step:.3g} s"
         budget.report(f"reference: {words}")
-        try:
-            run = timed(replace(setup, step_s=step), Limit(limit))
-        except OvertimeError:
-            late += 1
-            if late == _LATE:
-                return
-            continue  # steps that are too long may bring forth a motion that takes longer
-        if run.q is not None:
+        run = _in_time(replace(setup, step_s=step), budget)
+        late += run is None  # steps that are too long may bring forth a motion that takes longer
+        if late == _LATE:
+            return
+        if run is not None and run.q is not None:
             times, distance = _distance(t, q, run)
             size = float(np.log10(np.maximum(distance[1:], 1e-17)).mean())
             orderly = distance[1] < _ORDERLY
@@ -216,3 +231,68 @@ def _passes(t: np.ndarray, distance: np.ndarray, level: float) -> float | None:
         return None
     both = [int(above[0]) - 1, int(above[0])]
     return float(np.interp(np.log(level), np.log(np.maximum(distance[both], 1e-17)), t[both]))
+
+
+@final
+@dataclass(frozen=True)
+class PastHorizon:
+    """The finest run of a method over the whole requested time.
+
+    Attributes:
+        name: Of the method.
+        setting: Step, in [s], or relative tolerance.
+        energy: Largest residual of the energy ledger, as a part of the energy exchanged.
+        returned: Distance from the start of the run there and back, in [rad] or [m]; None if it does not return, or
+            the motion is driven or loses energy.
+    """
+
+    name: str
+    setting: float
+    energy: float
+    returned: float | None
+
+
+def past_horizon(
+    setup: Setup, horizon_s: float, ladders: Iterable[ToleranceLadder], integrators: Mapping[str, Any], budget: Budget
+) -> tuple[PastHorizon, ...]:
+    """Return energy and distance of return of each method past the horizon.
+
+    Args:
+        setup: Of the whole time.
+        horizon_s: Up to which errors were measured.
+        ladders: What was measured; the first one of each method counts.
+        integrators: The methods, by name.
+        budget: Of which a run may take a fiftieth.
+    """
+    found: dict[str, PastHorizon] = {}
+    longest, setup = _PART * budget.seconds, recorded(setup, setup.duration_s)
+    for ladder in ladders:
+        in_time = [p for p in ladder.points if isfinite(p.error) and p.time_s * setup.duration_s / horizon_s < longest]
+        if ladder.peer or not ladder.events or ladder.method in found or not in_time:
+            continue
+        budget.report(f"beyond the horizon: {ladder.name}")
+        with suppress(OvertimeError, RobotDynError):
+            setting = in_time[-1].setting
+            finest = replace(setup, integrator=integrators[ladder.method], engine=ladder.engine)
+            found[ladder.method] = PastHorizon(
+                ladder.method, setting, *_there_and_back(at_setting(finest, setting), longest)
+            )
+    return tuple(found.values())
+
+
+def _there_and_back(setup: Setup, longest: float) -> tuple[float, float | None]:
+    """Energy and distance of return."""
+    there, returned = _run(setup, longest), None
+    if setup.controller is None and all(isinstance(effect, Conservative) for effect in setup.plant.effects):
+        back = _run(replace(setup, q0=there.q[-1], v0=-there.v[-1]), longest)
+        returned = float(np.abs(back.q[-1] - setup.q0).max())
+    return there.ledger.closure, returned
+
+
+def _run(setup: Setup, longest: float) -> Trajectory:
+    run = simulate(setup, on_progress=Budget(longest).check)
+    if run.outcome.ending is Ending.STOPPED:
+        raise KeyboardInterrupt
+    if run.outcome.ending is not Ending.FINISHED:
+        raise RobotDynError(run.outcome.advice)
+    return run

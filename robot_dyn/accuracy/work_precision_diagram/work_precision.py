@@ -11,19 +11,21 @@ from math import floor, isfinite, log10
 from typing import Any, ClassVar, final
 
 from robot_dyn.accuracy.work_precision_diagram.measurement import measure
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import own, recorded, switches, whole
-from robot_dyn.accuracy.work_precision_diagram.past_horizon import PastHorizon, past_horizon
-from robot_dyn.accuracy.work_precision_diagram.peers import found
-from robot_dyn.accuracy.work_precision_diagram.reference_run import Reference, reference
-from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import (
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
     COMPILED,
     INTERPRETED,
     Point,
     Price,
     ToleranceLadder,
+    own,
+    recorded,
+    switches,
+    whole,
 )
+from robot_dyn.accuracy.work_precision_diagram.peers import found
+from robot_dyn.accuracy.work_precision_diagram.reference_run import PastHorizon, Reference, past_horizon, reference
 from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.answer import Block, Table
+from robot_dyn.foundations.answer import Block, Table, number_or_dash
 from robot_dyn.foundations.errors import QueryError, RobotDynError
 from robot_dyn.foundations.result import reported
 from robot_dyn.foundations.validate import function, instance, integer, number, truth
@@ -32,7 +34,7 @@ from robot_dyn.integrate.methods import METHODS, as_method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import format_duration, joint_units
 from robot_dyn.report.environment import processor_and_versions
-from robot_dyn.report.result import Result
+from robot_dyn.report.result import INTERRUPTED, Result
 from robot_dyn.report.time_budget import Budget
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.results.acting import acting
@@ -65,7 +67,6 @@ class WorkPrecision(Result):
         environment: Versions and processor.
         budget_s: That was allowed, in [s].
         spent_s: That was spent, without compiling, in [s].
-        interrupted: Whether it was ended by the user.
         past_horizon: Of chaotic motion, energy and the way back over all of the duration, by method; else nothing.
     """
 
@@ -84,11 +85,11 @@ class WorkPrecision(Result):
     environment: dict[str, str]
     budget_s: float
     spent_s: float
-    interrupted: bool = False
     past_horizon: tuple[PastHorizon, ...] = ()
 
-    def tables(self) -> Iterator[Block]:
-        """What it rests on, and a line for each method."""
+    @property
+    def basis(self) -> Iterator[str]:
+        """What acts, what errors are measured against, and where the horizon is cut, a line each."""
         of = self.reference
         yield f"{self.robot}: {', '.join(self.acting) or 'no effects'}"
         yield (
@@ -101,12 +102,44 @@ class WorkPrecision(Result):
                 f"horizon: {of.horizon_s:g} s of {self.duration_s:g} s: beyond it runs at tight tolerances part from"
                 f" each other{lost}"
             )
-        columns = [digits for digits in _DIGITS if 10.0**-digits >= of.error]
-        headings = ("method", "order", "measured", *(f"{digits} digits" for digits in columns), "least error", "in")
-        yield Table(headings, tuple(map(tuple, _ladder_rows(self, columns))), right=headings[1:])
+
+    def tables(self) -> Iterator[Block]:
+        """What it rests on, and a line for each method."""
+        yield from self.basis
+        yield self._table_of_ladders([digits for digits in _DIGITS if 10.0**-digits >= self.reference.error])
         yield "times of prepared runs, the least of runs that take turns; * the least; ( ) extrapolated by the order"
         if self.past_horizon:
-            yield from _beyond_horizon(self)
+            yield from self._beyond_horizon()
+
+    def _table_of_ladders(self, columns: list[int]) -> Table:
+        """A row for each method: orders, what so many digits cost, and the finest run."""
+        headings = ("method", "order", "measured", *(f"{digits} digits" for digits in columns), "least error", "in")
+        best = {digits: min((p.value for _, p in self.digits(10.0**-digits)), default=0.0) for digits in columns}
+        rows = []
+        for ladder in self.ladders:
+            cells = []
+            for digits in columns:
+                price = ladder.price(10.0**-digits)
+                shown = "—" if price is None else f"({price})" if price.extrapolated else str(price)
+                cells.append(shown + " *" * (price is not None and price.value == best[digits]))
+            finest = min(ladder.points, key=lambda point: point.error)
+            known = finest.error > self.reference.error
+            error = number_or_dash(finest.error, 2) if known else f"< {self.reference.error:.0e}"
+            orders = ["—" if order is None else f"{order:.2g}" for order in (ladder.order, ladder.measured_order)]
+            rows.append((ladder.name, *orders, *cells, error, format_duration(finest.time_s)))
+        return Table(headings, tuple(rows), right=headings[1:])
+
+    def _beyond_horizon(self) -> Iterator[Block]:
+        """Energy and the way back where no error can be measured, a line for each method."""
+        yield ""
+        yield f"over all of {self.duration_s:g} s, where no error can be measured, the finest runs:"
+        headings, rows = ("method", "setting", "energy", "there and back"), []
+        for run in self.past_horizon:
+            back = "—" if run.returned is None else f"{run.returned:.1e}"
+            rows.append((run.name, f"{run.setting:.3g}", f"{run.energy:.1e}", back))
+        yield Table(headings, tuple(rows), right=headings[1:])
+        yield "energy: largest residual, as a part of the energy exchanged; there and back: |q − q₀|"
+        yield f"in {self.unit} of a run that turns round at the end, where nothing drives it or takes energy"
 
     @property
     def front(self) -> tuple[tuple[ToleranceLadder, Point], ...]:
@@ -124,9 +157,14 @@ class WorkPrecision(Result):
     @reported
     def rows(self) -> list[Mapping[str, Any]]:
         """The runs, one after the other: what their ladder is, what was measured, and whether no other one beats it."""
-        front = {id(point) for _, point in self.front}
-        known = [vars(each) | vars(p) | {"on_front": id(p) in front} for each in self.ladders for p in each.points]
-        return [{key: run[key] for key in self.columns} for run in known]
+        front = [point for _, point in self.front]
+        return [
+            {name: getattr(ladder, name) for name in self.columns[:4]}
+            | {name: getattr(point, name) for name in self.columns[4:-1]}
+            | {"on_front": any(point is best for best in front)}
+            for ladder in self.ladders
+            for point in ladder.points
+        ]
 
     def digits(self, error: float) -> list[tuple[ToleranceLadder, Price]]:
         """Return what an error costs in time by each method whose runs show it, the cheapest first.
@@ -148,7 +186,7 @@ class WorkPrecision(Result):
         return self.sentence_of(min(_USUAL_DIGITS, floor(-log10(max(best, self.reference.error)))))
 
     def sentence_of(self, digits: int) -> str:
-        """What so many digits cost, in a sentence.
+        """Return what so many digits cost, in a sentence.
 
         Args:
             digits: Errors of at most 10^−digits.
@@ -171,9 +209,7 @@ class WorkPrecision(Result):
                 named.setdefault(program_of(ladder) if ladder.peer else ladder.name, (ladder.name, price))
         enough = sum(not price.extrapolated for _, price in named.values()) >= _ENOUGH
         parts = [
-            f"{name} would take {format_duration(price.value)} (extrapolated)"
-            if price.extrapolated
-            else f"{name} {format_duration(price.value)}"
+            f"{name} would take {price} (extrapolated)" if price.extrapolated else f"{name} {price}"
             for name, price in named.values()
             if not (enough and price.extrapolated)
         ]
@@ -217,8 +253,7 @@ def work_precision(
     given = {"duration_s": duration_s, "controller": controller}
     setup = setup_of("work_precision", what, starts(q0, v0) | {k: x for k, x in given.items() if x is not None})
     if methods is None:
-        methods = sorted(METHODS, key=lambda name: _FIRST.index(name) if name in _FIRST else len(_FIRST))
-        methods.remove(AUTO)
+        methods = [*_FIRST, *(name for name in METHODS if name not in (*_FIRST, AUTO))]
     instance("methods", methods, tuple | list, "give a list of names or methods, such as ['DOP853', 'rk4']")
     integrators = [as_method(each) for k, each in enumerate(methods) if each not in methods[:k]]
     if any(each.name == AUTO for each in integrators):
@@ -236,17 +271,15 @@ def work_precision(
         others, refused = found(setup) if peers else ([], [])
     place = len(integrators)  # programs in machine code come before what is interpreted, which takes longest
     candidates[place:place] = others
-    walks, interrupted = measure(candidates, exact, budget, repeats)
-    ladders = tuple(walk.ladder(exact.error) for walk in walks if walk.rungs)
-    left_out += unable + refused + [f"{walk.method.name}: {walk.ended}" for walk in walks if not walk.rungs]
-    left_out += ["what was to come when it was interrupted"] * interrupted
-    cut = exact.parted_s is not None and not interrupted
+    ladders, ended = measure(candidates, exact, budget, repeats)
+    left_out += unable + refused + ended
+    cut = exact.parted_s is not None and INTERRUPTED not in ended
     later = past_horizon(everything, exact.horizon_s, ladders, {x.name: x for x in integrators}, budget) if cut else ()
     dynamics: Any = setup.plant.dynamics
     types = getattr(dynamics, "joint_types", (None,))
     return WorkPrecision(
         getattr(dynamics, "name", type(dynamics).__name__), acting(setup), joint_units("q", types), requested, exact,
-        ladders, tuple(left_out), processor_and_versions(), budget.seconds, budget.spent, interrupted, later,
+        ladders, tuple(left_out), processor_and_versions(), budget.seconds, budget.spent, later,
     )  # fmt: skip
 
 
@@ -273,60 +306,26 @@ def _able(setup: Setup, integrators: list[Any]) -> tuple[list[Any], list[str]]:
     return able, why
 
 
-def _ladder_rows(result: WorkPrecision, columns: list[int]) -> Iterator[list[str]]:
-    """A row for each method: orders, what so many digits cost, and the finest run."""
-    floor = result.reference.error
-    best = {digits: min((p.value for _, p in result.digits(10.0**-digits)), default=0.0) for digits in columns}
-    for each in result.ladders:
-        prices = [(each.price(10.0**-digits), digits) for digits in columns]
-        cells = ["—" if p is None else _price(p.value, p.extrapolated, p.value == best[d]) for p, d in prices]
-        finest = min(each.points, key=lambda point: point.error)
-        error = f"{finest.error:.1e}" if finest.error > floor else f"< {floor:.0e}"
-        order = "—" if each.order is None else str(each.order)
-        seen = "—" if each.measured_order is None else f"{each.measured_order:.1f}"
-        yield [each.name, order, seen, *cells, error if isfinite(finest.error) else "—", format_duration(finest.time_s)]
-
-
-def _beyond_horizon(result: WorkPrecision) -> Iterator[Block]:
-    """Energy and the way back where no error can be measured, a line for each method."""
-    returns = any(each.returned is not None for each in result.past_horizon)
-    yield ""
-    yield f"over all of {result.duration_s:g} s, where no error can be measured, the finest runs:"
-    rows = []
-    for each in result.past_horizon:
-        back = "—" if each.returned is None else f"{each.returned:.1e}"
-        rows.append((each.name, f"{each.setting:.3g}", f"{each.energy:.1e}", *[back] * returns))
-    headings = ("method", "setting", "energy", *["there and back"] * returns)
-    yield Table(headings, tuple(rows), right=headings[1:])
-    yield "energy: largest residual, as a part of the energy exchanged" + (
-        f"; there and back: |q − q₀| in {result.unit} of a run that turns round at the end" if returns else ""
-    )
-
-
 def programs(result: WorkPrecision, error: float) -> Iterator[str]:
     """What an error takes by the cheapest method of each program, this library first; and what was left out."""
-    best: dict[str, Any] = {}
+    best: dict[str, tuple[ToleranceLadder, Price]] = {}
     for ladder, price in result.digits(error):
         best.setdefault(program_of(ladder), (ladder, price))
-    own = best.get(_OWN)
     for program in dict.fromkeys([_OWN, *best, *map(program_of, result.ladders)]):
         if program in best:
             ladder, price = best[program]
             name = f"{_OWN} {ladder.name}" if program == _OWN else ladder.name
-            times = f", {float(f'{price.value / own[1].value:.2g}'):g} times as long" if own and program != _OWN else ""
-            yield f"  {name}: {format_duration(price.value)}{times}{' (extrapolated)' if price.extrapolated else ''}"
+            times = ""
+            if _OWN in best and program != _OWN:
+                times = f", {float(f'{price.value / best[_OWN][1].value:.2g}'):g} times as long"
+            yield f"  {name}: {price}{times}{' (extrapolated)' * price.extrapolated}"
         else:
-            ended = dict.fromkeys(each.ended for each in result.ladders if program_of(each) == program)
+            ended = dict.fromkeys(ladder.ended for ladder in result.ladders if program_of(ladder) == program)
             yield f"  {program}: reached by no run ({'; '.join(ended)})"
     yield "  times of prepared runs, the least of runs that take turns"
-    yield from (f"  left out: {each}" for each in result.left_out)
+    yield from (f"  left out: {what}" for what in result.left_out)
 
 
 def program_of(ladder: ToleranceLadder) -> str:
     """The program that a ladder is of."""
     return ladder.method.split(" ")[0] if ladder.peer else _OWN
-
-
-def _price(seconds: float, extrapolated: bool, least: bool) -> str:
-    words = f"({format_duration(seconds)})" if extrapolated else format_duration(seconds)
-    return f"{words}{' *' if least else ''}"

@@ -5,9 +5,7 @@
 search       the parts of a stress test, one after the other
 work         pieces of work within a time
 worst        worst configurations, and states of few digits
-lost_digits  digits lost at the worst states
-stability    limits of step and gain, confirmed by runs
-loads        limits of speed and payload
+limits       limits of step, gain, speed and payload, confirmed by runs
 runs         random scenes, and their runs judged
 result       the result, and its text
 command      the command `stress`

@@ -3,6 +3,3 @@ from robot_dyn.tools.stress.result import Stress as Stress
 from robot_dyn.tools.stress.search import stress as stress
 
 __all__: list[str]
-
-# Names that only tools and tests import.
-from robot_dyn.tools.stress.search import stressed as stressed

@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from math import isfinite
-from typing import final
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from math import nan
+from typing import Any, final
+
+import numpy as np
 
 from robot_dyn import Setup
-from robot_dyn.foundations import UNREPORTED, Block, Table, reported
+from robot_dyn.foundations import UNREPORTED, Block, Table, number_or_dash, reported
 from robot_dyn.report import Result
+
+_TABLES = {  # by title, the findings in a table and their attributes
+    "worst configurations": (
+        "worst",
+        ("what", "joint", "typical", "random", "searched", "minimal", "unit", "note", "found"),
+    ),
+    "limits": ("limits", ("of", "what", "joint", "value", "unit", "within", "beyond", "confirmed")),
+    "random runs: errors of q in rad or m": (
+        "runs",
+        ("what", "duration_s", "estimated", "true", "unsure", "report", "misleads"),
+    ),
+}
+_NUMBERS = ("typical", "random", "searched", "minimal", "value", "duration_s", "estimated", "true", "unsure")
 
 
 @final
@@ -30,26 +45,26 @@ class WorstCase:
     """
 
     what: str
-    joint: str
-    unit: str
-    typical: float
-    random: float
-    searched: float
-    minimal: float
-    state: dict[str, list[float]] = field(hash=False)
-    note: str
+    joint: str = ""
+    unit: str = ""
+    typical: float = nan
+    random: float = nan
+    searched: float = nan
+    minimal: float = nan
+    state: dict[str, list[float]] = field(default_factory=dict, hash=False)
+    note: str = ""
+
+    def at(
+        self, typical: float, random: float, searched: float, state: Mapping[str, np.ndarray], minimal: float
+    ) -> WorstCase:
+        """Return the case with its sizes; the largest that was found may lie at few digits."""
+        sizes = {"typical": typical, "random": random, "searched": max(searched, minimal), "minimal": minimal}
+        return replace(self, **sizes, state={name: x.tolist() for name, x in state.items()})
 
     @reported
     def found(self) -> bool:
         """Whether the search found a worse state than the random ones."""
         return self.searched > self.random
-
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """Its row of a table."""
-        searched = f"{self.searched:.4g}" + ("" if self.found else " (none worse)")
-        least = f"{self.minimal:.4g} {self.unit}".rstrip()
-        return self.what, self.joint, f"{self.typical:.4g}", f"{self.random:.4g}", searched, least, self.note
 
 
 @final
@@ -81,13 +96,6 @@ class Limit:
     state: dict[str, list[float]] = field(default_factory=dict, hash=False)
     setups: tuple[Setup, ...] = field(default=(), hash=False, repr=False, metadata=UNREPORTED)
 
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """Its row of a table."""
-        limit = f"{_number(self.value)} {self.unit}" if isfinite(self.value) else "none"
-        verdict = {True: "confirmed", False: "REFUTED", None: ""}[self.confirmed]
-        return self.of, self.what, self.joint, limit, self.within, self.beyond, verdict
-
 
 @final
 @dataclass(frozen=True)
@@ -114,12 +122,6 @@ class JudgedRun:
     misleads: bool
     setup: Setup = field(hash=False, repr=False, metadata=UNREPORTED)
 
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """Its row of a table."""
-        errors = (f"{x:.4g}" if isfinite(x) else "–" for x in (self.estimated, self.true, self.unsure))
-        return self.what, f"{self.duration_s:g} s", *errors, self.report, "MISLEADS" * self.misleads
-
 
 Finding = WorstCase | Limit | JudgedRun
 
@@ -140,7 +142,6 @@ class Stress(Result):
         environment: Versions and processor.
         samples, seed: Number of random states; of the random generator.
         spent_s: Time that it took, in [s].
-        interrupted: Whether it was ended by the user.
     """
 
     robot: str
@@ -154,37 +155,27 @@ class Stress(Result):
     samples: int
     seed: int
     spent_s: float
-    interrupted: bool = False
 
     def tables(self) -> Iterator[Block]:
         """What it fails at, and a line for each finding."""
-        yield from (f"FAILURE: {each}" for each in self.failures)
+        yield from (f"FAILURE: {failure}" for failure in self.failures)
         yield from [""] * bool(self.failures)
-        of_worst = ("quantity", "joint", "typical", "worst random", "searched", "at few digits", "note")
-        of_limits = ("of", "what", "joint", "limit", "at 0.98", "at 1.02", "")
-        of_runs = ("run", "duration", "estimated", "true", "known to", "says", "")
-        for title, headings, findings in (
-            ("worst configurations", of_worst, self.worst),
-            ("limits", of_limits, self.limits),
-            ("random runs: errors of q in rad or m", of_runs, self.runs),
-        ):
-            if findings:
-                yield from (title, Table(headings, tuple(each.cells for each in findings), wrap=True), "")
-        yield from (f"not looked at for lack of time: {each}" for each in self.out_of_time)
+        for title, (part, columns) in _TABLES.items():
+            rows = tuple(tuple(_cell(getattr(case, name)) for name in columns) for case in getattr(self, part))
+            if rows:
+                yield from (title, Table(columns, rows, right=_NUMBERS, wrap=True), "")
+        yield from (f"not looked at for lack of time: {name}" for name in self.out_of_time)
 
     @reported
     def failures(self) -> tuple[str, ...]:
         """What the library fails at: limits that runs refute, and runs that mislead."""
+        refuted = (limit for limit in self.limits if limit.confirmed is False)
+        misleading = (run for run in self.runs if run.misleads)
         return (
+            *(f"{x.of} {x.what}: {x.value:.4g} [{x.unit}] is refuted: {x.within}; {x.beyond}" for x in refuted),
             *(
-                f"{each.of} {each.what}: {_number(each.value)} [{each.unit}] is refuted: {each.within}; {each.beyond}"
-                for each in self.limits
-                if each.confirmed is False
-            ),
-            *(
-                f"run, {each.what}: estimated {each.estimated:.1e}, true {each.true:.1e}, and nothing says so"
-                for each in self.runs
-                if each.misleads
+                f"run, {x.what}: estimated {x.estimated:.1e}, true {x.true:.1e}, and nothing says so"
+                for x in misleading
             ),
         )
 
@@ -197,16 +188,17 @@ class Stress(Result):
     def sentence(self) -> str:
         """The worst of each kind, in a sentence."""
         parts = []
-        for what in dict.fromkeys(each.what for each in self.worst):
-            top = max((each for each in self.worst if each.what == what), key=lambda each: each.searched)
+        for what in dict.fromkeys(case.what for case in self.worst):
+            top = max((case for case in self.worst if case.what == what), key=lambda case: case.searched)
             joint = f" ({top.joint})" if top.joint else ""
-            parts.append(f"{what} up to {top.searched:.3g}{f' {top.unit}' if top.unit else ''}{joint}")
-        checked = sum(each.confirmed is not None for each in self.limits) + len(self.runs)
+            parts.append(f"{what} up to {f'{top.searched:.3g} {top.unit}'.rstrip()}{joint}")
+        checked = sum(limit.confirmed is not None for limit in self.limits) + len(self.runs)
         failed = len(self.failures)
         if late := len(self.out_of_time):
             parts.append(f"{late} not looked at for lack of time")
         return f"{self.robot}: {failed or 'no'} failure{'s' * (failed != 1)} in {checked} checks; {'; '.join(parts)}"
 
 
-def _number(x: float) -> str:
-    return f"{x:.4g}" if isfinite(x) else "none"
+def _cell(x: Any) -> str:
+    words: dict[Any, str] = {True: "yes", False: "no", None: ""}
+    return number_or_dash(x, 4) if isinstance(x, float) else words.get(x, str(x))

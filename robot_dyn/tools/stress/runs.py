@@ -8,9 +8,9 @@ run, and neither its method nor its steps: DOP853 and an implicit method near ro
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +22,8 @@ from robot_dyn.integrate import Adaptive, method
 from robot_dyn.queries import M
 from robot_dyn.report import Budget
 from robot_dyn.simulation import Ending
+from robot_dyn.tools.stress.limits import LEAST, says
 from robot_dyn.tools.stress.result import JudgedRun
-from robot_dyn.tools.stress.stability import LEAST, says
 from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import shrunk
 
@@ -37,16 +37,9 @@ _ONE_TIME = 1e-12  # [s]
 _MOST_TRIES = 25  # of the start of a run that misleads
 
 
-@final
-@dataclass(frozen=True)
-class Scene:
-    """A setup, and a description of what acts in it."""
-
-    setup: Setup
-    what: str
-
-
-def scenes(robot: Robot, states: Batch, count: int, rng: np.random.Generator) -> Iterator[Callable[[], Scene]]:
+def scenes(
+    robot: Robot, states: Batch, count: int, rng: np.random.Generator
+) -> Iterator[Callable[[], tuple[Setup, str]]]:
     """Yield `count` scenes, each built when called; the families take turns."""
     scale = np.median(np.diagonal(evaluate(robot, M, {"q": states["q"][:200]}), axis1=-2, axis2=-1), axis=0)
     for k in range(count):
@@ -54,7 +47,8 @@ def scenes(robot: Robot, states: Batch, count: int, rng: np.random.Generator) ->
         yield partial(_scene, robot, FAMILIES[k % len(FAMILIES)], scale, own)
 
 
-def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generator) -> Scene:
+def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generator) -> tuple[Setup, str]:
+    """A setup, and a description of what acts in it."""
     q, n = robot.random_configuration(rng), robot.n
     v = rng.uniform(-1, 1, n) * np.where(np.isfinite(robot.velocity_limit), np.minimum(robot.velocity_limit, 1.0), 1.0)
     duration = float(np.round(rng.uniform(0.1, 0.3), 3))
@@ -68,8 +62,8 @@ def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generato
         except RobotDynError:  # not every method supports every effect
             continue
         steps = f", step {setup.nominal_step_s:g} s" if step else f", rtol {setup.integrator.rtol:.0e}"
-        return Scene(setup, f"{family}: {setup.integrator.name}{steps}")
-    return Scene(Setup(plant, q, v, duration, control), f"{family}: auto")
+        return setup, f"{family}: {setup.integrator.name}{steps}"
+    return Setup(plant, q, v, duration, control), f"{family}: auto"
 
 
 def _effects(robot: Robot, family: str, q: np.ndarray, scale: np.ndarray, rng: np.random.Generator) -> list[Effect]:
@@ -105,8 +99,10 @@ def _method(rng: np.random.Generator) -> tuple[Any, dict[str, Any]]:
     return method(str(rng.choice(_METHODS))), {"step_s": float(np.round(10 ** rng.uniform(-3.3, -2), 5))}
 
 
-def judged_runs(robot: Robot, states: Batch, count: int, rng: np.random.Generator, work: Work) -> Iterator[JudgedRun]:
-    """So many random runs."""
+def judged_runs(
+    robot: Robot, states: Batch, count: int, rng: np.random.Generator, work: Work
+) -> Iterator[JudgedRun | None]:
+    """Yield the random runs, None for those that were skipped."""
     for k, build in enumerate(scenes(robot, states, count, rng), 1):
         if work.over:
             work.skip(f"runs {k} to {count}" if k < count else f"run {k}")
@@ -114,9 +110,11 @@ def judged_runs(robot: Robot, states: Batch, count: int, rng: np.random.Generato
         scene = work.do(f"scene of run {k}", lambda _, build=build: build())
         if scene is None:
             continue
-        found = work.do(f"run {k}, {scene.what}", lambda until, of=scene: judged(of.setup, of.what, until))
-        if found is not None:
-            yield shrunk_run(scene.setup, found, f"shrinking of run {k}", work) if found.misleads else found
+        setup, what = scene
+        run = work.do(f"run {k}, {what}", partial(judged, setup, what))
+        if run is not None and run.misleads:
+            run = work.do(f"shrinking of run {k}", partial(shrunk_run, run)) or run
+        yield run
 
 
 def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
@@ -145,22 +143,23 @@ def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
     return JudgedRun(what, setup.duration_s, estimate, true, unsure, report or str(error), misleads, setup)
 
 
-def shrunk_run(setup: Setup, found: JudgedRun, name: str, work: Work) -> JudgedRun:
-    """A run that misleads, from the start of fewest digits that was found; itself if that is none."""
-    least = found
+def shrunk_run(run: JudgedRun, budget: Budget) -> JudgedRun:
+    """Return a run that misleads too, from the start of fewest digits that is found; the run itself if there is none.
 
-    def shrink(budget: Budget) -> np.ndarray:
-        def fails(x: np.ndarray) -> bool:
-            nonlocal least
-            q0, v0 = np.split(x, 2)
-            try:
-                young = judged(replace(setup, q0=q0, v0=v0), found.what, budget)
-            except RobotDynError:
-                return False
-            least = young if young.misleads else least
-            return young.misleads
+    Raises:
+        OvertimeError: If the budget ends.
+    """
+    small = run
 
-        return shrunk(np.concatenate([setup.q0, setup.v0]), fails, _MOST_TRIES)
+    def fails(x: np.ndarray) -> bool:
+        nonlocal small
+        q0, v0 = np.split(x, 2)
+        try:
+            young = judged(replace(run.setup, q0=q0, v0=v0), run.what, budget)
+        except RobotDynError:
+            return False
+        small = young if young.misleads else small
+        return young.misleads
 
-    work.do(name, shrink)
-    return least
+    shrunk(np.concatenate([run.setup.q0, run.setup.v0]), fails, _MOST_TRIES)
+    return small

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import count, islice
 from math import isfinite
 
@@ -17,12 +17,11 @@ from robot_dyn.accuracy import random_states
 from robot_dyn.integrate import FIXED_STEP
 from robot_dyn.report import Budget
 from robot_dyn.simulation import Ending
-from robot_dyn.tools.stress import runs, stability, stressed
-from robot_dyn.tools.stress.loads import payload_limit
-from robot_dyn.tools.stress.result import JudgedRun
+from robot_dyn.tools.stress import limits, runs
+from robot_dyn.tools.stress.result import JudgedRun, WorstCase
 from robot_dyn.tools.stress.runs import FAMILIES, scenes
 from robot_dyn.tools.stress.work import Work
-from robot_dyn.tools.stress.worst import BY_PD, FASTEST, pd_gains, worst, worst_configurations
+from robot_dyn.tools.stress.worst import BY_PD, FASTEST, pd_gains, shrunk, worst, worst_configurations
 from tests.cli.test_command_documents import promised
 from tests.command import refusal, run
 from tests.hostile.kinds import AXIS, LIMIT
@@ -69,7 +68,7 @@ def test_largest_payload_of_a_pole_is_that_of_statics() -> None:
     <limit lower="-3" upper="3" effort="30" velocity="2"/></joint>
     <joint name="tip" type="fixed"><parent link="bar"/><child link="end"/><origin xyz="0.8 0 0"/></joint></robot>"""
     robot, rng = rd.Robot.from_text(text), np.random.default_rng(0)
-    (payload,) = payload_limit(robot, random_states(robot, 300, rng), rng, (np.ones(1), np.ones(1)), Work())
+    payload = limits.payload_limit(robot, random_states(robot, 300, rng), rng, (np.ones(1), np.ones(1)), Budget())
     assert payload.value == pytest.approx((30 / 9.80665 - 0.8) / 0.8, rel=1e-6)
     assert payload.confirmed and payload.joint == "hinge" and payload.what.endswith("end")
 
@@ -86,13 +85,13 @@ def test_each_limit_is_confirmed_or_said(name: str) -> None:
 
 def test_a_limit_that_is_too_long_is_refuted(monkeypatch) -> None:
     """Steps 1.1 times as long as the advisor allows leave the equilibrium within the limit already."""
-    advise = stability.advice_about
+    advise = limits.advice_about
 
     def wrong(*arguments, **options):
         advice = advise(*arguments, **options)
         return replace(advice, limits={name: 1.1 * x for name, x in advice.limits.items()})
 
-    monkeypatch.setattr(stability, "advice_about", wrong)
+    monkeypatch.setattr(limits, "advice_about", wrong)
     result = rd.tools.stress.stress(rd.load("pendulum"), samples=200, runs=0, budget_s=FOREVER)
     refuted = {each.what for each in result.limits if each.confirmed is False}
     assert {"explicit_euler", "midpoint", "rk4", "order_8"} <= refuted
@@ -118,7 +117,7 @@ def test_an_estimate_that_is_too_small_misleads_and_shrinks_to_a_start_of_few_di
     found = runs.judged(setup, "swing", Budget())
     assert found.misleads and found.estimated < 0.3 * found.true
     assert runs.judged(replace(setup, integrator="order_8"), "swing", Budget()).misleads is False  # rounding
-    small = runs.shrunk_run(setup, found, "shrinking", Work())
+    small = runs.shrunk_run(found, Budget())
     start = [*small.setup.q0.tolist(), *small.setup.v0.tolist()]
     assert small.misleads and sum(map(len, map(repr, start))) < len("0.7312-0.43210.51110.7222")
 
@@ -127,7 +126,7 @@ def test_runs_of_all_families_are_judged_and_say_what_is_true() -> None:
     robot, rng = rd.load("cart_pole"), np.random.default_rng(1)
     states = {"q": np.array([robot.random_configuration(rng) for _ in range(200)])}
     work = Work()
-    found = list(runs.judged_runs(robot, states, len(FAMILIES), rng, work))
+    found = list(filter(None, runs.judged_runs(robot, states, len(FAMILIES), rng, work)))
     assert len(found) + len(work.left_out) == len(FAMILIES)
     assert len(found) >= len(FAMILIES) - 1 and not any(each.misleads for each in found)
     assert sum(isfinite(each.true) for each in found) >= len(FAMILIES) - 2
@@ -191,7 +190,8 @@ def test_numbers_beyond_a_float64_are_left_out_by_name() -> None:
     robot, rng, work = rd.Robot.from_text(text), np.random.default_rng(3), Work()
     states = random_states(robot, 100, rng)
     assert {each.what for each in worst_configurations(robot, states, rng, None, work)} == {"κ of M", FASTEST}
-    assert worst(states, rng, ("q",), lambda batch: np.full(len(batch["q"]), np.nan), work, "nothing") is None
+    nowhere = partial(worst, WorstCase("nothing"), states, rng, ("q",), lambda batch: np.full(len(batch["q"]), np.nan))
+    assert work.do("nothing", nowhere) is None
     assert [each.partition(": ")[0] for each in work.left_out] == [
         "worst gravity torque / effort limit, shoulder",
         "nothing",
@@ -212,7 +212,7 @@ def test_what_is_found_depends_on_the_seed_alone() -> None:
         rng = np.random.default_rng(seed)
         states = random_states(robot, 200, rng)
         worst = list(worst_configurations(robot, states, rng, None, Work()))
-        return [*worst, *(repr(make().setup) for make in scenes(robot, states, 7, rng))]
+        return [*worst, *(repr(make()[0]) for make in scenes(robot, states, 7, rng))]
 
     assert found(3) == found(3) != found(4)
 
@@ -245,7 +245,7 @@ def test_a_budget_looks_at_the_clock_within_each_piece() -> None:
     """So many looks, and few more: at most one for each name that is left."""
     looks = count()
     robot = rd.load("planar_2r")
-    stressed(robot, 100, 7, 2, 500, None, lambda: float(next(looks)))
+    short_stress(robot, 500, 7, 2, lambda: float(next(looks)))
     assert next(looks) < 500 + 200
 
 
@@ -256,7 +256,7 @@ def test_with_time_enough_what_is_found_depends_on_no_clock() -> None:
         rng, work = np.random.default_rng(5), Work(Budget(1e12, clock=clock), 1e11)
         states = random_states(robot, 100, rng)
         worst = list(worst_configurations(robot, states, rng, pd_gains(robot, states), work))
-        told = [f"{each} {each.setup}" for each in runs.judged_runs(robot, states, 2, rng, work)]
+        told = [f"{each} {each.setup}" for each in filter(None, runs.judged_runs(robot, states, 2, rng, work))]
         found.append((worst, told, work.left_out))
         assert work.out_of_time == []
     assert found[0] == found[1]
@@ -273,16 +273,17 @@ def test_a_run_ends_at_its_deadline_and_so_do_the_companions_of_its_error_estima
 
 def test_shrinking_that_has_no_time_keeps_the_failure(monkeypatch) -> None:
     """It is told as it was found."""
+    robot, rng, told = rd.load("pendulum"), np.random.default_rng(1), list[JudgedRun]()
 
     def judged(setup: rd.Setup, what: str, budget: Budget) -> JudgedRun:
-        while True:
+        while told:
             budget.check()
+        told.append(JudgedRun(what, 0.1, 1e-9, 1.0, 0.0, "", True, setup))
+        return told[0]
 
     monkeypatch.setattr(runs, "judged", judged)
-    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.7312], duration_s=0.1)
-    found = JudgedRun("swing", 0.1, 1e-9, 1.0, 0.0, "", True, setup)
-    work = Work(Budget(4, clock=ticking()))
-    assert runs.shrunk_run(setup, found, "shrinking of run 1", work) is found
+    work = Work(Budget(10, clock=ticking()))
+    assert list(runs.judged_runs(robot, random_states(robot, 100, rng), 1, rng, work)) == told
     assert work.out_of_time == ["shrinking of run 1"]
 
 
@@ -293,8 +294,10 @@ def test_friction_that_is_faster_than_all_else_is_what_the_push_is_along() -> No
     <joint name="hinge" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 1 0"/>
     <limit lower="-1" upper="1" effort="1" velocity="5"/><dynamics damping="5"/></joint></robot>"""
     robot = rd.Robot.from_text(text)
-    setup = stability.held(robot, np.array([0.3]), (np.array([2e-3]), np.array([2e-4])), 40.0)
-    found = {each.what: each for each in islice(stability.step_limits(setup, 0, Work()), 4)}  # the explicit ones
+    setup = limits.held(robot, np.array([0.3]), (np.array([2e-3]), np.array([2e-4])), 40.0)
+    found = {
+        each.what: each for each in islice(filter(None, limits.step_limits(setup, 0, Work())), 4)
+    }  # the explicit ones
     assert found["explicit_euler"].value == pytest.approx(2 * robot.M(np.array([0.3]))[0, 0] / 5, rel=0.01)
     assert all(each.confirmed for each in found.values())
 
@@ -304,8 +307,50 @@ def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
     robot = rd.load("pendulum")
     law = rd.control.PDGravity(robot, rd.control.hold([0.4]), 133.0, 13.3)
     setup = rd.Setup(rd.Plant(robot), [0.4 + 1e-6], duration_s=2.0, controller=law, integrator="midpoint", step_s=0.11)
-    pushed = stability.run_from_near(setup, np.array([0.4]), Budget(), True)
+    pushed = limits.run_from_near(setup, np.array([0.4]), Budget(), True)
     assert pushed.growth > 30 and not pushed.misleads  # it says so
+
+
+# --- shrinking: the property stays, and fewer entries and digits are left ----------------------------------------
+
+STATE = np.array([0.73125, -1.9371, 0.00123456, 2.718281828, -0.4])
+
+
+def test_entries_that_do_not_matter_become_zero_and_the_others_get_few_digits() -> None:
+    """x₃ > 2.5 holds at 3 alone, the one-digit number nearest to it."""
+    np.testing.assert_array_equal(shrunk(STATE, lambda x: x[3] > 2.5), [0, 0, 0, 3, 0])
+
+
+def test_digits_that_matter_are_kept() -> None:
+    """|x₁ + 1.9371| < 1e-4 takes five digits; x₀ ≥ 0.7 one."""
+    small = shrunk(STATE, lambda x: abs(x[1] + 1.9371) < 1e-5 and x[0] >= 0.7)
+    np.testing.assert_array_equal(small, [0.7, -1.9371, 0, 0, 0])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_given_back_has_the_property_and_no_entry_that_could_be_zero(seed: int) -> None:
+    """Of a property of sums, in which entries stand in for each other."""
+    rng = np.random.default_rng(seed)
+    x, weights = rng.normal(size=8), rng.normal(size=8)
+    level = float(x @ weights - 0.1 * abs(x @ weights))
+
+    def fails(y: np.ndarray) -> bool:
+        return bool(y @ weights >= level)
+
+    small = shrunk(x, fails)
+    assert fails(small)
+    assert np.count_nonzero(small) <= np.count_nonzero(x)
+    for k in np.flatnonzero(small):
+        young = small.copy()
+        young[k] = 0.0
+        assert not fails(young)
+
+
+def test_a_state_without_the_property_comes_back_as_it_is_and_tries_are_counted() -> None:
+    np.testing.assert_array_equal(shrunk(STATE, lambda x: False), STATE)
+    calls = []
+    shrunk(STATE, lambda x: bool(calls.append(1)) or (x[0] > 0.7 and x[3] > 2.7), most=7)
+    assert len(calls) == 7
 
 
 # --- the command ------------------------------------------------------------------------------------------------

@@ -15,14 +15,13 @@ from typing import Any, final
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import Run, switches
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import Limit, Run, switches
 from robot_dyn.control.independent_joint import PD
 from robot_dyn.control.reference import PiecewisePolynomial
 from robot_dyn.effects.friction import RegularisedCoulombFriction, ViscousFriction
 from robot_dyn.effects.joint_limit import JointStopDamper, JointStopSpring
 from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
 from robot_dyn.model.robot import Robot
-from robot_dyn.report.time_budget import Limit
 from robot_dyn.simulation.results.ledger import Ledger
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -154,17 +153,15 @@ class ArmMotion:
 
 
 def desired_motion(of: PiecewisePolynomial) -> Callable[[float], np.ndarray]:
-    """q_d and v_d at a time, (2, n), by powers of s = t − tᵢ: a fifth of the time of `of.at`, which checks t."""
-    powers = np.arange(of.coefficients.shape[1])
-    lower = np.maximum(powers - 1, 0)
-    ends = of.breaks[1:-1]
+    """q_d and v_d at a time, (2, n), in a fraction of the time of `of.at`, which checks t."""
+    from scipy.interpolate import PPoly
+
+    q = PPoly(np.moveaxis(of.coefficients, 1, 0)[::-1], of.breaks)
+    v = q.derivative()
 
     def at(t: float) -> np.ndarray:
         inside = min(max(t, of.start), of.end)
-        piece = int(np.searchsorted(ends, inside, side="right")) if len(ends) else 0
-        s = inside - of.breaks[piece]
-        rate = powers * s**lower if of.start <= t <= of.end else 0.0 * powers
-        return np.array([s**powers, rate]) @ of.coefficients[piece]
+        return np.array([q(inside), v(inside) * (inside == t)])
 
     return at
 

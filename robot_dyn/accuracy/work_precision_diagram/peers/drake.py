@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest, Run, tolerances
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import Limit, MethodUnderTest, Run, tolerances
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError, bare_urdf
-from robot_dyn.report.time_budget import Limit
 
 
 def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:

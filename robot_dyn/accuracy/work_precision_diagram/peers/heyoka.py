@@ -9,11 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest, Run
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import COMPILED, Limit, MethodUnderTest, Run
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError
-from robot_dyn.accuracy.work_precision_diagram.tolerance_ladder import COMPILED
 from robot_dyn.codegen.program import Kind, Program
-from robot_dyn.report.time_budget import Limit
 from robot_dyn.simulation.compiled.cache import machine_code
 
 _TOLERANCES = (1e-6, 1e-10, 1e-14)  # each is compiled by itself, which takes many seconds

@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest, Run, step_ladder
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import Limit, MethodUnderTest, Run, step_ladder
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError, bare_urdf, desired_motion
 from robot_dyn.control.independent_joint import PD
 from robot_dyn.effects.friction import ViscousFriction
 from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
 from robot_dyn.model.robot import Robot
-from robot_dyn.report.time_budget import Limit
 
 STEP_S = 1e-3
 _METHODS = {  # name of the option, order, evaluations of the equation of motion in a step

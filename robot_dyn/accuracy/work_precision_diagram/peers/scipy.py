@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import MethodUnderTest, Run, tolerances
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import Limit, MethodUnderTest, Run, tolerances
 from robot_dyn.accuracy.work_precision_diagram.peers.arm_motion import ArmMotion, PeerError
 from robot_dyn.effects.line_spring_damper import LineDamper, LineSpring
-from robot_dyn.report.time_budget import Limit
 
 _LEAST = 3e-14  # rtol; SciPy's own lower bound is 100 eps
 _FREE = {"DOP853": 8}  # with their orders

@@ -1,0 +1,368 @@
+"""What breaks first: the step of each method, the gain of a sampled PD, speed and payload, judged at 0.98 and 1.02.
+
+The arm is held at a configuration by a PD with its gravity balanced, an equilibrium, and the viscous friction of its
+file. Runs from near it judge steps and gain: at 0.98 of a limit a push stays, at 1.02 it grows.
+
+    growth = max ‖√M_ii δq_i‖ in the second half of the run / ‖√M_ii δq_i‖ at its start
+    kp = ω² m,   kd = 2 ω m,   m the median of M_ii:   the largest ω at which ticks of the given period are stable
+    s² |C(q, u) u|_i = τ_max,i,   |N_i(q) + m n_i(q)| = τ_max,i
+
+u is a velocity whose largest entry is the velocity limit of its joint, and n the gravity torque of 1 kg at the tip.
+Speed and payload are searched for over all configurations, and judged by the library's own implementation, a payload
+also by a run under a PD.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from math import inf, isfinite, sqrt
+from typing import final
+
+import numpy as np
+
+from robot_dyn import Lagrangian, Payload, Plant, Robot, RobotDynError, Setup, Trajectory, simulate
+from robot_dyn.accuracy import Advice, Batch, advice_about, at_rest, evaluate
+from robot_dyn.control import PDGravity, hold
+from robot_dyn.effects import EffortLimit, ViscousFriction
+from robot_dyn.integrate import FIXED_STEP, Gauss, method
+from robot_dyn.queries import CORIOLIS_TORQUE, N
+from robot_dyn.report import Budget
+from robot_dyn.simulation import Ending, RemarkKind, Stability, StateEquation, jacobian, linearised, step_map
+from robot_dyn.tools.stress.result import Limit, WorstCase
+from robot_dyn.tools.stress.work import Work
+from robot_dyn.tools.stress.worst import NOTHING, Gains, worst
+
+_WITHIN, _BEYOND = 0.98, 1.02  # of a limit
+LEAST = 0.3  # of the true error: an estimate below misleads
+_MOST = 1e3  # by which a push may grow within a limit, as the advisor counts it
+_LEFT = 10.0  # a run whose push grows by more, of itself and of what it does within the limit, has left
+_PUSH = 1e-6  # of the start, in [rad] or [m] of the joint of median inertia
+_RATE = 1e3  # [1/s]: that times as much in [rad/s] or [m/s] at most, as motions that are faster move less
+_TIMES = 400.0  # of the run, 1/|λ| of the fastest motion
+_STEPS = 10  # of a method whose stages are iterated
+_PARTS = 20  # of the run: the longest step that is judged
+_PERIOD_S, _TICKS = 1e-3, 200  # of the sampled PD, and of its run
+_RANGE, _SHARP = (1.0, 1e5), 1e-3  # of ω, in [rad/s]; relative
+_LOOKS = 50  # states at which the tip is looked for
+_HOLD_S = 0.05  # of a run that holds a payload
+_SPEED = 1.0  # [rad/s] or [m/s], of joints without a velocity limit
+_NO_TORQUE = "it has no torque on any joint with a limit"
+
+
+def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, budget: Budget) -> Limit:
+    """Return the least multiple of the velocity limits at which Coriolis torque alone passes an effort limit."""
+    effort, own = _efforts(robot), Lagrangian(robot)
+    most = np.where((robot.velocity_limit > 0) & np.isfinite(robot.velocity_limit), robot.velocity_limit, _SPEED)
+    states = states | {"v": states["v"] / np.abs(states["v"]).max() * most}
+
+    def direction(v: np.ndarray) -> np.ndarray:
+        largest = np.abs(v / most).max(axis=-1, keepdims=True)
+        return np.divide(v, largest, out=np.zeros_like(v), where=largest > 0)
+
+    def measure(batch: Batch) -> np.ndarray:
+        at = {"q": batch["q"], "v": direction(batch["v"])}
+        return (np.abs(evaluate(robot, CORIOLIS_TORQUE, at)) / effort).max(axis=1)
+
+    def holds(part: float) -> tuple[bool, str]:
+        return _load(own.coriolis_torque(q, part * limit.value * v), effort)
+
+    limit = Limit(
+        "speed", "Coriolis torque passes an effort limit, at a multiple of the velocity limits", "", inf, "times"
+    )
+    case = worst(WorstCase("speed"), states, rng, ("q", "v"), measure, budget)
+    if not case.minimal > NOTHING:
+        return replace(limit, within=_NO_TORQUE)
+    q, v = np.array(case.state["q"]), direction(np.array(case.state["v"]))
+    joint = robot.joint_names[int(np.argmax(np.abs(robot.coriolis_torque(q, v)) / effort))]
+    limit = replace(limit, joint=joint, value=case.minimal**-0.5, state={"q": q.tolist(), "v": v.tolist()})
+    return _judged(limit, holds)
+
+
+def payload_limit(robot: Robot, states: Batch, rng: np.random.Generator, gains: Gains | None, budget: Budget) -> Limit:
+    """Return the least mass at the tip at which gravity torque passes an effort limit.
+
+    Args:
+        robot: The robot.
+        states: Random ones.
+        rng: Of the search.
+        gains: Of the PD that holds it; None where M is singular, so that nothing can be run.
+        budget: Of search and runs.
+    """
+    effort, frame, setups = _efforts(robot), _tip(robot, states), list[Setup]()
+    kilogram = robot.with_(payload=Payload(frame, 1.0))
+
+    def inverse_masses(batch: Batch) -> np.ndarray:
+        """1/m of each joint, (S, n)."""
+        own = evaluate(robot, N, batch)
+        per_kg = evaluate(kilogram, N, batch) - own
+        spare = effort - np.sign(per_kg) * own
+        return np.where(np.isfinite(effort), np.abs(per_kg) / np.where(spare > 0, spare, 1e-300), 0.0)
+
+    def holds(part: float) -> tuple[bool, str]:
+        """By our Lagrangian and, with gains, by a run."""
+        loaded = robot.with_(payload=Payload(frame, part * limit.value))
+        by_torque, load = _load(Lagrangian(loaded).N(q), effort)
+        if gains is None:
+            return by_torque, load
+        plant, law = Plant(loaded, [EffortLimit(effort)]), PDGravity(loaded, hold(q), *gains)
+        setup = Setup(plant, q, duration_s=_HOLD_S, controller=law, estimate_error=False, engine="interpreted")
+        setups.append(setup)
+        try:
+            run = simulate(setup, on_progress=budget.check)
+        except RobotDynError as error:
+            return by_torque, f"{load}; not run: {error}"
+        is_reached = any(remark.kind is RemarkKind.EFFORT_REACHED for remark in run.remarks)
+        return not is_reached, f"{load}; a PD sags by {float(np.abs(run.q[-1] - q).max()):.1e} in {_HOLD_S:g} s"
+
+    limit = Limit("payload", f"gravity torque of a payload at {frame}", "", inf, "kg")
+    case = worst(WorstCase("payload"), states, rng, ("q",), lambda x: inverse_masses(x).max(axis=1), budget)
+    if not case.minimal > NOTHING:
+        return replace(limit, within=_NO_TORQUE)
+    q = np.array(case.state["q"])
+    joint = robot.joint_names[int(np.argmax(inverse_masses({"q": q[None]})[0]))]
+    limit = replace(limit, joint=joint, value=1 / case.minimal, state=case.state)
+    if case.minimal > 1e250:
+        return replace(limit, value=0.0, within="gravity alone passes its effort limit")
+    return replace(_judged(limit, holds), setups=tuple(setups))
+
+
+def _efforts(robot: Robot) -> np.ndarray:
+    """Effort limits, inf where none is stated or it is 0, (n,)."""
+    return np.where(robot.effort_limit > 0, robot.effort_limit, np.inf)
+
+
+def _load(torque: np.ndarray, effort: np.ndarray) -> tuple[bool, str]:
+    """Return True if a torque is within the effort limits, and how much of them it is."""
+    part = float((np.abs(torque) / effort).max())
+    return part < 1, f"{part:.3f} of the effort limit"
+
+
+def _judged(limit: Limit, holds: Callable[[float], tuple[bool, str]]) -> Limit:
+    """Return a limit with what happens at 0.98 and 1.02 of it."""
+    (is_held, within), (is_held_beyond, beyond) = holds(_WITHIN), holds(_BEYOND)
+    return replace(limit, within=within, beyond=beyond, confirmed=is_held and not is_held_beyond)
+
+
+def _tip(robot: Robot, states: Batch) -> str:
+    """The frame at which a mass has the largest gravity torques, −Jᵀ g of 1 kg."""
+    q, effort = states["q"][:_LOOKS], _efforts(robot)
+    effort = np.where(np.isfinite(effort), effort, np.nanmin(effort[np.isfinite(effort)], initial=1.0))
+
+    def torque(frame: str) -> float:
+        per_kg = np.abs(np.einsum("skj,k->sj", robot.jacobian(q, frame, errors="nan")[:, :3], robot.gravity))
+        return float((per_kg / effort).max(axis=1).mean())
+
+    return max(robot.frame_names, key=torque)
+
+
+def held(robot: Robot, q: np.ndarray, gains: Gains, rate: float) -> Setup:
+    """The arm at rest at q, held there; the run lasts so many times its fastest motion."""
+    effects = [ViscousFriction(robot.damping)] if np.any(robot.damping) else []
+    return Setup(
+        Plant(robot, effects), q, duration_s=_TIMES / rate, controller=PDGravity(robot, hold(q), *gains),
+        engine="interpreted",
+    )  # fmt: skip
+
+
+def step_limits(setup: Setup, seed: int, work: Work) -> Iterator[Limit | None]:
+    """Yield the limit of each method of fixed step, with runs at 0.98 and 1.02 of it.
+
+    Args:
+        setup: As of `held`.
+        seed: Of the push.
+        work: Does it.
+    """
+    names = {name: f"step of {name}" for name in FIXED_STEP}
+    known = work.do("linearisation", lambda _: _linearised(setup), tuple(names.values()))
+    if known is not None:
+        advice, J = known
+        setup = replace(setup, duration_s=min(setup.duration_s, _TIMES / abs(advice.fastest.eigenvalue)))
+        for name, piece in names.items():
+            yield work.do(piece, partial(_judged_step, setup, name, advice, J, seed))
+
+
+def _linearised(setup: Setup) -> tuple[Advice, np.ndarray]:
+    """The advice at rest, and J there."""
+    loop = StateEquation(setup.plant, setup.controller).in_a_mode
+    ((t, y),) = at_rest(setup, loop)
+    return advice_about(setup, at_rest), jacobian(loop, t, y, None)
+
+
+def _judged_step(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: int, budget: Budget) -> Limit:
+    """The limit of a method, with runs at both sides of it; without one, with steps as long as are judged.
+
+    Where the stages of a method are iterated, every step is stable, and a run ends, and says so, where they are not
+    found: a limit that is not sharp is neither reached nor kept.
+    """
+    limit = Limit("step", name, advice.fastest.joint, advice.limits[name], "s", state={"q": setup.q0.tolist()})
+    at, iterates = setup.q0, isinstance(method(name), Gauss)
+    try:
+        unstable = isfinite(limit.value) and not iterates
+        matrix = step_map(method(name), J, len(at))(_BEYOND * limit.value) if unstable else J
+        setup = _pushed(replace(setup, integrator=name), matrix, seed)
+        if not isfinite(limit.value):
+            setup = replace(setup, step_s=setup.duration_s / _PARTS)
+            run = run_from_near(setup, at, budget, True)
+            holds = not run.misleads and (run.stays or (iterates and not isfinite(run.growth)))
+            within = f"step {setup.step_s:.3g} s: {run.description}"
+            return replace(limit, joint="", within=within, confirmed=holds, setups=(setup,))
+        if iterates:
+            setup = replace(setup, duration_s=_STEPS * limit.value)
+            limit = replace(limit, what=f"{name}, about where its stages are not found")
+        setups = tuple(replace(setup, step_s=part * limit.value) for part in (_WITHIN, _BEYOND))
+        within, beyond = run_from_near(setups[0], at, budget), run_from_near(setups[1], at, budget, not iterates)
+    except RobotDynError as error:
+        return replace(limit, within=f"not run: {error}")
+    confirmed = within.stays and beyond.leaves(within) and not beyond.misleads
+    if iterates:
+        confirmed = False if any(not run.stays and isfinite(run.growth) for run in (within, beyond)) else None
+    said = beyond.description + " AND DOES NOT SAY SO" * beyond.misleads
+    return replace(limit, within=within.description, beyond=said, confirmed=confirmed, setups=setups)
+
+
+def gain_limit(setup: Setup, seed: int, budget: Budget) -> Limit:
+    """Return the largest frequency of a PD with ticks of 1 ms, with what advisor and runs report on both sides of it.
+
+    Args:
+        setup: As of `held`.
+        seed: Of the push.
+        budget: Of search and runs.
+    """
+    setup = replace(setup, duration_s=_TICKS * _PERIOD_S, engine="auto")
+    at, y = setup.q0, np.concatenate([setup.q0, setup.v0])
+    limit = Limit(
+        "gain", f"PD of ζ = 1 sampled at {_PERIOD_S:g} s, ω", "", _largest_frequency(setup, y, budget), "rad/s"
+    )
+    if not 0 < limit.value < inf:
+        within = f"stable up to ω = {_RANGE[1]:g} rad/s" if limit.value else f"unstable from ω = {_RANGE[0]:g} rad/s on"
+        return replace(limit, within=within)
+    both = [_sampled(setup, part * limit.value) for part in (_WITHIN, _BEYOND)]
+    loop = linearised(both[1].plant, both[1].controller, 0.0, y)
+    start = _pushed(both[0], loop.matrix(_PERIOD_S), seed)
+    setups = tuple(replace(sampled, q0=start.q0, v0=start.v0) for sampled in both)
+    limit = replace(limit, state={"q": at.tolist()}, setups=setups)
+    try:
+        periods = [advice_about(sampled, at_rest).longest_period_s for sampled in both]
+        within, beyond = (run_from_near(pushed, at, budget) for pushed in setups)
+    except RobotDynError as error:
+        return replace(limit, within=f"not run: {error}")
+    agrees = periods[0] >= _PERIOD_S > periods[1]
+    said = beyond.description + f"; THE ADVISOR TAKES IT FOR STABLE UP TO {periods[1]:.3g} s" * (not agrees)
+    confirmed = agrees and within.stays and beyond.leaves(within)
+    return replace(limit, within=within.description, beyond=said, confirmed=confirmed)
+
+
+def _sampled(setup: Setup, omega: float) -> Setup:
+    """The setup under a sampled PD of another frequency."""
+    law = setup.controller
+    inertia = law.kd**2 / (4 * law.kp)
+    sampled = PDGravity(law.model, law.reference, inertia * omega**2, 2 * inertia * omega, _PERIOD_S)
+    return replace(setup, controller=sampled)
+
+
+def _largest_frequency(setup: Setup, y: np.ndarray, budget: Budget) -> float:
+    """The largest stable ω, by bisection; inf or 0 if there is none."""
+
+    def stable(omega: float) -> bool:
+        budget.check()
+        try:
+            loop = linearised(setup.plant, _sampled(setup, omega).controller, 0.0, y)
+            return loop.growth(_PERIOD_S).verdict is not Stability.UNSTABLE
+        except np.linalg.LinAlgError:  # it is not finite
+            return False
+
+    low, high = _RANGE
+    if not stable(low):
+        return 0.0
+    if stable(high):
+        return inf
+    while high / low > 1 + _SHARP:
+        middle = sqrt(low * high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low
+
+
+def _pushed(setup: Setup, matrix: np.ndarray, seed: int) -> Setup:
+    """The setup with its start moved off the equilibrium: along what grows fastest, and a little along all positions.
+
+    Args:
+        setup: At an equilibrium.
+        matrix: Of (q, v, ...) from a step or tick to the next: its largest eigenvalue is of what grows fastest.
+        seed: Of the other positions.
+    """
+    n, units = len(setup.q0), _units(setup, setup.q0)
+    values, modes = np.linalg.eig(matrix)
+    mode = np.real(modes[:, np.argmax(np.abs(values))])
+    q, v = mode[:n] * units, mode[n : 2 * n] * units
+    size = _PUSH * np.median(units) / max(np.linalg.norm(q), np.linalg.norm(v) / _RATE)
+    others = np.random.default_rng(seed).normal(size=n)
+    q = size * (q + 0.1 * np.linalg.norm(q) * others / np.linalg.norm(others))
+    return replace(setup, q0=setup.q0 + q / units, v0=setup.v0 + size * v / units)
+
+
+def _units(setup: Setup, q: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.diagonal(setup.plant.dynamics.M(q)))
+
+
+@final
+@dataclass(frozen=True)
+class PushedRun:
+    """What a run from near an equilibrium did, and what it reports about itself.
+
+    Attributes:
+        growth: As above; inf if the run ended before its time.
+        misleads: Whether it has left an equilibrium that the motion does not leave, and reports nothing of it.
+        description: Both as text.
+    """
+
+    growth: float
+    misleads: bool
+    description: str
+
+    @property
+    def stays(self) -> bool:
+        """Whether it stays near the equilibrium."""
+        return self.growth < _MOST
+
+    def leaves(self, within: PushedRun) -> bool:
+        """Whether it leaves the equilibrium, and a run within the limit does not."""
+        return self.growth > _LEFT * max(within.growth, 1.0)
+
+
+def run_from_near(setup: Setup, at: np.ndarray, budget: Budget, numerical: bool = False) -> PushedRun:
+    """Run a setup and look how far it goes from an equilibrium.
+
+    Args:
+        setup: From near the equilibrium.
+        at: The equilibrium, (n,).
+        budget: Of the run.
+        numerical: Whether only errors of the method can make it go, so that its error estimate is looked at.
+
+    Raises:
+        OvertimeError: If the budget ends.
+    """
+    run, units = simulate(replace(setup, estimate_error=numerical), on_progress=budget.check), _units(setup, at)
+    with np.errstate(over="ignore"):  # a run that diverged may be off by inf
+        off = np.linalg.norm((run.q - at) * units, axis=1)
+    late = off[run.t >= run.t[-1] / 2]
+    finished = run.outcome.ending is Ending.FINISHED and bool(np.isfinite(late).all())
+    growth = float(late.max() / np.linalg.norm((setup.q0 - at) * units)) if finished else inf
+    how = f"the push grew {growth:.2g}-fold" if finished else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
+    said = says(run)
+    estimated = 0.0 if run.error is None else run.error.largest
+    silent = not said and estimated < LEAST * float(np.abs(run.q - at).max())
+    misleads = numerical and finished and growth > _LEFT and silent
+    return PushedRun(growth, misleads, f"{how}{f' ({said})' if said else ''}")
+
+
+def says(run: Trajectory) -> str:
+    """What a run says against itself, or of what it met; empty if its summary is clean."""
+    description = [str(kind).replace("_", " ") for kind in dict.fromkeys(each.kind for each in run.remarks)]
+    if run.error is not None and run.error.note:
+        until = run.error.until_s
+        description.append(f"error told up to {until:.3g} s only" if until else "no error told")
+    if "does not close" in run.summary:
+        description.append("the ledger does not close")
+    return ", ".join(description)
