@@ -132,7 +132,7 @@ def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _
                 observer.end()
                 far = runaway(setup, observer.fastest)
                 if far:
-                    record = replace(record, outcome=judged(setup, record.outcome))
+                    record = replace(record, outcome=judged(setup, record, far))
                 return _Ran(setup, engine, observer, record, ready + engine.compiling_s() - before, said, far)
 
 

@@ -116,3 +116,16 @@ def test_no_companion_runs_past_a_hundred_times_the_velocity_limit(tmp_path: Pat
     run = rd.simulate(rd.Plant(arm), [0.0], [v_end], duration_s=0.01)
     assert run.error is not None
     assert (run.statistics.companion_runs == 0, run.error.largest == inf) == (part > 1, part > 1)
+
+
+def test_a_run_that_a_stop_throws_out_of_its_steps_has_not_finished() -> None:
+    """A stop of 1e12 N m/rad, of which the steps know nothing until the joint is in it."""
+    arm = rd.load("planar_2r")
+    stops = np.atleast_1d(rd.effects.joint_stops([-1.0, -1.0], [0.5, 1.0], 1e12))
+    law = rd.control.PD(rd.control.hold([0.0, 0.0]), 40.0, 4.0)
+    run = rd.simulate(
+        rd.Plant(arm, [rd.effects.EffortLimit(30.0), *stops]), [0.4, -0.7], [3.0, 5.0], duration_s=0.2, controller=law,
+        integrator="rk4", step_s=2e-3,
+    )  # fmt: skip
+    assert not run.ledger.closes
+    assert run.outcome.ending == "diverged" and "joint_2" in run.outcome.advice

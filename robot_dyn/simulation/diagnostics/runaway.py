@@ -16,7 +16,9 @@ from robot_dyn.queries.units import joint_types_of, unit
 from robot_dyn.simulation.dynamics.fastest_motion import fastest, jacobian
 from robot_dyn.simulation.dynamics.stability import below, excess_rate, longest_step
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind, remark_lines
+from robot_dyn.simulation.results.samples import ledger
 from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
 
 EXPLAINS = 1e3  # growth of deviations over a run
@@ -69,8 +71,21 @@ def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
     return (remark,)
 
 
-def judged(setup: Setup, outcome: Outcome) -> Outcome:
-    """Return the outcome of a run that left all speeds: diverged if its step is too long to be stable at the start."""
-    if outcome.ending is Ending.FINISHED and (remarks := step_too_long(setup, outcome.t)):
+def judged(setup: Setup, record: Recording, why: str) -> Outcome:
+    """Return the outcome of a run by fixed steps that left all speeds: diverged where its energy came from nowhere.
+
+    Args:
+        setup: What ran.
+        record: Its recording.
+        why: Which joint left all speeds, see `runaway`.
+    """
+    outcome = record.outcome
+    if outcome.ending is not Ending.FINISHED or setup.integrator.controls_error:
+        return outcome
+    if remarks := step_too_long(setup, outcome.t):
         return Outcome(Ending.DIVERGED, outcome.t, remark_lines(remarks)[0])
-    return outcome
+    with np.errstate(all="ignore"):
+        if ledger(setup.equation, record).closes:
+            return outcome
+    remedy = f"take a smaller step than {setup.taken_step_s:g} s, or an implicit method"
+    return Outcome(Ending.DIVERGED, outcome.t, f"{why}, and its energy came from nowhere: {remedy}")

@@ -51,12 +51,7 @@ class MotorBudget(Result):
     left_out: tuple[str, ...]
     environment: dict[str, str]
     demand: Demand = field(metadata=UNREPORTED)
-<<<<<<< HEAD
     case: tuple[Plant, PiecewisePolynomial, Limits] | None = field(metadata=UNREPORTED)
-    interrupted: bool = False
-=======
-    case: tuple[Plant, PiecewisePolynomial, Limits, Any] | None = field(metadata=UNREPORTED)
->>>>>>> ac
 
     @reported
     def fits(self) -> bool:
