@@ -14,7 +14,7 @@ from itertools import islice
 from typing import Any
 
 from robot_dyn.foundations import SweepError, shown
-from robot_dyn.tools.sweeps.plan.work import Stopped
+from robot_dyn.tools.sweeps.work import Stopped
 
 _ATTEMPTS = 20  # rounds without a new file, after which a chunk is held to end its worker
 _LOOK_S = 0.5

@@ -12,8 +12,8 @@ from robot_dyn.cli import Force, Json, app, bar, say, say_json, to_stderr
 from robot_dyn.foundations import SweepError, nearest, shorten
 
 if TYPE_CHECKING:
-    from robot_dyn.tools.sweeps.plan.sweep import Sweep
     from robot_dyn.tools.sweeps.result import SweepResult
+    from robot_dyn.tools.sweeps.sweep import Sweep
 
 ACTIONS = ("run", "status", "verify", "report", "export")
 

@@ -5,24 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from inspect import signature
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import Caching, SweepError, Value, nearest, numbers, shown
+from robot_dyn.foundations import SweepError, Value, nearest, numbers, shown
 from robot_dyn.tools.sweeps.texts import called
 
 LEAST, MOST = 2.0**-54, 1 - 2.0**-53
 """Between which numbers are taken: F⁻¹(0) may be infinite."""
 _SCIPY = "scipy.stats."
+_ORDERED = {"uniform": ("low", "high"), "triangular": ("low", "mode", "high")}
+_BOUNDS: dict[str, Any] = {"sd": {"least": 0.0}, "sigma_of_log": {"least": 0.0}, "median": {"above": 0.0}}
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Distribution(Value, Caching):
+class Distribution(Value):
     """A distribution of one number, or of n independent ones.
 
     Attributes:
@@ -39,7 +40,7 @@ class Distribution(Value, Caching):
         checked = {}
         for key, x in self.parameters.items():
             what = f"the {key} of choice" if self.name == "choice" else f"{key} of {self.name}"
-            array = numbers(what, x, *shapes, error=SweepError)
+            array = numbers(what, x, *shapes, error=SweepError, **_BOUNDS.get(key, {}))
             if self.name.startswith(_SCIPY) and np.asarray(x).dtype.kind in "iu":  # SciPy may need whole numbers
                 array = np.array(x)
                 array.setflags(write=False)
@@ -48,7 +49,12 @@ class Distribution(Value, Caching):
         if self.name == "choice":
             return
         _ = self.shape  # refused if lengths differ
-        _check_order(self.name, checked)
+        for low, high in pairwise(_ORDERED.get(self.name, ())):
+            a, b = np.broadcast_arrays(checked[low], checked[high])
+            if (wrong := a > b).any():
+                raise SweepError(
+                    f"{low} of {self.name} must be at most {high}, got {a[wrong][0]:g} and {b[wrong][0]:g}"
+                )
         with np.errstate(all="ignore"):
             ends = self._inverse(np.full((3, self.size), [[LEAST], [0.5], [MOST]]).reshape(3, *self.shape))
         if not np.isfinite(ends).all():
@@ -71,6 +77,11 @@ class Distribution(Value, Caching):
     def size(self) -> int:
         """The columns of a design that it takes."""
         return 1 if self.name == "choice" or not self.shape else self.shape[0]
+
+    @property
+    def width(self) -> int:
+        """The numbers of one value."""
+        return self.shape[0] if self.shape else 1
 
     def values(self, u: Any) -> np.ndarray:
         """F⁻¹(u), shape (k,) or (k, n).
@@ -170,7 +181,7 @@ def distribution(value: Any) -> Distribution:
     return Distribution(_SCIPY + name, {str(k): x for k, x in enumerate(value.args)} | value.kwds)
 
 
-def from_dict(stored: Any) -> Distribution:
+def from_dict(stored: Mapping[str, Any]) -> Distribution:
     """The distribution of a dictionary that `to_dict` made.
 
     Raises:
@@ -184,27 +195,10 @@ def from_dict(stored: Any) -> Distribution:
         return Distribution(name, given)
     if name not in CONSTRUCTORS:
         raise SweepError(f"no distribution {shown(name)}; {nearest(name, CONSTRUCTORS)}")
-    expected = list(signature(CONSTRUCTORS[name]).parameters)
-    if set(given) != set(expected):
-        raise SweepError(f"{name} takes {', '.join(expected)}, got {', '.join(given) or 'nothing'}")
-    return Distribution(name, given)
-
-
-_ORDERED = {"uniform": ("low", "high"), "triangular": ("low", "mode", "high")}
-_LEAST = {"normal": {"sd": 0.0}, "lognormal": {"sigma_of_log": 0.0}}
-
-
-def _check_order(name: str, of: Mapping[str, Any]) -> None:
-    """Raise SweepError unless the parameters are in order, and widths are not negative."""
-    ordered = _ORDERED.get(name, ())
-    for low, high in pairwise(ordered):
-        a, b = np.broadcast_arrays(of[low], of[high])
-        if (wrong := a > b).any():
-            raise SweepError(f"{low} of {name} must be at most {high}, got {a[wrong][0]:g} and {b[wrong][0]:g}")
-    for key, least in _LEAST.get(name, {}).items():
-        numbers(f"{key} of {name}", of[key], (), ("n",), error=SweepError, least=least)
-    if name == "lognormal":
-        numbers(f"median of {name}", of["median"], (), ("n",), error=SweepError, above=0.0)
+    try:
+        return CONSTRUCTORS[name](**given)
+    except TypeError as error:
+        raise SweepError(f"distribution {error}") from None
 
 
 def _uniform(u: np.ndarray, low: Any, high: Any) -> np.ndarray:

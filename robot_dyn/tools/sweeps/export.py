@@ -9,10 +9,10 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from robot_dyn.foundations import FileKind, SweepError, file_path, needs, save, table_cell, target
-from robot_dyn.tools.sweeps.folder.folder import Folder
-from robot_dyn.tools.sweeps.folder.rows import FIXED, TEXTS, schema
-from robot_dyn.tools.sweeps.plan.specification import specification
-from robot_dyn.tools.sweeps.plan.sweep import Sweep, heading
+from robot_dyn.tools.sweeps.folder import Folder
+from robot_dyn.tools.sweeps.rows import FIXED, TEXTS, schema
+from robot_dyn.tools.sweeps.specification import specification
+from robot_dyn.tools.sweeps.sweep import Sweep
 
 _CSV, _PARQUET = FileKind("a table of runs", ".csv", b'"run",'), FileKind("a table", ".parquet", b"PAR1")
 
@@ -35,7 +35,7 @@ def _write(sweep: Sweep, folder: Folder, stream: BinaryIO, is_csv: bool) -> None
     pa, of_files, about = needs("pyarrow", extra="sweeps"), schema(folder.names), _about_columns(sweep)
     cell = table_cell if is_csv else str
     fields = [
-        field.with_name(cell(heading(sweep, field.name))).with_metadata(about.get(field.name)) for field in of_files
+        field.with_name(cell(sweep.heading(field.name))).with_metadata(about.get(field.name)) for field in of_files
     ]
     stated = pa.schema(fields, metadata={"title": "runs of robot_dyn", "sweep": _about(sweep, folder)})
     with _writer(stream, stated, is_csv) as writer:
@@ -55,7 +55,7 @@ def _writer(stream: BinaryIO, stated: Any, is_csv: bool) -> Any:
 def _about(sweep: Sweep, folder: Folder) -> str:
     """The specification as JSON, with the name of the scene in place of its path."""
     return json.dumps(
-        specification(sweep, folder.chunk).model_dump() | {"scene": Path(sweep.source).name}, ensure_ascii=False
+        specification(sweep, folder.chunk).model_dump() | {"scene": Path(sweep.scene).name}, ensure_ascii=False
     )
 
 

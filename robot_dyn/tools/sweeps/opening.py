@@ -1,4 +1,4 @@
-"""The folder of a sweep, opened or begun, with the work that fills it.
+"""The folder of a sweep, opened or begun.
 
 It begins with a pilot of 64 runs, from which the size of chunks follows: about 2 s of work, then fixed for ever. Its
 time is that of the processor: a busy machine would give small chunks.
@@ -14,7 +14,7 @@ import numpy as np
 
 from robot_dyn.foundations import SceneError, SweepError, integer, needs
 from robot_dyn.simulation.rollouts.lock_step import LANES
-from robot_dyn.tools.sweeps.folder.folder import (
+from robot_dyn.tools.sweeps.folder import (
     Folder,
     begin,
     has_specification,
@@ -22,19 +22,12 @@ from robot_dyn.tools.sweeps.folder.folder import (
     read_design,
     read_specification,
 )
-from robot_dyn.tools.sweeps.folder.rows import RAISED
-from robot_dyn.tools.sweeps.folder.samples import SampleStore
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
-from robot_dyn.tools.sweeps.plan.specification import (
-    Specification,
-    parsed,
-    processor,
-    specification,
-    sweep_of,
-    versions,
-)
-from robot_dyn.tools.sweeps.plan.sweep import Sweep
-from robot_dyn.tools.sweeps.plan.work import Work
+from robot_dyn.tools.sweeps.rows import RAISED
+from robot_dyn.tools.sweeps.sample_store import SampleStore
+from robot_dyn.tools.sweeps.specification import Specification, parsed, processor, specification, versions
+from robot_dyn.tools.sweeps.sweep import Sweep
+from robot_dyn.tools.sweeps.work import Work
 
 _RUNS = 64
 _CHUNK_S = 2.0
@@ -43,35 +36,36 @@ _SAMPLE_BYTES = 2**26
 _LEAST_CHUNKS = 32  # so that threads and machines share even a short sweep
 
 
-def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Work]:
-    """The folder of a sweep, and its work; arguments and errors as of `read`."""
+def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Sweep]:
+    """The folder of a sweep, and the sweep; arguments and errors as in `read`."""
     check_places(path)
     where = str(path / "sweep.json")
     stored = parsed(read_specification(path), where)
     try:
-        sweep = sweep_of(stored, read_design(path, stored.rows_sha256), where, names, path)
+        sweep = stored.sweep(read_design(path, stored.rows_sha256), where, names, path)
     except SceneError as error:
         raise SweepError(f"{where}: {error}; sw.read(folder, scene=…), --scene, where it lies now") from None
     stored.check_same(specification(sweep, stored.chunk), where, versions=False)
-    return _folder(path, sweep, stored), Work(sweep)
+    return _folder(path, sweep, stored), sweep
 
 
 def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
-    """The folder of a sweep, begun now unless it was; arguments and errors as of `run`."""
+    """The folder of a sweep, begun now unless it was; arguments and errors as in `run`."""
     if chunk is not None:
         chunk = integer("chunk", chunk, least=1, most=2**31, error=SweepError)
     needs("pyarrow", extra="sweeps")
-    where = str(path / "sweep.json")
-    new, t = not has_specification(path), None
-    if new:
+    where, t = str(path / "sweep.json"), None
+    if has_specification(path):
+        stored = parsed(read_specification(path), where)
+        stated = specification(sweep, chunk or stored.chunk)
+    else:
         _check_room(sweep, path)
         stated = specification(sweep, pilot(sweep, chunk))
         t = None if sweep.samples is None else _times(sweep)  # before the folder holds a sweep that is refused
         begin(path, stated.text, sweep.points.rows, stated.rows_sha256)
-    stored = parsed(read_specification(path), where)
-    stored.check_same(specification(sweep, chunk or stored.chunk), where)
-    if not new:
-        mend_design(path, sweep.points.rows, stored.rows_sha256)
+        stored = parsed(read_specification(path), where)
+    stored.check_same(stated, where)
+    mend_design(path, sweep.points.rows, stored.rows_sha256)
     folder = _folder(path, sweep, stored)
     if folder.samples is not None and not folder.present().any():
         folder.samples.create(_times(sweep) if t is None else t, sweep.setup.plant.dynamics.joint_names)
@@ -86,7 +80,7 @@ def _times(sweep: Sweep) -> np.ndarray:
 
 def _check_room(sweep: Sweep, path: Path) -> None:
     """Raise SweepError if the disk has not as much room as the sweep will take."""
-    there = next(each for each in (path.absolute(), *path.absolute().parents) if each.exists())
+    there = next(folder for folder in (path.absolute(), *path.absolute().parents) if folder.exists())
     free = disk_usage(there).free
     if sweep.bytes_expected > free:
         sizes = f"{sweep.bytes_expected / 2**30:.3g} GiB, and {there} has {free / 2**30:.3g} GiB"
@@ -106,10 +100,9 @@ def pilot(sweep: Sweep, chunk: int | None = None) -> int:
         SweepError: If all of them raise, or a figure cannot be computed of them; says why.
     """
     work, count = Work(sweep), min(_RUNS, sweep.runs)
-    rows = work.rows(0, count)  # with what is compiled first
+    rows = work.rows(0, count, check=True)  # with what is compiled first
     if (rows["outcome"] == RAISED).all():
         raise SweepError(f"all {count} runs of the pilot raise; the first: {rows['reason'][0]}")
-    work.check_figures(0, count)
     if chunk is not None:
         return chunk
     began = process_time()

@@ -12,9 +12,9 @@ import numpy as np
 from robot_dyn.foundations import Answer, FileKind, html_of, inline, page, side_by_side, text
 from robot_dyn.foundations import table as html_table
 from robot_dyn.report import PAGE, ink, styled
-from robot_dyn.tools.sweeps.estimate import Estimate
-from robot_dyn.tools.sweeps.folder.rows import FINISHED
+from robot_dyn.tools.sweeps.rows import FINISHED
 from robot_dyn.tools.sweeps.sensitivity import Sensitivity, bins
+from robot_dyn.tools.sweeps.statistics import Estimate
 
 KIND = FileKind("a page", ".html", b"<!doctype html>")
 _BINS, _CELLS, _MOST_CROSSES = 60, 24, 500

@@ -27,15 +27,15 @@ from robot_dyn.foundations import (
     truth,
 )
 from robot_dyn.tools.sweeps import statistics
-from robot_dyn.tools.sweeps.estimate import Estimate
 from robot_dyn.tools.sweeps.export import export, inputs_of
 from robot_dyn.tools.sweeps.expression import Expression, Truth
-from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
-from robot_dyn.tools.sweeps.folder.rows import FINISHED, FIXED, NUMBERS, OUTCOMES, digest_of
-from robot_dyn.tools.sweeps.plan.specification import specification
-from robot_dyn.tools.sweeps.plan.sweep import Sweep, heading, is_scene
-from robot_dyn.tools.sweeps.plan.work import Work
+from robot_dyn.tools.sweeps.folder import Folder
+from robot_dyn.tools.sweeps.rows import FINISHED, FIXED, NUMBERS, OUTCOMES
 from robot_dyn.tools.sweeps.sensitivity import Sensitivity, by_values, saltelli
+from robot_dyn.tools.sweeps.specification import specification
+from robot_dyn.tools.sweeps.statistics import Estimate
+from robot_dyn.tools.sweeps.sweep import Sweep, is_scene
+from robot_dyn.tools.sweeps.work import Work
 
 if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.report import FigureReport
@@ -155,7 +155,7 @@ class SweepResult(Answer):
             values = self.folder.columns(self.sweep.columns)
             columns = np.column_stack([values[name] for name in self.sweep.columns])
             found = by_values(x[keep], columns[keep], self.sweep.columns, failed=failed)
-        return replace(found, figure=heading(self.sweep, figure), given=given)
+        return replace(found, figure=self.sweep.heading(figure), given=given)
 
     def worst(self, figure: str, count: int = 5, given: str | None = None) -> tuple[int, ...]:
         """Numbers of the runs with the largest values of a figure; `run(i)` repeats one.
@@ -205,8 +205,8 @@ class SweepResult(Answer):
 
         inputs = inputs_of(self.folder, path)
         path = target(path, KIND, SweepError, inputs, truth("force", force, error=SweepError))
-        varied = {name: heading(self.sweep, name) for name in self.sweep.columns}
-        source = "" if is_scene(self.sweep.source) else f", scene={self.sweep.source!r}"
+        varied = {name: self.sweep.heading(name) for name in self.sweep.columns}
+        source = "" if is_scene(self.sweep.scene) else f", scene={self.sweep.scene!r}"
         repeat = f"sw.read({str(self.path)!r}{source}).run"
         figures = map(self._reported, self.sweep.figures)
         data = report(self, self.probability("failed"), self.table(), varied, figures, repeat).encode()
@@ -224,7 +224,7 @@ class SweepResult(Answer):
             sensitivity = str(error)
         quantiles = self.quantiles(name, PROBABILITIES, given=given)
         worst = self.worst(name, min(WORST, len(x)), given="known")
-        return FigureReport(heading(self.sweep, name), x, quantiles, worst, sensitivity)
+        return FigureReport(self.sweep.heading(name), x, quantiles, worst, sensitivity)
 
     def run(self, i: int) -> Trajectory:
         """Repeat run i alone, with all that rollouts record: the same bits.
@@ -246,7 +246,7 @@ class SweepResult(Answer):
         """
         self._check_complete()
         self.folder.check_samples()
-        return digest_of(read_all(self.folder))
+        return self.folder.digest_of_rows()
 
     @property
     def processors(self) -> dict[str, int]:
@@ -385,7 +385,7 @@ class SweepResult(Answer):
 
     def _named(self, found: Estimate, figure: str, given: str | None) -> Estimate:
         """With the figure it is of, its unit, and which runs were asked about."""
-        return replace(found, statistic=f"{found.statistic} of {heading(self.sweep, figure)}{_among(given)}")
+        return replace(found, statistic=f"{found.statistic} of {self.sweep.heading(figure)}{_among(given)}")
 
     def _scrambling(self, keep: np.ndarray) -> np.ndarray | None:
         """The scrambling of each run that is asked about; None of independent ones."""

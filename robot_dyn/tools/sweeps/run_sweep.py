@@ -11,13 +11,13 @@ from typing import Any
 from robot_dyn.codegen import thread_count
 from robot_dyn.foundations import SweepError, check_folder, file_path, shown
 from robot_dyn.tools.sweeps.chunks import fill_by_threads, share_of
-from robot_dyn.tools.sweeps.folder.folder import Folder
+from robot_dyn.tools.sweeps.folder import Folder
 from robot_dyn.tools.sweeps.imported import check_places, named
 from robot_dyn.tools.sweeps.opening import begun, opened
-from robot_dyn.tools.sweeps.plan.specification import names_of
-from robot_dyn.tools.sweeps.plan.sweep import Sweep
-from robot_dyn.tools.sweeps.plan.work import Work
 from robot_dyn.tools.sweeps.result import SweepResult
+from robot_dyn.tools.sweeps.specification import names_of
+from robot_dyn.tools.sweeps.sweep import Sweep
+from robot_dyn.tools.sweeps.work import Work
 
 Progress = Callable[[int, int], object]
 _SCAN_S = 1.0  # between looks into the folder
@@ -106,8 +106,8 @@ def read(
             imports from the folder.
     """
     path = file_path(folder, SweepError)
-    known, work = opened(path, named(scene, figures))
-    return SweepResult(work.sweep, known)
+    known, sweep = opened(path, named(scene, figures))
+    return SweepResult(sweep, known)
 
 
 class _Progress:

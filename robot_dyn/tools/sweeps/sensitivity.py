@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, final
 
 import numpy as np
 
 from robot_dyn.foundations import Answer, Block, SweepError, Table, needs, numbers
-from robot_dyn.tools.sweeps.estimate import Estimate, text
-from robot_dyn.tools.sweeps.statistics import check_figure, check_level
+from robot_dyn.tools.sweeps.statistics import Estimate, check_figure, check_level, student_quantile, text
 
 _RUNS_OF_A_BIN, _MOST_BINS = 64, 32
 _LEAST_SCRAMBLINGS = 3
@@ -114,19 +114,11 @@ def saltelli(
         return np.array([found["S1"], found["ST"]])
 
     theta, without = indices(rows), np.array([indices(rows[of != r]) for r in left])
-    half = _student_quantile(level, len(left) - 1) * np.sqrt((len(left) - 1) * without.var(axis=0))
+    half = student_quantile(level, len(left) - 1) * np.sqrt((len(left) - 1) * without.var(axis=0))
     left_out = int((~whole).sum())
+    stated = partial(Estimate, level=level, n=len(y), failed=failed, method="SALib")
     made = [
-        Estimate(
-            f"{kind} index of {name}",
-            float(x),
-            float(x - h),
-            float(x + h),
-            level=level,
-            n=len(y),
-            failed=failed,
-            method="SALib",
-        )
+        stated(f"{kind} index of {name}", float(x), float(x - h), float(x + h))
         for kind, row, halves in zip(("first-order", "total"), theta, half, strict=True)
         for name, x, h in zip(names, row, halves, strict=True)
     ]
@@ -186,12 +178,6 @@ def _pawn(y: np.ndarray, bins: np.ndarray) -> float:
 
     distance: Any = ks_2samp
     return float(np.median([distance(y[bins == k], y, method="asymp")[0] for k in range(bins.max() + 1)]))
-
-
-def _student_quantile(level: float, freedom: int) -> float:
-    from scipy.special import stdtrit
-
-    return float(stdtrit(freedom, (1 + level) / 2))
 
 
 def _check_varies(y: np.ndarray) -> None:

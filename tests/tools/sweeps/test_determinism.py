@@ -10,7 +10,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import Work
-from robot_dyn.tools.sweeps.folder.rows import digest_of
+from robot_dyn.tools.sweeps.rows import digest_of
 from tests.long import long
 from tests.tools.sweeps.swept import SCENE, digest, scene, swept
 

@@ -21,7 +21,7 @@ from robot_dyn.tools.sweeps import begun, chunks, cluster
 from robot_dyn.tools.sweeps.chunks import fill_by_threads
 from robot_dyn.tools.sweeps.cluster import client_of, fill_by_cluster
 from robot_dyn.tools.sweeps.imported import NOTHING
-from robot_dyn.tools.sweeps.plan.work import Stopped
+from robot_dyn.tools.sweeps.work import Stopped
 from tests.tools.sweeps.children import outcome_of
 from tests.tools.sweeps.swept import digest, names_in, swept
 
@@ -126,7 +126,7 @@ def test_workers_that_see_another_folder_are_refused(filled: Any, tmp_path: Path
 
     class Elsewhere(Client):  # reads the folder, as of a cache, and writes to another one
         def run(self, function: Any, ticket: Any, on_error: str) -> dict[str, Any]:
-            return {"tcp://10.0.0.1:1": f"{ticket.token}.host.1"}
+            return {"tcp://10.0.0.1:1": ".written elsewhere.unfinished"}
 
     with pytest.raises(SweepError, match=r"worker tcp://10.0.0.1:1 writes to another folder"):
         fill(Elsewhere(), folder)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -17,40 +15,10 @@ import pytest
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import Work, begun, opening
-from robot_dyn.tools.sweeps.folder import files
-from robot_dyn.tools.sweeps.folder.files import remove_abandoned, write
-from robot_dyn.tools.sweeps.folder.folder import MOST_FILES, Folder
-from robot_dyn.tools.sweeps.folder.rows import NUMBERS, TEXTS
+from robot_dyn.tools.sweeps.folder import MOST_FILES, Folder, begin
+from robot_dyn.tools.sweeps.rows import NUMBERS, TEXTS
+from robot_dyn.tools.sweeps.specification import specification
 from tests.tools.sweeps.swept import digest, names_in, swept
-
-CALLS = ("open", "write", "fsync", "close", "replace")
-
-
-def failing(monkeypatch: pytest.MonkeyPatch, call: str, error: BaseException) -> None:
-    """Let one call to the system of a write fail; the write itself after half of its bytes."""
-
-    class Failing:
-        def __getattr__(self, name: str):
-            def fail(*arguments):
-                if name == "write":
-                    os.write(arguments[0], arguments[1][: len(arguments[1]) // 2])
-                raise error
-
-            return fail if name == call else getattr(os, name)
-
-    monkeypatch.setattr(files, "os", Failing())
-
-
-@pytest.mark.parametrize("call", CALLS)
-@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
-def test_a_write_that_fails_leaves_no_file(tmp_path: Path, monkeypatch, call: str, error: BaseException) -> None:
-    write(tmp_path / "there", b"old")
-    failing(monkeypatch, call, error)
-    for name in ("there", "new"):
-        with pytest.raises(type(error)):
-            write(tmp_path / name, b"x" * 1000)
-    assert [path.name for path in tmp_path.iterdir()] == ["there"]
-    assert (tmp_path / "there").read_bytes() == b"old"
 
 
 def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypatch) -> None:
@@ -59,32 +27,36 @@ def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypa
     folder.prepare()
     work = Work(sweep)
     folder.write(0, work.rows(0, 20))
-    said = r"chunk 3 \(runs 60 to 79\) cannot be written .* \(No space left on device\)"
-    with monkeypatch.context() as patch, pytest.raises(SweepError, match=said):
-        failing(patch, "write", OSError(28, "No space left on device"))
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch, pytest.raises(SweepError, match=r"000003\.parquet.*No space left on device"):
+        patch.setattr(os, "fsync", full)
         folder.write(3, work.rows(60, 80))
     assert folder.missing().tolist() == [1, 2, 3, 4]
     done = sw.run(sweep, tmp_path / "out")
     assert done.verify() == digest(sweep)
 
 
-def test_what_dead_writers_left_is_removed_and_what_others_write_is_not(tmp_path: Path) -> None:
-    dead = subprocess.Popen([sys.executable, "-c", ""])
-    dead.wait()
-    host = files._HOST
-    names = {
-        f".000001.parquet.{host}.{dead.pid}.0123abcd.unfinished": False,
-        f".000002.parquet.{host}.{os.getpid()}.0123abcd.unfinished": True,
-        f".000003.parquet.elsewhere.{dead.pid}.0123abcd.unfinished": True,
-        f".000004.parquet.elsewhere.{dead.pid}.89abcdef.unfinished": False,  # a day old
-        "note.unfinished": True,  # not ours
+def test_what_killed_writers_left_is_removed_and_what_others_write_is_not(tmp_path: Path) -> None:
+    """When its file is written again, or by any run a day later."""
+    sweep = swept(tmp_path, 40)
+    folder = begun(sweep, tmp_path / "out", chunk=20)
+    folder.prepare()
+    ages = {
+        f".000001.parquet.{'0' * 16}.unfinished": 60.0,
+        f".000001.parquet.{'1' * 16}.unfinished": 0.0,  # another writer has just begun it
+        f".000009.parquet.{'2' * 16}.unfinished": 60.0,
+        f".000009.parquet.{'3' * 16}.unfinished": 90_000.0,
     }
-    for name in names:
-        (tmp_path / name).write_bytes(b"half")
-    old = time.time() - 90_000
-    os.utime(tmp_path / f".000004.parquet.elsewhere.{dead.pid}.89abcdef.unfinished", (old, old))
-    assert remove_abandoned([tmp_path]) == 2
-    assert {path.name for path in tmp_path.iterdir()} == {name for name, stays in names.items() if stays}
+    for name, age in ages.items():
+        path = folder.file(0).with_name(name)
+        path.write_bytes(b"half")
+        os.utime(path, (time.time() - age, time.time() - age))
+    assert not len(sw.run(sweep, folder.path).missing)
+    names = sorted(path.name for path in folder.file(0).parent.iterdir() if path.name in ages)
+    assert names == sorted(ages)[1:3]
 
 
 @pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "other sweep", "other chunk"])
@@ -178,13 +150,12 @@ def test_chunks_beyond_20_000_go_to_subfolders(tmp_path: Path) -> None:
 
 def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
     """The specification of the first stays; the second takes its chunks."""
-    sweep = swept(tmp_path, 50)
-    assert begun(sweep, tmp_path / "out", chunk=20) == begun(sweep, tmp_path / "out")
-    text = (tmp_path / "out" / "sweep.json").read_text()
-    with pytest.raises(FileExistsError):
-        write(tmp_path / "out" / "sweep.json", b"{}", exclusive=True)
-    assert (tmp_path / "out" / "sweep.json").read_text() == text
-    assert names_in(tmp_path / "out") == ["design", "sweep.json"]
+    sweep, out = swept(tmp_path, 50), tmp_path / "out"
+    assert begun(sweep, out, chunk=20) == begun(sweep, out)
+    text = (out / "sweep.json").read_text()
+    begin(out, "{}", sweep.points.rows, specification(sweep, 20).rows_sha256)
+    assert (out / "sweep.json").read_text() == text
+    assert names_in(out) == ["design", "sweep.json"]
 
 
 def test_another_sweep_that_begins_at_the_same_time_changes_nothing(tmp_path: Path, monkeypatch) -> None:

@@ -15,7 +15,7 @@ import robot_dyn as rd
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import Work
-from robot_dyn.tools.sweeps.folder.rows import FIXED
+from robot_dyn.tools.sweeps.rows import FIXED
 from tests.tools.sweeps.swept import SCENE, VARY, scene, swept
 
 WEAK = """

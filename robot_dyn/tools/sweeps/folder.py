@@ -4,6 +4,8 @@ sweep.json                   the specification
 design-0123456789abcdef.npy  rows of the design, with the start of their SHA-256
 rows/000123.parquet          a chunk; of more than 20 000 chunks rows/0004/080123.parquet
 samples/                     samples of runs, where they are kept
+
+Files are written whole or not at all. Two writers of one file harm nothing: the later one writes the same rows.
 """
 
 from __future__ import annotations
@@ -11,25 +13,26 @@ from __future__ import annotations
 import io
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
+from time import time
 from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import SweepError, needs, read, reading, shown, why
-from robot_dyn.tools.sweeps.folder.files import make_folder, remove_abandoned, write
-from robot_dyn.tools.sweeps.folder.rows import OUTCOMES, TEXTS, Rows, digest_of, schema, type_of
-from robot_dyn.tools.sweeps.folder.samples import SampleStore
+from robot_dyn.foundations import SweepError, needs, read, reading, save, shown, why
+from robot_dyn.tools.sweeps.rows import OUTCOMES, TEXTS, Rows, digest_of, schema, type_of
+from robot_dyn.tools.sweeps.sample_store import SampleStore
 
 MOST_FILES = 20_000  # of a folder
+OLD_S = 86_400.0  # age of a file that its writer has not finished, after which it is removed
 _MOST_TEXT, _MOST_TABLE = 2**26, 2**34
 _SPECIFICATION = "sweep.json"
-_SUFFIX, _FOOTER = ".parquet", b"footer"
+_SUFFIX, _FOOTER, _UNFINISHED = ".parquet", b"footer", ".unfinished"
 _REMEDY = "run the sweep again, after removing this file"
 _AGAIN = "run the sweep into this folder again, which writes the file"
 _NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
@@ -46,7 +49,7 @@ class Folder:
         chunk: Runs of a chunk; the last one may have fewer.
         digest: Of the specification.
         names: Of varied parameters and of figures.
-        about: What footers state beside the digest: versions and processor.
+        about: What footers state next to the digest: versions and processor.
         samples: Where samples of runs are; None where none are kept.
     """
 
@@ -71,19 +74,18 @@ class Folder:
         """The file of a chunk."""
         return self._subfolder(chunk) / f"{chunk:06d}{_SUFFIX}"
 
-    @property
-    def subfolders(self) -> list[Path]:
-        """The folders of files."""
-        return [self._subfolder(chunk) for chunk in range(0, self.count, MOST_FILES)]
-
     def _subfolder(self, chunk: int) -> Path:
         rows = self.path / "rows"
         return rows if self.count <= MOST_FILES else rows / f"{chunk // MOST_FILES:04d}"
 
+    @property
+    def _subfolders(self) -> list[Path]:
+        return [self._subfolder(chunk) for chunk in range(0, self.count, MOST_FILES)]
+
     def present(self) -> np.ndarray:
         """Whether each chunk has a file, (count,)."""
-        found = np.zeros(self.count, bool)
-        for folder in self.subfolders:
+        present = np.zeros(self.count, bool)
+        for folder in self._subfolders:
             try:
                 names = os.listdir(folder)
             except FileNotFoundError:
@@ -95,40 +97,37 @@ class Folder:
             for name in names:
                 stem = name.removesuffix(_SUFFIX)
                 if stem.isdigit() and stem != name and int(stem) < self.count:
-                    found[int(stem)] = True
-        return found
+                    present[int(stem)] = True
+        return present
 
     def missing(self) -> np.ndarray:
         """Numbers of the chunks without a file."""
         return np.flatnonzero(~self.present())
 
     def prepare(self) -> None:
-        """Make the folders, and remove what dead writers left."""
-        for folder in self.subfolders:
+        """Make the folders, and remove files that killed writers left a day ago; later ones go when written again."""
+        for folder in self._subfolders:
             make_folder(folder)
-        remove_abandoned((self.path, *self.subfolders))
+        for path in (path for folder in (self.path, *self._subfolders) for path in folder.glob(f".*{_UNFINISHED}")):
+            with suppress(OSError):  # removed meanwhile, or another user's
+                if time() - path.lstat().st_mtime > OLD_S:
+                    path.unlink()
 
     def write(self, chunk: int, rows: Rows, samples: Mapping[str, np.ndarray] = MappingProxyType({})) -> None:
         """Write a chunk, its samples first; SweepError if it cannot be written, with what is there unchanged."""
+        pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="sweeps")
         start, stop = self.of(chunk)
         footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": digest_of([rows])}
-        try:
-            kept = {} if self.samples is None else self.samples.write(chunk, samples)
-            write(self.file(chunk), self._packed(rows, footer | {"samples": kept} | self.about))
-        except OSError as error:
-            raise SweepError(
-                f"chunk {chunk} (runs {start} to {stop - 1}) cannot be written to {self.file(chunk)} ({why(error)});"
-                " the chunks that are there are kept: make room, and run the sweep again"
-            ) from None
-
-    def _packed(self, rows: Rows, footer: dict[str, Any]) -> bytes:
-        """Return rows and a footer as the bytes of a Parquet file with checksums of its pages."""
-        pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="sweeps")
-        stated = schema(self.names).with_metadata({_FOOTER: json.dumps(footer)})
-        table = pa.table(rows | {"run": np.arange(footer["start"], footer["stop"])}, stated)
-        stream = io.BytesIO()
-        parquet.write_table(table, stream, compression="zstd", use_dictionary=list(TEXTS), write_page_checksum=True)
-        return stream.getvalue()
+        footer["samples"] = {} if self.samples is None else self.samples.write(chunk, samples)
+        stated = schema(self.names).with_metadata({_FOOTER: json.dumps(footer | self.about)})
+        table = pa.table(rows | {"run": np.arange(start, stop)}, stated)
+        save(
+            self.file(chunk),
+            lambda stream: parquet.write_table(
+                table, stream, compression="zstd", use_dictionary=list(TEXTS), write_page_checksum=True
+            ),
+            SweepError,
+        )
 
     def read(self, chunk: int) -> Rows:
         """The rows of a chunk.
@@ -141,8 +140,12 @@ class Folder:
             raise SweepError(f"{self.file(chunk)}: was changed after it was written; {_REMEDY}")
         return rows
 
+    def digest_of_rows(self) -> str:
+        """SHA-256 of all rows; errors as in `read`."""
+        return digest_of(map(self.read, range(self.count)))
+
     def footer(self, chunk: int) -> dict[str, Any]:
-        """The footer of a chunk; errors as of `read`."""
+        """The footer of a chunk; errors as in `read`."""
         return self._read(chunk, [])[1]
 
     def check_samples(self) -> None:
@@ -152,7 +155,7 @@ class Folder:
                 self.samples.check(chunk, self.footer(chunk)["samples"])
 
     def columns(self, names: Iterable[str]) -> Rows:
-        """Columns of all rows, (N,); errors as of `read`."""
+        """Columns of all rows, (N,); errors as in `read`."""
         names = list(dict.fromkeys(names))
         columns = {name: np.empty(self.runs, type_of(name)) for name in names}
         for chunk in range(self.count):
@@ -163,45 +166,42 @@ class Folder:
 
     def _read(self, chunk: int, names: list[str]) -> tuple[Rows, dict[str, Any]]:
         """Return columns of a chunk, and its footer."""
-        parquet, path, expected = needs("pyarrow.parquet", extra="sweeps"), self.file(chunk), self.of(chunk)
-        with reading(path, SweepError, _REMEDY) as stream, _errors_of(path):
-            file = parquet.ParquetFile(stream, page_checksum_verification=True)
-            footer = json.loads(file.schema_arrow.metadata[_FOOTER])
-            if footer["sweep"] != self.digest:
-                raise SweepError(f"{path}: is of another sweep; {_REMEDY}")
-            if (footer["chunk"], footer["start"], footer["stop"]) != (chunk, *expected):
-                raise SweepError(f"{path}: is of other runs than its name says; {_REMEDY}")
-            if not isinstance(footer["rows"], str) or not isinstance(footer["samples"], dict):
-                raise SweepError(f"{path}: its footer lacks digests of rows and samples; {_REMEDY}")
-            if not file.schema_arrow.equals(schema(self.names)):
-                raise SweepError(f"{path}: its columns are not those of the sweep; {_REMEDY}")
-            if not names:
-                return {}, footer
-            table = file.read(columns=["run", *names], use_threads=False)
-            if len(table) != expected[1] - expected[0]:
-                raise SweepError(f"{path}: has {len(table)} rows, not {expected[1] - expected[0]}; {_REMEDY}")
-            columns = {name: table[name].to_numpy() for name in table.column_names}
-            if any(table[name].null_count for name in columns):
-                raise SweepError(f"{path}: has cells without a value; {_REMEDY}")
-            if (columns.pop("run") != np.arange(*expected)).any():
-                raise SweepError(
-                    f"{path}: its rows are not those of runs {expected[0]} to {expected[1] - 1}; {_REMEDY}"
-                )
-            if strange := set(columns.get("outcome", ())) - set(OUTCOMES):
-                known = ", ".join(OUTCOMES)
-                raise SweepError(f"{path}: has the outcome {shown(min(strange))}, not one of {known}; {_REMEDY}")
-            return {name: x.astype(type_of(name)) for name, x in columns.items()}, footer
+        path = self.file(chunk)
+        with reading(path, SweepError, _REMEDY) as stream:
+            try:
+                return self._parsed(stream, chunk, names)
+            except _DamagedError as error:
+                raise SweepError(f"{path}: {error}; {_REMEDY}") from None
+            except Exception as error:  # pyarrow promises no kinds
+                raise SweepError(f"{path}: is not a complete chunk ({type(error).__name__}); {_REMEDY}") from None
+
+    def _parsed(self, stream: Any, chunk: int, names: list[str]) -> tuple[Rows, dict[str, Any]]:
+        start, stop = self.of(chunk)
+        file = needs("pyarrow.parquet", extra="sweeps").ParquetFile(stream, page_checksum_verification=True)
+        footer = json.loads(file.schema_arrow.metadata[_FOOTER])
+        if footer["sweep"] != self.digest:
+            raise _DamagedError("is of another sweep")
+        if (footer["chunk"], footer["start"], footer["stop"]) != (chunk, start, stop):
+            raise _DamagedError("is of other runs than its name says")
+        if not isinstance(footer["rows"], str) or not isinstance(footer["samples"], dict):
+            raise _DamagedError("its footer lacks digests of rows and samples")
+        if not file.schema_arrow.equals(schema(self.names)):
+            raise _DamagedError("its columns are not those of the sweep")
+        if not names:
+            return {}, footer
+        table = file.read(columns=["run", *names], use_threads=False)
+        columns = {name: table[name].to_numpy() for name in table.column_names}
+        if any(table[name].null_count for name in columns):
+            raise _DamagedError("has cells without a value")
+        if columns.pop("run").tolist() != list(range(start, stop)):
+            raise _DamagedError(f"its rows are not those of runs {start} to {stop - 1}")
+        if strange := set(columns.get("outcome", ())) - set(OUTCOMES):
+            raise _DamagedError(f"has the outcome {shown(min(strange))}, not one of {', '.join(OUTCOMES)}")
+        return {name: x.astype(type_of(name)) for name, x in columns.items()}, footer
 
 
-@contextmanager
-def _errors_of(path: Path) -> Iterator[None]:
-    """Raise errors of a file as a SweepError with its path."""
-    try:
-        yield
-    except SweepError:
-        raise
-    except Exception as error:  # pyarrow promises no kinds
-        raise SweepError(f"{path}: is not a complete chunk ({type(error).__name__}); {_REMEDY}") from None
+class _DamagedError(Exception):
+    """What is wrong with a chunk."""
 
 
 def has_specification(path: Path) -> bool:
@@ -236,8 +236,7 @@ def mend_design(path: Path, rows: np.ndarray, digest: str) -> None:
     try:
         read_design(path, digest)
     except SweepError:
-        with _writing(path):
-            _write_design(path, rows, digest)
+        _write_design(path, rows, digest)
 
 
 def begin(path: Path, text: str, rows: np.ndarray, digest: str) -> None:
@@ -249,35 +248,33 @@ def begin(path: Path, text: str, rows: np.ndarray, digest: str) -> None:
         SweepError: If the folder holds other files, or cannot be written.
     """
     make_folder(path)
-    names = {each.name for each in path.iterdir() if not each.name.endswith(".unfinished")}
+    names = {entry.name for entry in path.iterdir() if not entry.name.endswith(_UNFINISHED)}
     strange = sorted(name for name in names if not name.startswith("design-"))
     if strange and _SPECIFICATION not in names:
         raise SweepError(f"{path}: holds other files, such as {strange[0]}; give a new folder")
-    with _writing(path):
-        _write_design(path, rows, digest)
-        with suppress(FileExistsError):
-            write(path / _SPECIFICATION, text.encode(), exclusive=True)
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    """Raise errors of writing into a folder as a SweepError with its path."""
+    _write_design(path, rows, digest)
+    own = path / f".{_SPECIFICATION}.{os.urandom(8).hex()}{_UNFINISHED}"
+    save(own, lambda stream: stream.write(text.encode()), SweepError)
     try:
-        yield
+        with suppress(FileExistsError):
+            os.link(own, path / _SPECIFICATION)  # which refuses one that exists, as os.replace does not
     except OSError as error:
         raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
+    finally:
+        own.unlink(missing_ok=True)
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, and those above it; SweepError if it cannot be made."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SweepError(f"{path}: the folder cannot be made ({why(error)}); give another path") from None
 
 
 def _write_design(path: Path, rows: np.ndarray, digest: str) -> None:
-    stream = io.BytesIO()
-    np.save(stream, rows, allow_pickle=False)
-    write(_design(path, digest), stream.getvalue())
+    save(_design(path, digest), lambda stream: np.save(stream, rows, allow_pickle=False), SweepError)
 
 
 def _design(path: Path, digest: str) -> Path:
     return path / f"design-{digest[:16]}.npy"
-
-
-def read_all(folder: Folder) -> Iterator[Rows]:
-    """The rows of all chunks, one after the other."""
-    return map(folder.read, range(folder.count))
