@@ -31,8 +31,8 @@ from benchmarks.planar_scene import planar_scene
 from robot_dyn.scene.starters import starter
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps.cluster import client_of
-from robot_dyn.tools.sweeps.folder import Folder
-from robot_dyn.tools.sweeps.opening import begun, opened
+from robot_dyn.tools.sweeps.folder import Folder, opened
+from robot_dyn.tools.sweeps.run_sweep import begun
 from robot_dyn.tools.sweeps.work import Work
 
 MIB = 2**20

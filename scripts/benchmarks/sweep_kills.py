@@ -26,7 +26,7 @@ import psutil
 from benchmarks.planar_scene import planar_scene
 from robot_dyn.foundations import files
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps.opening import begun
+from robot_dyn.tools.sweeps.run_sweep import begun
 
 RUNS, CHUNK = 20_000, 256
 CALLS = "open", "fsync", "replace"

@@ -21,5 +21,5 @@ from robot_dyn.tools.sweeps.sweep import from_scene as from_scene
 __all__: list[str]
 
 # Names that only tools and tests import.
-from robot_dyn.tools.sweeps.opening import begun as begun
+from robot_dyn.tools.sweeps.run_sweep import begun as begun
 from robot_dyn.tools.sweeps.work import Work as Work

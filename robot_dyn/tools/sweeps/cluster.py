@@ -21,10 +21,9 @@ from urllib.parse import urlsplit
 from robot_dyn import RobotDynError
 from robot_dyn.foundations import SweepError, needs, shown
 from robot_dyn.tools.sweeps.chunks import fill
-from robot_dyn.tools.sweeps.folder import Folder, read_specification
+from robot_dyn.tools.sweeps.folder import Folder, opened
 from robot_dyn.tools.sweeps.imported import Named
-from robot_dyn.tools.sweeps.opening import opened
-from robot_dyn.tools.sweeps.specification import parsed, versions
+from robot_dyn.tools.sweeps.specification import stated_in, versions
 from robot_dyn.tools.sweeps.work import Work
 
 _WINDOW = 3  # tasks a thread of a worker
@@ -216,6 +215,6 @@ def _check(ticket: Ticket) -> None:
         if here.get(name) != version:
             raise SweepError(f"{name} is {here.get(name)} on {host}, {version} at the driver; install it there")
     with suppress(SweepError):
-        digest = parsed(read_specification(Path(ticket.folder)), ticket.folder).digest
+        digest = stated_in(Path(ticket.folder)).digest
     if digest != ticket.digest:
         raise SweepError(f"{ticket.folder} on {host} is not the folder of the driver; share one")

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
-from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import SweepError, Value, nearest, numbers, shown
-from robot_dyn.tools.sweeps.texts import called
+from robot_dyn.foundations import SweepError, Value, numbers, shown
+from robot_dyn.tools.sweeps.texts import call_of, called
 
 LEAST, MOST = 2.0**-54, 1 - 2.0**-53
 """Between which numbers are taken: F⁻¹(0) may be infinite."""
@@ -45,7 +44,7 @@ class Distribution(Value):
                 array = np.array(x)
                 array.setflags(write=False)
             checked[key] = array
-        object.__setattr__(self, "parameters", MappingProxyType(checked))
+        object.__setattr__(self, "parameters", checked)
         if self.name == "choice":
             return
         _ = self.shape  # refused if lengths differ
@@ -60,10 +59,7 @@ class Distribution(Value):
         if not np.isfinite(ends).all():
             raise SweepError(f"{self.name} has no finite values between its quantiles of 2⁻⁵⁴ and 1 − 2⁻⁵³: {self}")
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Distribution, (self.name, dict(self.parameters))
-
-    @property
+    @cached_property
     def shape(self) -> tuple[int, ...]:
         """Of one value: () or (n,)."""
         if self.name == "choice":
@@ -107,7 +103,7 @@ class Distribution(Value):
     @cached_property
     def _ppf(self) -> Any:
         if not self.name.startswith(_SCIPY):
-            return lambda u: _INVERSES[self.name](u, **self.parameters)
+            return partial(_INVERSES[self.name], **self.parameters)
         from scipy import stats  # late: it takes a second
 
         name = self.name.removeprefix(_SCIPY)
@@ -193,12 +189,7 @@ def from_dict(stored: Mapping[str, Any]) -> Distribution:
     name = stored["distribution"]
     if name.startswith(_SCIPY):
         return Distribution(name, given)
-    if name not in CONSTRUCTORS:
-        raise SweepError(f"no distribution {shown(name)}; {nearest(name, CONSTRUCTORS)}")
-    try:
-        return CONSTRUCTORS[name](**given)
-    except TypeError as error:
-        raise SweepError(f"distribution {error}") from None
+    return call_of("distribution", name, CONSTRUCTORS, (), given)
 
 
 def _uniform(u: np.ndarray, low: Any, high: Any) -> np.ndarray:

@@ -20,7 +20,7 @@ from robot_dyn.foundations import SweepError, Value, choice, nearest, read_only,
 from robot_dyn.queries import joint_types_of, joint_units
 from robot_dyn.simulation import tracking_of
 from robot_dyn.tools.sweeps.imported import digest_of, imported, is_import_path, path_of
-from robot_dyn.tools.sweeps.texts import called
+from robot_dyn.tools.sweeps.texts import call_of, called
 
 _STATES = ("q", "v", "u")  # in the order of what is observed of a run
 _RECORDS = (*_STATES, "energy", "work")
@@ -338,6 +338,4 @@ def from_dict(stored: Mapping[str, Any], may_import: bool = False) -> Figure | U
         if not isinstance(digest, str) or not isinstance(unit, str):
             raise SweepError(f'figure {kind}: a stored function has texts for "sha256" and "unit"')
         return UserFigure(path_of(kind), None if may_import else (digest, unit))
-    if kind not in FIGURES:
-        raise SweepError(f"no figure {shown(kind)}; {nearest(kind, FIGURES)}")
-    return FIGURES[kind](**given)
+    return call_of("figure", kind, FIGURES, (), given)

@@ -24,18 +24,19 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import SweepError, needs, read, reading, save, shown, why
+from robot_dyn.foundations import SceneError, SweepError, needs, read, reading, save, shown, why
+from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
 from robot_dyn.tools.sweeps.rows import OUTCOMES, TEXTS, Rows, digest_of, schema, type_of
 from robot_dyn.tools.sweeps.sample_store import SampleStore
+from robot_dyn.tools.sweeps.specification import FILE, Specification, processor, specification, stated_in, versions
+from robot_dyn.tools.sweeps.sweep import Sweep
 
 MOST_FILES = 20_000  # of a folder
 OLD_S = 86_400.0  # age of a file that its writer has not finished, after which it is removed
-_MOST_TEXT, _MOST_TABLE = 2**26, 2**34
-_SPECIFICATION = "sweep.json"
+_MOST_TABLE = 2**34
 _SUFFIX, _FOOTER, _UNFINISHED = ".parquet", b"footer", ".unfinished"
 _REMEDY = "run the sweep again, after removing this file"
 _AGAIN = "run the sweep into this folder again, which writes the file"
-_NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
 
 
 @final
@@ -204,16 +205,6 @@ class _DamagedError(Exception):
     """What is wrong with a chunk."""
 
 
-def has_specification(path: Path) -> bool:
-    """Whether a folder holds a sweep."""
-    return (path / _SPECIFICATION).is_file()
-
-
-def read_specification(path: Path) -> str:
-    """The text of the specification of a folder; SweepError if it holds no sweep, or it cannot be read."""
-    return read(path / _SPECIFICATION, _MOST_TEXT, SweepError, _NONE).decode("utf-8", "replace")
-
-
 def read_design(path: Path, digest: str) -> np.ndarray:
     """The rows of the design of a folder.
 
@@ -231,15 +222,7 @@ def read_design(path: Path, digest: str) -> np.ndarray:
     return rows
 
 
-def mend_design(path: Path, rows: np.ndarray, digest: str) -> None:
-    """Write the rows of a design where their file is missing or damaged; SweepError if it cannot be written."""
-    try:
-        read_design(path, digest)
-    except SweepError:
-        _write_design(path, rows, digest)
-
-
-def begin(path: Path, text: str, rows: np.ndarray, digest: str) -> None:
+def begin(path: Path, stated: Specification, rows: np.ndarray) -> None:
     """Write the specification of a new sweep, unless another process was first.
 
     The file of a design is named after its rows, so that two sweeps that begin at one time do not mix.
@@ -250,14 +233,14 @@ def begin(path: Path, text: str, rows: np.ndarray, digest: str) -> None:
     make_folder(path)
     names = {entry.name for entry in path.iterdir() if not entry.name.endswith(_UNFINISHED)}
     strange = sorted(name for name in names if not name.startswith("design-"))
-    if strange and _SPECIFICATION not in names:
+    if strange and FILE not in names:
         raise SweepError(f"{path}: holds other files, such as {strange[0]}; give a new folder")
-    _write_design(path, rows, digest)
-    own = path / f".{_SPECIFICATION}.{os.urandom(8).hex()}{_UNFINISHED}"
-    save(own, lambda stream: stream.write(text.encode()), SweepError)
+    write_design(path, rows, stated.rows_sha256)
+    own = path / f".{FILE}.{os.urandom(8).hex()}{_UNFINISHED}"
+    save(own, lambda stream: stream.write(stated.text.encode()), SweepError)
     try:
         with suppress(FileExistsError):
-            os.link(own, path / _SPECIFICATION)  # which refuses one that exists, as os.replace does not
+            os.link(own, path / FILE)  # which refuses one that exists, as os.replace does not
     except OSError as error:
         raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
     finally:
@@ -272,9 +255,29 @@ def make_folder(path: Path) -> None:
         raise SweepError(f"{path}: the folder cannot be made ({why(error)}); give another path") from None
 
 
-def _write_design(path: Path, rows: np.ndarray, digest: str) -> None:
+def write_design(path: Path, rows: np.ndarray, digest: str) -> None:
+    """Write the rows of a design; SweepError if they cannot be written."""
     save(_design(path, digest), lambda stream: np.save(stream, rows, allow_pickle=False), SweepError)
 
 
 def _design(path: Path, digest: str) -> Path:
     return path / f"design-{digest[:16]}.npy"
+
+
+def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Sweep]:
+    """The folder of a sweep, and the sweep; arguments and errors as in `read`."""
+    check_places(path)
+    stored = stated_in(path)
+    try:
+        sweep = stored.sweep(read_design(path, stored.rows_sha256), path, names)
+    except SceneError as error:
+        raise SweepError(f"{path / FILE}: {error}; sw.read(folder, scene=…), --scene, where it lies now") from None
+    stored.check_same(specification(sweep, stored.chunk), path, versions=False)
+    return folder_of(path, sweep, stored), sweep
+
+
+def folder_of(path: Path, sweep: Sweep, stated: Specification) -> Folder:
+    """Return the folder of a sweep with the specification in it."""
+    store = sweep.samples and SampleStore(path / "samples", stated.runs, stated.chunk, sweep.samples)
+    names, about = (*sweep.columns, *sweep.figures), {"versions": versions()} | processor()
+    return Folder(path, stated.runs, stated.chunk, stated.digest, names, about, store)

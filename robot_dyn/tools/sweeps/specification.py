@@ -17,16 +17,19 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from robot_dyn import Setup
 from robot_dyn.codegen import processor_of_code
-from robot_dyn.foundations import SweepError, nearest, shorten, shown, version_of
+from robot_dyn.foundations import SweepError, nearest, read, shorten, shown, version_of
 from robot_dyn.simulation import settings_of
 from robot_dyn.tools.sweeps import distributions, figures
 from robot_dyn.tools.sweeps.designs import MOST_ROWS
 from robot_dyn.tools.sweeps.figures import UserFigure
-from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_named, digest_of
+from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_named, digest_of, is_scene
 from robot_dyn.tools.sweeps.sample_store import Samples
-from robot_dyn.tools.sweeps.sweep import Sweep, is_scene
+from robot_dyn.tools.sweeps.sweep import Sweep
 
+FILE = "sweep.json"
 FORMAT = 5
+_MOST_BYTES = 2**26
+_NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
 _PLACE = "scene"  # where it lies may differ
 
 
@@ -81,31 +84,30 @@ class Specification(BaseModel):
         """SHA-256 of all but where the scene lies."""
         return sha256(json.dumps(self.model_dump(exclude={_PLACE}), sort_keys=True).encode()).hexdigest()
 
-    def check_same(self, other: Specification, where: str, versions: bool = True) -> None:
+    def check_same(self, other: Specification, folder: Path, versions: bool = True) -> None:
         """Raise SweepError unless another specification has all that this one states; names the first difference.
 
         Args:
             other: The specification.
-            where: The file of this one, for the message.
+            folder: That of this one, for the message.
             versions: Whether versions of packages are compared too: they matter where rows are computed.
         """
         for name, here, there in _differences(self.model_dump(), other.model_dump(), ""):
             if name != _PLACE and (versions or not name.startswith("versions.")):
                 raise SweepError(
-                    f"{where}: holds another sweep: {name} is {shorten(here)} there, {shorten(there)} here; give"
-                    " another folder, or the sweep that was begun"
+                    f"{folder / FILE}: holds another sweep: {name} is {shorten(here)} there, {shorten(there)} here;"
+                    " give another folder, or the sweep that was begun"
                 )
 
-    def sweep(self, rows: np.ndarray, where: str, named: Named = NOTHING, folder: Path | None = None) -> Sweep:
+    def sweep(self, rows: np.ndarray, folder: Path, named: Named = NOTHING) -> Sweep:
         """Return the sweep, with its scene as it is now.
 
         Functions that the specification names are imported only if `named` has them too.
 
         Args:
             rows: Of the design.
-            where: Its file, for messages.
-            named: What the reader of the folder names.
             folder: The folder, from which nothing is imported.
+            named: What the reader of the folder names.
 
         Raises:
             SweepError: If it states no sweep; if the file of a named function has changed.
@@ -121,7 +123,7 @@ class Specification(BaseModel):
                 kind = self.figures.get(name, {}).get("figure")
                 if kind != path:
                     raise SweepError(
-                        f"{where}: the figure {name} is {shown(kind)}, not {path}; {nearest(name, self.figures)}"
+                        f"{folder}: the figure {name} is {shown(kind)}, not {path}; {nearest(name, self.figures)}"
                     )
                 check_named(path, self.figures[name].get("sha256"), folder)
             vary = {name: distributions.from_dict(self.vary[name]) for name in self.order}
@@ -129,23 +131,24 @@ class Specification(BaseModel):
             design, drawn = (rows, None) if self.design == "table" else (self.design, rows)
             return Sweep(scene, self.runs, vary, kept, design, self.seed, self.samples, drawn=drawn, stated=stated)
         except (KeyError, TypeError, AttributeError, ValueError) as error:
-            raise SweepError(f"{where}: is not the specification of a sweep ({error!r})") from None
+            raise SweepError(f"{folder / FILE}: is not the specification of a sweep ({error!r})") from None
 
 
-def parsed(text: str, where: str) -> Specification:
-    """The specification of a text; SweepError with the key and the value if it is not one, or of another format."""
+def stated_in(folder: Path) -> Specification:
+    """The specification in a folder; SweepError with the key and the value if there is none, or of another format."""
+    path = folder / FILE
     try:
-        return Specification.model_validate_json(text)
+        return Specification.model_validate_json(read(path, _MOST_BYTES, SweepError, _NONE))
     except ValidationError as error:
         first = error.errors()[0]
     key, got = ".".join(map(str, first["loc"])), first["input"]
     if key == "format" and isinstance(got, int):
         raise SweepError(
-            f"{where}: has format {got}, this version reads {FORMAT}; read it with the version that wrote it, or run"
+            f"{path}: has format {got}, this version reads {FORMAT}; read it with the version that wrote it, or run"
             " the sweep into a new folder"
         )
     raise SweepError(
-        f"{where}: is not the specification of a sweep: {key}{': ' * bool(key)}{first['msg']}, got {shown(got)}; take"
+        f"{path}: is not the specification of a sweep: {key}{': ' * bool(key)}{first['msg']}, got {shown(got)}; take"
         " that of a copy, or give a new folder"
     )
 

@@ -16,7 +16,7 @@ from robot_dyn.queries import joint_types_of, unit
 from robot_dyn.tools.sweeps.designs import Design, design, given
 from robot_dyn.tools.sweeps.distributions import Distribution, distribution
 from robot_dyn.tools.sweeps.figures import Figure, UserFigure, figure
-from robot_dyn.tools.sweeps.imported import imported, is_import_path, path_of
+from robot_dyn.tools.sweeps.imported import by_name, imported, is_import_path, is_scene, source_of
 from robot_dyn.tools.sweeps.rows import FIXED, NUMBERS, OUTCOMES, TEXTS
 from robot_dyn.tools.sweeps.sample_store import Samples, samples_of
 
@@ -60,13 +60,13 @@ class Sweep(Answer, Value):
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
-        set_(self, "scene", _source(self.scene))
-        set_(self, "vary", {name: _varied(name, of) for name, of in named("vary", self.vary).items()})
+        set_(self, "scene", source_of(self.scene))
+        set_(self, "vary", {name: _varied(name, of) for name, of in by_name("vary", self.vary).items()})
         if not self.vary:
             raise SweepError(
                 "vary: nothing varies; give distributions by name, such as {'kp': sw.uniform(low=1, high=2)}"
             )
-        figures = named("figures", self.figures)
+        figures = by_name("figures", self.figures)
         if taken := sorted(figures.keys() & {*RESERVED, *self.columns}):
             raise SweepError(f"figures: {taken[0]!r} is the name of another column of a sweep; take another one")
         set_(self, "figures", {name: figure(name, given) for name, given in figures.items()})
@@ -101,12 +101,12 @@ class Sweep(Answer, Value):
             return given(self.drawn, self.runs, dimensions, self.design)
         return design(self.design, self.runs, dimensions, self.seed)
 
-    @property
+    @cached_property
     def columns(self) -> tuple[str, ...]:
         """Names of the numbers that vary: of an array such as "q0", numbered from 0."""
         return tuple(f"{name}[{k}]" if of.shape else name for name, of in self.vary.items() for k in range(of.width))
 
-    @property
+    @cached_property
     def dimensions(self) -> tuple[str, ...]:
         """Names of the columns of the design, in their order."""
         return tuple(name if of.size == 1 else f"{name}[{k}]" for name, of in self.vary.items() for k in range(of.size))
@@ -221,7 +221,7 @@ def from_scene(path: str | Path, **changes: Any) -> Sweep:
             )
     stated = table | changes
     for name in ("vary", "figures"):
-        stated[name] = {**table.get(name, {}), **named(name, changes.get(name, {}))}
+        stated[name] = {**table.get(name, {}), **by_name(name, changes.get(name, {}))}
     if "runs" not in stated:
         raise SweepError(f"{path}: how many runs? give runs=, or a table [sweep] with them")
     return Sweep(str(path), **stated)
@@ -239,38 +239,11 @@ def parameter_of(column: str) -> str:
     return column.rpartition("[")[0]
 
 
-def is_scene(source: str) -> bool:
-    """Return True for the path of a scene file, False for an import path."""
-    return source.lower().endswith(".toml")
-
-
-def named(what: str, given: Any) -> dict[str, Any]:
-    """Distributions, figures or functions by name; SweepError if they are given otherwise."""
-    if not isinstance(given, Mapping) or not all(isinstance(name, str) and name for name in given):
-        raise SweepError(f"{what}: give them by name, as {{'kp': …}}, got {shown(given)}")
-    return dict(given)
-
-
 def _text(stored: Mapping[str, Any]) -> str:
     """A distribution or figure as users write it."""
     (_, name), *given = stored.items()
     of = [f"{key}={value!r}" for key, value in given if value is not None]
     return name if ":" in str(name) else f"{name}({', '.join(of)})"
-
-
-def _source(given: Any) -> str:
-    """The absolute path of a scene, or an import path."""
-    if isinstance(given, Setup):
-        raise SweepError(
-            "scene: a Setup cannot be made again in another process; give a scene file, or a function that returns the"
-            " setup, by import path such as 'my_arm:setup'"
-        )
-    if isinstance(given, Path) or (isinstance(given, str) and is_scene(given)):
-        return str(Path(given).absolute())
-    try:
-        return path_of(given)
-    except SweepError as error:
-        raise SweepError(f"scene: {error}") from None
 
 
 def _varied(name: str, given: Any) -> Distribution:

@@ -6,7 +6,7 @@ A text is a name with literal arguments. It is parsed, never evaluated.
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from inspect import signature
 from typing import Any
 
@@ -43,12 +43,18 @@ def called(what: str, text: Any, functions: Mapping[str, Callable[..., Any]]) ->
         raise wrong from None
     if not isinstance(call.func, ast.Name):
         raise wrong
-    name = call.func.id
+    return call_of(what, call.func.id, functions, arguments, by_name)
+
+
+def call_of(
+    what: str, name: str, functions: Mapping[str, Callable[..., Any]], arguments: Sequence[Any], by_name: dict[str, Any]
+) -> Any:
+    """Return what a function returns by its name; SweepError if there is none, or it does not take the arguments."""
     if name not in functions:
         raise SweepError(f"no {what} {shorten(name)!r}; {nearest(name, functions)}; such as {_EXAMPLES[what]}")
     function = functions[name]
     try:
-        signature(function).bind(*arguments, **by_name)
+        bound = signature(function).bind(*arguments, **by_name)
     except TypeError as error:
-        raise SweepError(f"{shorten(text)}: {error}; it is {name}{signature(function)}".replace(": Any", "")) from None
-    return function(*arguments, **by_name)
+        raise SweepError(f"{what}: {error}; it is {name}{signature(function)}".replace(": Any", "")) from None
+    return function(*bound.args, **bound.kwargs)

@@ -103,7 +103,7 @@ WRONG: dict[str, Callable[[], Any]] = {
     "scipy.stats.gamma has no finite values .*gamma.-2": lambda: ds.distribution(stats.gamma(-2.0)),
     "lengths differ in scipy.stats.gamma": lambda: ds.distribution(stats.gamma([1.0, 2.0], scale=Q)),
     "no distribution 'unifrm'; nearest: uniform": lambda: ds.from_dict({"distribution": "unifrm"}),
-    "distribution uniform.. missing .*.high": lambda: ds.from_dict({"distribution": "uniform", "low": 1}),
+    "missing a required .*argument: .high": lambda: ds.from_dict({"distribution": "uniform", "low": 1}),
     "has no distribution 'os' of one": lambda: ds.from_dict({"distribution": "scipy.stats.os"}),
     "does not take scipy.stats.gamma.foo=1": lambda: ds.from_dict({"distribution": "scipy.stats.gamma", "foo": 1}),
     "a stored distribution is a table": lambda: ds.from_dict([1, 2]),  # pyright: ignore[reportArgumentType]

@@ -14,7 +14,7 @@ import pytest
 
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps import Work, begun, opening
+from robot_dyn.tools.sweeps import Work, begun, run_sweep
 from robot_dyn.tools.sweeps.folder import MOST_FILES, Folder, begin
 from robot_dyn.tools.sweeps.rows import NUMBERS, TEXTS
 from robot_dyn.tools.sweeps.specification import specification
@@ -153,7 +153,7 @@ def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
     sweep, out = swept(tmp_path, 50), tmp_path / "out"
     assert begun(sweep, out, chunk=20) == begun(sweep, out)
     text = (out / "sweep.json").read_text()
-    begin(out, "{}", sweep.points.rows, specification(sweep, 20).rows_sha256)
+    begin(out, specification(sweep, 25), sweep.points.rows)
     assert (out / "sweep.json").read_text() == text
     assert names_in(out) == ["design", "sweep.json"]
 
@@ -161,14 +161,14 @@ def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
 def test_another_sweep_that_begins_at_the_same_time_changes_nothing(tmp_path: Path, monkeypatch) -> None:
     """The first begins while the second makes its pilot, which is refused and leaves the folder as it was."""
     first, second, out = swept(tmp_path, 50, samples="q"), swept(tmp_path, 50, seed=4, samples="v"), tmp_path / "out"
-    pilot = opening.pilot
+    pilot = run_sweep.pilot
 
     def pilot_of_the_second(sweep: sw.Sweep, chunk: int | None) -> int:
-        monkeypatch.setattr(opening, "pilot", pilot)
+        monkeypatch.setattr(run_sweep, "pilot", pilot)
         sw.run(first, out, chunk=20, share="1/3")
         return pilot(sweep, chunk)
 
-    monkeypatch.setattr(opening, "pilot", pilot_of_the_second)
+    monkeypatch.setattr(run_sweep, "pilot", pilot_of_the_second)
     with pytest.raises(SweepError, match="holds another sweep: seed"):
         sw.run(second, out, chunk=20)
     assert len(sw.read(out).missing) == 2
@@ -193,7 +193,7 @@ def test_a_disk_without_room_is_said_before_the_start(tmp_path: Path, monkeypatc
     sweep = swept(tmp_path, 1000, design="random")
     numbers, texts = 5 + 3 + len(NUMBERS), len(TEXTS)  # 5 numbers that vary, 3 figures
     assert sweep.bytes_expected == 1000 * (8 * numbers + 4 * texts)
-    monkeypatch.setattr(opening, "disk_usage", lambda _: SimpleNamespace(free=80_000))
+    monkeypatch.setattr(run_sweep, "disk_usage", lambda _: SimpleNamespace(free=80_000))
     with pytest.raises(SweepError, match=r"the sweep will take .* GiB, and .* has"):
         sw.run(sweep, tmp_path / "out")
     assert not (tmp_path / "out").exists()
