@@ -59,7 +59,7 @@ class Run(Value):
 
 @typing.final
 class Runs:
-    """Runs of a batch that finished, as batch forms of figures see them.
+    """Runs of a batch that finished, as figures of the library see them.
 
     Attributes:
         t: Times of samples, (m,), in [s].
@@ -208,10 +208,6 @@ class Figure(Value):
         what = {} if self.name == "rms_error" else {"of_what": self.of_what}
         return {"figure": self.name} | what | {"joint": self.joint}
 
-    def check(self, runs: Runs) -> None:
-        """Raise SweepError if it cannot be computed of the pilot's runs."""
-        self.of(runs)
-
 
 def _root_mean_square(x: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Of the known samples of each run, (B,), from x (B, m, k)."""
@@ -226,8 +222,7 @@ def _root_mean_square(x: np.ndarray, known: np.ndarray) -> np.ndarray:
 class UserFigure(Value):
     """A function f(run) → float of a `Run`, by import path; methods as of `Figure`.
 
-    Its attributes, if it has them: `record`, names of what is to be recorded, ("q", "v") otherwise; `unit`, a text;
-    `batch`, a function of `Runs` that gives the same numbers (B,) of many at once, to the bit.
+    Its attributes, if it has them: `record`, names of what is to be recorded, ("q", "v") otherwise; `unit`, a text.
 
     Attributes:
         path: Its import path.
@@ -256,10 +251,6 @@ class UserFigure(Value):
         return str(getattr(self.function, "unit", "")) if self.stated is None else self.stated[1]
 
     def of(self, runs: Runs) -> np.ndarray:
-        batch = getattr(self.function, "batch", None)
-        return self._one_by_one(runs) if batch is None else np.asarray(batch(runs), dtype=float)
-
-    def _one_by_one(self, runs: Runs) -> np.ndarray:
         values = list(map(self.function, runs))
         for value in values:
             if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
@@ -269,20 +260,6 @@ class UserFigure(Value):
     def to_dict(self) -> dict[str, Any]:
         digest = digest_of(self.path) if self.stated is None else self.stated[0]
         return {"figure": self.path, "sha256": digest, "unit": self.unit()}
-
-    def check(self, runs: Runs) -> None:
-        if getattr(self.function, "batch", None) is None:
-            return
-        together, single = self.of(runs), self._one_by_one(runs)
-        if together.shape != single.shape:
-            raise SweepError(f"{self.path}.batch: gives shape {together.shape} of {len(runs)} runs, not ({len(runs)},)")
-        differ = np.flatnonzero(together.view(np.int64) != single.view(np.int64))
-        if len(differ):
-            i = int(differ[0])
-            raise SweepError(
-                f"{self.path}.batch: gives {together[i]!r} of run {i} of the pilot, the function itself {single[i]!r};"
-                " make them equal to the bit, or remove the batch form"
-            )
 
 
 def rms_error(joint: str | None = None) -> Figure:

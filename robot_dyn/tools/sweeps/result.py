@@ -122,7 +122,7 @@ class SweepResult(Answer):
             SweepError: If the event is unknown in a run, of which there is no figure.
         """
         self._check_complete()
-        truth, failed = self._happened(event), self.failed
+        truth, failed = self._happened(event), self._failed
         known = truth.certain == truth.possible
         keep = self._asked(known, given)
         if (unknown := ~known & keep).any():
@@ -165,7 +165,7 @@ class SweepResult(Answer):
         it is "known".
         """
         count = integer("count", count, least=1, most=self.sweep.runs, error=SweepError)
-        x = self.figure(figure)
+        x = self._figure(figure)
         keep = self._asked(np.isfinite(x), given)
         runs, x = np.flatnonzero(keep), x[keep]
         order = np.argsort(-np.where(np.isnan(x), np.inf, x), kind="stable")
@@ -220,7 +220,7 @@ class SweepResult(Answer):
         """The section of the report on runs that failed."""
         from robot_dyn.tools.sweeps.report import failure_map, strongest
 
-        varied, failed, table = self.sweep.columns, self.failed, self.table()
+        varied, failed, table = self.sweep.columns, self._failed, self.table()
         blocks, drawing = [*self.probability("failed").blocks()], ""
         if failed.any():
             some = np.flatnonzero(failed)[:_WORST].tolist()
@@ -238,8 +238,8 @@ class SweepResult(Answer):
         """The section of the report on a figure: distribution, quantiles, worst runs, sensitivity."""
         from robot_dyn.tools.sweeps.report import histogram
 
-        heading, x = self.sweep.heading(name), self.figure(name)
-        given = "known" if (np.isnan(x) & ~self.failed).any() else None
+        heading, x = self.sweep.heading(name), self._figure(name)
+        given = "known" if (np.isnan(x) & ~self._failed).any() else None
         quantiles = self.quantiles(name, _PROBABILITIES, given=given)
         rows = tuple((of.statistic, of.estimate, of.low, of.high) for of in quantiles)
         first, finite = quantiles[0], x[np.isfinite(x)]
@@ -326,7 +326,7 @@ class SweepResult(Answer):
     def reasons(self) -> dict[str, int]:
         """Number of runs by reason of failure, the most frequent first; texts that differ in numbers alone are one."""
         first, count = dict[str, str](), Counter[str]()
-        for text in self.folder.columns(("reason",))["reason"][self.failed].tolist():
+        for text in self.folder.columns(("reason",))["reason"][self._failed].tolist():
             count[first.setdefault(_NUMBER.sub("…", text), text)] += 1
         return dict(count.most_common())
 
@@ -355,14 +355,14 @@ class SweepResult(Answer):
                 " run the sweep again, which does them alone"
             )
 
-    def figure(self, name: str) -> np.ndarray:
+    def _figure(self, name: str) -> np.ndarray:
         """A figure or a number that varies, of all runs, (N,); nan where a run has no value."""
         self._check_complete()
         names = (*self.sweep.figures, *self.sweep.columns, *NUMBERS)
         return self.folder.columns((choice("figure", name, names, error=SweepError),))[name]
 
     @property
-    def failed(self) -> np.ndarray:
+    def _failed(self) -> np.ndarray:
         """Which runs diverged or raised, (N,)."""
         return self.folder.columns(("outcome",))["outcome"] != FINISHED
 
@@ -382,7 +382,7 @@ class SweepResult(Answer):
         """Which runs are asked about, (N,): all, those that finished, or those whose value is known."""
         if given is None:
             return np.ones(len(known), bool)
-        return known if choice("given", given, _GIVEN, error=SweepError) == "known" else ~self.failed
+        return known if choice("given", given, _GIVEN, error=SweepError) == "known" else ~self._failed
 
     def _values(self, name: str, given: str | None, finite: str = "") -> tuple[np.ndarray, np.ndarray, int]:
         """A figure of all runs, which of them are asked about, and how many of these failed.
@@ -396,7 +396,7 @@ class SweepResult(Answer):
             SweepError: If a run that is asked about finished and has no value; or if its value must be finite and is
                 not.
         """
-        x, failed = self.figure(name), self.failed
+        x, failed = self._figure(name), self._failed
         unknown = np.isnan(x)
         keep = self._asked(~unknown, given)
         if (none := keep & unknown & ~failed).any():

@@ -22,7 +22,7 @@ from robot_dyn.tools.sweeps.chunks import fill_by_threads, share_of
 from robot_dyn.tools.sweeps.folder import Folder, begin, folder_of, opened, read_design, write_design
 from robot_dyn.tools.sweeps.imported import check_places, named
 from robot_dyn.tools.sweeps.result import SweepResult
-from robot_dyn.tools.sweeps.rows import RAISED
+from robot_dyn.tools.sweeps.rows import FINISHED, RAISED
 from robot_dyn.tools.sweeps.specification import (
     FILE,
     names_of,
@@ -174,31 +174,26 @@ def _check_room(sweep: Sweep, path: Path) -> None:
 def pilot(sweep: Sweep, chunk: int | None = None) -> int:
     """The number of runs of a chunk, from the time of the pilot's runs unless it is given.
 
+    It is in whole tiles, and its samples take at most 64 MiB.
+
     Raises:
-        SweepError: If all of them raise, or a figure cannot be computed of them; says why.
+        SweepError: If none of them finishes and some raise, themselves or figures of them; says why.
     """
     work, count = Work(sweep), min(_RUNS, sweep.runs)
-    rows = work.rows(0, count, check=True)  # with what is compiled first
-    if (rows["outcome"] == RAISED).all():
-        raise SweepError(f"all {count} runs of the pilot raise; the first: {rows['reason'][0]}")
+    rows = work.rows(0, count)  # with what is compiled first
+    raised = rows["outcome"] == RAISED
+    if raised.any() and not (rows["outcome"] == FINISHED).any():
+        raise SweepError(
+            f"none of the {count} runs of the pilot finishes, and {raised.sum()} raise; the first:"
+            f" {rows['reason'][raised][0]}"
+        )
     if chunk is not None:
         return chunk
     began = process_time()
     work.rows(0, count)
-    run_s = (process_time() - began) / count
-    return min(chunk_of(run_s, sweep.runs), most_of_samples(sweep, work))
-
-
-def most_of_samples(sweep: Sweep, work: Work) -> int:
-    """Number of runs of which samples take 64 MiB, in whole tiles."""
-    if sweep.samples is None:
-        return _MOST
-    size = 8 * len(work.times()) * sweep.setup.plant.dynamics.n * len(sweep.samples.names)
-    return LANES * max(1, _SAMPLE_BYTES // (size * LANES))
-
-
-def chunk_of(run_s: float, runs: int) -> int:
-    """About 2 s of runs that take so long, in whole tiles."""
-    most = min(_MOST, max(LANES, -(-runs // _LEAST_CHUNKS)))
-    tiles = max(1, round(min(_CHUNK_S / max(run_s, 1e-9), most) / LANES))
-    return tiles * LANES
+    runs = _CHUNK_S * count / max(process_time() - began, 1e-9)
+    most = min(_MOST, max(LANES, -(-sweep.runs // _LEAST_CHUNKS)))
+    if sweep.samples is not None:
+        size = 8 * len(work.times()) * sweep.setup.plant.dynamics.n * len(sweep.samples.names)
+        most = min(most, _SAMPLE_BYTES // size)
+    return LANES * max(1, round(min(runs, most) / LANES))

@@ -57,13 +57,11 @@ class Work:
         numbers = sum({"energy": 2, "work": 8}.get(name, n) for name in self.record)
         return LANES * max(1, min(256, _PART_BYTES // (8 * LANES * samples * max(1, numbers))))
 
-    def rows(self, start: int, stop: int, look: Look | None = None, check: bool = False) -> Rows:
-        """The rows of runs start, …, stop − 1; `look` and `check` as in `made`."""
-        return self.made(start, stop, None, look, check)[0]
+    def rows(self, start: int, stop: int) -> Rows:
+        """The rows of runs start, …, stop − 1."""
+        return self.made(start, stop, None)[0]
 
-    def made(
-        self, start: int, stop: int, t: np.ndarray | None, look: Look | None = None, check: bool = False
-    ) -> tuple[Rows, Samples]:
+    def made(self, start: int, stop: int, t: np.ndarray | None, look: Look | None = None) -> tuple[Rows, Samples]:
         """Make runs.
 
         Args:
@@ -71,13 +69,9 @@ class Work:
             stop: The run after the last.
             t: Times of samples, (m,), in [s]; None if no samples are kept.
             look: Called some ten times a second; ends the work by raising.
-            check: Whether figures that cannot be computed of finished runs are refused, as in a pilot.
 
         Returns:
             The rows of the runs, and their samples.
-
-        Raises:
-            SweepError: If `check`, and a figure cannot be computed, or its batch form gives other numbers.
         """
         kept, n = self.sweep.samples, self.sweep.setup.plant.dynamics.n
         samples = {} if kept is None or t is None else {
@@ -92,7 +86,7 @@ class Work:
                 if isinstance(result, str):
                     rows["outcome"][runs - first], rows["reason"][runs - first] = RAISED, result
                     continue
-                self._write(rows, runs - first, result, check)
+                self._write(rows, runs - first, result)
                 if kept is not None and t is not None:
                     which = kept.of(runs, result.diverged)
                     _check_times(result.t, t)
@@ -127,7 +121,7 @@ class Work:
         ((_, passed),) = manners(batch)
         return run_batch(batch, passed, True, 1, MOST_BYTES)[0]
 
-    def _write(self, rows: Rows, at: np.ndarray, result: Rollouts, check: bool) -> None:
+    def _write(self, rows: Rows, at: np.ndarray, result: Rollouts) -> None:
         """Rows of runs that were made; figures of those that finished."""
         for column in FIXED:
             rows[column.name][at] = column.values(result)
@@ -136,8 +130,6 @@ class Work:
             return
         runs, at = Runs(result, places), at[places]
         for name, figure in self.sweep.figures.items():
-            if check:
-                figure.check(runs)
             try:
                 rows[name][at] = figure.of(runs)
             except Exception:  # of a user's function: of which runs it raises

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from dataclasses import replace
@@ -19,6 +18,12 @@ from robot_dyn.tools.sweeps.folder import MOST_FILES, Folder, begin
 from robot_dyn.tools.sweeps.rows import NUMBERS, TEXTS
 from robot_dyn.tools.sweeps.specification import specification
 from tests.tools.sweeps.swept import digest, names_in, swept
+
+
+@pytest.fixture
+def begun_100(tmp_path: Path) -> Path:
+    """The folder of a sweep of 100 runs in chunks of 50, none of which is made."""
+    return begun(swept(tmp_path, 100), tmp_path / "out", chunk=50).path
 
 
 def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypatch) -> None:
@@ -59,34 +64,6 @@ def test_what_killed_writers_left_is_removed_and_what_others_write_is_not(tmp_pa
     assert names == sorted(ages)[1:3]
 
 
-@pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "other sweep", "other chunk"])
-def test_a_damaged_chunk_is_refused_by_name(tmp_path: Path, damage: str) -> None:
-    sweep = swept(tmp_path, 60)
-    done = sw.run(sweep, tmp_path / "out", chunk=20)
-    file = done.folder.file(1)
-    data = file.read_bytes()
-    if damage == "other sweep":
-        other = sw.run(swept(tmp_path, 60, seed=4), tmp_path / "other", chunk=20)
-        data = other.folder.file(1).read_bytes()
-    elif damage == "other chunk":
-        data = done.folder.file(2).read_bytes()
-    elif damage == "flipped":
-        at = len(data) // 4  # a page of numbers
-        data = data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
-    else:
-        data = data[: len(data) // 2] if damage == "cut" else b""
-    file.write_bytes(data)
-    with pytest.raises(SweepError, match=r"000001\.parquet"):
-        done.verify()
-    if damage != "flipped":  # of a column that this question does not read
-        with pytest.raises(SweepError, match=r"000001\.parquet"):
-            done.quantiles("end")
-    file.unlink()
-    with pytest.raises(SweepError, match="1 of 3 chunks are left to do, the first is 1"):
-        done.table()
-    assert sw.run(sweep, tmp_path / "out").verify() == digest(sweep)
-
-
 @pytest.mark.parametrize(
     ("change", "named"),
     [
@@ -97,41 +74,35 @@ def test_a_damaged_chunk_is_refused_by_name(tmp_path: Path, damage: str) -> None
         ({"design": "latin", "runs": 96}, "runs is 100"),
     ],
 )
-def test_another_sweep_in_the_folder_is_refused_with_the_first_difference(tmp_path: Path, change, named) -> None:
-    sw.run(swept(tmp_path, 100), tmp_path / "out", chunk=50)
+def test_another_sweep_in_the_folder_is_refused_with_the_first_difference(begun_100: Path, change, named) -> None:
     with pytest.raises(SweepError, match=f"holds another sweep: {named}"):
-        sw.run(swept(tmp_path, **{"runs": 100} | change), tmp_path / "out")
+        begun(swept(begun_100.parent, **{"runs": 100} | change), begun_100)
 
 
-def test_a_scene_that_changed_is_refused_by_the_name_of_what_changed(tmp_path: Path) -> None:
-    sweep = swept(tmp_path, 50)
-    sw.run(sweep, tmp_path / "out", chunk=50)
-    path = tmp_path / "scene.toml"
-    path.write_text(path.read_text().replace("kp = 40.0", "kp = 41.0"))
-    with pytest.raises(SweepError, match=r"setup.settings.control.kp is 40.* there, 41.* here"):
-        sw.read(tmp_path / "out")
+@pytest.mark.parametrize(
+    ("file", "old", "new", "named"),
+    [
+        ("scene.toml", "kp = 40.0", "kp = 41.0", r"setup.settings.control.kp is 40.* there, 41.* here"),
+        ("out/sweep.json", f'"numpy": "{np.__version__}"', '"numpy": "1.0"', r"versions.numpy is 1.0 there"),
+        ("out/sweep.json", '"chunk": 50', '"chunk": 25', "chunk is 25 there, 50 here"),
+    ],
+)
+def test_another_scene_version_or_chunk_is_refused_by_name(begun_100: Path, file, old, new, named) -> None:
+    path = begun_100.parent / file
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(SweepError, match=named):
+        begun(swept(begun_100.parent, 100), begun_100, chunk=50)
+    if file == "scene.toml":
+        with pytest.raises(SweepError, match=named):
+            sw.read(begun_100)
 
 
-def test_other_versions_are_refused_by_name(tmp_path: Path) -> None:
-    sweep = swept(tmp_path, 50)
-    sw.run(sweep, tmp_path / "out", chunk=50)
-    path = tmp_path / "out" / "sweep.json"
-    data = json.loads(path.read_text())
-    data["versions"]["numpy"] = "1.0"
-    path.write_text(json.dumps(data))
-    with pytest.raises(SweepError, match=r"versions.numpy is 1.0 there"):
-        sw.run(sweep, tmp_path / "out")
-
-
-def test_other_chunks_and_other_files_are_refused(tmp_path: Path) -> None:
-    sweep = swept(tmp_path, 50)
-    sw.run(sweep, tmp_path / "out", chunk=50)
-    with pytest.raises(SweepError, match="chunk is 50 there, 20 here"):
-        sw.run(sweep, tmp_path / "out", chunk=20)
+def test_a_folder_of_other_files_is_refused(tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.tex").write_text("")
     with pytest.raises(SweepError, match=r"holds other files, such as thesis\.tex"):
-        sw.run(sweep, tmp_path / "full")
+        sw.run(swept(tmp_path, 50), tmp_path / "full")
 
 
 def test_chunks_beyond_20_000_go_to_subfolders(tmp_path: Path) -> None:
