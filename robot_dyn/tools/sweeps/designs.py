@@ -70,12 +70,10 @@ def design(name: str | Any, runs: int, dimensions: int, seed: int = 0) -> Design
         SweepError: If the name is unknown, or the design cannot have so many rows; names the two nearest counts.
     """
     runs = integer("runs", runs, least=1, most=MOST_ROWS, error=SweepError)
-    d = integer("dimensions", dimensions, least=1, error=SweepError)
-    seed = integer("seed", seed, error=SweepError)
     if isinstance(name, np.ndarray | list | tuple):
-        return given(name, runs, d)
+        return given(name, runs, dimensions)
     name = choice("design", name, NAMES, error=SweepError)
-    return _design(name, _drawn(name, runs, d, seed))
+    return _design(name, _drawn(name, runs, dimensions, seed))
 
 
 def given(table: Any, runs: int, dimensions: int, name: str = "table") -> Design:

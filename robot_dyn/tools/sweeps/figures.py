@@ -311,8 +311,5 @@ def from_dict(stored: Mapping[str, Any], may_import: bool = False) -> Figure | U
     given = dict(stored)
     kind = given.pop("figure")
     if ":" in kind:
-        digest, unit = given["sha256"], given["unit"]
-        if not isinstance(digest, str) or not isinstance(unit, str):
-            raise SweepError(f'figure {kind}: a stored function has texts for "sha256" and "unit"')
-        return UserFigure(path_of(kind), None if may_import else (digest, unit))
+        return UserFigure(path_of(kind), None if may_import else (str(given["sha256"]), str(given["unit"])))
     return call_of("figure", kind, FIGURES, (), given)

@@ -124,7 +124,7 @@ class SweepResult(Answer):
         self._check_complete()
         truth, failed = self._happened(event), self._failed
         known = truth.certain == truth.possible
-        keep = self._asked(known, given)
+        keep = _some(self._asked(known, given), given)
         if (unknown := ~known & keep).any():
             remedy = f"write 'failed | {event}', or ask with given='finished'"
             if (unknown & ~failed).any():
@@ -398,7 +398,7 @@ class SweepResult(Answer):
         """
         x, failed = self._figure(name), self._failed
         unknown = np.isnan(x)
-        keep = self._asked(~unknown, given)
+        keep = _some(self._asked(~unknown, given), given)
         if (none := keep & unknown & ~failed).any():
             raise SweepError(
                 f"{name!r} has no value in {int(none.sum())} runs that finished, such as run {int(none.argmax())}: ask"
@@ -424,6 +424,13 @@ class SweepResult(Answer):
         """The scrambling of each run that is asked about; None of independent ones."""
         design = self.sweep.points
         return None if design.independent else design.scrambling[keep]
+
+
+def _some(keep: np.ndarray, given: str | None) -> np.ndarray:
+    """The runs that are asked about; SweepError if there are none."""
+    if not keep.any():
+        raise SweepError(f"no run is left with given={given!r}; leave it out, or see the reasons of failure")
+    return keep
 
 
 def _among(given: str | None) -> str:

@@ -17,7 +17,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import Answer, Block, SweepError, float64, number, numbers
+from robot_dyn.foundations import Answer, Block, SweepError, number, numbers
 
 NOT_RANDOM = "points that are not random"
 FEW = 5
@@ -77,7 +77,9 @@ def text(x: float) -> str:
     return ("−∞" if x < 0 else "+∞") if isinf(x) else f"{x:.4g}"
 
 
-def probability(events: Any, level: float = 0.95, scrambling: Any = None, *, failed: int = 0) -> Estimate:
+def probability(
+    events: np.ndarray, level: float = 0.95, scrambling: np.ndarray | None = None, *, failed: int = 0
+) -> Estimate:
     """Probability of an event.
 
     Args:
@@ -87,13 +89,11 @@ def probability(events: Any, level: float = 0.95, scrambling: Any = None, *, fai
         failed: How many runs failed, for the result to say.
 
     Raises:
-        SweepError: If an argument has another form.
+        SweepError: If the level is not between 0 and 1.
 
     Source: Clopper, Pearson, The use of confidence or fiducial limits, Biometrika 26, 1934.
     """
-    events, level = np.asarray(events), check_level(level)
-    if events.dtype != bool or events.ndim != 1 or not len(events):
-        raise SweepError(f"events must be truth values, one a run, got {events.dtype} of shape {events.shape}")
+    level = check_level(level)
     n, k = len(events), int(events.sum())
     few = min(k, n - k)
     note = ""
@@ -113,7 +113,12 @@ def probability(events: Any, level: float = 0.95, scrambling: Any = None, *, fai
 
 
 def quantiles(
-    x: Any, probabilities: Sequence[float] | float, level: float = 0.95, scrambling: Any = None, *, failed: int = 0
+    x: np.ndarray,
+    probabilities: Sequence[float] | float,
+    level: float = 0.95,
+    scrambling: np.ndarray | None = None,
+    *,
+    failed: int = 0,
 ) -> tuple[Estimate, ...]:
     """Quantiles of a figure, one for each probability.
 
@@ -128,11 +133,11 @@ def quantiles(
         failed: How many runs failed.
 
     Raises:
-        SweepError: If an argument has another form.
+        SweepError: If a probability or the level is not between 0 and 1.
 
     Source: Woodruff, Confidence intervals for medians and other position measures, J. Am. Stat. Assoc. 47, 1952.
     """
-    x, level = check_figure(x), check_level(level)
+    level = check_level(level)
     asked = numbers("probabilities", probabilities, (), ("k",), error=SweepError, above=0.0).reshape(-1)
     if (asked >= 1).any():
         raise SweepError(f"probabilities must be below 1, got {asked.max():g}")
@@ -154,7 +159,7 @@ def quantiles(
     return tuple(made)
 
 
-def mean(x: Any, level: float = 0.95, scrambling: Any = None, *, failed: int = 0) -> Estimate:
+def mean(x: np.ndarray, level: float = 0.95, scrambling: np.ndarray | None = None, *, failed: int = 0) -> Estimate:
     """Mean of a figure; without an interval where N < 100 g² with the skewness g, since it would hold too seldom.
 
     Args:
@@ -164,15 +169,15 @@ def mean(x: Any, level: float = 0.95, scrambling: Any = None, *, failed: int = 0
         failed: How many runs failed, and are not in x.
 
     Raises:
-        SweepError: If an argument has another form, or there are fewer than two runs.
+        SweepError: If the level is not between 0 and 1, or there are fewer than two runs.
 
     Source: Cochran, Sampling techniques, 1977, sec. 2.15.
     """
     from scipy.stats import skew
 
-    x, level = check_figure(x), check_level(level)
-    if len(x) < 2 or not np.isfinite(x).all():
-        raise SweepError(f"a mean needs two runs with a finite value, got {int(np.isfinite(x).sum())} of {len(x)}")
+    level = check_level(level)
+    if len(x) < 2:
+        raise SweepError(f"a mean needs two runs with a finite value, got {len(x)}")
     estimate, note = float(x.mean()), ""
     stated = partial(Estimate, level=level, n=len(x), failed=failed)
     if len(two := np.unique(x)) <= 2:  # then it follows from the share of the larger one
@@ -202,16 +207,13 @@ def _student(x: np.ndarray, level: float) -> float:
     return student_quantile(level, len(x) - 1) * float(np.std(x, ddof=1)) / sqrt(len(x))
 
 
-def _by_scrambling(x: np.ndarray, scrambling: Any) -> np.ndarray:
+def _by_scrambling(x: np.ndarray, scrambling: np.ndarray) -> np.ndarray:
     """The mean of each scrambling that has a run, shape (R,)."""
-    of = np.asarray(scrambling)
-    if of.shape != x.shape or of.dtype.kind not in "iu":
-        raise SweepError(f"scrambling must be {len(x)} whole numbers, one a run, got {of.dtype} of shape {of.shape}")
-    size = np.bincount(of)
-    return np.bincount(of, x)[size > 0] / size[size > 0]
+    size = np.bincount(scrambling)
+    return np.bincount(scrambling, x)[size > 0] / size[size > 0]
 
 
-def _half_width_of_share(events: np.ndarray, scrambling: Any, level: float) -> tuple[float, str]:
+def _half_width_of_share(events: np.ndarray, scrambling: np.ndarray, level: float) -> tuple[float, str]:
     """Half the width of Student's interval over shares of scramblings, where the sum of squares of counts is 2 larger.
 
     Counts are whole numbers: 16 equal ones do not show that their variance is 0. With 2 more, the half-width of 16
@@ -250,19 +252,6 @@ def _note_of_quantile(p: float, level: float, n: int, estimate: float, low: floa
     needed = log((1 - level) / 2) / log1p(-min(p, 1 - p))
     count = f"{ceil(needed)}" if needed < _COUNTABLE else f"{_COUNTABLE:g}"
     return f"{n} runs, or those that finished, do not bound the quantile; independent ones need {count} at least"
-
-
-def check_figure(x: Any) -> np.ndarray:
-    """A figure of each run as float64; SweepError if it has another form."""
-    try:
-        x = float64(x)
-    except ValueError as found:
-        raise SweepError(f"a figure must be real numbers, one a run, got {found}") from None
-    if x.ndim != 1 or not len(x):
-        raise SweepError(f"a figure must have shape (N,), one number a run, got {x.shape}")
-    if (unknown := np.isnan(x)).any():
-        raise SweepError(f"a figure must have a number for each run, got nan for run {int(unknown.argmax())}")
-    return x
 
 
 def check_level(level: Any) -> float:

@@ -128,6 +128,13 @@ def test_means_and_sensitivities_of_failed_runs_are_refused(done: sw.SweepResult
     assert done.mean("error", given="finished").estimate == pytest.approx(np.nanmean(x), rel=1e-12)
 
 
+def test_a_question_about_no_run_is_refused(tmp_path: Path) -> None:
+    done = sw.run(swept(tmp_path, 20, vary={"kd": sw.choice([4e6])}), tmp_path / "out", chunk=20)
+    for ask in (lambda: done.quantiles("end", given="finished"), lambda: done.probability("kd > 1", given="finished")):
+        with pytest.raises(SweepError, match="no run is left with given='finished'"):
+            ask()
+
+
 def test_worst_runs_are_those_that_failed_then_the_largest(done: sw.SweepResult) -> None:
     x = done.table("error")["error"]
     failed = np.flatnonzero(np.isnan(x)).tolist()
