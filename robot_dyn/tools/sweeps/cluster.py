@@ -8,6 +8,7 @@ are submitted again.
 from __future__ import annotations
 
 import os
+import re
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -45,15 +46,13 @@ class Ticket:
         folder: Path of the folder, the same on all hosts.
         digest: Of the specification in it.
         versions: Of the driver.
-        scene: What the driver names, as in `Named`.
-        figures: Same.
+        names: What the driver names.
     """
 
     folder: str
     digest: str
     versions: tuple[tuple[str, str], ...]
-    scene: str | None = None
-    figures: tuple[tuple[str, str], ...] = ()
+    names: Named
 
 
 @contextmanager
@@ -72,10 +71,9 @@ def client_of(cluster: Any) -> Iterator[Any]:
     if isinstance(cluster, distributed.Client):
         yield cluster
     elif isinstance(cluster, str) and cluster.startswith("local:"):
-        processes, threads = _local(cluster)
         with (
             needs("dask.config", extra="cluster").set(_LOCAL),
-            _started(distributed, processes, threads) as local,
+            _started(distributed, *_local(cluster)) as local,
             distributed.Client(local, set_as_default=False) as client,
         ):
             yield client
@@ -112,10 +110,11 @@ def _connected(distributed: Any, address: str) -> Any:
 
 def _local(text: str) -> tuple[int, int]:
     """Processes and threads of each."""
-    processes, _, threads = text.removeprefix("local:").partition("x")
-    if not processes.isdigit() or int(processes) < 1 or (threads and not (threads.isdigit() and int(threads))):
+    match = re.fullmatch(r"local:([1-9]\d*)(?:x([1-9]\d*))?", text)
+    if match is None:
         raise SweepError(f"cluster: 'local:2' is 2 processes, 'local:2x4' has 4 threads in each; got {shown(text)}")
-    return int(processes), int(threads) if threads else max(1, (os.cpu_count() or 1) // int(processes))
+    processes = int(match[1])
+    return processes, int(match[2] or max(1, (os.cpu_count() or 1) // processes))
 
 
 def _check_address(address: str) -> None:
@@ -160,8 +159,7 @@ def fill_by_cluster(
 
 def ticket_of(folder: Folder, names: Named) -> Ticket:
     """Return the ticket of a folder and of what workers may import."""
-    of_driver, figures = tuple(versions().items()), tuple(names.figures.items())
-    return Ticket(str(folder.path.absolute()), folder.digest, of_driver, names.scene, figures)
+    return Ticket(str(folder.path.absolute()), folder.digest, tuple(versions().items()), names)
 
 
 def _check_workers(client: Any, folder: Folder, ticket: Ticket) -> None:
@@ -204,7 +202,7 @@ def _answer(ticket: Ticket) -> str:
 def _work(ticket: Ticket) -> Any:
     """The folder, the work and the times of samples of a sweep, made once in a worker."""
     _check(ticket)
-    folder, sweep = opened(Path(ticket.folder), Named(ticket.scene, dict(ticket.figures)))
+    folder, sweep = opened(Path(ticket.folder), ticket.names)
     return folder, Work(sweep), None if folder.samples is None else folder.samples.times()
 
 

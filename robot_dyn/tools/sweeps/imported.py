@@ -10,7 +10,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from hashlib import sha256
 from importlib import import_module
 from importlib.machinery import PathFinder
@@ -29,11 +29,11 @@ class Named:
 
     Attributes:
         scene: Scene file, or import path of a function; None for the scene that the folder names.
-        figures: Import paths of functions, by name of figure.
+        figures: Names of figures, each with the import path of its function.
     """
 
     scene: str | None = None
-    figures: Mapping[str, str] = field(default_factory=dict)
+    figures: tuple[tuple[str, str], ...] = ()
 
 
 NOTHING = Named()
@@ -42,7 +42,7 @@ NOTHING = Named()
 def named(scene: Any, figures: Any) -> Named:
     """Return the scene and figures that a reader of a folder names; errors as in `source_of` and `path_of`."""
     functions = by_name("figures", {} if figures is None else figures)
-    paths = {name: path_of(function) for name, function in functions.items()}
+    paths = tuple((name, path_of(function)) for name, function in functions.items())
     return Named(None if scene is None else source_of(scene), paths)
 
 

@@ -36,7 +36,7 @@ from robot_dyn.tools.sweeps.rows import FINISHED, FIXED, NUMBERS, OUTCOMES
 from robot_dyn.tools.sweeps.sensitivity import Sensitivity, by_values, saltelli
 from robot_dyn.tools.sweeps.specification import specification
 from robot_dyn.tools.sweeps.statistics import Estimate
-from robot_dyn.tools.sweeps.sweep import Sweep
+from robot_dyn.tools.sweeps.sweep import Sweep, heading
 from robot_dyn.tools.sweeps.work import Work
 
 _SHOWN = 5  # reasons
@@ -156,7 +156,7 @@ class SweepResult(Answer):
             values = self.folder.columns(self.sweep.columns)
             columns = np.column_stack([values[name] for name in self.sweep.columns])
             found = by_values(x[keep], columns[keep], self.sweep.columns, failed=failed)
-        return replace(found, figure=self.sweep.heading(figure), given=given)
+        return replace(found, figure=heading(self.sweep, figure), given=given)
 
     def worst(self, figure: str, count: int = 5, given: str | None = None) -> tuple[int, ...]:
         """Numbers of the runs with the largest values of a figure; `run(i)` repeats one.
@@ -228,7 +228,7 @@ class SweepResult(Answer):
             blocks.append(Table(("first runs that failed", "outcome", "reason", "repeat it by"), tuple(rows)))
         if failed.any() and len(varied) > 1:
             first, second = (varied[k] for k in strongest(failed, np.column_stack([table[name] for name in varied])))
-            headings = self.sweep.heading(first), self.sweep.heading(second)
+            headings = heading(self.sweep, first), heading(self.sweep, second)
             drawing = failure_map(headings, [table[first], table[second]], failed)
             blocks.insert(0, "cells without runs are empty, each cross is a run that failed")
             blocks.insert(0, f"share of runs that failed over {first} and {second}, the two that it depends on most:")
@@ -238,7 +238,7 @@ class SweepResult(Answer):
         """The section of the report on a figure: distribution, quantiles, worst runs, sensitivity."""
         from robot_dyn.tools.sweeps.report import histogram
 
-        heading, x = self.sweep.heading(name), self._figure(name)
+        label, x = heading(self.sweep, name), self._figure(name)
         given = "known" if (np.isnan(x) & ~self._failed).any() else None
         quantiles = self.quantiles(name, _PROBABILITIES, given=given)
         rows = tuple((of.statistic, of.estimate, of.low, of.high) for of in quantiles)
@@ -248,7 +248,7 @@ class SweepResult(Answer):
             Table(("", "estimate", f"{100 * first.level:g} % interval from", "to"), rows, digits=4),
             f"{first.n} runs, {first.failed} failed",
             Table(
-                ("worst runs that finished", heading, "repeat it by"),
+                ("worst runs that finished", label, "repeat it by"),
                 tuple((i, float(x[i]), f"{self._repeat}({i})") for i in worst),
             ),
         ]
@@ -256,7 +256,7 @@ class SweepResult(Answer):
             blocks += self.sensitivity(name, given="known").blocks()
         except SweepError as error:  # of a figure that is the same in all runs
             blocks.append(f"no sensitivity: {error}")
-        return heading, histogram(heading, finite) if len(finite) else "", blocks
+        return label, histogram(label, finite) if len(finite) else "", blocks
 
     def run(self, i: int) -> Trajectory:
         """Repeat run i alone, with all that rollouts record: the same bits.
@@ -418,7 +418,7 @@ class SweepResult(Answer):
 
     def _named(self, found: Estimate, figure: str, given: str | None) -> Estimate:
         """With the figure it is of, its unit, and which runs were asked about."""
-        return replace(found, statistic=f"{found.statistic} of {self.sweep.heading(figure)}{_among(given)}")
+        return replace(found, statistic=f"{found.statistic} of {heading(self.sweep, figure)}{_among(given)}")
 
     def _scrambling(self, keep: np.ndarray) -> np.ndarray | None:
         """The scrambling of each run that is asked about; None of independent ones."""

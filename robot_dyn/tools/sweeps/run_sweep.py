@@ -135,21 +135,18 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
     if chunk is not None:
         chunk = integer("chunk", chunk, least=1, most=2**31, error=SweepError)
     needs("pyarrow", extra="sweeps")
-    t = None
-    if (path / FILE).is_file():
-        stored = stated_in(path)
-        stored.check_same(specification(sweep, chunk or stored.chunk), path)
-        try:
-            read_design(path, stored.rows_sha256)
-        except SweepError:
-            write_design(path, sweep.points.rows, stored.rows_sha256)
-    else:
+    stated, t = specification(sweep, chunk or 1), None
+    if not (path / FILE).is_file():
         _check_room(sweep, path)
-        stated = specification(sweep, pilot(sweep, chunk))
+        stated = stated.model_copy(update={"chunk": pilot(sweep, chunk)})
         t = None if sweep.samples is None else _times(sweep)  # before the folder holds a sweep that is refused
         begin(path, stated, sweep.points.rows)
-        stored = stated_in(path)
-        stored.check_same(stated, path)
+    stored = stated_in(path)  # of another driver, if it was first
+    stored.check_same(stated.model_copy(update={"chunk": chunk or stored.chunk}), path)
+    try:
+        read_design(path, stored.rows_sha256)
+    except SweepError:
+        write_design(path, sweep.points.rows, stored.rows_sha256)
     folder = folder_of(path, sweep, stored)
     if folder.samples is not None and not folder.present().any():
         folder.samples.create(_times(sweep) if t is None else t, sweep.setup.plant.dynamics.joint_names)

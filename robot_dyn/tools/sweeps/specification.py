@@ -119,7 +119,7 @@ class Specification(BaseModel):
                 _SetupOfFunction.model_validate(stated)
             elif not is_scene(scene):
                 check_named(scene, self.setup.get("function_sha256"), folder)
-            for name, path in named.figures.items():
+            for name, path in named.figures:
                 kind = self.figures.get(name, {}).get("figure")
                 if kind != path:
                     raise SweepError(
@@ -127,7 +127,7 @@ class Specification(BaseModel):
                     )
                 check_named(path, self.figures[name].get("sha256"), folder)
             vary = {name: distributions.from_dict(self.vary[name]) for name in self.order}
-            kept = {name: figures.from_dict(of, name in named.figures) for name, of in self.figures.items()}
+            kept = {name: figures.from_dict(of, name in dict(named.figures)) for name, of in self.figures.items()}
             design, drawn = (rows, None) if self.design == "table" else (self.design, rows)
             return Sweep(scene, self.runs, vary, kept, design, self.seed, self.samples, drawn=drawn, stated=stated)
         except (KeyError, TypeError, AttributeError, ValueError) as error:
@@ -175,8 +175,8 @@ def specification(sweep: Sweep, chunk: int) -> Specification:
 
 def names_of(sweep: Sweep) -> Named:
     """The scene and functions that a sweep names, for the processes that run it."""
-    paths = {name: figure.path for name, figure in sweep.figures.items() if isinstance(figure, UserFigure)}
-    return Named(sweep.scene, paths)
+    functions = {name: figure for name, figure in sweep.figures.items() if isinstance(figure, UserFigure)}
+    return Named(sweep.scene, tuple((name, figure.path) for name, figure in functions.items()))
 
 
 def _setup(sweep: Sweep) -> dict[str, Any]:

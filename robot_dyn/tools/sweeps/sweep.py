@@ -140,7 +140,12 @@ class Sweep(Answer, Value):
         return self.runs * rows + 8 * numbers * -(-self.runs // self.samples.every)
 
     def values(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """What varies in runs start, …, stop − 1, by name: starts (k, n), numbers (k,), arrays (k, size)."""
+        """What varies in runs start, …, stop − 1, by name; SweepError if there are no such runs.
+
+        Starts have shape (k, n), numbers (k,), arrays (k, size).
+        """
+        stop = integer("stop", stop, most=self.runs, error=SweepError)
+        start = integer("start", start, most=stop, error=SweepError)
         return self._values(self.points.rows[start:stop])
 
     def _values(self, u: np.ndarray) -> dict[str, np.ndarray]:
@@ -151,10 +156,6 @@ class Sweep(Answer, Value):
             values[name] = x.reshape((len(u), -1) if name in STARTS or of.width > 1 else -1)
             first += of.size
         return values
-
-    def by_column(self, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """The numbers that vary, of `values`, as columns (k,) by name."""
-        return dict(zip(self.columns, np.column_stack(list(values.values())).T, strict=True))
 
     def _check_names(self) -> None:
         """Raise SweepError if what varies has no name or not the size that the setup knows."""
@@ -180,7 +181,7 @@ class Sweep(Answer, Value):
         rows = ((self._varies(name), _text(of.to_dict())) for name, of in self.vary.items())
         yield Table(("varies", "distribution"), tuple(rows), wrap=True)
         if self.figures:
-            rows = ((self.heading(name), _text(figure.to_dict())) for name, figure in self.figures.items())
+            rows = ((heading(self, name), _text(figure.to_dict())) for name, figure in self.figures.items())
             yield Table(("figure", "computed by"), tuple(rows))
 
     def _varies(self, name: str) -> str:
@@ -189,9 +190,10 @@ class Sweep(Answer, Value):
         of = dict.fromkeys(self.units[column] for column in columns if column in self.units)
         return f"{name} [{' or '.join(of)}]" if of else name
 
-    def heading(self, column: str) -> str:
-        """The name of a column with its unit, as "torque [N m]"."""
-        return f"{column} [{self.units[column]}]" if column in self.units else column
+
+def heading(sweep: Sweep, column: str) -> str:
+    """The name of a column with its unit, as "torque [N m]"."""
+    return f"{column} [{sweep.units[column]}]" if column in sweep.units else column
 
 
 def from_scene(path: str | Path, **changes: Any) -> Sweep:

@@ -81,7 +81,8 @@ class Work:
         for first in range(start, stop, self.part):
             last = min(first + self.part, stop)
             values = self.sweep.values(first, last)
-            rows = empty(last - first, self.sweep.by_column(values), self.sweep.figures)
+            columns = np.column_stack(list(values.values())).T
+            rows = empty(last - first, dict(zip(self.sweep.columns, columns, strict=True)), self.sweep.figures)
             for runs, result in self._results(np.arange(first, last), values, look):
                 if isinstance(result, str):
                     rows["outcome"][runs - first], rows["reason"][runs - first] = RAISED, result

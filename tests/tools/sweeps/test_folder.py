@@ -129,6 +129,17 @@ def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
     assert names_in(out) == ["design", "sweep.json"]
 
 
+def test_a_driver_that_was_second_takes_the_chunks_of_the_first(tmp_path: Path, monkeypatch) -> None:
+    sweep, out = swept(tmp_path, 50), tmp_path / "out"
+
+    def slow_pilot(*_: object) -> int:
+        begin(out, specification(sweep, 20), sweep.points.rows)
+        return 16
+
+    monkeypatch.setattr(run_sweep, "pilot", slow_pilot)
+    assert begun(sweep, out).chunk == 20
+
+
 def test_another_sweep_that_begins_at_the_same_time_changes_nothing(tmp_path: Path, monkeypatch) -> None:
     """The first begins while the second makes its pilot, which is refused and leaves the folder as it was."""
     first, second, out = swept(tmp_path, 50, samples="q"), swept(tmp_path, 50, seed=4, samples="v"), tmp_path / "out"
