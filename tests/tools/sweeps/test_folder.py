@@ -119,17 +119,8 @@ def test_chunks_beyond_20_000_go_to_subfolders(tmp_path: Path) -> None:
     assert np.flatnonzero(many.present()).tolist() == [0, MOST_FILES, many.count - 1]
 
 
-def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
-    """The specification of the first stays; the second takes its chunks."""
-    sweep, out = swept(tmp_path, 50), tmp_path / "out"
-    assert begun(sweep, out, chunk=20) == begun(sweep, out)
-    text = (out / "sweep.json").read_text()
-    begin(out, specification(sweep, 25), sweep.points.rows)
-    assert (out / "sweep.json").read_text() == text
-    assert names_in(out) == ["design", "sweep.json"]
-
-
-def test_a_driver_that_was_second_takes_the_chunks_of_the_first(tmp_path: Path, monkeypatch) -> None:
+def test_a_driver_that_was_second_takes_the_specification_of_the_first(tmp_path: Path, monkeypatch) -> None:
+    """Their pilots took different times; the first begins the folder while the second makes its pilot."""
     sweep, out = swept(tmp_path, 50), tmp_path / "out"
 
     def slow_pilot(*_: object) -> int:
@@ -137,7 +128,8 @@ def test_a_driver_that_was_second_takes_the_chunks_of_the_first(tmp_path: Path, 
         return 16
 
     monkeypatch.setattr(run_sweep, "pilot", slow_pilot)
-    assert begun(sweep, out).chunk == 20
+    assert begun(sweep, out) == begun(sweep, out, chunk=20)
+    assert names_in(out) == ["design", "sweep.json"]
 
 
 def test_another_sweep_that_begins_at_the_same_time_changes_nothing(tmp_path: Path, monkeypatch) -> None:
