@@ -208,6 +208,10 @@ class Figure(Value):
         what = {} if self.name == "rms_error" else {"of_what": self.of_what}
         return {"figure": self.name} | what | {"joint": self.joint}
 
+    def __str__(self) -> str:
+        _, *arguments = self.to_dict().items()
+        return f"{self.name}({', '.join(f'{key}={x!r}' for key, x in arguments if x is not None)})"
+
 
 def _root_mean_square(x: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Of the known samples of each run, (B,), from x (B, m, k)."""
@@ -256,6 +260,9 @@ class UserFigure(Value):
             if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
                 raise SweepError(f"{self.path}: returned {shown(value)}; return a number, nan where a run has none")
         return np.array(values, float)
+
+    def __str__(self) -> str:
+        return self.path
 
     def to_dict(self) -> dict[str, Any]:
         digest = digest_of(self.path) if self.stated is None else self.stated[0]

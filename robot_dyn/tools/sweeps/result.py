@@ -298,7 +298,7 @@ class SweepResult(Answer):
     @reported
     def specification(self) -> dict[str, Any]:
         """As the folder states it."""
-        return specification(self.sweep, self.folder.chunk).model_dump()
+        return specification(self.sweep, self.folder.chunk).model_dump(mode="json")
 
     @reported
     def units(self) -> dict[str, str]:

@@ -178,10 +178,10 @@ class Sweep(Answer, Value):
         design = self.design if isinstance(self.design, str) else "a table"
         size = f"{self.bytes_expected / 2**20:.3g} MiB"
         yield f"{self.runs} runs of {Path(self.scene).name}, design {design}, seed {self.seed}; on disk {size}"
-        rows = ((self._varies(name), _text(of.to_dict())) for name, of in self.vary.items())
+        rows = ((self._varies(name), str(of)) for name, of in self.vary.items())
         yield Table(("varies", "distribution"), tuple(rows), wrap=True)
         if self.figures:
-            rows = ((heading(self, name), _text(figure.to_dict())) for name, figure in self.figures.items())
+            rows = ((heading(self, name), str(figure)) for name, figure in self.figures.items())
             yield Table(("figure", "computed by"), tuple(rows))
 
     def _varies(self, name: str) -> str:
@@ -234,13 +234,6 @@ def samples_of_run(setup: Setup) -> int:
 def parameter_of(column: str) -> str:
     """The name in `vary` of a column that is a number of an array."""
     return column.rpartition("[")[0]
-
-
-def _text(stored: Mapping[str, Any]) -> str:
-    """A distribution or figure as users write it."""
-    (_, name), *given = stored.items()
-    of = [f"{key}={value!r}" for key, value in given if value is not None]
-    return name if ":" in str(name) else f"{name}({', '.join(of)})"
 
 
 def _varied(name: str, given: Any) -> Distribution:
