@@ -24,8 +24,6 @@ from robot_dyn.tools.sweeps.sweep import STARTS, Sweep, samples_of_run
 _PART_BYTES = 2**23  # that the runs of a part record; memory does not grow with the chunk, and allocators reuse blocks
 _RECORDS = ("q", "v", "u", "energy", "work")
 Look = Callable[[float], object]
-Samples = dict[str, np.ndarray]
-"""Samples of runs by name, (k, m, n), nan where they are not kept."""
 
 
 class Stopped(Exception):  # noqa: N818  it is not an error
@@ -61,7 +59,9 @@ class Work:
         """The rows of runs start, …, stop − 1."""
         return self.made(start, stop, None)[0]
 
-    def made(self, start: int, stop: int, t: np.ndarray | None, look: Look | None = None) -> tuple[Rows, Samples]:
+    def made(
+        self, start: int, stop: int, t: np.ndarray | None, look: Look | None = None
+    ) -> tuple[Rows, dict[str, np.ndarray]]:
         """Make runs.
 
         Args:
@@ -71,13 +71,12 @@ class Work:
             look: Called some ten times a second; ends the work by raising.
 
         Returns:
-            The rows of the runs, and their samples.
+            The rows of the runs, and their samples by name, (k, m, n), nan where they are not kept.
         """
         kept, n = self.sweep.samples, self.sweep.setup.plant.dynamics.n
-        samples = {} if kept is None or t is None else {
-            name: np.full((stop - start, len(t), n), np.nan) for name in kept.names
-        }  # fmt: skip
-        parts = []
+        samples, parts = dict[str, np.ndarray](), []
+        if kept is not None and t is not None:
+            samples = {name: np.full((stop - start, len(t), n), np.nan) for name in kept.names}
         for first in range(start, stop, self.part):
             last = min(first + self.part, stop)
             values = self.sweep.values(first, last)
