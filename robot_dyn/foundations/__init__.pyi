@@ -22,9 +22,7 @@ from robot_dyn.foundations.display import inline as inline
 from robot_dyn.foundations.display import legend as legend
 from robot_dyn.foundations.display import page as page
 from robot_dyn.foundations.display import plot as plot
-from robot_dyn.foundations.display import side_by_side as side_by_side
 from robot_dyn.foundations.display import table as table
-from robot_dyn.foundations.display import text as text
 from robot_dyn.foundations.errors import CatalogError as CatalogError
 from robot_dyn.foundations.errors import ControlError as ControlError
 from robot_dyn.foundations.errors import DescriptionError as DescriptionError
@@ -59,7 +57,6 @@ from robot_dyn.foundations.files import file_path as file_path
 from robot_dyn.foundations.files import read as read
 from robot_dyn.foundations.files import reading as reading
 from robot_dyn.foundations.files import save as save
-from robot_dyn.foundations.files import sync_folder as sync_folder
 from robot_dyn.foundations.files import table_cell as table_cell
 from robot_dyn.foundations.files import target as target
 from robot_dyn.foundations.files import why as why
@@ -83,7 +80,6 @@ from robot_dyn.foundations.spatial import rpy_of as rpy_of
 from robot_dyn.foundations.spatial import spatial_inertia as spatial_inertia
 from robot_dyn.foundations.validate import choice as choice
 from robot_dyn.foundations.validate import duration as duration
-from robot_dyn.foundations.validate import float64 as float64
 from robot_dyn.foundations.validate import function as function
 from robot_dyn.foundations.validate import instance as instance
 from robot_dyn.foundations.validate import integer as integer
@@ -91,6 +87,5 @@ from robot_dyn.foundations.validate import number as number
 from robot_dyn.foundations.validate import numbers as numbers
 from robot_dyn.foundations.validate import one_state as one_state
 from robot_dyn.foundations.validate import truth as truth
-from robot_dyn.foundations.values import Caching as Caching
 from robot_dyn.foundations.values import Value as Value
 from robot_dyn.foundations.values import read_only as read_only

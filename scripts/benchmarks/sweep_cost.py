@@ -31,15 +31,15 @@ from benchmarks.planar_scene import planar_scene
 from robot_dyn.scene.starters import starter
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps.cluster import client_of
-from robot_dyn.tools.sweeps.folder.folder import Folder
-from robot_dyn.tools.sweeps.opening import begun, opened
-from robot_dyn.tools.sweeps.plan.work import Work
+from robot_dyn.tools.sweeps.folder import Folder, opened
+from robot_dyn.tools.sweeps.run_sweep import begun
+from robot_dyn.tools.sweeps.work import Work
 
 MIB = 2**20
 RESUME = """
 import time
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps.plan.work import Work
+from robot_dyn.tools.sweeps.work import Work
 began, cpu, plain, first = time.perf_counter(), time.process_time(), Work.made, []
 def made(self, *given):
     first.append(time.perf_counter() - began)
@@ -116,7 +116,7 @@ def samples(given: argparse.Namespace) -> None:
 
 def rollouts_of(setup: rd.Setup, values: dict[str, np.ndarray], work: Work) -> None:
     """What a user would call for the runs of a chunk."""
-    params = {name: x[:, 0] if x.shape[1] == 1 else x for name, x in values.items() if name != "q0"}
+    params = {name: x for name, x in values.items() if name != "q0"}
     rd.rollouts(setup, values.get("q0"), params=params, record=work.record, threads=1)
 
 
@@ -158,7 +158,7 @@ def overhead(given: argparse.Namespace) -> None:
 
 def rollouts_in_a_worker(folder: str, start: int, stop: int) -> float:
     """CPU time of a worker for rd.rollouts of the runs of a chunk, the folder of which it has opened before."""
-    work = opened(Path(folder))[1]
+    work = Work(opened(Path(folder))[1])
     values, setup = work.sweep.values(start, stop), replace(work.sweep.setup, estimate_error=False)
     began = time.process_time()
     rollouts_of(setup, values, work)

@@ -141,7 +141,7 @@ def ishigami_indices() -> tuple[Numbers, Numbers]:
 def indices_of_a_seed(points: int, seed: int) -> list[tuple[bool, float, float]]:
     of = designs.design("saltelli", 16 * 5 * points, 3, seed)
     y = ishigami(of.rows)
-    made = sensitivity.saltelli(y, np.isfinite(y), "123", of.scrambling)
+    made = sensitivity.saltelli(y, np.isfinite(y), ("1", "2", "3"), of.scrambling)
     true = np.concatenate(ishigami_indices())
     return [
         (each.low <= x <= each.high, each.high - each.low, each.estimate)

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from itertools import islice
 from typing import Any
 
 from robot_dyn.foundations import SweepError, shown
-from robot_dyn.tools.sweeps.plan.work import Stopped
+from robot_dyn.tools.sweeps.work import Stopped
 
 _ATTEMPTS = 20  # rounds without a new file, after which a chunk is held to end its worker
 _LOOK_S = 0.5
@@ -42,7 +42,21 @@ def fill(
     """
     left, attempts = missing(), 0
     while left:
-        _round(submit, left, capacity, look, lost)
+        waiting, pending = iter(left), set[Future[Any]]()
+        try:
+            while True:  # until each chunk was submitted once, and has ended in some way
+                pending |= {submit(chunk) for chunk in islice(waiting, max(0, capacity() - len(pending)))}
+                if not pending:
+                    break
+                look()
+                ended, pending = wait(pending, _LOOK_S, FIRST_COMPLETED)
+                for future in ended:
+                    error = None if future.cancelled() else future.exception()
+                    if error is not None and not isinstance(error, lost):
+                        raise error
+        finally:
+            for future in pending:
+                future.cancel()
         before, left = len(left), missing()
         attempts = attempts + 1 if len(left) == before else 0
         if attempts == _ATTEMPTS:
@@ -50,31 +64,6 @@ def fill(
                 f"chunk {left[0]} ended its worker {_ATTEMPTS} times; make it in this process to see why, with"
                 " the same folder and cluster=None"
             )
-
-
-def _round(
-    submit: Callable[[int], Future[Any]],
-    chunks: Iterable[int],
-    capacity: Callable[[], int],
-    look: Callable[[], object],
-    lost: tuple[type[BaseException], ...],
-) -> None:
-    """Submit each chunk once, and wait until each has ended in some way."""
-    left, pending = iter(chunks), set[Future[Any]]()
-    try:
-        while True:
-            pending |= {submit(chunk) for chunk in islice(left, max(0, capacity() - len(pending)))}
-            if not pending:
-                return
-            look()
-            ended, pending = wait(pending, _LOOK_S, FIRST_COMPLETED)
-            for future in ended:
-                error = None if future.cancelled() else future.exception()
-                if error is not None and not isinstance(error, lost):
-                    raise error
-    finally:
-        for future in pending:
-            future.cancel()
 
 
 def fill_by_threads(

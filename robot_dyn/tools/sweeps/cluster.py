@@ -1,13 +1,14 @@
 """Chunks by workers of Dask.distributed, on this machine or others that share the folder.
 
-A task makes one chunk and returns nothing: what is done is asked of the folder. A few tasks for each worker are
-submitted at a time, since a scheduler keeps some 15 kB for each. Workers that die are replaced by Dask, and chunks
-without a file are submitted again.
+A task makes one chunk and returns nothing: the folder shows what is done. A few tasks for each worker are submitted at
+a time, since a scheduler keeps some 15 kB for each. Workers that die are replaced by Dask, and chunks without a file
+are submitted again.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -21,11 +22,10 @@ from urllib.parse import urlsplit
 from robot_dyn import RobotDynError
 from robot_dyn.foundations import SweepError, needs, shown
 from robot_dyn.tools.sweeps.chunks import fill
-from robot_dyn.tools.sweeps.folder.files import temporary_name, write
-from robot_dyn.tools.sweeps.folder.folder import Folder
+from robot_dyn.tools.sweeps.folder import Folder, opened
 from robot_dyn.tools.sweeps.imported import Named
-from robot_dyn.tools.sweeps.opening import opened
-from robot_dyn.tools.sweeps.plan.specification import versions
+from robot_dyn.tools.sweeps.specification import stated_in, versions
+from robot_dyn.tools.sweeps.work import Work
 
 _WINDOW = 3  # tasks a thread of a worker
 _WAIT_S = 60.0  # for the first worker
@@ -45,18 +45,14 @@ class Ticket:
     Attributes:
         folder: Path of the folder, the same on all hosts.
         digest: Of the specification in it.
-        token: Name of a file in the folder, and its content.
         versions: Of the driver.
-        scene: What the driver names, as in `Named`.
-        figures: Same.
+        names: What the driver names.
     """
 
     folder: str
     digest: str
-    token: str
     versions: tuple[tuple[str, str], ...]
-    scene: str | None = None
-    figures: tuple[tuple[str, str], ...] = ()
+    names: Named
 
 
 @contextmanager
@@ -75,10 +71,9 @@ def client_of(cluster: Any) -> Iterator[Any]:
     if isinstance(cluster, distributed.Client):
         yield cluster
     elif isinstance(cluster, str) and cluster.startswith("local:"):
-        processes, threads = _local(cluster)
         with (
             needs("dask.config", extra="cluster").set(_LOCAL),
-            _started(distributed, processes, threads) as local,
+            _started(distributed, *_local(cluster)) as local,
             distributed.Client(local, set_as_default=False) as client,
         ):
             yield client
@@ -115,10 +110,11 @@ def _connected(distributed: Any, address: str) -> Any:
 
 def _local(text: str) -> tuple[int, int]:
     """Processes and threads of each."""
-    processes, _, threads = text.removeprefix("local:").partition("x")
-    if not processes.isdigit() or int(processes) < 1 or (threads and not (threads.isdigit() and int(threads))):
+    match = re.fullmatch(r"local:([1-9]\d*)(?:x([1-9]\d*))?", text)
+    if match is None:
         raise SweepError(f"cluster: 'local:2' is 2 processes, 'local:2x4' has 4 threads in each; got {shown(text)}")
-    return int(processes), int(threads) if threads else max(1, (os.cpu_count() or 1) // int(processes))
+    processes = int(match[1])
+    return processes, int(match[2] or max(1, (os.cpu_count() or 1) // processes))
 
 
 def _check_address(address: str) -> None:
@@ -151,39 +147,37 @@ def fill_by_cluster(
     """
     distributed = needs("distributed", extra="cluster")
     lost = distributed.KilledWorker, distributed.comm.CommClosedError, OSError
-    key = f"token-{os.urandom(8).hex()}"
-    ticket = ticket_of(folder, temporary_name(key), names)
-    write(folder.path / ticket.token, ticket.token.encode())
-    try:
-        _check_workers(client, folder, ticket)
-        executor = client.get_executor(pure=False, retries=0)
+    ticket = ticket_of(folder, names)
+    _check_workers(client, folder, ticket)
+    executor = client.get_executor(pure=False, retries=0)
 
-        def capacity() -> int:
-            return _WINDOW * max(1, sum(client.nthreads().values()))
+    def capacity() -> int:
+        return _WINDOW * max(1, sum(client.nthreads().values()))
 
-        fill(lambda chunk: executor.submit(make_chunk, ticket, chunk), missing, capacity, look, lost)
-    finally:
-        for path in folder.path.glob(f".{key}.*"):
-            path.unlink(missing_ok=True)
+    fill(lambda chunk: executor.submit(make_chunk, ticket, chunk), missing, capacity, look, lost)
 
 
-def ticket_of(folder: Folder, token: str, names: Named) -> Ticket:
+def ticket_of(folder: Folder, names: Named) -> Ticket:
     """Return the ticket of a folder and of what workers may import."""
-    of_driver, figures = tuple(versions().items()), tuple(names.figures.items())
-    return Ticket(str(folder.path.absolute()), folder.digest, token, of_driver, names.scene, figures)
+    return Ticket(str(folder.path.absolute()), folder.digest, tuple(versions().items()), names)
 
 
 def _check_workers(client: Any, folder: Folder, ticket: Ticket) -> None:
-    """Let each worker read the token and write one back, which is read here."""
+    """Let each worker write a file into the folder, which is found here."""
     client.wait_for_workers(1, timeout=_WAIT_S)
-    for worker, answer in client.run(_answer, ticket, on_error="return").items():
-        if isinstance(answer, BaseException):
-            why = str(answer) if isinstance(answer, RobotDynError) else f"{type(answer).__name__}: {answer}"
+    answers = client.run(_answer, ticket, on_error="return")
+    files = {worker: folder.path / name for worker, name in answers.items() if isinstance(name, str)}
+    strangers = [worker for worker, file in files.items() if not file.is_file()]
+    for file in files.values():
+        file.unlink(missing_ok=True)
+    for worker, error in answers.items():
+        if worker not in files:
+            why = str(error) if isinstance(error, RobotDynError) else f"{type(error).__name__}: {error}"
             raise SweepError(f"worker {worker}: {why}")
-        if not (folder.path / answer).is_file():
-            raise SweepError(
-                f"worker {worker} writes to another folder than {folder.path}: give one that all hosts share"
-            )
+    if strangers:
+        raise SweepError(
+            f"worker {strangers[0]} writes to another folder than {folder.path}: give one that all hosts share"
+        )
 
 
 # --- in a worker
@@ -197,10 +191,10 @@ def make_chunk(ticket: Ticket, chunk: int) -> None:
 
 
 def _answer(ticket: Ticket) -> str:
-    """Write a token beside that of the driver; its name."""
+    """Write a file into the folder; its name."""
     _check(ticket)
-    name = temporary_name(ticket.token.split(".")[1])
-    write(Path(ticket.folder) / name, ticket.token.encode())
+    name = f".{os.urandom(8).hex()}.unfinished"
+    (Path(ticket.folder) / name).touch()
     return name
 
 
@@ -208,20 +202,17 @@ def _answer(ticket: Ticket) -> str:
 def _work(ticket: Ticket) -> Any:
     """The folder, the work and the times of samples of a sweep, made once in a worker."""
     _check(ticket)
-    folder, work = opened(Path(ticket.folder), Named(ticket.scene, dict(ticket.figures)))
-    if folder.digest != ticket.digest:
-        raise SweepError(f"{ticket.folder}: holds another sweep here than at the driver; give one that all hosts share")
-    return folder, work, None if folder.samples is None else folder.samples.times()
+    folder, sweep = opened(Path(ticket.folder), ticket.names)
+    return folder, Work(sweep), None if folder.samples is None else folder.samples.times()
 
 
 def _check(ticket: Ticket) -> None:
     """Refuse another folder, and other versions, by name."""
-    token = Path(ticket.folder) / ticket.token
-    if not token.is_file() or token.read_text() != ticket.token:
-        raise SweepError(f"{ticket.folder} on {socket.gethostname()} is not the folder of the driver; share one")
-    here = versions()
+    here, host, digest = versions(), socket.gethostname(), ""
     for name, version in ticket.versions:
         if here.get(name) != version:
-            raise SweepError(
-                f"{name} is {here.get(name)} on {socket.gethostname()}, {version} at the driver; install it there"
-            )
+            raise SweepError(f"{name} is {here.get(name)} on {host}, {version} at the driver; install it there")
+    with suppress(SweepError):
+        digest = stated_in(Path(ticket.folder)).digest
+    if digest != ticket.digest:
+        raise SweepError(f"{ticket.folder} on {host} is not the folder of the driver; share one")

@@ -12,8 +12,8 @@ from robot_dyn.cli import Force, Json, app, bar, say, say_json, to_stderr
 from robot_dyn.foundations import SweepError, nearest, shorten
 
 if TYPE_CHECKING:
-    from robot_dyn.tools.sweeps.plan.sweep import Sweep
     from robot_dyn.tools.sweeps.result import SweepResult
+    from robot_dyn.tools.sweeps.sweep import Sweep
 
 ACTIONS = ("run", "status", "verify", "report", "export")
 
@@ -72,9 +72,10 @@ def sweep(
     if what.lower().endswith(".toml"):
         if folder is not None or output is None:
             raise SweepError("give the folder to fill with -o FOLDER")
-        given = {"runs": runs, "design": design, "seed": seed, "samples": samples}
-        stated = _stated(what, given, vary or [], figure or [])
-        result = _run(stated, output, options | {"chunk": chunk})
+        changes: dict[str, Any] = {"runs": runs, "design": design, "seed": seed, "samples": samples}
+        changes = {name: value for name, value in changes.items() if value is not None}
+        changes |= {"vary": _assignments("--vary", vary), "figures": _assignments("--figure", figure)}
+        result = _run(sw.from_scene(what, **changes), output, options | {"chunk": chunk})
     else:
         if what not in ACTIONS:
             raise SweepError(
@@ -82,7 +83,7 @@ def sweep(
             )
         if folder is None:
             raise SweepError(f"{what}: of which folder? robot-dyn sweep {what} FOLDER")
-        result = sw.read(folder, scene, _assignments("--figure", figure or []))
+        result = sw.read(folder, scene, _assignments("--figure", figure))
         if what == "run":
             result = _run(result.sweep, folder, options)
         elif what == "verify":
@@ -102,18 +103,10 @@ def sweep(
         raise typer.Exit(130)
 
 
-def _stated(scene: str, given: dict[str, Any], vary: list[str], figure: list[str]) -> Sweep:
-    """The sweep of a scene and of options, which take the place of what its table states."""
-    from robot_dyn.tools import sweeps as sw
-
-    changes = {name: value for name, value in given.items() if value is not None}
-    return sw.from_scene(scene, vary=_assignments("--vary", vary), figures=_assignments("--figure", figure), **changes)
-
-
-def _assignments(option: str, texts: list[str]) -> dict[str, str]:
+def _assignments(option: str, texts: list[str] | None) -> dict[str, str]:
     """Names and values of texts NAME=VALUE; SweepError if one has another form."""
     values = {}
-    for text in texts:
+    for text in texts or ():
         name, equals, value = text.partition("=")
         if not equals or not name.strip():
             raise SweepError(f"{option} must be NAME=VALUE, got {shorten(text)!r}")

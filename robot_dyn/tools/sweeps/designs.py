@@ -11,7 +11,7 @@ Row i belongs to scrambling (i mod 16), a block of "saltelli" as one row, so tha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, final
@@ -70,14 +70,10 @@ def design(name: str | Any, runs: int, dimensions: int, seed: int = 0) -> Design
         SweepError: If the name is unknown, or the design cannot have so many rows; names the two nearest counts.
     """
     runs = integer("runs", runs, least=1, most=MOST_ROWS, error=SweepError)
-    d = integer("dimensions", dimensions, least=1, error=SweepError)
-    seed = integer("seed", seed, error=SweepError)
     if isinstance(name, np.ndarray | list | tuple):
-        return given(name, runs, d)
+        return given(name, runs, dimensions)
     name = choice("design", name, NAMES, error=SweepError)
-    if name == "saltelli":
-        return Design(name, _saltelli(runs, d, seed), d + 2)
-    return Design(name, _DRAWN[name](runs, d, seed))
+    return _design(name, _drawn(name, runs, dimensions, seed))
 
 
 def given(table: Any, runs: int, dimensions: int, name: str = "table") -> Design:
@@ -93,84 +89,52 @@ def given(table: Any, runs: int, dimensions: int, name: str = "table") -> Design
             f"the table of the design has {rows.shape[0]} rows of {rows.shape[1]} numbers,"
             f" the sweep {runs} runs of {dimensions}"
         )
-    return Design(name, rows, dimensions + 2 if name == "saltelli" else 1)
+    return _design(name, rows)
 
 
-def _generators(seed: int) -> list[np.random.Generator]:
-    """One generator a scrambling, independent of each other."""
-    return list(map(np.random.default_rng, np.random.SeedSequence(seed).spawn(SCRAMBLINGS)))
+def _design(name: str, rows: np.ndarray) -> Design:
+    return Design(name, rows, rows.shape[1] + 2 if name == "saltelli" else 1)
 
 
-def _random(runs: int, d: int, seed: int) -> np.ndarray:
-    return np.random.default_rng(seed).random((runs, d))
+def _drawn(name: str, runs: int, d: int, seed: int) -> np.ndarray:
+    """The rows of a design, (N, d)."""
+    if name == "random":
+        return np.random.default_rng(seed).random((runs, d))
+    if name == "grid":
+        return _grid(runs, d)
+    block = d + 2 if name == "saltelli" else 1
+    each = _engine(name, d)
+    _check_scrambled(name, runs, SCRAMBLINGS * block)
+    seeds = np.random.SeedSequence(seed).spawn(SCRAMBLINGS)
+    rows = [each(runs // block // SCRAMBLINGS, np.random.default_rng(child)) for child in seeds]
+    return np.minimum(np.stack([x.reshape(-1, block, d) for x in rows], 1).reshape(runs, d), np.nextafter(1.0, 0.0))
 
 
-def _scrambled(engine: Callable[..., Any]) -> Callable[[int, int, int], np.ndarray]:
-    """Draw N/16 rows of each of 16 scramblings of an engine of SciPy, and take them in turns."""
-
-    def draw(runs: int, d: int, seed: int) -> np.ndarray:
-        each = [engine(d, generator).random(runs // SCRAMBLINGS) for generator in _generators(seed)]
-        return np.minimum(np.stack(each, axis=1).reshape(runs, d), np.nextafter(1.0, 0.0))
-
-    return draw
-
-
-def _sobol(runs: int, d: int, seed: int) -> np.ndarray:
+def _engine(name: str, d: int) -> Callable[[int, np.random.Generator], np.ndarray]:
+    """Return a function that draws points, or blocks of "saltelli", of one scrambling."""
     from scipy.stats import qmc  # late: it takes a second
 
-    _check_dimensions("sobol", d, qmc.Sobol.MAXDIM)
-    _check_power("sobol", runs, SCRAMBLINGS, "16 scramblings of a balanced sequence")
-    return _scrambled(lambda d, rng: qmc.Sobol(d, bits=_BITS, rng=rng))(runs, d, seed)
-
-
-def _halton(runs: int, d: int, seed: int) -> np.ndarray:
-    from scipy.stats import qmc
-
-    _check_multiple("halton", runs, "16 scramblings")
-    return _scrambled(lambda d, rng: qmc.Halton(d, rng=rng))(runs, d, seed)
-
-
-def _latin(runs: int, d: int, seed: int) -> np.ndarray:
-    from scipy.stats import qmc
-
-    _check_multiple("latin", runs, "16 hypercubes")
-    return _scrambled(lambda d, rng: qmc.LatinHypercube(d, rng=rng))(runs, d, seed)
-
-
-def _saltelli(runs: int, d: int, seed: int) -> np.ndarray:
-    """Blocks A, A with column j of B for every j, B, as SALib draws and analyses them."""
-    from scipy.stats import qmc
-
-    sample = needs("SALib.sample.sobol", extra="sweeps").sample
-    _check_dimensions("saltelli", d, qmc.Sobol.MAXDIM // 2)  # A and B are one point of Sobol'
-    _check_power("saltelli", runs, SCRAMBLINGS * (d + 2), f"16 scramblings of blocks of {d + 2} rows")
-    problem = {"num_vars": d, "names": [f"x{j}" for j in range(d)], "bounds": [[0.0, 1.0]] * d}
-    blocks = runs // (d + 2)
-    each = [
-        sample(problem, blocks // SCRAMBLINGS, calc_second_order=False, seed=generator)
-        for generator in _generators(seed)
-    ]
-    rows = np.stack([x.reshape(-1, d + 2, d) for x in each], axis=1).reshape(runs, d)
-    return np.minimum(rows, np.nextafter(1.0, 0.0))
-
-
-def _grid(runs: int, d: int, seed: int) -> np.ndarray:
-    """Levels (2m + 1) / 2k, m = 0, …, k − 1; the last dimension changes first."""
-    k = round(runs ** (1 / d)) + 1
-    while k**d > runs:
-        k -= 1
-    _check_count("grid", runs, f"a number of levels to the power of {d}", k**d, (k + 1) ** d)
-    return np.array(list(product((np.arange(k) + 0.5) / k, repeat=d))).reshape(runs, d)
-
-
-_DRAWN: Mapping[str, Callable[[int, int, int], np.ndarray]] = {
-    "random": _random, "sobol": _sobol, "halton": _halton, "latin": _latin, "grid": _grid,
-}  # fmt: skip
-
-
-def _check_dimensions(name: str, d: int, most: int) -> None:
+    most = {"sobol": qmc.Sobol.MAXDIM, "saltelli": qmc.Sobol.MAXDIM // 2}.get(name, d)  # A and B are one point
     if d > most:
         raise SweepError(f"design {name!r} takes at most {most} dimensions, got {d}")
+    if name == "saltelli":  # blocks A, A with column j of B for every j, B
+        sample = needs("SALib.sample.sobol", extra="sweeps").sample
+        problem = {"num_vars": d, "names": [f"x{j}" for j in range(d)], "bounds": [[0.0, 1.0]] * d}
+        return lambda count, rng: sample(problem, count, calc_second_order=False, seed=rng)
+    if name == "sobol":
+        return lambda count, rng: qmc.Sobol(d, bits=_BITS, rng=rng).random(count)
+    engine = qmc.Halton if name == "halton" else qmc.LatinHypercube
+    return lambda count, rng: engine(d, rng=rng).random(count)
+
+
+def _check_scrambled(name: str, runs: int, unit: int) -> None:
+    """Raise SweepError unless each scrambling has 2 points or blocks or more, for balance a power of two."""
+    if name in ("sobol", "saltelli"):
+        count = unit << max((runs // unit).bit_length() - 1, 1)
+        _check_count(name, runs, f"{unit} times a power of two, {2 * unit} at least", count, 2 * count)
+    else:
+        count = max(runs // unit, 2) * unit
+        _check_count(name, runs, f"a multiple of {unit}, {2 * unit} at least", count, count + unit)
 
 
 def _check_count(name: str, runs: int, allowed: str, count: int, above: int) -> None:
@@ -179,14 +143,10 @@ def _check_count(name: str, runs: int, allowed: str, count: int, above: int) -> 
         raise SweepError(f"design {name!r} takes {allowed}, got {runs} runs; nearest: {count} or {above}")
 
 
-def _check_multiple(name: str, runs: int, why: str) -> None:
-    """Raise SweepError unless `runs` is a multiple of the scramblings, and at least two times it."""
-    count = max(runs // SCRAMBLINGS, 2) * SCRAMBLINGS
-    allowed = f"a multiple of {SCRAMBLINGS}, {2 * SCRAMBLINGS} at least ({why})"
-    _check_count(name, runs, allowed, count, count + SCRAMBLINGS)
-
-
-def _check_power(name: str, runs: int, of: int, why: str) -> None:
-    """Raise SweepError unless `runs` is a number times a power of two, at least two times it."""
-    count = of << max((runs // of).bit_length() - 1, 1)
-    _check_count(name, runs, f"{of} times a power of two, {2 * of} at least ({why})", count, 2 * count)
+def _grid(runs: int, d: int) -> np.ndarray:
+    """Levels (2m + 1) / 2k, m = 0, …, k − 1; the last dimension changes first."""
+    k = round(runs ** (1 / d)) + 1
+    while k**d > runs:
+        k -= 1
+    _check_count("grid", runs, f"a number of levels to the power of {d}", k**d, (k + 1) ** d)
+    return np.array(list(product((np.arange(k) + 0.5) / k, repeat=d))).reshape(runs, d)

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from inspect import signature
+from functools import cached_property, partial
 from itertools import pairwise
-from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import Caching, SweepError, Value, nearest, numbers, shown
-from robot_dyn.tools.sweeps.texts import called
+from robot_dyn.foundations import SweepError, Value, numbers, shown
+from robot_dyn.tools.sweeps.texts import call_of, called
 
 LEAST, MOST = 2.0**-54, 1 - 2.0**-53
 """Between which numbers are taken: F⁻¹(0) may be infinite."""
 _SCIPY = "scipy.stats."
+_ORDERED = {"uniform": ("low", "high"), "triangular": ("low", "mode", "high")}
+_BOUNDS: dict[str, Any] = {"sd": {"least": 0.0}, "sigma_of_log": {"least": 0.0}, "median": {"above": 0.0}}
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Distribution(Value, Caching):
+class Distribution(Value):
     """A distribution of one number, or of n independent ones.
 
     Attributes:
@@ -39,25 +39,27 @@ class Distribution(Value, Caching):
         checked = {}
         for key, x in self.parameters.items():
             what = f"the {key} of choice" if self.name == "choice" else f"{key} of {self.name}"
-            array = numbers(what, x, *shapes, error=SweepError)
+            array = numbers(what, x, *shapes, error=SweepError, **_BOUNDS.get(key, {}))
             if self.name.startswith(_SCIPY) and np.asarray(x).dtype.kind in "iu":  # SciPy may need whole numbers
                 array = np.array(x)
                 array.setflags(write=False)
             checked[key] = array
-        object.__setattr__(self, "parameters", MappingProxyType(checked))
+        object.__setattr__(self, "parameters", checked)
         if self.name == "choice":
             return
         _ = self.shape  # refused if lengths differ
-        _check_order(self.name, checked)
+        for low, high in pairwise(_ORDERED.get(self.name, ())):
+            a, b = np.broadcast_arrays(checked[low], checked[high])
+            if (wrong := a > b).any():
+                raise SweepError(
+                    f"{low} of {self.name} must be at most {high}, got {a[wrong][0]:g} and {b[wrong][0]:g}"
+                )
         with np.errstate(all="ignore"):
             ends = self._inverse(np.full((3, self.size), [[LEAST], [0.5], [MOST]]).reshape(3, *self.shape))
         if not np.isfinite(ends).all():
             raise SweepError(f"{self.name} has no finite values between its quantiles of 2⁻⁵⁴ and 1 − 2⁻⁵³: {self}")
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Distribution, (self.name, dict(self.parameters))
-
-    @property
+    @cached_property
     def shape(self) -> tuple[int, ...]:
         """Of one value: () or (n,)."""
         if self.name == "choice":
@@ -72,18 +74,13 @@ class Distribution(Value, Caching):
         """The columns of a design that it takes."""
         return 1 if self.name == "choice" or not self.shape else self.shape[0]
 
-    def values(self, u: Any) -> np.ndarray:
-        """F⁻¹(u), shape (k,) or (k, n).
+    @property
+    def width(self) -> int:
+        """The numbers of one value."""
+        return self.shape[0] if self.shape else 1
 
-        Args:
-            u: Numbers in [0, 1), shape (k, size); 0 is taken for 2⁻⁵⁴.
-
-        Raises:
-            SweepError: If u is anything else.
-        """
-        u = numbers(f"u of {self.name}", u, ("k", self.size), error=SweepError, least=0.0)
-        if (u >= 1).any():
-            raise SweepError(f"u of {self.name} must be below 1, got {u[u >= 1][0]:g}")
+    def values(self, u: np.ndarray) -> np.ndarray:
+        """F⁻¹(u), shape (k,) or (k, n), of numbers in [0, 1), shape (k, size); 0 is taken for 2⁻⁵⁴."""
         if self.name == "choice":
             of = self.parameters["values"]
             return of[np.minimum((u[:, 0] * len(of)).astype(int), len(of) - 1)]
@@ -96,7 +93,7 @@ class Distribution(Value, Caching):
     @cached_property
     def _ppf(self) -> Any:
         if not self.name.startswith(_SCIPY):
-            return lambda u: _INVERSES[self.name](u, **self.parameters)
+            return partial(_INVERSES[self.name], **self.parameters)
         from scipy import stats  # late: it takes a second
 
         name = self.name.removeprefix(_SCIPY)
@@ -170,41 +167,13 @@ def distribution(value: Any) -> Distribution:
     return Distribution(_SCIPY + name, {str(k): x for k, x in enumerate(value.args)} | value.kwds)
 
 
-def from_dict(stored: Any) -> Distribution:
-    """The distribution of a dictionary that `to_dict` made.
-
-    Raises:
-        SweepError: If it has another form.
-    """
-    if not isinstance(stored, Mapping) or not isinstance(stored.get("distribution"), str):
-        raise SweepError(f'a stored distribution is a table with the key "distribution", got {shown(stored)}')
-    given = {str(key): x for key, x in stored.items() if key != "distribution"}
-    name = stored["distribution"]
-    if name.startswith(_SCIPY):
+def from_dict(stored: Mapping[str, Any]) -> Distribution:
+    """The distribution of a dictionary that `to_dict` made; SweepError or KeyError if it has another form."""
+    given = dict(stored)
+    name = given.pop("distribution")
+    if str(name).startswith(_SCIPY):
         return Distribution(name, given)
-    if name not in CONSTRUCTORS:
-        raise SweepError(f"no distribution {shown(name)}; {nearest(name, CONSTRUCTORS)}")
-    expected = list(signature(CONSTRUCTORS[name]).parameters)
-    if set(given) != set(expected):
-        raise SweepError(f"{name} takes {', '.join(expected)}, got {', '.join(given) or 'nothing'}")
-    return Distribution(name, given)
-
-
-_ORDERED = {"uniform": ("low", "high"), "triangular": ("low", "mode", "high")}
-_LEAST = {"normal": {"sd": 0.0}, "lognormal": {"sigma_of_log": 0.0}}
-
-
-def _check_order(name: str, of: Mapping[str, Any]) -> None:
-    """Raise SweepError unless the parameters are in order, and widths are not negative."""
-    ordered = _ORDERED.get(name, ())
-    for low, high in pairwise(ordered):
-        a, b = np.broadcast_arrays(of[low], of[high])
-        if (wrong := a > b).any():
-            raise SweepError(f"{low} of {name} must be at most {high}, got {a[wrong][0]:g} and {b[wrong][0]:g}")
-    for key, least in _LEAST.get(name, {}).items():
-        numbers(f"{key} of {name}", of[key], (), ("n",), error=SweepError, least=least)
-    if name == "lognormal":
-        numbers(f"median of {name}", of["median"], (), ("n",), error=SweepError, above=0.0)
+    return call_of("distribution", name, CONSTRUCTORS, (), given)
 
 
 def _uniform(u: np.ndarray, low: Any, high: Any) -> np.ndarray:

@@ -9,10 +9,10 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from robot_dyn.foundations import FileKind, SweepError, file_path, needs, save, table_cell, target
-from robot_dyn.tools.sweeps.folder.folder import Folder
-from robot_dyn.tools.sweeps.folder.rows import FIXED, TEXTS, schema
-from robot_dyn.tools.sweeps.plan.specification import specification
-from robot_dyn.tools.sweeps.plan.sweep import Sweep, heading
+from robot_dyn.tools.sweeps.folder import Folder
+from robot_dyn.tools.sweeps.rows import FIXED, TEXTS, schema
+from robot_dyn.tools.sweeps.specification import specification
+from robot_dyn.tools.sweeps.sweep import Sweep, heading, parameter_of
 
 _CSV, _PARQUET = FileKind("a table of runs", ".csv", b'"run",'), FileKind("a table", ".parquet", b"PAR1")
 
@@ -37,7 +37,9 @@ def _write(sweep: Sweep, folder: Folder, stream: BinaryIO, is_csv: bool) -> None
     fields = [
         field.with_name(cell(heading(sweep, field.name))).with_metadata(about.get(field.name)) for field in of_files
     ]
-    stated = pa.schema(fields, metadata={"title": "runs of robot_dyn", "sweep": _about(sweep, folder)})
+    stated_sweep = specification(sweep, folder.chunk).model_dump() | {"scene": Path(sweep.scene).name}  # not its folder
+    metadata = {"title": "runs of robot_dyn", "sweep": json.dumps(stated_sweep, ensure_ascii=False)}
+    stated = pa.schema(fields, metadata=metadata)
     with _writer(stream, stated, is_csv) as writer:
         for chunk in range(folder.count):
             rows = folder.read(chunk) | {"run": np.arange(*folder.of(chunk))}
@@ -52,16 +54,9 @@ def _writer(stream: BinaryIO, stated: Any, is_csv: bool) -> Any:
     return needs("pyarrow.parquet", extra="sweeps").ParquetWriter(stream, stated)
 
 
-def _about(sweep: Sweep, folder: Folder) -> str:
-    """The specification as JSON, with the name of the scene in place of its path."""
-    return json.dumps(
-        specification(sweep, folder.chunk).model_dump() | {"scene": Path(sweep.source).name}, ensure_ascii=False
-    )
-
-
 def _about_columns(sweep: Sweep) -> dict[str, dict[str, str]]:
     """Unit and meaning of columns, distribution of what varies, and how a figure is computed."""
-    varied = {name: name if name in sweep.vary else name.rpartition("[")[0] for name in sweep.columns}
+    varied = {name: name if name in sweep.vary else parameter_of(name) for name in sweep.columns}
     about = {column: {"distribution": json.dumps(sweep.vary[name].to_dict())} for column, name in varied.items()}
     about |= {name: {"computed by": json.dumps(figure.to_dict())} for name, figure in sweep.figures.items()}
     about |= {column.name: {"meaning": column.meaning} for column in FIXED}

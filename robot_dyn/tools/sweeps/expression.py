@@ -1,31 +1,39 @@
-"""Events as texts, "diverged | error > 0.1": names, numbers, comparisons and logic, parsed here and never evaluated.
+"""Events as texts over columns, such as "diverged | error > 0.1", read by Python's parser and never evaluated by it.
 
-    or     = and { "|" and }          not     = ("!" | "not") not | "(" or ")" | compared
-    and    = not { "&" not }          compared = value [ ("<" | "<=" | ">" | ">=" | "==" | "!=") value ]
-
-`or` and `and` may be written for | and &. A comparison with nan is unknown, and so is what depends on it: the logic is
-Kleene's, so that `diverged | error > 0.1` is known of a run that diverged.
+Comparisons of names and numbers are joined by |, & and !, for which `or`, `and` and `not` may be written, and
+parentheses; they bind in this order, the last the most. Columns whose names are no words stand in quotes.
+A comparison with nan is unknown, and so is what depends on it: the logic is Kleene's, so that
+`diverged | error > 0.1` is known of a run that diverged.
 """
 
 from __future__ import annotations
 
+import ast
 import re
-from collections.abc import Mapping
+from bisect import bisect
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from typing import final
 
 import numpy as np
 
-from robot_dyn.foundations import SweepError, nearest, shorten, shown
+from robot_dyn.foundations import SweepError, nearest, shown
 
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?![\w.])|(?P<operator><=|>=|==|!=|[<>|&!()])"
     r"|(?P<name>[^\W\d][\w.]*(?::[\w./-]+)?(?:\[\d+\])?(?:\.\w+)?)|(?P<quoted>\"[^\"]+\"|'[^']+'))"
 )
-_WORDS = {"or": "|", "and": "&", "not": "!"}
+_WORDS = {"|": "or", "&": "and", "!": "not"}
 _COMPARE = {
-    "<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal, "==": np.equal, "!=": np.not_equal,
+    ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal, ast.Eq: np.equal,
+    ast.NotEq: np.not_equal,
 }  # fmt: skip
+_REMEDIES: dict[type[ast.AST], str] = {
+    ast.Compare: "0.1 < x < 0.2 is x > 0.1 & x < 0.2",
+    ast.Call: "functions are not known: a figure may compute what is to be compared",
+}
+_REMEDY = "a name of several words stands in quotes, and units are left out"
 _MOST = 1000  # characters
 _DEEPEST = 50
 
@@ -44,7 +52,7 @@ class Expression:
     """An expression, parsed.
 
     Args:
-        text: As above; a name that is no word stands in quotes.
+        text: As above.
 
     Raises:
         SweepError: If it is not one; marks the place.
@@ -53,94 +61,81 @@ class Expression:
     def __init__(self, text: str) -> None:
         if not isinstance(text, str) or len(text) > _MOST:
             raise SweepError(f"an event is a text such as 'diverged | error > 0.1', got {shown(text)}")
-        self.text, self._tokens, self._at, self._depth = text, _tokens(text), 0, 0
-        self._tree = self._or()
-        if self._at < len(self._tokens):
-            raise self._wrong("ends, or goes on with | or &,", self._remedy())
+        self.text = text
+        self._operands: dict[str, str | float] = {}  # names and numbers, by the names that they have for Python
+        words, self._places, self._columns, depth = [], [], [0], 0
+        for kind, value, place in _tokens(text):
+            depth += (value == "(") - (value == ")")
+            if depth > _DEEPEST:
+                raise SweepError(f"{shown(text)}: is nested too deeply")
+            if kind != "operator":
+                self._operands[f"_{place}"] = float(value) if kind == "number" else value
+                value = f"_{place}"
+            words.append(_WORDS.get(value, value))
+            self._places.append(place)
+            self._columns.append(self._columns[-1] + len(words[-1]) + 1)
+        try:
+            self._tree = ast.parse(" ".join(words), mode="eval").body
+        except (SyntaxError, RecursionError, MemoryError) as error:
+            raise self._wrong((getattr(error, "offset", None) or 1) - 1) from None
 
     @property
     def names(self) -> tuple[str, ...]:
         """Of the columns that it needs."""
-        return tuple(dict.fromkeys(value for kind, value, _ in self._tokens if kind == "name"))
+        return tuple(dict.fromkeys(value for value in self._operands.values() if isinstance(value, str)))
 
     def of(self, columns: Mapping[str, np.ndarray]) -> Truth:
         """The event in each run; SweepError if a name is not that of a column."""
         for name in self.names:
             if name not in columns:
                 raise SweepError(f"no column {name!r}; {nearest(name, columns)}")
-        return _truth(self._tree, columns)
-
-    def _or(self) -> tuple:
-        tree = self._and()
-        while self._next("|"):
-            tree = ("|", tree, self._and())
-        return tree
-
-    def _and(self) -> tuple:
-        tree = self._not()
-        while self._next("&"):
-            tree = ("&", tree, self._not())
-        return tree
-
-    def _not(self) -> tuple:
-        self._depth += 1
-        if self._depth > _DEEPEST:
-            raise SweepError(f"{shorten(self.text)}: is nested too deeply")
         try:
-            if self._next("!"):
-                return ("!", self._not())
-            if self._next("("):
-                tree = self._or()
-                if not self._next(")"):
-                    raise self._wrong("has a )")
-                return tree
-            return self._compared()
-        finally:
-            self._depth -= 1
+            return self._truth(self._tree, columns)
+        except RecursionError:
+            raise SweepError(f"{shown(self.text)}: is nested too deeply") from None
 
-    def _compared(self) -> tuple:
-        left = self._value()
-        for operator in _COMPARE:
-            if self._next(operator):
-                right = self._value()
-                if left[0] == right[0] == "number":
-                    raise SweepError(f"{self.text}: compares two numbers; one of them must be the name of a column")
-                return (operator, left, right)
-        if left[0] == "number":
-            raise self._wrong("compares the number with <, <=, >, >=, == or !=")
-        return left
+    def _truth(self, tree: ast.AST, columns: Mapping[str, np.ndarray]) -> Truth:
+        match tree:
+            case ast.BoolOp(op=operator, values=values):
+                parts = [self._truth(value, columns) for value in values]
+                join = np.logical_or if isinstance(operator, ast.Or) else np.logical_and
+                return Truth(reduce(join, [x.certain for x in parts]), reduce(join, [x.possible for x in parts]))
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                of = self._truth(operand, columns)
+                return Truth(~of.possible, ~of.certain)
+            case ast.Compare(left=ast.Name(id=a), ops=[operator], comparators=[ast.Name(id=b)]):
+                return self._compared(operator, self._operands[a], self._operands[b], columns)
+            case ast.Name(id=name) if isinstance(column := self._operands[name], str):
+                x = columns[column]
+                if x.dtype != bool:
+                    raise SweepError(f"{column!r} is a number: compare it, as {column} > 0.1")
+                return Truth(x, x)
+        raise self._wrong(getattr(tree, "col_offset", 0), _REMEDIES.get(type(tree), _REMEDY))
 
-    def _value(self) -> tuple:
-        kind, value, _ = self._tokens[self._at] if self._at < len(self._tokens) else ("end", "", 0)
-        if kind not in ("name", "number"):
-            raise self._wrong("has a name or a number")
-        self._at += 1
-        return (kind, float(value) if kind == "number" else value)
+    def _compared(
+        self, operator: ast.cmpop, a: str | float, b: str | float, columns: Mapping[str, np.ndarray]
+    ) -> Truth:
+        left, right = (columns[x] if isinstance(x, str) else np.float64(x) for x in (a, b))
+        if not isinstance(a, str) and not isinstance(b, str):
+            raise SweepError(f"{self.text}: compares two numbers; one of them must be the name of a column")
+        if bool in (left.dtype, right.dtype):
+            raise SweepError("an outcome is true or false: it is not compared with a number")
+        with np.errstate(invalid="ignore"):
+            x = np.asarray(_COMPARE[type(operator)](left, right))
+        known = np.asarray(~(np.isnan(left) | np.isnan(right)))
+        return Truth(x & known, x | ~known)
 
-    def _next(self, operator: str) -> bool:
-        found = self._at < len(self._tokens) and self._tokens[self._at][:2] == ("operator", operator)
-        self._at += found
-        return found
-
-    def _remedy(self) -> str:
-        """For what stands where an event could end."""
-        kind, value, _ = self._tokens[self._at]
-        if value in _COMPARE:
-            return "; 0.1 < x < 0.2 is x > 0.1 & x < 0.2"
-        if value == "(":
-            return "; functions are not known: a figure may compute what is to be compared"
-        return "; a name of several words stands in quotes, and units are left out" if kind == "name" else ""
-
-    def _wrong(self, expected: str, remedy: str = "") -> SweepError:
-        place = self._tokens[self._at][2] if self._at < len(self._tokens) else len(self.text)
-        return SweepError(f"{self.text[:place]}⟨here⟩{self.text[place:]}: is not an event; one {expected} here{remedy}")
+    def _wrong(self, column: int, remedy: str = _REMEDY) -> SweepError:
+        """The error at a column of what Python parsed."""
+        k = bisect(self._columns, column) - 1
+        place = self._places[k] if k < len(self._places) else len(self.text)
+        return SweepError(f"{self.text[:place]}⟨here⟩{self.text[place:]}: is not an event; {remedy}")
 
 
-def _tokens(text: str) -> list[tuple[str, str, int]]:
+def _tokens(text: str) -> Iterator[tuple[str, str, int]]:
     """Kind, value and place of each."""
-    found, at = [], 0
-    text_end = len(text.rstrip())
-    while at < text_end:
+    at, end = 0, len(text.rstrip())
+    while at < end:
         match = _TOKEN.match(text, at)
         if match is None:
             place = at + len(text[at:]) - len(text[at:].lstrip())
@@ -149,34 +144,7 @@ def _tokens(text: str) -> list[tuple[str, str, int]]:
                 f" (<, <=, >, >=, ==, !=)"
             )
         kind = str(match.lastgroup)
-        value, at = match[kind], match.end()
-        if kind == "name" and value in _WORDS:
-            kind, value = "operator", _WORDS[value]
-        if kind == "quoted":
-            kind, value = "name", value[1:-1]
-        found.append((kind, value, match.start(match.lastgroup or 0)))
-    return found
-
-
-def _truth(tree: tuple, columns: Mapping[str, np.ndarray]) -> Truth:
-    kind = tree[0]
-    if kind == "name":
-        x = columns[tree[1]]
-        if x.dtype != bool:
-            raise SweepError(f"{tree[1]!r} is a number: compare it, as {tree[1]} > 0.1")
-        return Truth(x, x)
-    if kind == "!":
-        of = _truth(tree[1], columns)
-        return Truth(~of.possible, ~of.certain)
-    if kind in "|&":
-        a, b = _truth(tree[1], columns), _truth(tree[2], columns)
-        if kind == "|":
-            return Truth(a.certain | b.certain, a.possible | b.possible)
-        return Truth(a.certain & b.certain, a.possible & b.possible)
-    left, right = (each[1] if each[0] == "number" else columns[each[1]] for each in tree[1:])
-    if any(isinstance(x, np.ndarray) and x.dtype == bool for x in (left, right)):
-        raise SweepError("an outcome is true or false: it is not compared with a number")
-    with np.errstate(invalid="ignore"):
-        x = np.asarray(_COMPARE[kind](left, right))
-    known = np.asarray(~(np.isnan(left) | np.isnan(right)))
-    return Truth(x & known, x | ~known)
+        value, place, at = match[kind], match.start(kind), match.end()
+        if value in _WORDS.values():
+            kind = "operator"
+        yield ("name", value[1:-1], place) if kind == "quoted" else (kind, value, place)

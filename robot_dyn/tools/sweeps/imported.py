@@ -10,7 +10,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from hashlib import sha256
 from importlib import import_module
 from importlib.machinery import PathFinder
@@ -29,32 +29,46 @@ class Named:
 
     Attributes:
         scene: Scene file, or import path of a function; None for the scene that the folder names.
-        figures: Import paths of functions, by name of figure.
+        figures: Names of figures, each with the import path of its function.
     """
 
     scene: str | None = None
-    figures: Mapping[str, str] = field(default_factory=dict)
+    figures: tuple[tuple[str, str], ...] = ()
 
 
 NOTHING = Named()
 
 
 def named(scene: Any, figures: Any) -> Named:
-    """Return the scene and figures that a reader of a folder names.
+    """Return the scene and figures that a reader of a folder names; errors as in `source_of` and `path_of`."""
+    functions = by_name("figures", {} if figures is None else figures)
+    paths = tuple((name, path_of(function)) for name, function in functions.items())
+    return Named(None if scene is None else source_of(scene), paths)
 
-    Raises:
-        SweepError: If the scene is neither a file nor a function, or a figure is not a function.
-    """
-    if figures is not None and not (isinstance(figures, Mapping) and all(isinstance(name, str) for name in figures)):
-        raise SweepError(f"figures: give functions by name of figure, as {{'settling': …}}, got {shown(figures)}")
-    if isinstance(scene, Path):
-        scene = str(scene)
-    elif scene is not None and not (isinstance(scene, str) and scene.lower().endswith(".toml")):
-        try:
-            scene = path_of(scene)
-        except SweepError as error:
-            raise SweepError(f"scene: give the path of a scene file, or a function ({error})") from None
-    return Named(scene, {name: path_of(function) for name, function in (figures or {}).items()})
+
+def by_name(what: str, given: Any) -> dict[str, Any]:
+    """Distributions, figures or functions by name; SweepError if they are given otherwise."""
+    if not isinstance(given, Mapping) or not all(isinstance(name, str) and name for name in given):
+        raise SweepError(f"{what}: give them by name, as {{'kp': …}}, got {shown(given)}")
+    return dict(given)
+
+
+def source_of(scene: Any) -> str:
+    """The absolute path of a scene file, or the import path of a function; SweepError if it is neither."""
+    if isinstance(scene, Path) or (isinstance(scene, str) and is_scene(scene)):
+        return str(Path(scene).absolute())
+    try:
+        return path_of(scene)
+    except SweepError as error:
+        raise SweepError(
+            "scene: give a scene file, or a function that returns the setup, by import path such as 'my_arm:setup'"
+            f" ({error})"
+        ) from None
+
+
+def is_scene(source: str) -> bool:
+    """Return True for the path of a scene file, False for an import path."""
+    return source.lower().endswith(".toml")
 
 
 def is_import_path(text: str) -> bool:
@@ -109,7 +123,7 @@ def digest_of(path: str) -> str:
     return _digest(path, getattr(module, "__file__", None))
 
 
-def check_named(path: str, digest: Any, folder: Path | None) -> None:
+def check_named(path: str, digest: Any, folder: Path) -> None:
     """Compare the file of a function with the digest that a folder states, before the function is imported.
 
     Raises:
@@ -117,12 +131,11 @@ def check_named(path: str, digest: Any, folder: Path | None) -> None:
     """
     if not isinstance(digest, str):
         raise SweepError(f"{path}: the folder states no function here; leave it out, or name the scene file it states")
-    if folder is not None:
-        check_places(folder, str(Path.cwd()))
+    check_places(folder, str(Path.cwd()))
     file = _file_of(path.partition(":")[0])
     if file is None:
         raise SweepError(f"{path} cannot be imported: no such file in the working directory or on PYTHONPATH")
-    if folder is not None and _lies_in(file, folder):
+    if _lies_in(file, os.path.realpath(folder)):
         raise SweepError(f"{path}: {file} lies in the folder, from which nothing is imported; move it elsewhere")
     if (found := _digest(path, file)) != digest:
         raise SweepError(
@@ -133,17 +146,17 @@ def check_named(path: str, digest: Any, folder: Path | None) -> None:
 
 def check_places(folder: Path, *more: str) -> None:
     """Raise SweepError if Python imports from a folder of results, such as from a working directory that is one."""
+    real = os.path.realpath(folder)
     for place in (*sys.path, *more):
-        if isinstance(place, str) and _lies_in(place or os.curdir, folder):
+        if isinstance(place, str) and _lies_in(place or os.curdir, real):
             raise SweepError(
                 f"{folder}: Python imports modules from {place or 'the working directory'}, which lies in this folder,"
                 " so its files would run as code: change to another working directory, or remove it from PYTHONPATH"
             )
 
 
-def _lies_in(place: str, folder: Path) -> bool:
-    real, inside = os.path.realpath(folder), os.path.realpath(place)
-    return inside == real or inside.startswith(os.path.join(real, ""))
+def _lies_in(place: str, folder: str) -> bool:
+    return Path(os.path.realpath(place)).is_relative_to(folder)
 
 
 def _file_of(name: str) -> str | None:

@@ -1,25 +1,19 @@
-"""The report of a sweep as one HTML page, without scripts: distributions, failures over two parameters, worst runs."""
+"""What the report of a sweep draws: distributions, and failures over two parameters; one HTML page without scripts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
 from html import escape
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
-from robot_dyn.foundations import Answer, FileKind, html_of, inline, page, side_by_side, text
-from robot_dyn.foundations import table as html_table
+from robot_dyn.foundations import Block, FileKind, html_of, inline, page
 from robot_dyn.report import PAGE, ink, styled
-from robot_dyn.tools.sweeps.estimate import Estimate
-from robot_dyn.tools.sweeps.folder.rows import FINISHED
-from robot_dyn.tools.sweeps.sensitivity import Sensitivity, bins
+from robot_dyn.tools.sweeps.sensitivity import bins
 
 KIND = FileKind("a page", ".html", b"<!doctype html>")
 _BINS, _CELLS, _MOST_CROSSES = 60, 24, 500
-WORST = 10
-PROBABILITIES = (0.05, 0.5, 0.95, 0.99)
 _HEAD = (
     '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="color-scheme" content="light dark">'
     "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
@@ -28,55 +22,10 @@ _HEAD = (
 )
 
 
-@final
-@dataclass(frozen=True)
-class FigureReport:
-    """What a report shows of a figure.
-
-    Attributes:
-        heading: Its name with its unit.
-        values: Of all runs, (N,).
-        quantiles: Of `PROBABILITIES`.
-        worst: Numbers of runs with the largest values.
-        sensitivity: To varied parameters; a text if there is none.
-    """
-
-    heading: str
-    values: np.ndarray
-    quantiles: tuple[Estimate, ...]
-    worst: tuple[int, ...]
-    sensitivity: Sensitivity | str
-
-
-def report(
-    result: Answer, failure: Estimate, table: Mapping[str, np.ndarray], varied: Mapping[str, str],
-    figures: Iterable[FigureReport], repeat: str,
-) -> str:  # fmt: skip
-    """The page.
-
-    Args:
-        result: Whose title and blocks are shown.
-        failure: Probability of a failure.
-        table: Columns of all runs.
-        varied: Headings of varied parameters, by column.
-        figures: Parts on figures, in their order.
-        repeat: Python that repeats a run, without its number.
-    """
-    failed = table["outcome"] != FINISHED
-    parts = [*html_of(result.blocks()), "<h2>Failures</h2>", text(repr(failure))]
-    if failed.any():
-        some = np.flatnonzero(failed)[:WORST].tolist()
-        rows = [(i, str(table["outcome"][i]), str(table["reason"][i]), f"{repeat}({i})") for i in some]
-        parts.append(html_table(("first runs that failed", "outcome", "reason", "repeat it by"), rows))
-    if failed.any() and len(varied) > 1:
-        names = tuple(varied)
-        first, second = (names[k] for k in strongest(failed, np.column_stack([table[name] for name in names])))
-        shown = f"Share of runs that failed over {first} and {second}, the two that it depends on most"
-        parts.append(f"<p>{escape(shown)}; cells without runs are empty, each cross is a run that failed.</p>")
-        parts.append(_failure_map((varied[first], varied[second]), [table[first], table[second]], failed))
-    for figure in figures:
-        parts += _of_figure(figure, repeat)
-    return _HEAD.format(title=escape(result.title), body=page(result.title, *parts))
+def document(title: str, sections: Iterable[tuple[str, str, Iterable[Block]]]) -> str:
+    """The page of sections, each a heading, a drawing, and texts and tables."""
+    parts = (f"<h2>{escape(heading)}</h2>{drawing}{''.join(html_of(blocks))}" for heading, drawing, blocks in sections)
+    return _HEAD.format(title=escape(title), body=page(title, *parts))
 
 
 def strongest(failed: np.ndarray, x: np.ndarray) -> tuple[int, int]:
@@ -95,23 +44,8 @@ def strongest(failed: np.ndarray, x: np.ndarray) -> tuple[int, int]:
     return first, second
 
 
-def _of_figure(figure: FigureReport, repeat: str) -> Iterator[str]:
-    """Distribution, quantiles and worst runs of a figure."""
-    yield f"<h2>{escape(figure.heading)}</h2>"
-    first, finite = figure.quantiles[0], figure.values[np.isfinite(figure.values)]
-    rows = [(each.statistic, each.estimate, each.low, each.high) for each in figure.quantiles]
-    level = f"{100 * first.level:g} % interval from"
-    parts = [html_table(("", "estimate", level, "to"), rows), text(f"{first.n} runs, {first.failed} failed")]
-    worst = [(i, float(figure.values[i]), f"{repeat}({i})") for i in figure.worst]
-    yield side_by_side([*([_histogram(figure.heading, finite)] if len(finite) else []), f"<div>{''.join(parts)}</div>"])
-    yield html_table(("worst runs that finished", figure.heading, "repeat it by"), worst)
-    if isinstance(figure.sensitivity, str):
-        yield text(f"no sensitivity: {figure.sensitivity}")
-    else:
-        yield from html_of(figure.sensitivity.blocks())
-
-
-def _histogram(name: str, x: np.ndarray) -> str:
+def histogram(name: str, x: np.ndarray) -> str:
+    """The distribution of a figure, from its finite values."""
     figure, axes = _figure(4.6, 2.6)
     low, most, high = np.quantile(x, (0.0, 0.999, 1.0))
     high = most if high - most > most - low else high  # few values that are far off leave no room for the others
@@ -124,7 +58,7 @@ def _histogram(name: str, x: np.ndarray) -> str:
     return inline(figure)
 
 
-def _failure_map(names: tuple[str, ...], x: list[np.ndarray], failed: np.ndarray) -> str:
+def failure_map(names: tuple[str, ...], x: list[np.ndarray], failed: np.ndarray) -> str:
     """The share of runs that failed in cells over two parameters."""
     figure, axes = _figure(5.6, 3.8)
     edges = [_edges(each) for each in x]
@@ -146,14 +80,12 @@ def _failure_map(names: tuple[str, ...], x: list[np.ndarray], failed: np.ndarray
 def _edges(x: np.ndarray) -> np.ndarray:
     """Edges of cells: around each of a few values, else of one width."""
     values = np.unique(x)
-    if len(values) <= _CELLS:
-        between = (values[1:] + values[:-1]) / 2
-        return (
-            np.array([2 * values[0] - between[0], *between, 2 * values[-1] - between[-1]])
-            if len(between)
-            else (values[0] + np.array([-0.5, 0.5]))
-        )
-    return np.linspace(values[0], values[-1], _CELLS + 1)
+    if len(values) > _CELLS:
+        return np.linspace(values[0], values[-1], _CELLS + 1)
+    if len(values) == 1:
+        return values[0] + np.array([-0.5, 0.5])
+    between = (values[1:] + values[:-1]) / 2
+    return np.array([2 * values[0] - between[0], *between, 2 * values[-1] - between[-1]])
 
 
 def _figure(width: float, height: float) -> tuple[Any, Any]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from robot_dyn.foundations import (
     Answer,
     Block,
     SweepError,
+    Table,
     choice,
     integer,
     nearest,
@@ -27,20 +28,20 @@ from robot_dyn.foundations import (
     truth,
 )
 from robot_dyn.tools.sweeps import statistics
-from robot_dyn.tools.sweeps.estimate import Estimate
 from robot_dyn.tools.sweeps.export import export, inputs_of
 from robot_dyn.tools.sweeps.expression import Expression, Truth
-from robot_dyn.tools.sweeps.folder.folder import Folder, read_all
-from robot_dyn.tools.sweeps.folder.rows import FINISHED, FIXED, NUMBERS, OUTCOMES, digest_of
-from robot_dyn.tools.sweeps.plan.specification import specification
-from robot_dyn.tools.sweeps.plan.sweep import Sweep, heading, is_scene
-from robot_dyn.tools.sweeps.plan.work import Work
+from robot_dyn.tools.sweeps.folder import Folder
+from robot_dyn.tools.sweeps.imported import is_scene
+from robot_dyn.tools.sweeps.rows import FINISHED, FIXED, NUMBERS, OUTCOMES
 from robot_dyn.tools.sweeps.sensitivity import Sensitivity, by_values, saltelli
+from robot_dyn.tools.sweeps.specification import specification
+from robot_dyn.tools.sweeps.statistics import Estimate
+from robot_dyn.tools.sweeps.sweep import Sweep, heading
+from robot_dyn.tools.sweeps.work import Work
 
-if TYPE_CHECKING:
-    from robot_dyn.tools.sweeps.report import FigureReport
-
-_SHOWN = 5  # reasons, and worst runs
+_SHOWN = 5  # reasons
+_WORST = 10  # runs in a report
+_PROBABILITIES = (0.05, 0.5, 0.95, 0.99)
 _GIVEN = "finished", "known"
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
@@ -123,7 +124,7 @@ class SweepResult(Answer):
         self._check_complete()
         truth, failed = self._happened(event), self._failed
         known = truth.certain == truth.possible
-        keep = self._asked(known, given)
+        keep = _some(self._asked(known, given), given)
         if (unknown := ~known & keep).any():
             remedy = f"write 'failed | {event}', or ask with given='finished'"
             if (unknown & ~failed).any():
@@ -137,7 +138,7 @@ class SweepResult(Answer):
 
     def mean(self, figure: str, level: float = 0.95, given: str | None = None) -> Estimate:
         """Mean of a figure with its interval; `given` as in `quantiles`, needed where runs have no value."""
-        x, keep, failed = self._finite(figure, "mean", given)
+        x, keep, failed = self._values(figure, given, "mean")
         found = statistics.mean(x[keep], level, self._scrambling(keep), failed=failed)
         return self._named(found, figure, given)
 
@@ -147,7 +148,7 @@ class SweepResult(Answer):
         First-order and total Sobol' indices of design "saltelli", else rank correlations and PAWN indices.
         """
         level = statistics.check_level(level)
-        x, keep, failed = self._finite(figure, "sensitivity", given)
+        x, keep, failed = self._values(figure, given, "sensitivity")
         if self.sweep.points.name == "saltelli":
             scrambling = self.sweep.points.scrambling
             found = saltelli(x, keep, self.sweep.dimensions, scrambling, level, failed=failed)
@@ -201,30 +202,61 @@ class SweepResult(Answer):
 
         `path` and `force` as in `export`; SweepError if it cannot be written.
         """
-        from robot_dyn.tools.sweeps.report import KIND, report
+        from robot_dyn.tools.sweeps.report import KIND, document
 
         inputs = inputs_of(self.folder, path)
         path = target(path, KIND, SweepError, inputs, truth("force", force, error=SweepError))
-        varied = {name: heading(self.sweep, name) for name in self.sweep.columns}
-        source = "" if is_scene(self.sweep.source) else f", scene={self.sweep.source!r}"
-        repeat = f"sw.read({str(self.path)!r}{source}).run"
-        figures = map(self._reported, self.sweep.figures)
-        data = report(self, self.probability("failed"), self.table(), varied, figures, repeat).encode()
+        sections = self._failures(), *map(self._of_figure, self.sweep.figures)
+        data = document(self.title, (("Runs", "", self.blocks()), *sections)).encode()
         return save(path, lambda stream: stream.write(data), SweepError)
 
-    def _reported(self, name: str) -> FigureReport:
-        """Return the part of the report on a figure."""
-        from robot_dyn.tools.sweeps.report import PROBABILITIES, WORST, FigureReport
+    @property
+    def _repeat(self) -> str:
+        """Python that repeats a run, without its number."""
+        source = "" if is_scene(self.sweep.scene) else f", scene={self.sweep.scene!r}"
+        return f"sw.read({str(self.path)!r}{source}).run"
 
-        x = self._figure(name)
+    def _failures(self) -> tuple[str, str, list[Block]]:
+        """The section of the report on runs that failed."""
+        from robot_dyn.tools.sweeps.report import failure_map, strongest
+
+        varied, failed, table = self.sweep.columns, self._failed, self.table()
+        blocks, drawing = [*self.probability("failed").blocks()], ""
+        if failed.any():
+            some = np.flatnonzero(failed)[:_WORST].tolist()
+            rows = ((i, str(table["outcome"][i]), str(table["reason"][i]), f"{self._repeat}({i})") for i in some)
+            blocks.append(Table(("first runs that failed", "outcome", "reason", "repeat it by"), tuple(rows)))
+        if failed.any() and len(varied) > 1:
+            first, second = (varied[k] for k in strongest(failed, np.column_stack([table[name] for name in varied])))
+            headings = heading(self.sweep, first), heading(self.sweep, second)
+            drawing = failure_map(headings, [table[first], table[second]], failed)
+            blocks.insert(0, "cells without runs are empty, each cross is a run that failed")
+            blocks.insert(0, f"share of runs that failed over {first} and {second}, the two that it depends on most:")
+        return "Failures", drawing, blocks
+
+    def _of_figure(self, name: str) -> tuple[str, str, list[Block]]:
+        """The section of the report on a figure: distribution, quantiles, worst runs, sensitivity."""
+        from robot_dyn.tools.sweeps.report import histogram
+
+        label, x = heading(self.sweep, name), self._figure(name)
         given = "known" if (np.isnan(x) & ~self._failed).any() else None
+        quantiles = self.quantiles(name, _PROBABILITIES, given=given)
+        rows = tuple((of.statistic, of.estimate, of.low, of.high) for of in quantiles)
+        first, finite = quantiles[0], x[np.isfinite(x)]
+        worst = self.worst(name, min(_WORST, len(x)), given="known")
+        blocks: list[Block] = [
+            Table(("", "estimate", f"{100 * first.level:g} % interval from", "to"), rows, digits=4),
+            f"{first.n} runs, {first.failed} failed",
+            Table(
+                ("worst runs that finished", label, "repeat it by"),
+                tuple((i, float(x[i]), f"{self._repeat}({i})") for i in worst),
+            ),
+        ]
         try:
-            sensitivity = self.sensitivity(name, given="known")
+            blocks += self.sensitivity(name, given="known").blocks()
         except SweepError as error:  # of a figure that is the same in all runs
-            sensitivity = str(error)
-        quantiles = self.quantiles(name, PROBABILITIES, given=given)
-        worst = self.worst(name, min(WORST, len(x)), given="known")
-        return FigureReport(heading(self.sweep, name), x, quantiles, worst, sensitivity)
+            blocks.append(f"no sensitivity: {error}")
+        return label, histogram(label, finite) if len(finite) else "", blocks
 
     def run(self, i: int) -> Trajectory:
         """Repeat run i alone, with all that rollouts record: the same bits.
@@ -246,7 +278,7 @@ class SweepResult(Answer):
         """
         self._check_complete()
         self.folder.check_samples()
-        return digest_of(read_all(self.folder))
+        return self.folder.digest_of_rows()
 
     @property
     def processors(self) -> dict[str, int]:
@@ -266,7 +298,7 @@ class SweepResult(Answer):
     @reported
     def specification(self) -> dict[str, Any]:
         """As the folder states it."""
-        return specification(self.sweep, self.folder.chunk).model_dump()
+        return specification(self.sweep, self.folder.chunk).model_dump(mode="json")
 
     @reported
     def units(self) -> dict[str, str]:
@@ -324,9 +356,10 @@ class SweepResult(Answer):
             )
 
     def _figure(self, name: str) -> np.ndarray:
+        """A figure or a number that varies, of all runs, (N,); nan where a run has no value."""
         self._check_complete()
-        known = (*self.sweep.figures, *self.sweep.columns, *NUMBERS)
-        return self.folder.columns((choice("figure", name, known, error=SweepError),))[name]
+        names = (*self.sweep.figures, *self.sweep.columns, *NUMBERS)
+        return self.folder.columns((choice("figure", name, names, error=SweepError),))[name]
 
     @property
     def _failed(self) -> np.ndarray:
@@ -340,10 +373,9 @@ class SweepResult(Answer):
         for name in expression.names:
             if name not in numbers | outcomes:
                 raise SweepError(f"no column {name!r}; {nearest(name, sorted(numbers | outcomes))}")
-        columns = self.folder.columns(name for name in expression.names if name in numbers)
-        if outcomes & set(expression.names):
-            outcome = self.folder.columns(("outcome",))["outcome"]
-            columns |= {name: outcome == name for name in OUTCOMES} | {"failed": outcome != FINISHED}
+        columns = self.folder.columns((*numbers.intersection(expression.names), "outcome"))
+        outcome = columns.pop("outcome")
+        columns |= {name: outcome == name for name in OUTCOMES} | {"failed": outcome != FINISHED}
         return expression.of(columns)
 
     def _asked(self, known: np.ndarray, given: str | None) -> np.ndarray:
@@ -352,36 +384,37 @@ class SweepResult(Answer):
             return np.ones(len(known), bool)
         return known if choice("given", given, _GIVEN, error=SweepError) == "known" else ~self._failed
 
-    def _values(self, name: str, given: str | None) -> tuple[np.ndarray, np.ndarray, int]:
+    def _values(self, name: str, given: str | None, finite: str = "") -> tuple[np.ndarray, np.ndarray, int]:
         """A figure of all runs, which of them are asked about, and how many of these failed.
 
+        Args:
+            name: Of the figure.
+            given: As in `quantiles`.
+            finite: A statistic that needs finite values; or empty.
+
         Raises:
-            SweepError: If one that finished is asked about, and has no value.
+            SweepError: If a run that is asked about finished and has no value; or if its value must be finite and is
+                not.
         """
         x, failed = self._figure(name), self._failed
         unknown = np.isnan(x)
-        keep = self._asked(~unknown, given)
+        keep = _some(self._asked(~unknown, given), given)
         if (none := keep & unknown & ~failed).any():
             raise SweepError(
                 f"{name!r} has no value in {int(none.sum())} runs that finished, such as run {int(none.argmax())}: ask"
                 " with given='known', which leaves them out"
             )
-        return x, keep, int((failed & (keep if given is None else ~keep)).sum())
-
-    def _finite(self, name: str, what: str, given: str | None) -> tuple[np.ndarray, np.ndarray, int]:
-        """As `_values`; SweepError if a run that is asked about failed, or its value is not finite."""
-        x, keep, failed = self._values(name, given)
-        if lost := int((keep & np.isnan(x)).sum()):
+        if finite and (lost := int((keep & unknown).sum())):
             raise SweepError(
-                f"{lost} of {len(x)} runs failed: a {what} of those that finished is given='finished', of those with a"
-                " value given='known'"
+                f"{lost} of {len(x)} runs failed: a {finite} of those that finished is given='finished', of those with"
+                " a value given='known'"
             )
-        if (infinite := keep & np.isinf(x)).any():
+        if finite and (infinite := keep & np.isinf(x)).any():
             raise SweepError(
                 f"{name!r} is infinite in {int(infinite.sum())} runs, such as run {int(infinite.argmax())}: it has no"
-                f" {what}; quantiles and probabilities count it"
+                f" {finite}; quantiles and probabilities count it"
             )
-        return x, keep, failed
+        return x, keep, int((failed & (keep if given is None else ~keep)).sum())
 
     def _named(self, found: Estimate, figure: str, given: str | None) -> Estimate:
         """With the figure it is of, its unit, and which runs were asked about."""
@@ -391,6 +424,13 @@ class SweepResult(Answer):
         """The scrambling of each run that is asked about; None of independent ones."""
         design = self.sweep.points
         return None if design.independent else design.scrambling[keep]
+
+
+def _some(keep: np.ndarray, given: str | None) -> np.ndarray:
+    """The runs that are asked about; SweepError if there are none."""
+    if not keep.any():
+        raise SweepError(f"no run is left with given={given!r}; leave it out, or see the reasons of failure")
+    return keep
 
 
 def _among(given: str | None) -> str:

@@ -1,26 +1,44 @@
-"""`run`: fill the folder of a sweep, by threads, a cluster or a job of an array; begun before, it is resumed."""
+"""`run` fills the folder of a sweep by threads, a cluster or a job of an array, or resumes it; `read` opens it.
+
+A folder begins with a pilot of 64 runs, from which the size of chunks follows: about 2 s of work, then fixed for ever.
+Its time is that of the processor: a busy machine would give small chunks.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from time import perf_counter
+from shutil import disk_usage
+from time import perf_counter, process_time
 from typing import Any
 
+import numpy as np
+
 from robot_dyn.codegen import thread_count
-from robot_dyn.foundations import SweepError, check_folder, file_path, shown
+from robot_dyn.foundations import SweepError, check_folder, file_path, function, instance, integer, needs
+from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.tools.sweeps.chunks import fill_by_threads, share_of
-from robot_dyn.tools.sweeps.folder.folder import Folder
+from robot_dyn.tools.sweeps.folder import Folder, begin, folder_of, opened, read_design, write_design
 from robot_dyn.tools.sweeps.imported import check_places, named
-from robot_dyn.tools.sweeps.opening import begun, opened
-from robot_dyn.tools.sweeps.plan.specification import names_of
-from robot_dyn.tools.sweeps.plan.sweep import Sweep
-from robot_dyn.tools.sweeps.plan.work import Work
 from robot_dyn.tools.sweeps.result import SweepResult
+from robot_dyn.tools.sweeps.rows import FINISHED, RAISED
+from robot_dyn.tools.sweeps.specification import (
+    FILE,
+    names_of,
+    specification,
+    stated_in,
+)
+from robot_dyn.tools.sweeps.sweep import Sweep
+from robot_dyn.tools.sweeps.work import Work
 
 Progress = Callable[[int, int], object]
 _SCAN_S = 1.0  # between looks into the folder
+_RUNS = 64
+_CHUNK_S = 2.0
+_MOST = 16_384
+_SAMPLE_BYTES = 2**26
+_LEAST_CHUNKS = 32  # so that threads and machines share even a short sweep
 
 
 def run(
@@ -50,14 +68,10 @@ def run(
     Raises:
         SweepError: If an argument is not allowed, the folder holds another sweep, or a file cannot be written.
     """
-    if not isinstance(sweep, Sweep):
-        raise SweepError(f"run takes a Sweep, got {shown(sweep)}; sw.read(folder).sweep is that of a folder")
+    instance("run takes a Sweep", sweep, Sweep, "sw.read(folder).sweep is that of a folder", error=SweepError)
+    function("on_progress", on_progress, "the runs that are done and of all", error=SweepError)
     path, (job, jobs), work = file_path(folder, SweepError), share_of(share), Work(sweep)
     count = thread_count(threads)
-    if on_progress is not None and not callable(on_progress):
-        raise SweepError(
-            f"on_progress must be a function of the runs that are done and of all, got {shown(on_progress)}"
-        )
     if cluster is not None and (share is not None or threads is not None):
         raise SweepError("cluster: its scheduler shares out the chunks; leave out share and threads")
     check_places(path)
@@ -65,7 +79,13 @@ def run(
     _ = sweep.setup, work.record  # refused if a folder names functions that its reader has not named
     known = begun(sweep, path, chunk)
     known.prepare()
-    tell, t = _Progress(known, on_progress), None if known.samples is None else known.samples.times()
+    t, last = None if known.samples is None else known.samples.times(), 0.0
+
+    def tell() -> None:
+        nonlocal last
+        if on_progress is not None and perf_counter() - last > _SCAN_S:
+            last = perf_counter()
+            on_progress(min(int(known.present().sum()) * known.chunk, known.runs), known.runs)
 
     def missing() -> list[int]:
         chunks = known.missing()
@@ -83,7 +103,8 @@ def run(
 
             with client_of(cluster) as client:
                 fill_by_cluster(client, known, names_of(sweep), missing, tell)
-    tell(True)
+    last = -_SCAN_S
+    tell()
     return SweepResult(sweep, known)
 
 
@@ -105,19 +126,71 @@ def read(
         SweepError: If it holds none; if its scene is missing, or it or a named function has changed since; if Python
             imports from the folder.
     """
-    path = file_path(folder, SweepError)
-    known, work = opened(path, named(scene, figures))
-    return SweepResult(work.sweep, known)
+    known, sweep = opened(file_path(folder, SweepError), named(scene, figures))
+    return SweepResult(sweep, known)
 
 
-class _Progress:
-    """Tells how many runs are done, as the folder has them, some once a second."""
+def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
+    """The folder of a sweep, begun now unless it was; arguments and errors as in `run`."""
+    if chunk is not None:
+        chunk = integer("chunk", chunk, least=1, most=2**31, error=SweepError)
+    needs("pyarrow", extra="sweeps")
+    stated, t = specification(sweep, chunk or 1), None
+    if not (path / FILE).is_file():
+        _check_room(sweep, path)
+        stated = stated.model_copy(update={"chunk": pilot(sweep, chunk)})
+        t = None if sweep.samples is None else _times(sweep)  # before the folder holds a sweep that is refused
+        begin(path, stated, sweep.points.rows)
+    stored = stated_in(path)  # of another driver, if it was first
+    stored.check_same(stated.model_copy(update={"chunk": chunk or stored.chunk}), path)
+    try:
+        read_design(path, stored.rows_sha256)
+    except SweepError:
+        write_design(path, sweep.points.rows, stored.rows_sha256)
+    folder = folder_of(path, sweep, stored)
+    if folder.samples is not None and not folder.present().any():
+        folder.samples.create(_times(sweep) if t is None else t, sweep.setup.plant.dynamics.joint_names)
+    return folder
 
-    def __init__(self, folder: Folder, on_progress: Progress | None) -> None:
-        self._folder, self._on_progress, self._last = folder, on_progress, 0.0
 
-    def __call__(self, now: bool = False) -> None:
-        if self._on_progress is not None and (now or perf_counter() - self._last > _SCAN_S):
-            self._last = perf_counter()
-            done = int(self._folder.present().sum()) * self._folder.chunk
-            self._on_progress(min(done, self._folder.runs), self._folder.runs)
+def _times(sweep: Sweep) -> np.ndarray:
+    """Times of the samples, (m,), in [s]; errors where samples cannot be kept."""
+    needs("zarr", extra="sweeps")
+    return Work(sweep).times()
+
+
+def _check_room(sweep: Sweep, path: Path) -> None:
+    """Raise SweepError if the disk has not as much room as the sweep will take."""
+    there = next(folder for folder in (path.absolute(), *path.absolute().parents) if folder.exists())
+    free = disk_usage(there).free
+    if sweep.bytes_expected > free:
+        sizes = f"{sweep.bytes_expected / 2**30:.3g} GiB, and {there} has {free / 2**30:.3g} GiB"
+        raise SweepError(f"{path}: the sweep will take {sizes}; give another folder, fewer runs or fewer samples")
+
+
+def pilot(sweep: Sweep, chunk: int | None = None) -> int:
+    """The number of runs of a chunk, from the time of the pilot's runs unless it is given.
+
+    It is in whole tiles, and its samples take at most 64 MiB.
+
+    Raises:
+        SweepError: If none of them finishes and some raise, themselves or figures of them; says why.
+    """
+    work, count = Work(sweep), min(_RUNS, sweep.runs)
+    rows = work.rows(0, count)  # with what is compiled first
+    raised = rows["outcome"] == RAISED
+    if raised.any() and not (rows["outcome"] == FINISHED).any():
+        raise SweepError(
+            f"none of the {count} runs of the pilot finishes, and {raised.sum()} raise; the first:"
+            f" {rows['reason'][raised][0]}"
+        )
+    if chunk is not None:
+        return chunk
+    began = process_time()
+    work.rows(0, count)
+    runs = _CHUNK_S * count / max(process_time() - began, 1e-9)
+    most = min(_MOST, max(LANES, -(-sweep.runs // _LEAST_CHUNKS)))
+    if sweep.samples is not None:
+        size = 8 * len(work.times()) * sweep.setup.plant.dynamics.n * len(sweep.samples.names)
+        most = min(most, _SAMPLE_BYTES // size)
+    return LANES * max(1, round(min(runs, most) / LANES))

@@ -10,15 +10,15 @@ Design "saltelli" gives S and T, by SALib; any other gives ρ and PAWN of the va
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import Answer, Block, SweepError, Table, needs, numbers
-from robot_dyn.tools.sweeps.estimate import Estimate, text
-from robot_dyn.tools.sweeps.statistics import check_figure, check_level
+from robot_dyn.foundations import Answer, Block, SweepError, Table, needs
+from robot_dyn.tools.sweeps.statistics import Estimate, check_level, student_quantile, text
 
 _RUNS_OF_A_BIN, _MOST_BINS = 64, 32
 _LEAST_SCRAMBLINGS = 3
@@ -79,7 +79,13 @@ class Sensitivity(Answer):
 
 
 def saltelli(
-    y: Any, known: np.ndarray, names: Sequence[str], scrambling: Any, level: float = 0.95, *, failed: int = 0
+    y: np.ndarray,
+    known: np.ndarray,
+    names: tuple[str, ...],
+    scrambling: np.ndarray,
+    level: float = 0.95,
+    *,
+    failed: int = 0,
 ) -> Sensitivity:
     """First-order and total Sobol' indices from the runs of design "saltelli", in its order, by SALib.
 
@@ -95,14 +101,12 @@ def saltelli(
         failed: How many runs failed.
 
     Raises:
-        SweepError: If an argument has another form, or too few scramblings are left.
+        SweepError: If the level is not between 0 and 1, too few scramblings are left, or the figure does not vary.
     """
     analyze = needs("SALib.analyze.sobol", extra="sweeps").analyze
-    level, names, block = check_level(level), tuple(names), len(names) + 2
-    if len(y) % block or not names:
-        raise SweepError(f"of {len(names)} parameters a saltelli design has a multiple of {block} runs, got {len(y)}")
+    level, block = check_level(level), len(names) + 2
     whole = known.reshape(-1, block).all(axis=1)
-    rows, of = np.asarray(y, float).reshape(-1, block)[whole], np.asarray(scrambling).reshape(-1, block)[whole, 0]
+    rows, of = y.reshape(-1, block)[whole], scrambling.reshape(-1, block)[whole, 0]
     left = np.unique(of)
     if len(left) < _LEAST_SCRAMBLINGS:
         raise SweepError(f"sensitivities need runs of {_LEAST_SCRAMBLINGS} scramblings or more, got {len(left)}")
@@ -114,19 +118,11 @@ def saltelli(
         return np.array([found["S1"], found["ST"]])
 
     theta, without = indices(rows), np.array([indices(rows[of != r]) for r in left])
-    half = _student_quantile(level, len(left) - 1) * np.sqrt((len(left) - 1) * without.var(axis=0))
+    half = student_quantile(level, len(left) - 1) * np.sqrt((len(left) - 1) * without.var(axis=0))
     left_out = int((~whole).sum())
+    stated = partial(Estimate, level=level, n=len(y), failed=failed, method="SALib")
     made = [
-        Estimate(
-            f"{kind} index of {name}",
-            float(x),
-            float(x - h),
-            float(x + h),
-            level=level,
-            n=len(y),
-            failed=failed,
-            method="SALib",
-        )
+        stated(f"{kind} index of {name}", float(x), float(x - h), float(x + h))
         for kind, row, halves in zip(("first-order", "total"), theta, half, strict=True)
         for name, x, h in zip(names, row, halves, strict=True)
     ]
@@ -137,7 +133,7 @@ def saltelli(
     return Sensitivity(names, first, total, n=len(y), failed=failed, method=method, left_out=left_out)
 
 
-def by_values(y: Any, x: Any, names: Sequence[str], *, failed: int = 0) -> Sensitivity:
+def by_values(y: np.ndarray, x: np.ndarray, names: tuple[str, ...], *, failed: int = 0) -> Sensitivity:
     """Spearman's rank correlation and PAWN indices of the values that vary, of the runs of any design.
 
     Args:
@@ -147,17 +143,13 @@ def by_values(y: Any, x: Any, names: Sequence[str], *, failed: int = 0) -> Sensi
         failed: How many runs failed.
 
     Raises:
-        SweepError: If an argument has another form, or the figure does not vary.
+        SweepError: If the figure does not vary.
 
     Source: Pianosi, Wagener, A simple and efficient method for global sensitivity analysis based on cumulative
     distribution functions, Environ. Model. Softw. 67, 2015.
     """
     from scipy.stats import spearmanr
 
-    y, names = check_figure(y), tuple(names)
-    x = numbers("x", x, ("N", "d"), error=SweepError)
-    if x.shape != (len(y), len(names)) or not names:
-        raise SweepError(f"x must have shape ({len(y)}, {len(names)}), a row a run and a column a name, got {x.shape}")
     _check_varies(y)
     rank: Any = spearmanr
     correlation = tuple(float(rank(column, y)[0]) if np.ptp(column) > 0 else 0.0 for column in x.T)
@@ -186,12 +178,6 @@ def _pawn(y: np.ndarray, bins: np.ndarray) -> float:
 
     distance: Any = ks_2samp
     return float(np.median([distance(y[bins == k], y, method="asymp")[0] for k in range(bins.max() + 1)]))
-
-
-def _student_quantile(level: float, freedom: int) -> float:
-    from scipy.special import stdtrit
-
-    return float(stdtrit(freedom, (1 + level) / 2))
 
 
 def _check_varies(y: np.ndarray) -> None:

@@ -9,14 +9,15 @@ How often these intervals hold the true value: docs/data/sweep_coverage.csv, by 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from math import ceil, floor, inf, isinf, isnan, log, log1p, nan, sqrt
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import SweepError, float64, number, numbers
-from robot_dyn.tools.sweeps.estimate import Estimate
+from robot_dyn.foundations import Answer, Block, SweepError, number, numbers
 
 NOT_RANDOM = "points that are not random"
 FEW = 5
@@ -25,7 +26,60 @@ _COCHRAN = 100  # with his 25, 10 % of the intervals of a log-normal figure of 5
 _COUNTABLE = 1e15  # runs; a larger number is rounded, or infinite
 
 
-def probability(events: Any, level: float = 0.95, scrambling: Any = None, *, failed: int = 0) -> Estimate:
+@final
+@dataclass(frozen=True, repr=False)
+class Estimate(Answer):
+    """A statistic of the runs of a sweep.
+
+    Attributes:
+        statistic: Its name, such as "mean".
+        estimate: Its value; infinite if it lies among runs that failed.
+        low: Lower end of the interval; −∞ if the runs are too few to give one, nan if there is no interval.
+        high: Upper end, accordingly.
+        level: Probability with which such intervals hold the true value.
+        n: Runs.
+        failed: Runs without a finite value, or that were counted as failed.
+        method: How the interval was computed.
+        note: What limits the result; empty if nothing does.
+    """
+
+    statistic: str
+    estimate: float
+    low: float
+    high: float
+    level: float
+    n: int
+    failed: int
+    method: str
+    note: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """The statistic and its interval in a line."""
+        if isnan(self.low):
+            return f"{self.statistic}: {text(self.estimate)}, without an interval"
+        interval = f"{100 * self.level:g} % interval {text(self.low)} … {text(self.high)}"
+        if self.statistic.startswith("probability") and self.estimate == 0:
+            return f"{self.statistic}: below {text(self.high)} ({interval}; no events)"
+        if self.statistic.startswith("probability") and self.estimate == 1:
+            return f"{self.statistic}: above {text(self.low)} ({interval}; events in all runs)"
+        return f"{self.statistic}: {text(self.estimate)} ({interval})"
+
+    def blocks(self) -> Iterator[Block]:
+        yield self.sentence
+        yield f"{self.n} runs, {self.failed} failed; {self.method}"
+        if self.note:
+            yield f"note: {self.note}"
+
+
+def text(x: float) -> str:
+    """A number in four digits, or ±∞."""
+    return ("−∞" if x < 0 else "+∞") if isinf(x) else f"{x:.4g}"
+
+
+def probability(
+    events: np.ndarray, level: float = 0.95, scrambling: np.ndarray | None = None, *, failed: int = 0
+) -> Estimate:
     """Probability of an event.
 
     Args:
@@ -35,13 +89,11 @@ def probability(events: Any, level: float = 0.95, scrambling: Any = None, *, fai
         failed: How many runs failed, for the result to say.
 
     Raises:
-        SweepError: If an argument has another form.
+        SweepError: If the level is not between 0 and 1.
 
     Source: Clopper, Pearson, The use of confidence or fiducial limits, Biometrika 26, 1934.
     """
-    events, level = np.asarray(events), check_level(level)
-    if events.dtype != bool or events.ndim != 1 or not len(events):
-        raise SweepError(f"events must be truth values, one a run, got {events.dtype} of shape {events.shape}")
+    level = check_level(level)
     n, k = len(events), int(events.sum())
     few = min(k, n - k)
     note = ""
@@ -56,13 +108,17 @@ def probability(events: Any, level: float = 0.95, scrambling: Any = None, *, fai
     if few < FEW and not isnan(low):
         which = "event" if few == k else "run without the event"
         note = f"{few} {which}{'s' * (few != 1)}, fewer than {FEW}: the interval is conservative"
-    return Estimate(
-        "probability", k / n, float(low), float(high), level=level, n=n, failed=failed, method=method, note=note
-    )
+    stated = partial(Estimate, level=level, n=n, failed=failed)
+    return stated("probability", k / n, float(low), float(high), method=method, note=note)
 
 
 def quantiles(
-    x: Any, probabilities: Sequence[float] | float, level: float = 0.95, scrambling: Any = None, *, failed: int = 0
+    x: np.ndarray,
+    probabilities: Sequence[float] | float,
+    level: float = 0.95,
+    scrambling: np.ndarray | None = None,
+    *,
+    failed: int = 0,
 ) -> tuple[Estimate, ...]:
     """Quantiles of a figure, one for each probability.
 
@@ -77,16 +133,16 @@ def quantiles(
         failed: How many runs failed.
 
     Raises:
-        SweepError: If an argument has another form.
+        SweepError: If a probability or the level is not between 0 and 1.
 
     Source: Woodruff, Confidence intervals for medians and other position measures, J. Am. Stat. Assoc. 47, 1952.
     """
-    x, level = check_figure(x), check_level(level)
+    level = check_level(level)
     asked = numbers("probabilities", probabilities, (), ("k",), error=SweepError, above=0.0).reshape(-1)
     if (asked >= 1).any():
         raise SweepError(f"probabilities must be below 1, got {asked.max():g}")
-    ordered = np.sort(x)
-    made = []
+    ordered, made = np.sort(x), []
+    stated = partial(Estimate, level=level, n=len(x), failed=failed)
     for p in map(float, asked):
         estimate = _at_rank(ordered, max(ceil(len(x) * p - 1e-9), 1))  # N p may be rounded up
         if scrambling is None:
@@ -99,23 +155,11 @@ def quantiles(
             half, method = _half_width_of_share(x <= estimate, scrambling, level)
             low, high = (_at_rank(ordered, len(x) * q + 0.5) for q in (p - half, p + half))
         note = _note_of_quantile(p, level, len(x), estimate, low, high)
-        made.append(
-            Estimate(
-                f"quantile {p:g}",
-                estimate,
-                float(low),
-                float(high),
-                level=level,
-                n=len(x),
-                failed=failed,
-                method=method,
-                note=note,
-            )
-        )
+        made.append(stated(f"quantile {p:g}", estimate, float(low), float(high), method=method, note=note))
     return tuple(made)
 
 
-def mean(x: Any, level: float = 0.95, scrambling: Any = None, *, failed: int = 0) -> Estimate:
+def mean(x: np.ndarray, level: float = 0.95, scrambling: np.ndarray | None = None, *, failed: int = 0) -> Estimate:
     """Mean of a figure; without an interval where N < 100 g² with the skewness g, since it would hold too seldom.
 
     Args:
@@ -125,22 +169,21 @@ def mean(x: Any, level: float = 0.95, scrambling: Any = None, *, failed: int = 0
         failed: How many runs failed, and are not in x.
 
     Raises:
-        SweepError: If an argument has another form, or there are fewer than two runs.
+        SweepError: If the level is not between 0 and 1, or there are fewer than two runs.
 
     Source: Cochran, Sampling techniques, 1977, sec. 2.15.
     """
     from scipy.stats import skew
 
-    x, level = check_figure(x), check_level(level)
-    if len(x) < 2 or not np.isfinite(x).all():
-        raise SweepError(f"a mean needs two runs with a finite value, got {int(np.isfinite(x).sum())} of {len(x)}")
+    level = check_level(level)
+    if len(x) < 2:
+        raise SweepError(f"a mean needs two runs with a finite value, got {len(x)}")
     estimate, note = float(x.mean()), ""
+    stated = partial(Estimate, level=level, n=len(x), failed=failed)
     if len(two := np.unique(x)) <= 2:  # then it follows from the share of the larger one
         share = probability(x == two[-1], level, scrambling)
         low, high = (float(two[0] + (two[-1] - two[0]) * end) for end in (share.low, share.high))
-        return Estimate(
-            "mean", estimate, low, high, level=level, n=len(x), failed=failed, method=share.method, note=share.note
-        )
+        return stated("mean", estimate, low, high, method=share.method, note=share.note)
     if scrambling is None:
         half, method = _student(x, level), "Student's t"
     else:
@@ -149,49 +192,39 @@ def mean(x: Any, level: float = 0.95, scrambling: Any = None, *, failed: int = 0
     skewness = float(skew(x))
     if len(x) < _COCHRAN * skewness**2 and not isnan(half):
         half, note = nan, f"no interval: skewness {skewness:.2g} is too large for {len(x)} runs (Cochran's rule)"
-    return Estimate(
-        "mean",
-        estimate,
-        estimate - half,
-        estimate + half,
-        level=level,
-        n=len(x),
-        failed=failed,
-        method=method,
-        note=note,
-    )
+    return stated("mean", estimate, estimate - half, estimate + half, method=method, note=note)
+
+
+def student_quantile(level: float, freedom: int) -> float:
+    """The half-width of an interval of a level, in standard errors, by Student's t."""
+    from scipy.special import stdtrit  # late: only statistics need it
+
+    return float(stdtrit(freedom, (1 + level) / 2))
 
 
 def _student(x: np.ndarray, level: float) -> float:
     """Half the width t s / √n of Student's interval of the mean of n independent numbers."""
-    from scipy.special import stdtrit  # late: only statistics need it
-
-    return float(stdtrit(len(x) - 1, (1 + level) / 2)) * float(np.std(x, ddof=1)) / sqrt(len(x))
+    return student_quantile(level, len(x) - 1) * float(np.std(x, ddof=1)) / sqrt(len(x))
 
 
-def _by_scrambling(x: np.ndarray, scrambling: Any) -> np.ndarray:
+def _by_scrambling(x: np.ndarray, scrambling: np.ndarray) -> np.ndarray:
     """The mean of each scrambling that has a run, shape (R,)."""
-    of = np.asarray(scrambling)
-    if of.shape != x.shape or of.dtype.kind not in "iu":
-        raise SweepError(f"scrambling must be {len(x)} whole numbers, one a run, got {of.dtype} of shape {of.shape}")
-    size = np.bincount(of)
-    return np.bincount(of, x)[size > 0] / size[size > 0]
+    size = np.bincount(scrambling)
+    return np.bincount(scrambling, x)[size > 0] / size[size > 0]
 
 
-def _half_width_of_share(events: np.ndarray, scrambling: Any, level: float) -> tuple[float, str]:
+def _half_width_of_share(events: np.ndarray, scrambling: np.ndarray, level: float) -> tuple[float, str]:
     """Half the width of Student's interval over shares of scramblings, where the sum of squares of counts is 2 larger.
 
     Counts are whole numbers: 16 equal ones do not show that their variance is 0. With 2 more, the half-width of 16
     equal counts is 0.195 of one event a scrambling, near to 0.206, the Clopper–Pearson bound of 0 in 16.
     """
-    from scipy.special import stdtrit
-
     shares = _by_scrambling(events, scrambling)
     R = len(shares)
     if R < 2:
         return nan, NOT_RANDOM
     squares = float(np.sum((shares - shares.mean()) ** 2)) + 2 * (R / len(events)) ** 2
-    return float(stdtrit(R - 1, (1 + level) / 2)) * sqrt(squares / (R - 1) / R), _over(shares)
+    return student_quantile(level, R - 1) * sqrt(squares / (R - 1) / R), _over(shares)
 
 
 def _over(statistics: np.ndarray) -> str:
@@ -219,19 +252,6 @@ def _note_of_quantile(p: float, level: float, n: int, estimate: float, low: floa
     needed = log((1 - level) / 2) / log1p(-min(p, 1 - p))
     count = f"{ceil(needed)}" if needed < _COUNTABLE else f"{_COUNTABLE:g}"
     return f"{n} runs, or those that finished, do not bound the quantile; independent ones need {count} at least"
-
-
-def check_figure(x: Any) -> np.ndarray:
-    """A figure of each run as float64; SweepError if it has another form."""
-    try:
-        x = float64(x)
-    except ValueError as found:
-        raise SweepError(f"a figure must be real numbers, one a run, got {found}") from None
-    if x.ndim != 1 or not len(x):
-        raise SweepError(f"a figure must have shape (N,), one number a run, got {x.shape}")
-    if (unknown := np.isnan(x)).any():
-        raise SweepError(f"a figure must have a number for each run, got nan for run {int(unknown.argmax())}")
-    return x
 
 
 def check_level(level: Any) -> float:

@@ -44,12 +44,8 @@ def outcome_of(code: str, folder: Path, gib: int = 8, wait_s: float = 60.0, firs
     """
     lines = "".join(f"    {line}\n" for line in code.splitlines())
     text = _START.format(root=str(_ROOT), bytes=gib << 30, folder=str(folder), code=lines, first=first)
-    pipes = {
-        "stdout": subprocess.PIPE,
-        "stderr": subprocess.PIPE,
-        "bufsize": 0,
-    }  # the first line takes no other with it
-    with subprocess.Popen([sys.executable, "-c", text], **pipes) as child:
+    command = [sys.executable, "-c", text]  # without buffers, the first line takes no other with it
+    with subprocess.Popen(command, bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
         assert child.stdout is not None
         ready = child.stdout.readline()
         try:

@@ -9,7 +9,7 @@ import pytest
 
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import Work
-from robot_dyn.tools.sweeps.folder.rows import digest_of
+from robot_dyn.tools.sweeps.rows import digest_of
 
 pytest.importorskip("pyarrow")
 

@@ -18,13 +18,15 @@ from robot_dyn.tools import sweeps as sw
 from tests.campaigns.fuzz.campaign import limited
 from tests.long import long
 from tests.tools.sweeps.children import outcome_of
-from tests.tools.sweeps.swept import swept
+from tests.tools.sweeps.swept import digest, swept
 
 for _module in ("zarr", "xarray"):
     pytest.importorskip(_module)
 pa = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
 Damage = Callable[[Path], object]
+ROWS, SHARD = "rows/000001.parquet", "samples/q/c/1/0/0"
+AGAIN = "; run the sweep again"
 
 
 @pytest.fixture(scope="module")
@@ -39,133 +41,158 @@ def copy(whole: sw.SweepResult, tmp_path: Path) -> Path:
     return Path(shutil.copytree(whole.path, tmp_path / "out"))
 
 
+def gone(name: str) -> Damage:
+    """A file, or folder, or the only one that matches a pattern, is missing."""
+
+    def remove(folder: Path) -> Path:
+        path = next(folder.glob(name))
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+        return path
+
+    return remove
+
+
+def replaced(name: str, make: Callable[[Path], object]) -> Damage:
+    return lambda folder: make(gone(name)(folder))  # pyright: ignore[reportArgumentType]
+
+
 def text(name: str, written: str | bytes) -> Damage:
-    return lambda folder: (folder / name).write_bytes(written if isinstance(written, bytes) else written.encode())
+    return replaced(name, lambda path: path.write_bytes(written if isinstance(written, bytes) else written.encode()))
+
+
+def a_folder(name: str) -> Damage:
+    return replaced(name, Path.mkdir)
+
+
+def zeros(name: str) -> Damage:
+    return replaced(name, lambda path: path.symlink_to("/dev/zero"))
+
+
+def bytes_of(name: str, change: Callable[[bytes], bytes]) -> Damage:
+    def damage(folder: Path) -> None:
+        path = next(folder.glob(name))
+        path.write_bytes(change(path.read_bytes()))
+
+    return damage
 
 
 def key(name: str, value: Any) -> Damage:
     """Another value of a key of sweep.json; None removes it."""
 
-    def change(folder: Path) -> None:
-        data = json.loads((folder / "sweep.json").read_text()) | {name: value}
-        kept = {key: each for key, each in data.items() if each is not None or key != name}
-        (folder / "sweep.json").write_text(json.dumps(kept))
+    def change(data: bytes) -> bytes:
+        stated = json.loads(data) | {name: value}
+        return json.dumps({key: x for key, x in stated.items() if x is not None or key != name}).encode()
 
-    return change
-
-
-def removed(folder: Path, name: str) -> Path:
-    path = folder / name
-    shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
-    return path
-
-
-def pipe(name: str) -> Damage:
-    return lambda folder: os.mkfifo(removed(folder, name))
-
-
-def zeros(name: str) -> Damage:
-    return lambda folder: removed(folder, name).symlink_to("/dev/zero")
-
-
-def a_folder(name: str) -> Damage:
-    return lambda folder: removed(folder, name).mkdir()
-
-
-def gone(name: str) -> Damage:
-    return lambda folder: removed(folder, name)
-
-
-def design_of_zeros(folder: Path) -> None:
-    (design,) = folder.glob("design-*.npy")
-    zeros(design.name)(folder)
-
-
-def rows_of(change: Callable[[Any], Any]) -> Damage:
-    """Another table of a chunk, with the footer that `change` leaves it."""
-
-    def write(folder: Path) -> None:
-        parquet.write_table(change(parquet.read_table(folder / ROWS)), folder / ROWS)
-
-    return write
+    return bytes_of("sweep.json", change)
 
 
 def cell(name: str, value: Any) -> Damage:
     """Another value of the first row of a column."""
 
-    def change(table: Any) -> Any:
+    def write(folder: Path) -> None:
+        table = parquet.read_table(folder / ROWS)
         at, values = table.column_names.index(name), [value, *table[name].to_pylist()[1:]]
-        return table.set_column(at, table.schema.field(name), pa.array(values, table.schema.field(name).type))
+        field = table.schema.field(name)
+        parquet.write_table(table.set_column(at, field, pa.array(values, field.type)), folder / ROWS)
 
-    return rows_of(change)
+    return write
 
 
 def footer(**changes: Any) -> Damage:
     """Another footer of a chunk; None removes a key."""
 
-    def change(table: Any) -> Any:
-        found = json.loads(table.schema.metadata[b"footer"]) | changes
-        found = {name: each for name, each in found.items() if each is not None}
-        return table.replace_schema_metadata({b"footer": json.dumps(found)})
+    def write(folder: Path) -> None:
+        table = parquet.read_table(folder / ROWS)
+        stated = json.loads(table.schema.metadata[b"footer"]) | changes
+        stated = {name: x for name, x in stated.items() if x is not None}
+        parquet.write_table(table.replace_schema_metadata({b"footer": json.dumps(stated)}), folder / ROWS)
 
-    return rows_of(change)
-
-
-ROWS, SHARD = "rows/000001.parquet", "samples/q/c/1/0/0"
+    return write
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        pytest.param(text("sweep.json", ""), id="empty"),
-        pytest.param(text("sweep.json", b"\xff\x00" * 100), id="binary"),
-        pytest.param(text("sweep.json", "NaN"), id="NaN"),
-        pytest.param(text("sweep.json", "[]"), id="a list"),
-        pytest.param(text("sweep.json", "[" * 100_000), id="brackets"),
-        pytest.param(a_folder("sweep.json"), id="a folder"),
-        pytest.param(key("runs", "60"), id="runs of text"),
-        pytest.param(key("runs", 10**30), id="too many runs"),
-        pytest.param(key("vary", None), id="without vary"),
-        pytest.param(key("order", 3), id="order of a number"),
-        pytest.param(key("chunk", None), id="without chunk"),
-        pytest.param(key("chunk", 0), id="chunk 0"),
-        pytest.param(key("chunk", -1), id="chunk -1"),
-        pytest.param(key("chunk", 1.5), id="chunk 1.5"),
-        pytest.param(key("chunk", "20"), id="chunk of text"),
-        pytest.param(text(ROWS, ""), id="empty rows"),
-        pytest.param(text(ROWS, b"PAR1" * 100), id="rows of nothing"),
-        pytest.param(a_folder(ROWS), id="rows of a folder"),
-        pytest.param(lambda folder: text("rows", "")(removed(folder, "rows").parent), id="rows a file"),
-    ],
-)
-def test_a_damaged_specification_or_chunk_is_refused(copy: Path, damage: Damage) -> None:
-    damage(copy)
+def flipped(data: bytes, at: int) -> bytes:
+    return data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
+
+
+SPECIFICATION: dict[str, Damage] = {
+    "empty": text("sweep.json", ""),
+    "binary": text("sweep.json", b"\xff\x00" * 100),
+    "NaN": text("sweep.json", "NaN"),
+    "a list": text("sweep.json", "[]"),
+    "brackets": text("sweep.json", "[" * 100_000),
+    "a folder": a_folder("sweep.json"),
+    "runs of text": key("runs", "60"),
+    "too many runs": key("runs", 10**30),
+    "without vary": key("vary", None),
+    "order of a number": key("order", 3),
+    **{f"chunk {value!r}": key("chunk", value) for value in (None, 0, -1, 1.5, "20")},
+}
+CHUNK: dict[str, Damage] = {
+    "empty rows": text(ROWS, ""),
+    "half of the rows": bytes_of(ROWS, lambda data: data[: len(data) // 2]),
+    "rows of nothing": text(ROWS, b"PAR1" * 100),
+    "rows of a folder": a_folder(ROWS),
+    "rows a file": text("rows", ""),
+    "another chunk": lambda folder: shutil.copy(folder / "rows/000002.parquet", folder / ROWS),
+    "another sweep": footer(sweep="0" * 64),
+}
+BY_HAND: dict[str, Damage] = {
+    "no digest of rows": footer(rows=None),
+    "digest of a number": footer(rows=3),
+    "no digests of samples": footer(samples=None),
+    "a list of digests": footer(samples=[]),
+    "no reason": cell("reason", None),
+    "no outcome": cell("outcome", None),
+    "another outcome": cell("outcome", "finishedX"),
+    "no figure": cell("error", None),
+    "another run": cell("run", 7),
+}
+SAMPLES: dict[str, Damage] = {
+    "no samples": gone("samples"),
+    "no shard": gone(SHARD),
+    "no array": gone("samples/q/zarr.json"),
+    "group": text("samples/zarr.json", "{"),
+    "times": text("samples/t/zarr.json", "{"),
+    "array": text("samples/q/zarr.json", "{}"),
+    "empty shard": text(SHARD, ""),
+    "one bit of a shard": bytes_of(SHARD, lambda data: flipped(data, 1000)),
+}
+DESIGN: dict[str, Damage] = {
+    "gone": gone("design-*"),
+    "short": bytes_of("design-*", lambda data: data[:-8]),
+    "changed": bytes_of("design-*", lambda data: flipped(data, len(data) - 3)),
+    "empty design": text("design-*", ""),
+    "another kind": text("design-*", b"PK\x03\x04"),
+}
+
+
+@pytest.mark.parametrize("name", [*SPECIFICATION, *CHUNK])
+def test_a_damaged_specification_or_chunk_is_refused(copy: Path, name: str) -> None:
+    (SPECIFICATION | CHUNK)[name](copy)
     with pytest.raises(RobotDynError):
         sw.read(copy).table()
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        pytest.param(footer(rows=None), id="no digest of rows"),
-        pytest.param(footer(rows=3), id="digest of a number"),
-        pytest.param(footer(samples=None), id="no digests of samples"),
-        pytest.param(footer(samples=[]), id="a list of digests"),
-        pytest.param(cell("reason", None), id="no reason"),
-        pytest.param(cell("outcome", None), id="no outcome"),
-        pytest.param(cell("outcome", "finishedX"), id="another outcome"),
-        pytest.param(cell("error", None), id="no figure"),
-        pytest.param(cell("run", 7), id="another run"),
-    ],
-)
+@pytest.mark.parametrize("name", BY_HAND)
 @pytest.mark.parametrize("question", [sw.SweepResult.verify, sw.SweepResult.table])
-def test_a_chunk_written_by_hand_is_refused_by_its_file(
-    copy: Path, damage: Damage, question: Callable[[sw.SweepResult], object]
-) -> None:
+def test_a_chunk_written_by_hand_is_refused_by_its_file(copy: Path, name: str, question: Callable[..., object]) -> None:
     question(sw.read(copy))
-    damage(copy)
-    with pytest.raises(SweepError, match=r"000001\.parquet: .*; run the sweep again"):
+    BY_HAND[name](copy)
+    with pytest.raises(SweepError, match=rf"000001\.parquet: .*{AGAIN}"):
         question(sw.read(copy))
+
+
+@pytest.mark.parametrize("name", ["half of the rows", "another chunk", "another sweep"])
+def test_a_damaged_chunk_is_made_again_once_it_is_removed(copy: Path, whole: sw.SweepResult, name: str) -> None:
+    CHUNK[name](copy)
+    done = sw.read(copy)
+    for question in (done.verify, lambda: done.quantiles("end")):
+        with pytest.raises(SweepError, match=r"000001\.parquet"):
+            question()
+    (copy / ROWS).unlink()
+    with pytest.raises(SweepError, match="1 of 3 chunks are left to do, the first is 1"):
+        done.table()
+    assert sw.run(whole.sweep, copy).verify() == digest(whole.sweep)
 
 
 @pytest.mark.parametrize("found", [4, 6])
@@ -175,110 +202,56 @@ def test_a_folder_of_another_format_is_refused_with_both(copy: Path, found: int)
         sw.read(copy)
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        pytest.param(text("sweep.json", ""), id="empty"),
-        pytest.param(text("sweep.json", b"\xff\x00" * 100), id="binary"),
-        pytest.param(text("sweep.json", "[]"), id="a list"),
-        pytest.param(a_folder("sweep.json"), id="a folder"),
-        pytest.param(key("runs", "60"), id="runs of text"),
-        pytest.param(key("chunk", 0), id="chunk 0"),
-        pytest.param(text("samples/t/zarr.json", "{"), id="times of samples"),
-        pytest.param(gone("samples"), id="no samples"),
-    ],
-)
-def test_a_damaged_folder_is_not_resumed(copy: Path, whole: sw.SweepResult, damage: Damage) -> None:
-    damage(copy)
+RESUMED = ("empty", "binary", "a list", "a folder", "runs of text", "chunk 0", "times", "no samples")
+
+
+@pytest.mark.parametrize("name", RESUMED)
+def test_a_damaged_folder_is_not_resumed(copy: Path, whole: sw.SweepResult, name: str) -> None:
+    (SPECIFICATION | SAMPLES)[name](copy)
     with pytest.raises(RobotDynError):
         sw.run(whole.sweep, copy)
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        pytest.param(gone("samples"), id="no samples"),
-        pytest.param(gone(SHARD), id="no shard"),
-        pytest.param(gone("samples/q/zarr.json"), id="no array"),
-        pytest.param(text("samples/zarr.json", "{"), id="group"),
-        pytest.param(text("samples/t/zarr.json", "{"), id="times"),
-        pytest.param(text("samples/q/zarr.json", "{}"), id="array"),
-        pytest.param(text(SHARD, ""), id="empty shard"),
-    ],
-)
-def test_damaged_samples_are_refused(copy: Path, damage: Damage) -> None:
-    damage(copy)
+@pytest.mark.parametrize("name", SAMPLES)
+def test_damaged_samples_are_refused(copy: Path, name: str) -> None:
+    SAMPLES[name](copy)
     with pytest.raises(RobotDynError):
         sw.read(copy).samples().q.values  # noqa: B018
 
 
-@pytest.mark.skipif(os.name != "posix", reason="pipes have paths on POSIX alone")
-def test_a_pipe_is_refused_at_once(copy: Path) -> None:
-    pipe("samples/q/zarr.json")(copy)
-    with pytest.raises(RobotDynError), limited(6):
-        sw.read(copy).samples()
-    pipe("sweep.json")(copy)
-    with pytest.raises(RobotDynError), limited(6):
-        sw.read(copy)
-
-
-@pytest.mark.skipif(os.name != "posix", reason="devices have paths on POSIX alone")
-@pytest.mark.parametrize(
-    ("damage", "question"),
-    [
-        pytest.param(zeros(SHARD), "samples().q.values", id="shard, zeros"),
-        *long(
-            [
-                pytest.param(design_of_zeros, "table()", id="design, zeros"),
-                pytest.param(zeros(ROWS), "table()", id="rows, zeros"),
-                pytest.param(zeros("samples/t/zarr.json"), "samples().q.values", id="times, zeros"),
-            ]
-        ),
-    ],
-)
-def test_what_is_not_a_regular_file_is_refused_at_once(
-    copy: Path, whole: sw.SweepResult, damage: Damage, question: str
-) -> None:
-    """The same question is put to the whole folder first, so that the time is that of reading alone."""
-    damage(copy)
-    first = f"sw.read({str(whole.path)!r}).{question}"
-    assert outcome_of(f"sw.read(folder).{question}", copy, wait_s=6.0, first=first) == "refused"
-
-
-# --- the design
-
-
-def short(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[:-8])
-
-
-def changed(path: Path) -> None:
-    data = path.read_bytes()
-    path.write_bytes(flipped(data, len(data) - 3))
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [Path.unlink, short, changed, lambda path: path.write_bytes(b""), lambda path: path.write_bytes(b"PK\x03\x04")],
-    ids=["gone", "short", "changed", "empty", "another kind"],
-)
-def test_a_damaged_design_is_refused_until_the_sweep_is_run_again(
-    copy: Path, whole: sw.SweepResult, damage: Callable[[Path], object]
-) -> None:
+@pytest.mark.parametrize("name", DESIGN)
+def test_a_damaged_design_is_refused_until_the_sweep_is_run_again(copy: Path, whole: sw.SweepResult, name: str) -> None:
     (design,) = copy.glob("design-*.npy")
     rows = design.read_bytes()
-    damage(design)
+    DESIGN[name](copy)
     with pytest.raises(SweepError, match="run the sweep into this folder again"):
         sw.read(copy)
     sw.run(whole.sweep, copy)
     assert design.read_bytes() == rows and sw.read(copy).verify() == whole.verify()
 
 
-# --- bits
+@pytest.mark.skipif(os.name != "posix", reason="pipes have paths on POSIX alone")
+def test_a_pipe_is_refused_at_once(copy: Path) -> None:
+    for name, question in (("samples/q/zarr.json", lambda done: done.samples()), ("sweep.json", None)):
+        replaced(name, os.mkfifo)(copy)
+        with pytest.raises(RobotDynError), limited(6):
+            done = sw.read(copy)
+            question and question(done)
 
 
-def flipped(data: bytes, at: int) -> bytes:
-    return data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
+@pytest.mark.skipif(os.name != "posix", reason="devices have paths on POSIX alone")
+@pytest.mark.parametrize(
+    ("name", "question"),
+    [
+        (SHARD, "samples().q.values"),
+        *long([("design-*", "table()"), (ROWS, "table()"), ("samples/t/zarr.json", "samples().q.values")]),
+    ],
+)
+def test_zeros_without_end_are_refused_at_once(copy: Path, whole: sw.SweepResult, name: str, question: str) -> None:
+    """The same question is put to the whole folder first, so that the time is that of reading alone."""
+    zeros(name)(copy)
+    first = f"sw.read({str(whole.path)!r}).{question}"
+    assert outcome_of(f"sw.read(folder).{question}", copy, wait_s=6.0, first=first) == "refused"
 
 
 def test_one_flipped_bit_of_a_chunk_is_refused_or_changes_nothing(copy: Path) -> None:
@@ -293,13 +266,6 @@ def test_one_flipped_bit_of_a_chunk_is_refused_or_changes_nothing(copy: Path) ->
             continue
         others += [at for name, x in table.items() if not np.array_equal(x, read[name], equal_nan=x.dtype.kind == "f")]
     assert not others
-
-
-def test_one_flipped_bit_of_samples_is_refused(copy: Path) -> None:
-    shard = copy / SHARD
-    shard.write_bytes(flipped(shard.read_bytes(), 1000))
-    with pytest.raises(RobotDynError):
-        sw.read(copy).samples().q.values  # noqa: B018
 
 
 # --- memory, versions

@@ -128,8 +128,6 @@ def test_counts_that_a_design_cannot_take_are_refused_with_the_nearest_two(
         ({"runs": 0}, "runs must be a whole number"),
         ({"runs": 10**7 + 1}, "runs must be a whole number"),
         ({"runs": 3.5}, "runs must be a whole number"),
-        ({"dimensions": 0}, "dimensions must be a whole number, 1 or more"),
-        ({"seed": -1}, "seed must be a whole number"),
         ({"name": [[0.5, 0.5]]}, "the table of the design has 1 rows of 2 numbers, the sweep 64 runs of 2"),
         ({"name": [[0.5, 1.0]]}, r"numbers in \[0, 1\), got 1 in row 0, column 1"),
         ({"name": [[0.5, np.nan]]}, "the table of a design must be finite"),

@@ -10,7 +10,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import Work
-from robot_dyn.tools.sweeps.folder.rows import digest_of
+from robot_dyn.tools.sweeps.rows import digest_of
 from tests.long import long
 from tests.tools.sweeps.swept import SCENE, digest, scene, swept
 
@@ -47,21 +47,8 @@ def test_noise_is_numbered_by_the_run_not_by_its_place(tmp_path: Path) -> None:
     assert Work(sweep).rows(7, 8)["error"][0] == rows["error"][7]
 
 
-def test_a_run_by_itself_has_the_bits_of_its_row(tmp_path: Path) -> None:
-    sweep = swept(tmp_path, 120)
-    done = sw.run(sweep, tmp_path / "out", chunk=50)
-    table = done.table()
-    for i in (0, 49, 50, 119):
-        if table["outcome"][i] == "finished":
-            run = done.run(i)
-            assert isinstance(run, rd.Trajectory)
-            assert run.q[-1, 1] == table["end"][i]
-            assert np.abs(run.extremes[1]).max() == table["peak"][i]
-            assert run.tracking_error == pytest.approx(table["error"][i], rel=1e-12)  # another order of the sum
-            assert run.q[0].tolist() == [table["q0[0]"][i], table["q0[1]"][i]]
-
-
 SCENES = {
+    "plain": SCENE,
     "noise": NOISY,
     "stops": SCENE.replace("[control]", STOPS),
     "steps that are chosen": SCENE.replace('method = "rk4"\nstep_s = 0.001\n', ""),
@@ -71,15 +58,18 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", ["stops", "steps that are chosen", *long(["noise", "samples between steps"])])
-def test_what_else_is_recorded_changes_no_bits(tmp_path: Path, name: str) -> None:
-    """`run(i)` records torques, energies and works too, and goes by itself."""
+@pytest.mark.parametrize("name", ["plain", "stops", "steps that are chosen", *long(["noise", "samples between steps"])])
+def test_a_run_by_itself_has_the_bits_of_its_row(tmp_path: Path, name: str) -> None:
+    """It goes alone, and records torques, energies and works too."""
     sweep = swept(scene(tmp_path, SCENES[name]).parent, 12, vary={"q0": sw.normal(mean=[0.4, 0.9], sd=0.6)})
     rows = Work(sweep).rows(0, 12)
     for i in (0, 11):
         run = Work(sweep).run(i)
+        assert isinstance(run, rd.Trajectory) and run.q is not None
         assert run.q[-1, 1] == rows["end"][i]
         assert np.abs(run.extremes[1]).max() == rows["peak"][i]
+        assert run.q[0].tolist() == [rows["q0[0]"][i], rows["q0[1]"][i]]
+        assert run.tracking_error == pytest.approx(rows["error"][i], rel=1e-12)  # another order of the sum
 
 
 def test_figures_are_those_of_simulate(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def test_a_stored_distribution_has_equal_bits(name: str) -> None:
 def test_a_choice_takes_each_value_as_often() -> None:
     values = ds.choice([50, 100, 70]).values(np.arange(300)[:, None] / 300)
     np.testing.assert_array_equal(values, np.repeat([50.0, 100.0, 70.0], 100))
-    rows = ds.choice([Q, 2 * Q]).values([[0.1], [0.9]])
+    rows = ds.choice([Q, 2 * Q]).values(np.array([[0.1], [0.9]]))
     np.testing.assert_array_equal(rows, [Q, 2 * Q])
 
 
@@ -72,7 +72,7 @@ def test_a_choice_takes_each_value_as_often() -> None:
 def test_the_ends_of_the_unit_interval_give_finite_values(name: str) -> None:
     """Sobol' points may be 0, where an inverse is −∞; they are taken for 2⁻⁵⁴."""
     made, scipy = MADE[name]
-    ends = made.values([[0.0] * made.size, [np.nextafter(1.0, 0.0)] * made.size])
+    ends = made.values(np.array([[0.0] * made.size, [np.nextafter(1.0, 0.0)] * made.size]))
     assert np.isfinite(ends).all()
     low, high = scipy.support()
     assert (ends >= low).all() and (ends <= high).all()
@@ -103,12 +103,9 @@ WRONG: dict[str, Callable[[], Any]] = {
     "scipy.stats.gamma has no finite values .*gamma.-2": lambda: ds.distribution(stats.gamma(-2.0)),
     "lengths differ in scipy.stats.gamma": lambda: ds.distribution(stats.gamma([1.0, 2.0], scale=Q)),
     "no distribution 'unifrm'; nearest: uniform": lambda: ds.from_dict({"distribution": "unifrm"}),
-    "uniform takes low, high, got low$": lambda: ds.from_dict({"distribution": "uniform", "low": 1}),
+    "missing a required .*argument: .high": lambda: ds.from_dict({"distribution": "uniform", "low": 1}),
     "has no distribution 'os' of one": lambda: ds.from_dict({"distribution": "scipy.stats.os"}),
     "does not take scipy.stats.gamma.foo=1": lambda: ds.from_dict({"distribution": "scipy.stats.gamma", "foo": 1}),
-    "a stored distribution is a table": lambda: ds.from_dict([1, 2]),  # pyright: ignore[reportArgumentType]
-    "u of normal must have shape \\(k, 3\\)": lambda: ds.normal(mean=Q, sd=1.0).values([[0.5]]),
-    "u of uniform must be below 1": lambda: ds.uniform(low=0, high=1).values([[1.0]]),
 }
 
 

@@ -21,7 +21,7 @@ from robot_dyn.tools.sweeps import begun, chunks, cluster
 from robot_dyn.tools.sweeps.chunks import fill_by_threads
 from robot_dyn.tools.sweeps.cluster import client_of, fill_by_cluster
 from robot_dyn.tools.sweeps.imported import NOTHING
-from robot_dyn.tools.sweeps.plan.work import Stopped
+from robot_dyn.tools.sweeps.work import Stopped
 from tests.tools.sweeps.children import outcome_of
 from tests.tools.sweeps.swept import digest, names_in, swept
 
@@ -102,34 +102,30 @@ def test_an_error_of_a_task_is_raised(filled: Any, monkeypatch: pytest.MonkeyPat
         fill(Client(), folder)
 
 
-def with_another(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> None:
-    """Give workers a ticket of the driver with other entries."""
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"versions": (("scipy", "0.1"),)}, r"worker tcp://127.0.0.1:1: scipy is .* on .*, 0\.1 at the driver"),
+        ({"digest": "of another one"}, "worker tcp://127.0.0.1:1: .* is not the folder of the driver"),
+        ({"folder": "/proc"}, "worker tcp://127.0.0.1:1: /proc .* is not the folder of the driver"),
+    ],
+)
+def test_workers_that_disagree_are_refused_by_name(filled: Any, monkeypatch, changes: Any, said: str) -> None:
+    folder, _ = filled
     ticket_of = cluster.ticket_of
     monkeypatch.setattr(cluster, "ticket_of", lambda *given: replace(ticket_of(*given), **changes))
-
-
-def test_workers_with_other_versions_are_refused_by_name(filled: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder, _ = filled
-    with_another(monkeypatch, versions=(("scipy", "0.1"),))
-    with pytest.raises(SweepError, match=r"worker tcp://127.0.0.1:1: scipy is .* on .*, 0\.1 at the driver"):
+    with pytest.raises(SweepError, match=said):
         fill(Client(), folder)
     assert len(folder.missing()) == 10
 
 
-def test_workers_that_see_another_folder_are_refused(filled: Any, tmp_path: Path, monkeypatch) -> None:
-    folder, _ = filled
-    other = tmp_path / "same path on another disk"
-    other.mkdir()
-    with monkeypatch.context() as patch, pytest.raises(SweepError, match="is not the folder of the driver"):
-        with_another(patch, folder=str(other))
-        fill(Client(), folder)
-
+def test_workers_that_write_to_another_folder_are_refused(filled: Any) -> None:
     class Elsewhere(Client):  # reads the folder, as of a cache, and writes to another one
         def run(self, function: Any, ticket: Any, on_error: str) -> dict[str, Any]:
-            return {"tcp://10.0.0.1:1": f"{ticket.token}.host.1"}
+            return {"tcp://10.0.0.1:1": ".written elsewhere.unfinished"}
 
     with pytest.raises(SweepError, match=r"worker tcp://10.0.0.1:1 writes to another folder"):
-        fill(Elsewhere(), folder)
+        fill(Elsewhere(), filled[0])
 
 
 def test_few_tasks_wait_at_a_scheduler(filled: Any) -> None:
@@ -250,25 +246,6 @@ def test_workers_in_processes_make_the_same_bits_and_one_that_is_killed_is_repla
 
         done = sw.run(sweep, tmp_path / "out", chunk=5, cluster=client, on_progress=progress)
     assert killed and done.verify() == digest(sweep)
-
-
-DYING = """
-import os, signal
-import distributed
-from tests.tools.sweeps.test_engines import Client
-class Dying(Client, distributed.Client):
-    def submit(self, *_, **__):
-        os.kill(os.getpid(), signal.SIGKILL)
-sw.run(swept(folder, 40), folder / 'out', chunk=10, cluster=Dying())
-"""
-
-
-def test_what_a_killed_driver_left_is_removed_by_the_next_one(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    assert outcome_of(DYING, tmp_path, gib=64) == "killed"
-    done = sw.run(swept(tmp_path, 40), tmp_path / "out")
-    assert not len(done.missing)
-    assert names_in(tmp_path / "out") == ["design", "rows", "sweep.json"]
 
 
 WITHOUT_SEMAPHORES = """

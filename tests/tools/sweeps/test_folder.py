@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import os
-import subprocess
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -16,41 +13,17 @@ import pytest
 
 from robot_dyn.foundations import SweepError
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps import Work, begun, opening
-from robot_dyn.tools.sweeps.folder import files
-from robot_dyn.tools.sweeps.folder.files import remove_abandoned, write
-from robot_dyn.tools.sweeps.folder.folder import MOST_FILES, Folder
-from robot_dyn.tools.sweeps.folder.rows import NUMBERS, TEXTS
+from robot_dyn.tools.sweeps import Work, begun, run_sweep
+from robot_dyn.tools.sweeps.folder import MOST_FILES, Folder, begin
+from robot_dyn.tools.sweeps.rows import NUMBERS, TEXTS
+from robot_dyn.tools.sweeps.specification import specification
 from tests.tools.sweeps.swept import digest, names_in, swept
 
-CALLS = ("open", "write", "fsync", "close", "replace")
 
-
-def failing(monkeypatch: pytest.MonkeyPatch, call: str, error: BaseException) -> None:
-    """Let one call to the system of a write fail; the write itself after half of its bytes."""
-
-    class Failing:
-        def __getattr__(self, name: str):
-            def fail(*arguments):
-                if name == "write":
-                    os.write(arguments[0], arguments[1][: len(arguments[1]) // 2])
-                raise error
-
-            return fail if name == call else getattr(os, name)
-
-    monkeypatch.setattr(files, "os", Failing())
-
-
-@pytest.mark.parametrize("call", CALLS)
-@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
-def test_a_write_that_fails_leaves_no_file(tmp_path: Path, monkeypatch, call: str, error: BaseException) -> None:
-    write(tmp_path / "there", b"old")
-    failing(monkeypatch, call, error)
-    for name in ("there", "new"):
-        with pytest.raises(type(error)):
-            write(tmp_path / name, b"x" * 1000)
-    assert [path.name for path in tmp_path.iterdir()] == ["there"]
-    assert (tmp_path / "there").read_bytes() == b"old"
+@pytest.fixture
+def begun_100(tmp_path: Path) -> Path:
+    """The folder of a sweep of 100 runs in chunks of 50, none of which is made."""
+    return begun(swept(tmp_path, 100), tmp_path / "out", chunk=50).path
 
 
 def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypatch) -> None:
@@ -59,60 +32,36 @@ def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypa
     folder.prepare()
     work = Work(sweep)
     folder.write(0, work.rows(0, 20))
-    said = r"chunk 3 \(runs 60 to 79\) cannot be written .* \(No space left on device\)"
-    with monkeypatch.context() as patch, pytest.raises(SweepError, match=said):
-        failing(patch, "write", OSError(28, "No space left on device"))
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch, pytest.raises(SweepError, match=r"000003\.parquet.*No space left on device"):
+        patch.setattr(os, "fsync", full)
         folder.write(3, work.rows(60, 80))
     assert folder.missing().tolist() == [1, 2, 3, 4]
     done = sw.run(sweep, tmp_path / "out")
     assert done.verify() == digest(sweep)
 
 
-def test_what_dead_writers_left_is_removed_and_what_others_write_is_not(tmp_path: Path) -> None:
-    dead = subprocess.Popen([sys.executable, "-c", ""])
-    dead.wait()
-    host = files._HOST
-    names = {
-        f".000001.parquet.{host}.{dead.pid}.0123abcd.unfinished": False,
-        f".000002.parquet.{host}.{os.getpid()}.0123abcd.unfinished": True,
-        f".000003.parquet.elsewhere.{dead.pid}.0123abcd.unfinished": True,
-        f".000004.parquet.elsewhere.{dead.pid}.89abcdef.unfinished": False,  # a day old
-        "note.unfinished": True,  # not ours
+def test_what_killed_writers_left_is_removed_and_what_others_write_is_not(tmp_path: Path) -> None:
+    """When its file is written again, or by any run a day later."""
+    sweep = swept(tmp_path, 40)
+    folder = begun(sweep, tmp_path / "out", chunk=20)
+    folder.prepare()
+    ages = {
+        f".000001.parquet.{'0' * 16}.unfinished": 60.0,
+        f".000001.parquet.{'1' * 16}.unfinished": 0.0,  # another writer has just begun it
+        f".000009.parquet.{'2' * 16}.unfinished": 60.0,
+        f".000009.parquet.{'3' * 16}.unfinished": 90_000.0,
     }
-    for name in names:
-        (tmp_path / name).write_bytes(b"half")
-    old = time.time() - 90_000
-    os.utime(tmp_path / f".000004.parquet.elsewhere.{dead.pid}.89abcdef.unfinished", (old, old))
-    assert remove_abandoned([tmp_path]) == 2
-    assert {path.name for path in tmp_path.iterdir()} == {name for name, stays in names.items() if stays}
-
-
-@pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "other sweep", "other chunk"])
-def test_a_damaged_chunk_is_refused_by_name(tmp_path: Path, damage: str) -> None:
-    sweep = swept(tmp_path, 60)
-    done = sw.run(sweep, tmp_path / "out", chunk=20)
-    file = done.folder.file(1)
-    data = file.read_bytes()
-    if damage == "other sweep":
-        other = sw.run(swept(tmp_path, 60, seed=4), tmp_path / "other", chunk=20)
-        data = other.folder.file(1).read_bytes()
-    elif damage == "other chunk":
-        data = done.folder.file(2).read_bytes()
-    elif damage == "flipped":
-        at = len(data) // 4  # a page of numbers
-        data = data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
-    else:
-        data = data[: len(data) // 2] if damage == "cut" else b""
-    file.write_bytes(data)
-    with pytest.raises(SweepError, match=r"000001\.parquet"):
-        done.verify()
-    if damage != "flipped":  # of a column that this question does not read
-        with pytest.raises(SweepError, match=r"000001\.parquet"):
-            done.quantiles("end")
-    file.unlink()
-    with pytest.raises(SweepError, match="1 of 3 chunks are left to do, the first is 1"):
-        done.table()
-    assert sw.run(sweep, tmp_path / "out").verify() == digest(sweep)
+    for name, age in ages.items():
+        path = folder.file(0).with_name(name)
+        path.write_bytes(b"half")
+        os.utime(path, (time.time() - age, time.time() - age))
+    assert not len(sw.run(sweep, folder.path).missing)
+    names = sorted(path.name for path in folder.file(0).parent.iterdir() if path.name in ages)
+    assert names == sorted(ages)[1:3]
 
 
 @pytest.mark.parametrize(
@@ -125,41 +74,35 @@ def test_a_damaged_chunk_is_refused_by_name(tmp_path: Path, damage: str) -> None
         ({"design": "latin", "runs": 96}, "runs is 100"),
     ],
 )
-def test_another_sweep_in_the_folder_is_refused_with_the_first_difference(tmp_path: Path, change, named) -> None:
-    sw.run(swept(tmp_path, 100), tmp_path / "out", chunk=50)
+def test_another_sweep_in_the_folder_is_refused_with_the_first_difference(begun_100: Path, change, named) -> None:
     with pytest.raises(SweepError, match=f"holds another sweep: {named}"):
-        sw.run(swept(tmp_path, **{"runs": 100} | change), tmp_path / "out")
+        begun(swept(begun_100.parent, **{"runs": 100} | change), begun_100)
 
 
-def test_a_scene_that_changed_is_refused_by_the_name_of_what_changed(tmp_path: Path) -> None:
-    sweep = swept(tmp_path, 50)
-    sw.run(sweep, tmp_path / "out", chunk=50)
-    path = tmp_path / "scene.toml"
-    path.write_text(path.read_text().replace("kp = 40.0", "kp = 41.0"))
-    with pytest.raises(SweepError, match=r"setup.settings.control.kp is 40.* there, 41.* here"):
-        sw.read(tmp_path / "out")
+@pytest.mark.parametrize(
+    ("file", "old", "new", "named"),
+    [
+        ("scene.toml", "kp = 40.0", "kp = 41.0", r"setup.settings.control.kp is 40.* there, 41.* here"),
+        ("out/sweep.json", f'"numpy": "{np.__version__}"', '"numpy": "1.0"', r"versions.numpy is 1.0 there"),
+        ("out/sweep.json", '"chunk": 50', '"chunk": 25', "chunk is 25 there, 50 here"),
+    ],
+)
+def test_another_scene_version_or_chunk_is_refused_by_name(begun_100: Path, file, old, new, named) -> None:
+    path = begun_100.parent / file
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(SweepError, match=named):
+        begun(swept(begun_100.parent, 100), begun_100, chunk=50)
+    if file == "scene.toml":
+        with pytest.raises(SweepError, match=named):
+            sw.read(begun_100)
 
 
-def test_other_versions_are_refused_by_name(tmp_path: Path) -> None:
-    sweep = swept(tmp_path, 50)
-    sw.run(sweep, tmp_path / "out", chunk=50)
-    path = tmp_path / "out" / "sweep.json"
-    data = json.loads(path.read_text())
-    data["versions"]["numpy"] = "1.0"
-    path.write_text(json.dumps(data))
-    with pytest.raises(SweepError, match=r"versions.numpy is 1.0 there"):
-        sw.run(sweep, tmp_path / "out")
-
-
-def test_other_chunks_and_other_files_are_refused(tmp_path: Path) -> None:
-    sweep = swept(tmp_path, 50)
-    sw.run(sweep, tmp_path / "out", chunk=50)
-    with pytest.raises(SweepError, match="chunk is 50 there, 20 here"):
-        sw.run(sweep, tmp_path / "out", chunk=20)
+def test_a_folder_of_other_files_is_refused(tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.tex").write_text("")
     with pytest.raises(SweepError, match=r"holds other files, such as thesis\.tex"):
-        sw.run(sweep, tmp_path / "full")
+        sw.run(swept(tmp_path, 50), tmp_path / "full")
 
 
 def test_chunks_beyond_20_000_go_to_subfolders(tmp_path: Path) -> None:
@@ -176,28 +119,30 @@ def test_chunks_beyond_20_000_go_to_subfolders(tmp_path: Path) -> None:
     assert np.flatnonzero(many.present()).tolist() == [0, MOST_FILES, many.count - 1]
 
 
-def test_two_drivers_begin_one_folder(tmp_path: Path) -> None:
-    """The specification of the first stays; the second takes its chunks."""
-    sweep = swept(tmp_path, 50)
-    assert begun(sweep, tmp_path / "out", chunk=20) == begun(sweep, tmp_path / "out")
-    text = (tmp_path / "out" / "sweep.json").read_text()
-    with pytest.raises(FileExistsError):
-        write(tmp_path / "out" / "sweep.json", b"{}", exclusive=True)
-    assert (tmp_path / "out" / "sweep.json").read_text() == text
-    assert names_in(tmp_path / "out") == ["design", "sweep.json"]
+def test_a_driver_that_was_second_takes_the_specification_of_the_first(tmp_path: Path, monkeypatch) -> None:
+    """Their pilots took different times; the first begins the folder while the second makes its pilot."""
+    sweep, out = swept(tmp_path, 50), tmp_path / "out"
+
+    def slow_pilot(*_: object) -> int:
+        begin(out, specification(sweep, 20), sweep.points.rows)
+        return 16
+
+    monkeypatch.setattr(run_sweep, "pilot", slow_pilot)
+    assert begun(sweep, out) == begun(sweep, out, chunk=20)
+    assert names_in(out) == ["design", "sweep.json"]
 
 
 def test_another_sweep_that_begins_at_the_same_time_changes_nothing(tmp_path: Path, monkeypatch) -> None:
     """The first begins while the second makes its pilot, which is refused and leaves the folder as it was."""
     first, second, out = swept(tmp_path, 50, samples="q"), swept(tmp_path, 50, seed=4, samples="v"), tmp_path / "out"
-    pilot = opening.pilot
+    pilot = run_sweep.pilot
 
     def pilot_of_the_second(sweep: sw.Sweep, chunk: int | None) -> int:
-        monkeypatch.setattr(opening, "pilot", pilot)
+        monkeypatch.setattr(run_sweep, "pilot", pilot)
         sw.run(first, out, chunk=20, share="1/3")
         return pilot(sweep, chunk)
 
-    monkeypatch.setattr(opening, "pilot", pilot_of_the_second)
+    monkeypatch.setattr(run_sweep, "pilot", pilot_of_the_second)
     with pytest.raises(SweepError, match="holds another sweep: seed"):
         sw.run(second, out, chunk=20)
     assert len(sw.read(out).missing) == 2
@@ -222,7 +167,7 @@ def test_a_disk_without_room_is_said_before_the_start(tmp_path: Path, monkeypatc
     sweep = swept(tmp_path, 1000, design="random")
     numbers, texts = 5 + 3 + len(NUMBERS), len(TEXTS)  # 5 numbers that vary, 3 figures
     assert sweep.bytes_expected == 1000 * (8 * numbers + 4 * texts)
-    monkeypatch.setattr(opening, "disk_usage", lambda _: SimpleNamespace(free=80_000))
+    monkeypatch.setattr(run_sweep, "disk_usage", lambda _: SimpleNamespace(free=80_000))
     with pytest.raises(SweepError, match=r"the sweep will take .* GiB, and .* has"):
         sw.run(sweep, tmp_path / "out")
     assert not (tmp_path / "out").exists()

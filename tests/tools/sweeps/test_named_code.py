@@ -70,7 +70,7 @@ def test_results_are_read_without_importing_what_the_folder_names(received: Path
     shown = str(done), done.status, done.units, done.outcomes, done.verify(), done.worst("mine")
     done.export("rows.csv"), done.save_report("report.html"), done.to_json()
     again = pickle.loads(pickle.dumps(done.sweep))
-    assert again.units == done.units and again.source == SCENE
+    assert again.units == done.units and again.scene == SCENE
     assert no_code_ran()
     named = sw.read(received, scene=SCENE, figures={"mine": FIGURE})
     assert answers == (named.mean("mine"), named.quantiles("peak"), named.probability("mine > 0.1"), answers[3])

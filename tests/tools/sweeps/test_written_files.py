@@ -12,7 +12,7 @@ import pytest
 
 from robot_dyn.foundations import SweepError, check_folder, table_cell
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps import opening
+from robot_dyn.tools.sweeps import run_sweep
 from tests import command
 from tests.tools.sweeps.swept import VARY, swept
 
@@ -87,7 +87,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_run(tmp_path: Pat
     def no_pilot(*_: object) -> int:
         raise AssertionError("a run was made")
 
-    monkeypatch.setattr(opening, "pilot", no_pilot)
+    monkeypatch.setattr(run_sweep, "pilot", no_pilot)
     sweep = swept(tmp_path, 48, vary={"q0": VARY["q0"]})
     (tmp_path / "file").write_text("")
     for folder in (tmp_path / "file", tmp_path / "file" / "out", "/proc/none/out", "\0", tmp_path / "a\0b"):

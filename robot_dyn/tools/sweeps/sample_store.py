@@ -16,10 +16,9 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import SweepError, Value, choice, integer, needs, reading, truth, why
+from robot_dyn.foundations import SweepError, Value, choice, integer, needs, reading, save, truth, why
 from robot_dyn.queries import joint_units
 from robot_dyn.simulation import SAMPLED
-from robot_dyn.tools.sweeps.folder.files import make_folder, write
 from robot_dyn.tools.sweeps.texts import called
 
 RECORDED = ("q", "v", "u")
@@ -42,6 +41,14 @@ class Samples(Value):
     every: int = 1
     failed: bool = False
 
+    def __post_init__(self) -> None:
+        if not self.names:
+            raise SweepError(f"samples: of what? give some of {', '.join(RECORDED)}")
+        for name in self.names:
+            choice("samples", name, RECORDED, error=SweepError)
+        integer("every", self.every, least=1, most=2**53, error=SweepError)
+        truth("failed", self.failed, error=SweepError)
+
     def of(self, runs: np.ndarray, diverged: np.ndarray) -> np.ndarray:
         """Which of these runs are kept, (k,)."""
         return (runs % self.every == 0) & (diverged | (not self.failed))
@@ -58,10 +65,7 @@ def samples(*names: str, every: int = 1, failed: bool = False) -> Samples:
     Raises:
         SweepError: If an argument is not allowed.
     """
-    if not names:
-        raise SweepError(f"samples: of what? give some of {', '.join(RECORDED)}")
-    chosen = tuple(dict.fromkeys(choice("samples", name, RECORDED, error=SweepError) for name in names))
-    return Samples(chosen, integer("every", every, least=1, most=2**53, error=SweepError), truth("failed", failed))
+    return Samples(tuple(dict.fromkeys(names)), every, failed)
 
 
 def samples_of(given: Any) -> Samples | None:
@@ -96,12 +100,11 @@ class SampleStore:
         memory = zarr.storage.MemoryStore()
         group = zarr.create_group(memory, zarr_format=3, attributes={"joint": list(joint_names)})
         for name in self.kept.names:
-            self._array(zarr, memory, name, t, joint_names)
+            self._array(zarr, memory, name, (len(t), len(joint_names)))
         times = group.create_array("t", data=t, dimension_names=("t",), compressors=None)
         times.attrs["units"] = "s"
         for name in sorted(memory._store_dict, key=_TIMES.__eq__):  # the times are last: then all is there
-            make_folder((self.path / name).parent)
-            write(self.path / name, memory._store_dict[name].to_bytes())
+            _write(self.path / name, memory._store_dict[name].to_bytes())
 
     def times(self) -> np.ndarray:
         """Of the samples, (m,), in [s]."""
@@ -110,7 +113,7 @@ class SampleStore:
             return zarr.open_group(self.path, mode="r")["t"][:]
 
     def write(self, chunk: int, samples: Mapping[str, np.ndarray]) -> dict[str, str]:
-        """Write the samples (k, m, n) of the runs of a chunk, nan where they are not kept; OSError if that fails.
+        """Write the samples (k, m, n) of the runs of a chunk, nan where they are not kept; SweepError if that fails.
 
         Returns:
             SHA-256 of the file of each quantity that has some.
@@ -118,15 +121,12 @@ class SampleStore:
         zarr, digests = needs("zarr", extra="sweeps"), dict[str, str]()
         for name, x in samples.items():
             memory = zarr.storage.MemoryStore()
-            array = self._array(zarr, memory, name, np.empty(x.shape[1]), ("",) * x.shape[2])
             start = chunk * self.chunk
-            array[start : start + len(x)] = x
-            path = self._shard(name, chunk)
-            path.parent.mkdir(parents=True, exist_ok=True)
+            self._array(zarr, memory, name, x.shape[1:])[start : start + len(x)] = x
             shard = memory._store_dict.get(f"{name}/c/{chunk}/0/0")
             if shard is not None:  # it has something
                 data = shard.to_bytes()
-                write(path, data)
+                _write(self._shard(name, chunk), data)
                 digests[name] = sha256(data).hexdigest()
         return digests
 
@@ -136,15 +136,14 @@ class SampleStore:
         for name, digest in digests.items():
             path = self._shard(name, chunk)
             with reading(path, SweepError, remedy) as stream:
-                found = file_digest(stream, "sha256")  # pyright: ignore[reportArgumentType]
-                if found.hexdigest() != digest:
+                if file_digest(stream, "sha256").hexdigest() != digest:  # pyright: ignore[reportArgumentType]
                     raise SweepError(f"{path}: was changed after it was written; {remedy}")
 
     @contextmanager
     def _reading(self) -> Iterator[None]:
         """What is wrong with the files that describe the arrays, as a SweepError; Zarr opens pipes and devices too."""
         remedy = "take it from a copy of the folder, or run the sweep into a new one"
-        for name in ("zarr.json", *(f"{each}/zarr.json" for each in ("t", *self.kept.names)), _TIMES):
+        for name in ("zarr.json", *(f"{array}/zarr.json" for array in ("t", *self.kept.names)), _TIMES):
             with reading(self.path / name, SweepError, remedy):
                 pass
         try:
@@ -162,23 +161,22 @@ class SampleStore:
         xarray = needs("xarray", extra="sweeps")
         needs("zarr", extra="sweeps")
         with self._reading():
-            found = xarray.open_zarr(self.path, consolidated=False, chunks=None)
+            data = xarray.open_zarr(self.path, consolidated=False, chunks=None)
             for name in self.kept.names:
-                found[name].attrs |= {"units": joint_units(name, joint_types), "long_name": SAMPLED[name].title}
-            return found.assign_coords(run=np.arange(self.runs), joint=list(found.attrs.pop("joint")))
+                data[name].attrs |= {"units": joint_units(name, joint_types), "long_name": SAMPLED[name].title}
+            return data.assign_coords(run=np.arange(self.runs), joint=list(data.attrs.pop("joint")))
 
-    def _array(self, zarr: Any, store: Any, name: str, t: np.ndarray, joints: tuple[str, ...]) -> Any:
-        """An array of the store without numbers."""
+    def _array(self, zarr: Any, store: Any, name: str, shape: tuple[int, ...]) -> Any:
+        """An array of the store without numbers; `shape` (m, n) is that of a run."""
         dense = self.kept.every == 1 and not self.kept.failed
         inner = min(_INNER, self.chunk) if dense and self.chunk % _INNER == 0 else 1
         return zarr.create_array(
-            store, name=name, shape=(self.runs, len(t), len(joints)), dtype="float64",
-            chunks=(inner, len(t), len(joints)), shards=(self.chunk, len(t), len(joints)), compressors=None,
+            store, name=name, shape=(self.runs, *shape), dtype="float64",
+            chunks=(inner, *shape), shards=(self.chunk, *shape), compressors=None,
             fill_value=float("nan"), dimension_names=("run", "t", "joint"), zarr_format=3,
         )  # fmt: skip
 
 
-def check_times(t: np.ndarray, known: np.ndarray) -> None:
-    """Raise SweepError unless the times of a batch are the first of those that all runs have."""
-    if len(t) > len(known) or (t != known[: len(t)]).any():
-        raise SweepError("samples: the runs are not sampled at the same times; give the scene a record_period_s")
+def _write(path: Path, data: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    save(path, lambda stream: stream.write(data), SweepError)

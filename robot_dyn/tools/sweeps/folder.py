@@ -1,0 +1,283 @@
+"""The folder of a sweep: its specification, and a file for each chunk that is done. What has no file is left to do.
+
+sweep.json                   the specification
+design-0123456789abcdef.npy  rows of the design, with the start of their SHA-256
+rows/000123.parquet          a chunk; of more than 20 000 chunks rows/0004/080123.parquet
+samples/                     samples of runs, where they are kept
+
+Files are written whole or not at all. Two writers of one file harm nothing: the later one writes the same rows.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from time import time
+from types import MappingProxyType
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn.foundations import SceneError, SweepError, needs, read, reading, save, shown, why
+from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
+from robot_dyn.tools.sweeps.rows import OUTCOMES, TEXTS, Rows, digest_of, schema, type_of
+from robot_dyn.tools.sweeps.sample_store import SampleStore
+from robot_dyn.tools.sweeps.specification import FILE, Specification, processor, specification, stated_in, versions
+from robot_dyn.tools.sweeps.sweep import Sweep
+
+MOST_FILES = 20_000  # of a folder
+OLD_S = 86_400.0  # age of a file that its writer has not finished, after which it is removed
+_MOST_TABLE = 2**34
+_SUFFIX, _FOOTER, _UNFINISHED = ".parquet", b"footer", ".unfinished"
+_REMEDY = "run the sweep again, after removing this file"
+_AGAIN = "run the sweep into this folder again, which writes the file"
+
+
+@final
+@dataclass(frozen=True)
+class Folder:
+    """Chunks of the runs 0, …, N − 1 as files.
+
+    Attributes:
+        path: Of the folder.
+        runs: N.
+        chunk: Runs of a chunk; the last one may have fewer.
+        digest: Of the specification.
+        names: Of varied parameters and of figures.
+        about: What footers state next to the digest: versions and processor.
+        samples: Where samples of runs are; None where none are kept.
+    """
+
+    path: Path
+    runs: int
+    chunk: int
+    digest: str
+    names: tuple[str, ...]
+    about: dict[str, Any] = field(default_factory=dict)
+    samples: SampleStore | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of chunks."""
+        return -(-self.runs // self.chunk)
+
+    def of(self, chunk: int) -> tuple[int, int]:
+        """The first run of a chunk, and that after its last."""
+        return chunk * self.chunk, min((chunk + 1) * self.chunk, self.runs)
+
+    def file(self, chunk: int) -> Path:
+        """The file of a chunk."""
+        return self._subfolder(chunk) / f"{chunk:06d}{_SUFFIX}"
+
+    def _subfolder(self, chunk: int) -> Path:
+        rows = self.path / "rows"
+        return rows if self.count <= MOST_FILES else rows / f"{chunk // MOST_FILES:04d}"
+
+    @property
+    def _subfolders(self) -> list[Path]:
+        return [self._subfolder(chunk) for chunk in range(0, self.count, MOST_FILES)]
+
+    def present(self) -> np.ndarray:
+        """Whether each chunk has a file, (count,)."""
+        present = np.zeros(self.count, bool)
+        for folder in self._subfolders:
+            try:
+                names = os.listdir(folder)
+            except FileNotFoundError:
+                continue
+            except OSError as error:
+                raise SweepError(
+                    f"{folder}: is not a folder of rows ({why(error)}); remove it, and run again"
+                ) from None
+            for name in names:
+                stem = name.removesuffix(_SUFFIX)
+                if stem.isdigit() and stem != name and int(stem) < self.count:
+                    present[int(stem)] = True
+        return present
+
+    def missing(self) -> np.ndarray:
+        """Numbers of the chunks without a file."""
+        return np.flatnonzero(~self.present())
+
+    def prepare(self) -> None:
+        """Make the folders, and remove files that killed writers left a day ago; later ones go when written again."""
+        for folder in self._subfolders:
+            make_folder(folder)
+        for path in (path for folder in (self.path, *self._subfolders) for path in folder.glob(f".*{_UNFINISHED}")):
+            with suppress(OSError):  # removed meanwhile, or another user's
+                if time() - path.lstat().st_mtime > OLD_S:
+                    path.unlink()
+
+    def write(self, chunk: int, rows: Rows, samples: Mapping[str, np.ndarray] = MappingProxyType({})) -> None:
+        """Write a chunk, its samples first; SweepError if it cannot be written, with what is there unchanged."""
+        pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="sweeps")
+        start, stop = self.of(chunk)
+        footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": digest_of([rows])}
+        footer["samples"] = {} if self.samples is None else self.samples.write(chunk, samples)
+        stated = schema(self.names).with_metadata({_FOOTER: json.dumps(footer | self.about)})
+        table = pa.table(rows | {"run": np.arange(start, stop)}, stated)
+        save(
+            self.file(chunk),
+            lambda stream: parquet.write_table(
+                table, stream, compression="zstd", use_dictionary=list(TEXTS), write_page_checksum=True
+            ),
+            SweepError,
+        )
+
+    def read(self, chunk: int) -> Rows:
+        """The rows of a chunk.
+
+        Raises:
+            SweepError: If its file is missing, damaged, or of another sweep.
+        """
+        rows, footer = self._read(chunk, [name for name in schema(self.names).names if name != "run"])
+        if digest_of([rows]) != footer["rows"]:
+            raise SweepError(f"{self.file(chunk)}: was changed after it was written; {_REMEDY}")
+        return rows
+
+    def digest_of_rows(self) -> str:
+        """SHA-256 of all rows; errors as in `read`."""
+        return digest_of(map(self.read, range(self.count)))
+
+    def footer(self, chunk: int) -> dict[str, Any]:
+        """The footer of a chunk; errors as in `read`."""
+        return self._read(chunk, [])[1]
+
+    def check_samples(self) -> None:
+        """Raise SweepError where samples that were written are missing or have changed."""
+        if self.samples is not None:
+            for chunk in range(self.count):
+                self.samples.check(chunk, self.footer(chunk)["samples"])
+
+    def columns(self, names: Iterable[str]) -> Rows:
+        """Columns of all rows, (N,); errors as in `read`."""
+        names = list(dict.fromkeys(names))
+        columns = {name: np.empty(self.runs, type_of(name)) for name in names}
+        for chunk in range(self.count):
+            start, stop = self.of(chunk)
+            for name, x in self._read(chunk, names)[0].items():
+                columns[name][start:stop] = x
+        return columns
+
+    def _read(self, chunk: int, names: list[str]) -> tuple[Rows, dict[str, Any]]:
+        """Return columns of a chunk, and its footer."""
+        path = self.file(chunk)
+        with reading(path, SweepError, _REMEDY) as stream:
+            try:
+                return self._parsed(stream, chunk, names)
+            except _DamagedError as error:
+                raise SweepError(f"{path}: {error}; {_REMEDY}") from None
+            except Exception as error:  # pyarrow promises no kinds
+                raise SweepError(f"{path}: is not a complete chunk ({type(error).__name__}); {_REMEDY}") from None
+
+    def _parsed(self, stream: Any, chunk: int, names: list[str]) -> tuple[Rows, dict[str, Any]]:
+        start, stop = self.of(chunk)
+        file = needs("pyarrow.parquet", extra="sweeps").ParquetFile(stream, page_checksum_verification=True)
+        footer = json.loads(file.schema_arrow.metadata[_FOOTER])
+        if footer["sweep"] != self.digest:
+            raise _DamagedError("is of another sweep")
+        if (footer["chunk"], footer["start"], footer["stop"]) != (chunk, start, stop):
+            raise _DamagedError("is of other runs than its name says")
+        if not isinstance(footer["rows"], str) or not isinstance(footer["samples"], dict):
+            raise _DamagedError("its footer lacks digests of rows and samples")
+        if not file.schema_arrow.equals(schema(self.names)):
+            raise _DamagedError("its columns are not those of the sweep")
+        if not names:
+            return {}, footer
+        table = file.read(columns=["run", *names], use_threads=False)
+        columns = {name: table[name].to_numpy() for name in table.column_names}
+        if any(table[name].null_count for name in columns):
+            raise _DamagedError("has cells without a value")
+        if columns.pop("run").tolist() != list(range(start, stop)):
+            raise _DamagedError(f"its rows are not those of runs {start} to {stop - 1}")
+        if strange := set(columns.get("outcome", ())) - set(OUTCOMES):
+            raise _DamagedError(f"has the outcome {shown(min(strange))}, not one of {', '.join(OUTCOMES)}")
+        return {name: x.astype(type_of(name)) for name, x in columns.items()}, footer
+
+
+class _DamagedError(Exception):
+    """What is wrong with a chunk."""
+
+
+def read_design(path: Path, digest: str) -> np.ndarray:
+    """The rows of the design of a folder.
+
+    Raises:
+        SweepError: If their file is missing or damaged, or has another SHA-256 than the specification states.
+    """
+    file = _design(path, digest)
+    data = read(file, _MOST_TABLE, SweepError, _AGAIN)
+    try:
+        rows = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    except Exception as error:  # of a damaged header NumPy promises no kinds
+        raise SweepError(f"{file}: is not a table of numbers ({why(error)}); {_AGAIN}") from None
+    if sha256(np.ascontiguousarray(rows).tobytes()).hexdigest() != digest:
+        raise SweepError(f"{file}: was changed after it was written; {_AGAIN}")
+    return rows
+
+
+def begin(path: Path, stated: Specification, rows: np.ndarray) -> None:
+    """Write the specification of a new sweep, unless another process was first.
+
+    The file of a design is named after its rows, so that two sweeps that begin at one time do not mix.
+
+    Raises:
+        SweepError: If the folder holds other files, or cannot be written.
+    """
+    make_folder(path)
+    names = {entry.name for entry in path.iterdir() if not entry.name.endswith(_UNFINISHED)}
+    strange = sorted(name for name in names if not name.startswith("design-"))
+    if strange and FILE not in names:
+        raise SweepError(f"{path}: holds other files, such as {strange[0]}; give a new folder")
+    write_design(path, rows, stated.rows_sha256)
+    own = path / f".{FILE}.{os.urandom(8).hex()}{_UNFINISHED}"
+    save(own, lambda stream: stream.write(stated.text.encode()), SweepError)
+    try:
+        with suppress(FileExistsError):
+            os.link(own, path / FILE)  # which refuses one that exists, as os.replace does not
+    except OSError as error:
+        raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
+    finally:
+        own.unlink(missing_ok=True)
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, and those above it; SweepError if it cannot be made."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SweepError(f"{path}: the folder cannot be made ({why(error)}); give another path") from None
+
+
+def write_design(path: Path, rows: np.ndarray, digest: str) -> None:
+    """Write the rows of a design; SweepError if they cannot be written."""
+    save(_design(path, digest), lambda stream: np.save(stream, rows, allow_pickle=False), SweepError)
+
+
+def _design(path: Path, digest: str) -> Path:
+    return path / f"design-{digest[:16]}.npy"
+
+
+def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Sweep]:
+    """The folder of a sweep, and the sweep; arguments and errors as in `read`."""
+    check_places(path)
+    stored = stated_in(path)
+    try:
+        sweep = stored.sweep(read_design(path, stored.rows_sha256), path, names)
+    except SceneError as error:
+        raise SweepError(f"{path / FILE}: {error}; sw.read(folder, scene=…), --scene, where it lies now") from None
+    stored.check_same(specification(sweep, stored.chunk), path, versions=False)
+    return folder_of(path, sweep, stored), sweep
+
+
+def folder_of(path: Path, sweep: Sweep, stated: Specification) -> Folder:
+    """Return the folder of a sweep with the specification in it."""
+    store = sweep.samples and SampleStore(path / "samples", stated.runs, stated.chunk, sweep.samples)
+    names, about = (*sweep.columns, *sweep.figures), {"versions": versions()} | processor()
+    return Folder(path, stated.runs, stated.chunk, stated.digest, names, about, store)

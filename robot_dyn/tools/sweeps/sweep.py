@@ -1,0 +1,243 @@
+"""`Sweep`: what varies in the runs of a scene, how many there are, and which figures of each are kept. A value."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn import RobotDynError, Setup, sweepable
+from robot_dyn.foundations import Answer, Block, QueryError, SweepError, Table, Value, integer, shorten, shown
+from robot_dyn.queries import joint_types_of, unit
+from robot_dyn.tools.sweeps.designs import Design, design, given
+from robot_dyn.tools.sweeps.distributions import Distribution, distribution
+from robot_dyn.tools.sweeps.figures import Figure, UserFigure, figure
+from robot_dyn.tools.sweeps.imported import by_name, imported, is_import_path, is_scene, source_of
+from robot_dyn.tools.sweeps.rows import FIXED, NUMBERS, OUTCOMES, TEXTS
+from robot_dyn.tools.sweeps.sample_store import Samples, samples_of
+
+STARTS = ("q0", "v0")
+RESERVED = ("run", *NUMBERS, *TEXTS, "failed", *OUTCOMES)
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweep(Answer, Value):
+    """Runs 0, …, N − 1 of a setup. Run i is a function of this value and i alone: start, parameters and noise.
+
+    Attributes:
+        scene: A scene file, or the import path of a function that returns a `Setup`, such as "my_arm:setup".
+        runs: N.
+        vary: Distributions by name: a parameter of `rollouts(params=…)`, "q0" or "v0". A frozen distribution of
+            scipy.stats is one, and a text such as "uniform(low=0, high=3)".
+        figures: What to keep of each run, by name: `rms_error()`, `peak("u")`, `final("q", joint)`, or a function of a
+            `Run` by import path. Texts such as "peak('u')" are figures too.
+        design: "random", "sobol", "halton", "latin", "saltelli", "grid"; or rows in [0, 1), (N, d), a column for each
+            number that varies.
+        seed: Of the design.
+        samples: What to keep of the motion: "q", or `samples("q", "u", every=100)`; nothing by default.
+        drawn: The rows of the design, (N, d), as a folder keeps them; None to draw them by name and seed.
+        stated: The setup as a folder states it, if its reader has not named the function that makes it; else None.
+
+    Raises:
+        SweepError: If an argument is not allowed; names it.
+        SceneError: If the scene cannot be read.
+    """
+
+    scene: str
+    runs: int
+    vary: dict[str, Distribution]
+    figures: dict[str, Figure | UserFigure] = field(default_factory=dict)
+    design: Any = "random"
+    seed: int = 0
+    samples: Samples | None = None
+    drawn: np.ndarray | None = None
+    stated: Mapping[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        set_ = object.__setattr__
+        set_(self, "scene", source_of(self.scene))
+        set_(self, "vary", {name: _varied(name, of) for name, of in by_name("vary", self.vary).items()})
+        if not self.vary:
+            raise SweepError(
+                "vary: nothing varies; give distributions by name, such as {'kp': sw.uniform(low=1, high=2)}"
+            )
+        figures = by_name("figures", self.figures)
+        if taken := sorted(figures.keys() & {*RESERVED, *self.columns}):
+            raise SweepError(f"figures: {taken[0]!r} is the name of another column of a sweep; take another one")
+        set_(self, "figures", {name: figure(name, given) for name, given in figures.items()})
+        set_(self, "seed", integer("seed", self.seed, most=2**63 - 1, error=SweepError))
+        set_(self, "samples", samples_of(self.samples))
+        _ = self.points  # refused if the design does not have so many rows
+        if self.stated is None:  # else the folder was begun by a sweep that was checked
+            self._check_names()
+
+    @cached_property
+    def setup(self) -> Setup:
+        """Return the setup without varied parameters; SweepError for a function that the reader has not named."""
+        if self.stated is not None:
+            raise SweepError(
+                f"the folder names the function {self.scene} as its scene, which is called only if you name it:"
+                f" sw.read(folder, scene={self.scene!r}), or --scene {self.scene}"
+            )
+        if is_scene(self.scene):
+            from robot_dyn.scene import read_both  # late: functions need none of it
+
+            return read_both(self.scene)[1]
+        made = imported(self.scene)()
+        if not isinstance(made, Setup):
+            raise SweepError(f"{self.scene}: returned {shown(made)}; return a robot_dyn.Setup")
+        return made
+
+    @cached_property
+    def points(self) -> Design:
+        """The design, drawn once."""
+        dimensions = len(self.dimensions)
+        if self.drawn is not None and isinstance(self.design, str):
+            return given(self.drawn, self.runs, dimensions, self.design)
+        return design(self.design, self.runs, dimensions, self.seed)
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the numbers that vary: of an array such as "q0", numbered from 0."""
+        return tuple(f"{name}[{k}]" if of.shape else name for name, of in self.vary.items() for k in range(of.width))
+
+    @cached_property
+    def dimensions(self) -> tuple[str, ...]:
+        """Names of the columns of the design, in their order."""
+        return tuple(name if of.size == 1 else f"{name}[{k}]" for name, of in self.vary.items() for k in range(of.size))
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """Units of the columns that have one, by name."""
+        if self.stated is not None:
+            return dict(self.stated["units"])
+        of = {parameter.name: parameter.unit for parameter in sweepable(self.setup).parameters}
+        of |= {f"{name}[{k}]": unit(name[0], kind) for name in STARTS for k, kind in enumerate(self.joint_types)}
+        units = {name: of.get(name, of.get(parameter_of(name), "")) for name in self.columns}
+        units |= {name: figure.unit(self.setup) for name, figure in self.figures.items()}
+        units |= {column.name: column.unit for column in FIXED}
+        return {name: text for name, text in units.items() if text}
+
+    @property
+    def joint_types(self) -> tuple[str | None, ...]:
+        """Types of the joints, "revolute", "continuous" or "prismatic"; None where the dynamics do not state one."""
+        return tuple(joint_types_of(self.setup.plant.dynamics) if self.stated is None else self.stated["joint_types"])
+
+    @cached_property
+    def bytes_expected(self) -> int:
+        """What its rows and samples take on disk, at most but for footers and texts."""
+        if self.stated is not None:
+            return self.stated["bytes_expected"]
+        rows = 8 * (len(self.columns) + len(self.figures) + len(NUMBERS)) + 4 * len(TEXTS)
+        if self.samples is None or self.samples.failed:
+            return self.runs * rows
+        numbers = samples_of_run(self.setup) * self.setup.plant.dynamics.n * len(self.samples.names)
+        return self.runs * rows + 8 * numbers * -(-self.runs // self.samples.every)
+
+    def values(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """What varies in runs start, …, stop − 1, by name; SweepError if there are no such runs.
+
+        Starts have shape (k, n), numbers (k,), arrays (k, size).
+        """
+        stop = integer("stop", stop, most=self.runs, error=SweepError)
+        start = integer("start", start, most=stop, error=SweepError)
+        return self._values(self.points.rows[start:stop])
+
+    def _values(self, u: np.ndarray) -> dict[str, np.ndarray]:
+        """Values at points u (k, d) of the design."""
+        first, values = 0, {}
+        for name, of in self.vary.items():
+            x = of.values(np.ascontiguousarray(u[:, first : first + of.size]))
+            values[name] = x.reshape((len(u), -1) if name in STARTS or of.width > 1 else -1)
+            first += of.size
+        return values
+
+    def _check_names(self) -> None:
+        """Raise SweepError if what varies has no name or not the size that the setup knows."""
+        from robot_dyn.simulation.rollouts.rollouts import batch_of
+
+        n, values = self.setup.plant.dynamics.n, self._values(np.full((2, len(self.dimensions)), 0.5))
+        for name in STARTS:
+            if (size := values.pop(name, np.empty((2, n))).shape[1]) != n:
+                raise SweepError(f"vary: {name} has {n} numbers, got a distribution of {size}; give arrays of {n}")
+        try:
+            batch_of(self.setup, None, None, values, ())
+        except QueryError as error:
+            raise SweepError(f"vary: {str(error).removeprefix('params: ')}") from None
+
+    @property
+    def title(self) -> str:
+        return f"Sweep of {Path(self.scene).name}"
+
+    def blocks(self) -> Iterator[Block]:
+        design = self.design if isinstance(self.design, str) else "a table"
+        size = f"{self.bytes_expected / 2**20:.3g} MiB"
+        yield f"{self.runs} runs of {Path(self.scene).name}, design {design}, seed {self.seed}; on disk {size}"
+        rows = ((self._varies(name), str(of)) for name, of in self.vary.items())
+        yield Table(("varies", "distribution"), tuple(rows), wrap=True)
+        if self.figures:
+            rows = ((heading(self, name), str(figure)) for name, figure in self.figures.items())
+            yield Table(("figure", "computed by"), tuple(rows))
+
+    def _varies(self, name: str) -> str:
+        """A name in `vary` with its unit, each once where those of the numbers of an array differ."""
+        columns = [column for column in self.columns if name in (column, parameter_of(column))]
+        of = dict.fromkeys(self.units[column] for column in columns if column in self.units)
+        return f"{name} [{' or '.join(of)}]" if of else name
+
+
+def heading(sweep: Sweep, column: str) -> str:
+    """The name of a column with its unit, as "torque [N m]"."""
+    return f"{column} [{sweep.units[column]}]" if column in sweep.units else column
+
+
+def from_scene(path: str | Path, **changes: Any) -> Sweep:
+    """The sweep that a scene states in its table `[sweep]`.
+
+    Args:
+        path: Of the scene.
+        **changes: Attributes of `Sweep`, which replace those that are stated.
+
+    Raises:
+        SceneError: If the scene cannot be read.
+        SweepError: If it states no sweep, or one that is not allowed.
+    """
+    from robot_dyn.scene import read_both
+
+    part = getattr(read_both(path)[0], "sweep", None)
+    table = {} if part is None else part.model_dump(exclude_unset=True)
+    for name, text in table.get("figures", {}).items():
+        if is_import_path(text):
+            raise SweepError(
+                f"figures: {name}: {shorten(text)} runs code, and a scene is data; give it in Python or --figure"
+            )
+    stated = table | changes
+    for name in ("vary", "figures"):
+        stated[name] = {**table.get(name, {}), **by_name(name, changes.get(name, {}))}
+    if "runs" not in stated:
+        raise SweepError(f"{path}: how many runs? give runs=, or a table [sweep] with them")
+    return Sweep(str(path), **stated)
+
+
+def samples_of_run(setup: Setup) -> int:
+    """Number of samples of a run, at most."""
+    if setup.record_period_s:
+        return int(setup.duration_s / setup.record_period_s) + 2
+    return 1000 if setup.integrator.controls_error else setup.steps + 1
+
+
+def parameter_of(column: str) -> str:
+    """The name in `vary` of a column that is a number of an array."""
+    return column.rpartition("[")[0]
+
+
+def _varied(name: str, given: Any) -> Distribution:
+    try:
+        return distribution(given)
+    except RobotDynError as error:
+        raise SweepError(f"vary: {name}: {error}") from None

@@ -1,0 +1,202 @@
+"""The work of a chunk: runs start, …, stop − 1 of a sweep, as rows. A run that fails is a row with its reason.
+
+Bits of a row depend on the sweep and the number of the run alone: not on the chunk, its parts or the threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+
+from robot_dyn import RobotDynError, Rollouts, Setup, Trajectory
+from robot_dyn.foundations import SweepError, because
+from robot_dyn.simulation import MOST_BYTES, parts_of_run
+from robot_dyn.simulation.rollouts.batch import Batch
+from robot_dyn.simulation.rollouts.lock_step import LANES
+from robot_dyn.simulation.rollouts.rollouts import batch_of, manners, run_batch
+from robot_dyn.tools.sweeps.figures import Runs
+from robot_dyn.tools.sweeps.rows import FIXED, RAISED, Rows, empty, joined
+from robot_dyn.tools.sweeps.sweep import STARTS, Sweep, samples_of_run
+
+_PART_BYTES = 2**23  # that the runs of a part record; memory does not grow with the chunk, and allocators reuse blocks
+_RECORDS = ("q", "v", "u", "energy", "work")
+Look = Callable[[float], object]
+
+
+class Stopped(Exception):  # noqa: N818  it is not an error
+    """The work is to end, and what was under way is dropped."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Work:
+    """How the runs of a sweep are made; one is used by all threads of a process.
+
+    Attributes:
+        sweep: What is swept.
+    """
+
+    sweep: Sweep
+
+    @property
+    def record(self) -> tuple[str, ...]:
+        """What figures and samples need recorded."""
+        names = {name for figure in self.sweep.figures.values() for name in figure.record}
+        names |= set(self.sweep.samples.names if self.sweep.samples else ())
+        return tuple(name for name in _RECORDS if name in names)
+
+    @property
+    def part(self) -> int:
+        """Number of runs that are made together: whole tiles, as many as memory is for."""
+        n, samples = self.sweep.setup.plant.dynamics.n, samples_of_run(self.sweep.setup)
+        numbers = sum({"energy": 2, "work": 8}.get(name, n) for name in self.record)
+        return LANES * max(1, min(256, _PART_BYTES // (8 * LANES * samples * max(1, numbers))))
+
+    def rows(self, start: int, stop: int) -> Rows:
+        """The rows of runs start, …, stop − 1."""
+        return self.made(start, stop, None)[0]
+
+    def made(
+        self, start: int, stop: int, t: np.ndarray | None, look: Look | None = None
+    ) -> tuple[Rows, dict[str, np.ndarray]]:
+        """Make runs.
+
+        Args:
+            start: The first run.
+            stop: The run after the last.
+            t: Times of samples, (m,), in [s]; None if no samples are kept.
+            look: Called some ten times a second; ends the work by raising.
+
+        Returns:
+            The rows of the runs, and their samples by name, (k, m, n), nan where they are not kept.
+        """
+        kept, n = self.sweep.samples, self.sweep.setup.plant.dynamics.n
+        samples, parts = dict[str, np.ndarray](), []
+        if kept is not None and t is not None:
+            samples = {name: np.full((stop - start, len(t), n), np.nan) for name in kept.names}
+        for first in range(start, stop, self.part):
+            last = min(first + self.part, stop)
+            values = self.sweep.values(first, last)
+            columns = np.column_stack(list(values.values())).T
+            rows = empty(last - first, dict(zip(self.sweep.columns, columns, strict=True)), self.sweep.figures)
+            for runs, result in self._results(np.arange(first, last), values, look):
+                if isinstance(result, str):
+                    rows["outcome"][runs - first], rows["reason"][runs - first] = RAISED, result
+                    continue
+                self._write(rows, runs - first, result)
+                if kept is not None and t is not None:
+                    which = kept.of(runs, result.diverged)
+                    _check_times(result.t, t)
+                    for name, x in samples.items():
+                        x[runs[which] - start, : len(result.t)] = getattr(result, name)[which]
+            parts.append(rows)
+        return joined(parts), samples
+
+    def times(self) -> np.ndarray:
+        """Of the samples of the first run that finishes among 64, (m,), in [s]."""
+        count = min(64, self.sweep.runs)
+        for _, result in self._results(np.arange(count), self.sweep.values(0, count)):
+            if not isinstance(result, str) and not result.diverged.all():
+                return result.t
+        raise SweepError(f"samples: none of the first {count} runs finishes, so that their times are not known")
+
+    def setup_of(self, i: int) -> Setup:
+        """The setup of run i; SweepError with its reason if there is none."""
+        setup, values = self.sweep.setup, {name: x[0] for name, x in self.sweep.values(i, i + 1).items()}
+        starts = {name: values.pop(name) for name in STARTS if name in values}
+        try:
+            plant, controller = parts_of_run(setup, values, i)
+            return replace(setup, plant=plant, controller=controller, **starts)
+        except RobotDynError as error:
+            raise SweepError(f"run {i} raised: {error}") from None
+
+    def run(self, i: int) -> Trajectory:
+        """Run i as a trajectory; SweepError with its reason if it raised."""
+        batch, reasons = self._batch(np.array([i]), self.sweep.values(i, i + 1), _RECORDS)
+        if batch is None:
+            raise SweepError(f"run {i} raised: {reasons[0]}")
+        ((_, passed),) = manners(batch)
+        return run_batch(batch, passed, True, 1, MOST_BYTES)[0]
+
+    def _write(self, rows: Rows, at: np.ndarray, result: Rollouts) -> None:
+        """Rows of runs that were made; figures of those that finished."""
+        for column in FIXED:
+            rows[column.name][at] = column.values(result)
+        places = np.flatnonzero(~result.diverged)
+        if not len(places):
+            return
+        runs, at = Runs(result, places), at[places]
+        for name, figure in self.sweep.figures.items():
+            try:
+                rows[name][at] = figure.of(runs)
+            except Exception:  # of a user's function: of which runs it raises
+                for i, place in enumerate(at.tolist()):
+                    try:
+                        rows[name][place] = figure.of(runs.only(i))[0]
+                    except Exception as error:
+                        rows["outcome"][place], rows["reason"][place] = RAISED, f"figure {name}: {because(error)}"
+
+    def _results(
+        self, runs: np.ndarray, values: dict[str, np.ndarray], look: Look | None = None
+    ) -> Iterator[tuple[np.ndarray, Rollouts | str]]:
+        """The rollouts of runs by their numbers; of one that raises, the reason."""
+        batch, reasons = self._batch(runs, values, self.record)
+        yield from ((runs[[i]], reason) for i, reason in reasons.items())
+        if batch is None:
+            return
+
+        def made(places: np.ndarray) -> list[tuple[np.ndarray, Rollouts]]:
+            some, results = batch.some(places), []
+            for at, passed in manners(some):
+                result = run_batch(some.some(at), passed, True, 1, MOST_BYTES, look)
+                if result.stopped.any():  # Ctrl-C came inside
+                    raise Stopped
+                results.append((some.number_of(at), result))
+            return results
+
+        for places, results in _in_halves(np.arange(len(batch)), made):
+            yield from [(batch.number_of(places), because(results))] if isinstance(results, Exception) else results
+
+    def _batch(
+        self, runs: np.ndarray, values: dict[str, np.ndarray], record: tuple[str, ...]
+    ) -> tuple[Batch | None, dict[int, str]]:
+        """The batch of the runs whose values are allowed; why those of the others are not, by place."""
+        setup = replace(self.sweep.setup, estimate_error=False, accuracy=None)
+
+        def batch(at: np.ndarray) -> Batch:
+            chosen = {name: x[at] for name, x in values.items()}
+            q0, v0 = (chosen.pop(name, None) for name in STARTS)
+            return batch_of(setup, q0, v0, chosen, record, runs[at])
+
+        tried = list(_in_halves(np.arange(len(runs)), batch))
+        reasons = {int(at[0]): because(found) for at, found in tried if isinstance(found, Exception)}
+        if not reasons:
+            return tried[0][1], {}
+        allowed = [i for i in range(len(runs)) if i not in reasons]
+        return (batch(np.array(allowed)) if allowed else None), reasons
+
+
+def _in_halves(places: np.ndarray, attempt: Callable[[np.ndarray], Any]) -> Iterator[tuple[np.ndarray, Any]]:
+    """What `attempt` returns of places, or of their halves where it raises; of one place that raises, the error."""
+    try:
+        result = attempt(places)
+    except (Stopped, MemoryError):
+        raise
+    except Exception as error:  # of the library, or of a user's code in a run
+        if len(places) == 1:
+            yield places, error
+        else:
+            half = len(places) // 2
+            yield from _in_halves(places[:half], attempt)
+            yield from _in_halves(places[half:], attempt)
+        return
+    yield places, result
+
+
+def _check_times(t: np.ndarray, known: np.ndarray) -> None:
+    """Raise SweepError unless the times of a batch are the first of those that all runs have."""
+    if len(t) > len(known) or (t != known[: len(t)]).any():
+        raise SweepError("samples: the runs are not sampled at the same times; give the scene a record_period_s")
