@@ -15,7 +15,6 @@ from robot_dyn import Compiled
 from robot_dyn.codegen import CompiledPlant, Trace
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.effects import Active
-from robot_dyn.foundations import TraceError
 from tests.codegen.arms import states
 
 ROBOT = rd.load("planar_2r")
@@ -109,13 +108,6 @@ class Kick(Active):
         return 0 * q
 
 
-class Opaque(Active):
-    """A force that needs numbers."""
-
-    def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:
-        return np.interp(q, [0, 1], [0, 1])
-
-
 def test_an_effect_with_branches_is_followed_both_ways() -> None:
     """Its `if` is in the kernel, not decided while tracing."""
     compiled = plant([Kick()])
@@ -123,12 +115,6 @@ def test_an_effect_with_branches_is_followed_both_ways() -> None:
         for q0 in (0.5, 1.5):
             q, v = np.array([q0, 0.3]), np.array([-0.4, 0.7])
             assert np.allclose(compiled.torque(t, q, v), compiled.interpreted.torque(t, q, v), atol=1e-15)
-
-
-def test_an_effect_that_cannot_be_traced_is_named() -> None:
-    """And the remedy is said."""
-    with pytest.raises(TraceError, match="effect opaque cannot be compiled"):
-        plant([Opaque()]).forward_dynamics(0.0, *np.ones((3, 2)))
 
 
 def test_machine_code_does_not_keep_the_plant_that_it_was_made_for() -> None:

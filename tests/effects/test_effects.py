@@ -228,27 +228,6 @@ def test_plant_keeps_the_equation_of_motion(engine, batch) -> None:
     np.testing.assert_allclose(plant.N(0.2, q, v), full_N, rtol=1e-13, atol=1e-13)
 
 
-def test_plant_without_effects_is_its_dynamics() -> None:
-    (q,), (v,) = states(1)
-    plant = Plant(ROBOT)
-    assert np.array_equal(plant.forward_dynamics(0.0, q, v, list(v)), ROBOT.forward_dynamics(q, v, v))
-    assert np.array_equal(plant.N(0.0, q, v), ROBOT.N(q))
-
-
-def test_urdf_effects_are_what_the_file_states() -> None:
-    viscous, dry = Plant(ROBOT, "urdf").effects
-    np.testing.assert_array_equal(viscous.damping, [0.8, 0.02])
-    np.testing.assert_array_equal(dry.friction, [1.5, 0.01])
-    assert Plant(rd.load("ur5"), effects="urdf").effects == ()
-
-
-def test_friction_of_coupled_joints_counts_by_virtual_work() -> None:
-    """mimic_chain: q2 = q1/2 + …, q3 = −3/8 q1 + …; b = Σ s² b_i and f = Σ |s| f_i, from the file's 0.01 and 0.02."""
-    finger = rd.load("mimic_chain")
-    np.testing.assert_allclose(finger.damping, [0.01 * (1 + 0.25 + 0.375**2), 0.0], rtol=1e-15)
-    np.testing.assert_allclose(finger.friction, [0.02 * (1 + 0.5 + 0.375), 0.0], rtol=1e-15)
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [

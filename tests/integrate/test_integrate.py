@@ -98,11 +98,6 @@ def test_a_surd_is_as_fine_as_its_arithmetic() -> None:
         assert float(x.rad()) < 1e-85
 
 
-def test_an_unknown_method_is_refused_with_the_nearest_names() -> None:
-    with pytest.raises(QueryError, match="no integration method 'rk44'; nearest: rk4"):
-        method("rk44")
-
-
 def test_names_and_traits_of_the_table() -> None:
     assert {each.name for each in ALL} == set(FIXED_STEP)
     assert {each.name for each in ALL if each.canonical} == {"gauss_2", "gauss_4", "gauss_6"}

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.control import Stateless
 from robot_dyn.effects import Active
 from robot_dyn.foundations import QueryError, TraceError
 from robot_dyn.integrate import FIXED_STEP
@@ -180,32 +179,12 @@ def test_progress_is_told_and_an_interrupt_keeps_the_samples() -> None:
 
 
 @final
-@dataclass(frozen=True)
-class Elsewhere(Stateless):
-    """A controller written elsewhere, which traces nonetheless."""
-
-    n: int = 2
-    period_s: float = 0.0
-
-    def torque(self, t, q, v, z):
-        return -4.0 * q if t < 0.05 else 0 * q
-
-
-@final
 @dataclass(frozen=True, eq=False)
 class Table(Active):
     """An effect that looks its torque up, which symbols cannot."""
 
     def torque(self, dynamics, t, q, v):
         return np.array([0.1, 0.2])[int(10 * t) % 2] * v
-
-
-def test_an_undeclared_controller_runs_interpreted_unless_it_is_asked_for() -> None:
-    setup = rd.Setup(rd.Plant(ARM), Q, controller=Elsewhere(), duration_s=0.1, estimate_error=False, integrator="rk4")
-    run = rd.simulate(setup)
-    assert run.statistics.engine.startswith("interpreted (Elsewhere declares no thresholds")
-    assert run.statistics.engine in run.summary
-    check_equal(rd.simulate(setup, engine="compiled"), run, 1e-12)
 
 
 def test_a_reference_that_jumps_between_rests() -> None:

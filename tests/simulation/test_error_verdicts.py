@@ -462,12 +462,3 @@ def test_metadata_of_packages_are_read_once(monkeypatch) -> None:
         assert "robot-dyn 1" in rd.simulate(rd.Plant(RAIL), q0=[0.0], duration_s=0.01).about["versions"]
     assert len(asked) == len(set(asked)) > 0
     origin.versions.cache_clear()
-
-
-@pytest.mark.parametrize("period", [-0.1, np.nan, np.inf, "a", None, True])
-def test_a_period_of_control_that_is_not_a_time_is_refused(period) -> None:
-    """Also that of a class which the library did not write: a negative one would run as continuous control."""
-    law = rd.control.PD(rd.control.hold([0.0]), 1.0, 1.0)
-    object.__setattr__(law, "period_s", period)
-    with pytest.raises(QueryError, match="period_s of the controller"):
-        rd.Setup(rd.Plant(RAIL), [0.1], controller=law)
