@@ -13,24 +13,17 @@ import numpy as np
 from scipy.linalg import expm
 
 import robot_dyn as rd
+from tests.slides import slides
 
 Law = Callable[[int, np.ndarray, np.ndarray], np.ndarray]
-ARM = """<robot name="slides"><link name="base"/>
-<link name="one"><inertial><mass value="1.3"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="two"><inertial><mass value="0.7"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="a" type="prismatic"><parent link="base"/><child link="one"/><axis xyz="1 0 0"/>
-<limit effort="1e6" velocity="1e6" lower="-9" upper="9"/></joint>
-<joint name="b" type="prismatic"><parent link="one"/><child link="two"/><axis xyz="0.6 0.8 0"/>
-<limit effort="1e6" velocity="1e6" lower="-9" upper="9"/></joint></robot>"""
+ARM = slides(("a", "base", "one", 1.3), ("b", "one", "two", 0.7), axes=("1 0 0", "0.6 0.8 0"))
 STIFFNESS, DAMPING = np.array([7.0, 3.0]), np.array([0.4, 0.9])
 Q0, V0 = np.array([0.31, -0.23]), np.array([0.7, -0.4])
 
 
 def plant() -> rd.Plant:
     """Two coupled slides on springs and dampers: a linear plant whose M is constant and not diagonal."""
-    robot = rd.Robot.from_text(ARM).with_(gravity=(0.0, 0.0, 0.0))
+    robot = ARM.with_(gravity=(0.0, 0.0, 0.0))
     return rd.Plant(robot, [rd.effects.Spring(STIFFNESS), rd.effects.ViscousFriction(DAMPING)])
 
 

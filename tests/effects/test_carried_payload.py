@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations import EffectError, QueryError, TraceError
+from robot_dyn.foundations import EffectError, TraceError
 from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 
 ARM = rd.load("planar_2r")
@@ -180,19 +180,3 @@ def test_a_plant_is_asked_at_a_time() -> None:
             ask()
     with pytest.raises(TraceError, match=r"carried_payload comes and goes: ask plant.at\(t\)"):
         rd.Compiled(plant).forward_dynamics(0.0, Q, V, V)
-
-
-def test_what_is_not_supported_is_refused_by_name() -> None:
-    body = rd.effects.CarriedPayload(BODY, 0.1, 0.2)
-    with pytest.raises(QueryError, match=r"carried_payload: .* changes momenta, which gauss_4 integrates"):
-        rd.Setup(rd.Plant(ARM, [body]), Q, duration_s=0.3, integrator="gauss_4")
-    with pytest.raises(QueryError, match="cuts=False: carried_payload comes and goes, where steps must end"):
-        rd.rollouts(rd.Plant(ARM, [body]), q0=[Q, Q], duration_s=0.3, integrator="rk4", cuts=False)
-    with pytest.raises(QueryError, match="advise: carried_payload changes the bodies"):
-        rd.advise(rd.Plant(ARM, [body]), Q)
-    with pytest.raises(EffectError, match=r"carried_payload: .*'tipp'"):
-        rd.Plant(ARM, [rd.effects.CarriedPayload(rd.Payload("tipp", 1.0))])
-    with pytest.raises(EffectError, match="carried_payload: needs a Robot, got Lagrangian"):
-        rd.Plant(rd.Lagrangian(ARM), [body])
-    with pytest.raises(EffectError, match=r"end_s must lie after start_s, got 0.2 and 0.1"):
-        rd.effects.CarriedPayload(BODY, 0.2, 0.1)

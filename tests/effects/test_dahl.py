@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -73,18 +73,3 @@ def test_bristles_only_take_energy(exponent: float | None) -> None:
 
 def test_an_exponent_of_one_that_is_stated_is_the_default() -> None:
     np.testing.assert_allclose(run(1.0, "interpreted").q, run(None, "interpreted").q, atol=1e-10)
-
-
-def test_exponents_differ_from_run_to_run_in_rollouts() -> None:
-    """Each run is that of the setup with its value, 1e-12."""
-    plant = rd.Plant(SLIDER, [rd.effects.DahlFriction(STIFFNESS, LEVEL, 1.5)])
-    base = rd.Setup(
-        plant, [0.0], duration_s=0.5, controller=Beats(), integrator="rk4", record_period_s=0.1, estimate_error=False
-    )
-    values = np.array([1.2, 2.0])
-    runs = rd.rollouts(base, params={"dahl_friction.exponent": values})
-    for k, value in enumerate(values):
-        other = rd.Plant(SLIDER, [rd.effects.DahlFriction(STIFFNESS, LEVEL, value)])
-        alone = rd.simulate(replace(base, plant=other), engine="interpreted")
-        np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-12)
-    assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-6

@@ -228,27 +228,6 @@ def test_plant_keeps_the_equation_of_motion(engine, batch) -> None:
     np.testing.assert_allclose(plant.N(0.2, q, v), full_N, rtol=1e-13, atol=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: rd.effects.ViscousFriction(-0.1), "damping must not be negative"),
-        (lambda: rd.effects.ViscousFriction([0.1, np.nan]), "damping must be finite"),
-        (lambda: rd.effects.ViscousFriction("much"), "damping must be real numbers"),
-        (lambda: rd.effects.RegularisedCoulombFriction(1.0, 0.0), "velocity_scale must be positive"),
-        (lambda: rd.effects.JointStopSpring(1.0, 0.5, 3.0), "lower stops must lie below"),
-        (lambda: rd.effects.ExternalWrench("pole", [1, 2, 3]), r"shape \(6,\)"),
-        (lambda: rd.effects.ExternalWrench("pole", WRENCH, start_s=2.0, end_s=1.0), "end_s must lie after"),
-        (lambda: rd.effects.EffortLimit(-1.0), "limit must not be negative"),
-        (lambda: Plant(ROBOT, "friction"), "give effects, or 'urdf'"),
-        (lambda: Plant(ROBOT, [3]), "3 is neither a Force nor a Bound"),
-        (lambda: Plant(object(), "urdf"), "give a robot, such as rd.load"),
-    ],
-)
-def test_meaningless_coefficients_are_refused(make, message: str) -> None:
-    with pytest.raises(EffectError, match=message):
-        make()
-
-
 @pytest.mark.parametrize("method", ["N", "forward_dynamics", "inverse_dynamics", "torque"])
 def test_a_velocity_of_the_wrong_shape_is_refused(method: str) -> None:
     plant = Plant(ROBOT, list(FORMULAS))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations import EffectError, QueryError
 from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 from tests.long import long
+from tests.slides import slides
 
 ARM = rd.load("planar_2r")
 Q = np.array([0.3, -0.5])
@@ -83,17 +83,7 @@ class Beats(rd.control.Stateless):
 @pytest.mark.parametrize("restitution", [0.3, *long([0.9])])
 def test_a_motor_in_a_backlash_is_a_body_between_rigid_stops(restitution: float) -> None:
     """The same as a second slider on the first one, whose coordinate is δ, between its rigid stops; 1e-10."""
-    both = rd.Robot.from_text(
-        f"""<robot name="two"><link name="base"/>
-<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
-<limit lower="-99" upper="99" effort="99" velocity="99"/></joint>
-<joint name="play" type="prismatic"><parent link="cart"/><child link="motor"/><axis xyz="1 0 0"/>
-<limit lower="-99" upper="99" effort="99" velocity="99"/></joint>
-<link name="cart"><inertial><mass value="{MASS}"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="motor"><inertial><mass value="{REFLECTED}"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
-    )
+    both = slides(("slide", "base", "cart", MASS), ("play", "cart", "motor", REFLECTED))
     options = {"duration_s": 3.0, "integrator": TIGHT, "record_period_s": 0.01, "estimate_error": False}
     stops = rd.effects.RigidStops([-np.inf, -GAP], [np.inf, GAP], [0.0, restitution])
     theirs = rd.simulate(rd.Plant(both, [stops]), [0.0, 0.0], controller=Beats(2), **options)
@@ -191,20 +181,3 @@ def test_a_payload_that_a_pushed_joint_picks_up_is_an_impact_of_its_motor_too(en
     np.testing.assert_allclose(run.effect_states["rigid_backlash"][-1, :3], [GAP, 0.0, run.v[-1, 0]], atol=1e-13)
     assert np.abs(run.ledger.residual).max() < 1e-12
     assert next(each.name for each in run.events if each.t >= at) == "payload on cart picked up at rest"
-
-
-def test_what_is_not_supported_is_refused_by_name() -> None:
-    plant = rd.Plant(ARM, [rd.effects.RigidBacklash(0.01, 0.1)])
-    for method in ("gauss_4", "time_stepping"):
-        with pytest.raises(QueryError, match="rigid_backlash: "):
-            rd.Setup(plant, Q, integrator=method)
-    with pytest.raises(QueryError, match="cuts=False: rigid_backlash holds joints"):
-        rd.rollouts(plant, q0=[Q, Q], duration_s=0.1, integrator="rk4", cuts=False)
-    with pytest.raises(QueryError, match="advise: rigid_backlash frees and couples motors by turns"):
-        rd.advise(plant, Q)
-    with pytest.raises(EffectError, match="rigid_backlash: gap is 0 for all joints"):
-        rd.Plant(ARM, [rd.effects.RigidBacklash(0.0, 0.1)])
-    with pytest.raises(EffectError, match="restitution must not be greater than 1"):
-        rd.effects.RigidBacklash(0.1, 0.1, restitution=1.5)
-    with pytest.raises(EffectError, match="joint 'joint_1' has two drives"):
-        rd.Setup(rd.Plant(ARM, [rd.effects.RigidBacklash(0.1, 0.1), rd.effects.SeriesElastic(9.0, 0.1)]), Q)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations import EffectError, QueryError
+from robot_dyn.foundations import QueryError
 from tests.campaigns.estimates.held import held_scene
 from tests.campaigns.estimates.scenes import arms
 from tests.long import long
@@ -213,22 +213,6 @@ def test_joints_that_stops_throw_at_each_other_end_at_rest_all_of_them() -> None
     assert np.abs(change[others]).max() < 1e-2 * np.abs(change).max()  # what loads do in 4 µs
 
 
-def test_a_start_beyond_a_stop_is_refused_by_name() -> None:
-    plant = rd.Plant(ARM, [rd.effects.RigidStops([-1.0, -1.0], [1.0, 1.0])])
-    with pytest.raises(QueryError, match=r"q0: 'joint_2' is 0\.2 beyond its upper stop"):
-        rd.simulate(plant, [0.3, 1.2])
-
-
-@pytest.mark.parametrize(("method", "why"), [("gauss_4", "momenta"), ("explicit_euler", "order 1")])
-def test_methods_whose_steps_cannot_end_there_are_refused(method: str, why: str) -> None:
-    with pytest.raises(QueryError, match=f"dry_friction: .* {why}.*DOP853"):
-        rd.simulate(rd.Plant(ARM, [rd.effects.DryFriction(1.0)]), [0.3, 0.2], integrator=method)
-    with pytest.raises(QueryError, match=f"dry_friction: .* {why}.*DOP853"):
-        rd.rollouts(rd.Plant(ARM, [rd.effects.DryFriction(1.0)]), [0.3, 0.2], integrator=method)
-    with pytest.raises(QueryError, match="cuts=False: dry_friction holds joints and lets them go, where steps must"):
-        rd.rollouts(rd.Plant(ARM, [rd.effects.DryFriction(1.0)]), [0.3, 0.2], integrator="rk4", cuts=False)
-
-
 @pytest.mark.parametrize("method", ["time_stepping", "rk4", "DOP853"])
 def test_a_start_of_a_batch_beyond_a_stop_is_refused_by_number(method: str) -> None:
     plant = rd.Plant(ARM, [rd.effects.RigidStops([-1.0, -1.0], [1.0, 1.0])])
@@ -327,16 +311,3 @@ def test_the_stops_of_the_file_are_the_limits_of_its_joints() -> None:
     assert (both.lower == ur5.lower).all()
     assert (both.upper == ur5.upper).all()
     assert (one.upper == ur5.upper).all()
-    with pytest.raises(EffectError, match="must lie below"):
-        rd.Plant(ur5, [rd.effects.RigidStops(7.0, "urdf")])
-
-
-def test_what_makes_no_sense_is_refused() -> None:
-    with pytest.raises(EffectError, match="restitution must not be greater than 1"):
-        rd.effects.RigidStops(-1.0, 1.0, 1.5)
-    with pytest.raises(EffectError, match="must lie below"):
-        rd.effects.RigidStops(1.0, -1.0)
-    with pytest.raises(EffectError, match="static must not be less"):
-        rd.effects.DryFriction(2.0, 1.0)
-    with pytest.raises(EffectError, match="no effect without static"):
-        rd.effects.DryFriction(2.0, stribeck_velocity=0.1)
