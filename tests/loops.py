@@ -6,13 +6,12 @@ x' = A x + B u;   u_k = law(k, what was measured at t_k − τ_m) acts on [t_k +
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
-from math import ceil
 
 import numpy as np
 from scipy.linalg import expm
 
 import robot_dyn as rd
+from tests.short_loops import Arm, ShortLoop
 from tests.slides import slides
 
 Law = Callable[[int, np.ndarray, np.ndarray], np.ndarray]
@@ -83,30 +82,10 @@ def exact(law: Law, period: float, periods: int, measured_late: float = 0.0, act
 def growth(
     arm: rd.Robot, q: np.ndarray, gains: tuple[np.ndarray, np.ndarray], period: float, late: tuple[float, float]
 ) -> float:
-    """ρ of the exact map of a period of an arm at rest under PD, by the definition of delays (measured, acting).
-
-    Its state is (x_k, u_{k−1}, u_{k−2}, …, and the samples that are on their way, the newest first).
-    """
-    n, e = arm.n, 1e-6
-    M = arm.M(q)
+    """ρ of the exact map of a period of an arm at rest under PD, by the definition of delays (measured, acting)."""
+    n, e, M = arm.n, 1e-6, arm.M(q)
     slope = np.array([(arm.N(q + e * d) - arm.N(q - e * d)) / (2 * e) for d in np.eye(n)]).T
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, slope), np.zeros((n, n))]])
-    both = np.block([[A, np.vstack([np.zeros((n, n)), np.linalg.inv(M)])], [np.zeros((n, 3 * n))]])
-    waiting, acting = ceil(late[0]), ceil(late[1])
-    size = 2 * n + (acting + 1) * n + waiting * 2 * n
-    rows = iter(np.eye(size).reshape(-1, n, size))
-    x = np.vstack([next(rows), next(rows)])
-    torques = [next(rows) for _ in range(acting + 1)]
-    samples = [np.vstack([next(rows), next(rows)]) for _ in range(waiting)]
-    law = -np.hstack([np.diag(each) for each in gains])
-    torques.insert(0, law @ (samples[-1] if waiting else x))
-    passes, measures = late[1] % 1, -late[0] % 1
-    times = sorted({0.0, passes, measures, 1.0})
-    for a, b in pairwise(times):
-        if waiting and a == measures:
-            newest = x
-        u = torques[acting] if a < passes else torques[int(late[1])]
-        flow = expm(both * (b - a) * period)
-        x = flow[: 2 * n, : 2 * n] @ x + flow[: 2 * n, 2 * n :] @ u
-    made = [x, *torques[: acting + 1], *([newest, *samples[:-1]] if waiting else [])]
-    return float(np.abs(np.linalg.eigvals(np.vstack(made))).max())
+    B = np.vstack([np.zeros((n, n)), np.linalg.inv(M)])
+    about = Arm("at rest", rd.Plant(arm), A, B, np.diag(M), q, q, 0 * q)
+    return ShortLoop(about, gains[0], None, gains[1], late, False, 0, 1.0, 1).radius(period)

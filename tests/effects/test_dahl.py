@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -16,21 +15,15 @@ STIFFNESS, LEVEL = 40.0, 1.3  # [N/m], [N]
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 
 
-@dataclass(frozen=True, eq=False)
-class Beats(rd.control.Stateless):
+def beats(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """A force of two frequencies, so that reversals fall on many parts of the curve."""
-
-    period_s: float = 0.0
-    n: int = 1
-
-    def torque(self, t, q, v, z):
-        return np.stack([2.0 * np.sin(3.1 * t + 0.4) + 1.1 * np.sin(7.3 * t)])
+    return np.stack([2.0 * np.sin(3.1 * t + 0.4) + 1.1 * np.sin(7.3 * t)])
 
 
 def run(exponent: float | None, engine: str, **options) -> rd.Trajectory:
     plant = rd.Plant(SLIDER, [rd.effects.DahlFriction(STIFFNESS, LEVEL, exponent)])
     options = {"duration_s": 6.0, "record_period_s": 0.01, "estimate_error": False} | options
-    return rd.simulate(plant, q0=[0.0], controller=Beats(), engine=engine, **options)
+    return rd.simulate(plant, q0=[0.0], controller=beats, engine=engine, **options)
 
 
 def curve(start: float, path: np.ndarray, side: float, exponent: float) -> np.ndarray:

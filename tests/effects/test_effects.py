@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from pathlib import Path
-from typing import final
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from robot_dyn import Plant
 from robot_dyn.effects import Active, Bound, Conservative, Dissipative, Effect, Force, Stateful
 from robot_dyn.foundations import EffectError, QueryError
 from tests.effect_examples import EFFECTS, arguments, example
+from tests.user_parts import counted
 
 ROBOT = rd.load("cart_pole")
 B, F, V_S = np.array([0.7, 0.2]), np.array([1.4, 0.3]), np.array([0.05, 0.2])
@@ -186,31 +186,18 @@ def test_effort_limit_cuts_the_actuation() -> None:
     assert np.array_equal(cut, ROBOT.forward_dynamics(still, still, np.array([1.0, 2.0])))
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Counted(Active):
-    """A constant push that counts how often it is evaluated."""
-
-    calls: list[float] = field(default_factory=list)
-
-    def torque(self, dynamics, t, q, v):
-        self.calls.append(t)
-        return np.full(np.shape(v), 0.5)
-
-
-def test_what_is_off_is_evaluated_zero_times_and_what_is_on_once() -> None:
-    on, off = Counted(), Counted()
+def test_an_effect_is_evaluated_once_in_a_query_that_has_torques() -> None:
+    on, calls = counted()
     (q,), (v,) = states(1)
     plant = Plant(ROBOT, [on])
     plant.forward_dynamics(1.5, q, v, v)
-    assert on.calls == [1.5]
+    assert calls == [1.5]
     plant.inverse_dynamics(2.0, q, v, v)
     plant.N(2.5, q, v)
-    assert on.calls == [1.5, 2.0, 2.5]
+    assert calls == [1.5, 2.0, 2.5]
     plant.M(q)
     plant.C(q, v)
-    assert len(on.calls) == 3
-    assert off.calls == []
+    assert len(calls) == 3
 
 
 @pytest.mark.parametrize("engine", [ROBOT, rd.Lagrangian(ROBOT)], ids=["Robot", "Lagrangian"])

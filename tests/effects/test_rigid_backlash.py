@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
@@ -65,19 +63,9 @@ def test_a_pushed_motor_bounces_at_an_end_of_the_gap_like_a_ball(restitution: fl
         np.testing.assert_allclose(run.a[-1], force / (MASS + REFLECTED), rtol=1e-13)
 
 
-@dataclass(frozen=True, eq=False)
-class Beats(rd.control.Stateless):
+def beats(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """A force of two frequencies on the motor, and on the joint as well where both are coordinates."""
-
-    joints: int = 1
-    period_s: float = 0.0
-
-    @property
-    def n(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
-        return self.joints
-
-    def torque(self, t, q, v, z):
-        return np.stack([3.0 * np.cos(9.1 * t + 0.3) + 1.5 * np.cos(23.0 * t)] * self.joints)
+    return np.stack([3.0 * np.cos(9.1 * t + 0.3) + 1.5 * np.cos(23.0 * t)] * len(q))
 
 
 @pytest.mark.parametrize("restitution", [0.3, *long([0.9])])
@@ -86,9 +74,9 @@ def test_a_motor_in_a_backlash_is_a_body_between_rigid_stops(restitution: float)
     both = slides(("slide", "base", "cart", MASS), ("play", "cart", "motor", REFLECTED))
     options = {"duration_s": 3.0, "integrator": TIGHT, "record_period_s": 0.01, "estimate_error": False}
     stops = rd.effects.RigidStops([-np.inf, -GAP], [np.inf, GAP], [0.0, restitution])
-    theirs = rd.simulate(rd.Plant(both, [stops]), [0.0, 0.0], controller=Beats(2), **options)
+    theirs = rd.simulate(rd.Plant(both, [stops]), [0.0, 0.0], controller=beats, **options)
     ours = rd.simulate(
-        rd.Plant(SLIDER, [rd.effects.RigidBacklash(GAP, J, RATIO, restitution)]), [0.0], controller=Beats(), **options
+        rd.Plant(SLIDER, [rd.effects.RigidBacklash(GAP, J, RATIO, restitution)]), [0.0], controller=beats, **options
     )
     names = " ".join(each.name for each in ours.events)
     assert all(word in names for word in ("strikes the forward end", "strikes the backward end"))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from tests.effects.test_dahl import LEVEL, STIFFNESS, Beats
+from tests.effects.test_dahl import LEVEL, STIFFNESS, beats
 from tests.effects.test_effect_states import ARM, FRICTION, SLIDER, Q
 from tests.effects.test_line_spring_damper import BETWEEN, TO_WORLD, TREE, state
 from tests.long import long
@@ -38,7 +38,7 @@ def driven(period_s: float) -> tuple[Any, ...]:
 STIFFNESSES = {"series_elastic.stiffness": [[200.0, 0.0], [90.0, 0.0]]}
 POINTS = [[0.8, 0.2, 0.3], [0.6, 0.1, 1.0]]
 CASES = [
-    ([rd.effects.DahlFriction(STIFFNESS, LEVEL, 1.5)], (SLIDER, [0.0], None, 0.5, Beats()),
+    ([rd.effects.DahlFriction(STIFFNESS, LEVEL, 1.5)], (SLIDER, [0.0], None, 0.5, beats),
      {"dahl_friction.exponent": [1.2, 2.0]}),
     (STATES, ON_ARM, {"actuator_lag.time_constant": [[0.05, 0.02], [0.01, 0.08]]}),
     (STATES, ON_ARM, {"lugre_friction.bristle_stiffness": [120.0, 60.0]}),

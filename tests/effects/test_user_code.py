@@ -13,7 +13,6 @@ import pytest
 import robot_dyn as rd
 from robot_dyn import export
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SceneError, TraceError
-from robot_dyn.simulation import MachineError
 from tests.long import long
 
 ARM = rd.load("planar_2r")
@@ -336,30 +335,6 @@ def test_wrong_keys_of_an_effect_of_a_users_own_are_told(keys: str, said: str, t
         rd.read_scene(path, effects={"drag": Drag})
     with pytest.raises(SceneError, match="'spring' is a kind that scenes have"):
         rd.read_scene(path, effects={"spring": Drag})
-
-
-@dataclass(eq=False)
-class Changing(rd.effects.Active):
-    """An effect whose coefficient its owner changes between two runs."""
-
-    stiffness: float
-
-    def torque(self, dynamics, t, q, v):
-        return -self.stiffness * q
-
-
-def test_machine_code_of_a_part_that_has_changed_since_is_refused() -> None:
-    """Constants are in the code: another value is found by the self check of each run of a user's own parts."""
-    effect = Changing(3.0)
-    setup = rd.Setup(
-        rd.Plant(ARM, [effect]), [0.3, -0.4], duration_s=0.05, engine="compiled", estimate_error=False, integrator="rk4"
-    )
-    rd.simulate(setup)
-    effect.stiffness = 5.0
-    with pytest.raises(MachineError, match="differs from the interpreted one"):
-        rd.simulate(setup)
-    with pytest.raises(MachineError, match="differs from the interpreted one"):
-        rd.simulate(setup, integrator=rd.integrate.Adaptive())
 
 
 @pytest.mark.parametrize(

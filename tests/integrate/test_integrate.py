@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import FrozenInstanceError, replace
 from fractions import Fraction
 from typing import Any
@@ -195,12 +193,6 @@ def test_quadratures_integrate_power(integrator: Integrator) -> None:
         y = integrator.step(System(undamped, 1), i * h, y, h)
     assert abs(energy(y) - energy(start) - y[2]) < 5 * h**integrator.order + 1e-13
     assert abs(y[2]) > 0.02
-
-
-def test_importing_the_package_loads_no_scipy() -> None:
-    modules = "explicit, gauss, rosenbrock, adaptive, methods"
-    code = f"import sys, robot_dyn.integrate; from robot_dyn.integrate import {modules}; print('scipy' in sys.modules)"
-    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "False"
 
 
 def test_one_list_of_names_serves_all_that_take_a_method() -> None:

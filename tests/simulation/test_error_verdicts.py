@@ -23,6 +23,7 @@ from tests.campaigns.estimates.truth import truth
 from tests.campaigns.hard.stiff_motion import stop
 from tests.long import long
 from tests.own_method import OwnImplicit
+from tests.user_parts import Push
 
 RAIL = arms()["rail"].with_(gravity=(0.0, 0.0, 0.0))
 TOSS = arms()["rail"]
@@ -391,18 +392,6 @@ def test_a_setup_keeps_its_start() -> None:
         setup.q0[0] = 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class Pulse(Active):
-    """A force of its own on a short time, told to nobody."""
-
-    start: float
-    length: float
-    force: float
-
-    def torque(self, dynamics, t, q, v):
-        return (self.force if self.start <= t < self.start + self.length else 0.0) + 0 * v
-
-
 @pytest.mark.parametrize(
     "method",
     [
@@ -414,9 +403,8 @@ class Pulse(Active):
 def test_code_that_acts_between_steps_is_looked_at_there(method) -> None:
     """A pulse of 1 ms inside steps of 10 ms, at no node: no method sees it."""
     options = {} if isinstance(method, rd.integrate.Adaptive) else {"step_s": 0.01}
-    run = rd.simulate(
-        rd.Plant(RAIL, [Pulse(0.5016, 1e-3, 1e3)]), q0=[0.0], v0=[0.2], duration_s=2.0, integrator=method, **options
-    )
+    pulse = Push(lambda t, q, v: (1e3 if 0.5016 <= t < 0.5026 else 0.0) + 0 * v)
+    run = rd.simulate(rd.Plant(RAIL, [pulse]), q0=[0.0], v0=[0.2], duration_s=2.0, integrator=method, **options)
     error = abs(run.q[-1, 0] - (0.4 + 1.0 * (2.0 - 0.5021)))
     assert run.error.note or run.error.largest >= LEAST * error
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from itertools import pairwise
 from math import ceil
-from typing import final
 
 import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.effects import Active
 from tests.long import long
+from tests.user_parts import counted
 
 DOUBLE = rd.load("planar_2r")
 PLANT = rd.Plant(DOUBLE, [rd.effects.ViscousFriction([0.4, 0.2])])
@@ -137,22 +135,10 @@ def test_a_switch_on_a_tick_is_one_cut(edge: float) -> None:
     assert run.error.largest < 1e-6
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Counted(Active):
-    """A constant push that counts how often it is evaluated."""
-
-    calls: list[float] = field(default_factory=list)
-
-    def torque(self, dynamics, t, q, v):
-        self.calls.append(t)
-        return np.full(np.shape(v), 0.5)
-
-
 @pytest.mark.parametrize("method", ["explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8"])
 def test_a_run_evaluates_what_its_method_declares_and_nothing_it_does_not_name(method: str) -> None:
     """48 steps; besides them an effect is asked at the two samples only, for their acceleration and power."""
-    on, off = Counted(), Counted()
+    on, seen = counted()
     integrator = rd.integrate.method(method)
     run = rd.simulate(
         rd.Plant(DOUBLE, [on]), **START, duration_s=0.048, integrator=integrator, record_period_s=0.048,
@@ -163,8 +149,7 @@ def test_a_run_evaluates_what_its_method_declares_and_nothing_it_does_not_name(m
     assert run.statistics.evaluations == 48 * integrator.evaluations_per_step
     assert len(run.t) == 2
     # twice a sample, of which there are two, and at the start to see that it fits and that M is not singular there
-    assert run.statistics.evaluations <= len(on.calls) <= run.statistics.evaluations + 2 * 2 + 2
-    assert off.calls == []
+    assert run.statistics.evaluations <= len(seen) <= run.statistics.evaluations + 2 * 2 + 2
 
 
 @pytest.mark.parametrize(
@@ -174,10 +159,10 @@ def test_companions_that_are_off_cost_nothing(method) -> None:
     """Of 2, 3 and 5 times the step: 1/2 + 1/3 + 1/5 of the steps more, and looks between them; the run is the same."""
     runs, calls = [], []
     for estimate in (False, True):
-        effect = Counted()
+        effect, seen = counted()
         plant = rd.Plant(DOUBLE, [effect])
         runs.append(rd.simulate(plant, **START, duration_s=0.04, integrator=method, estimate_error=estimate))
-        calls.append(len(effect.calls))
+        calls.append(len(seen))
     without, with_companions = runs
     assert without.error is None
     assert "not estimated" in without.summary

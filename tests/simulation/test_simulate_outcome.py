@@ -10,11 +10,12 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.control import Stateless
-from robot_dyn.effects import Active, Conservative
+from robot_dyn.effects import Conservative
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SingularError
 from robot_dyn.simulation.run.event_run import EventRun
 from robot_dyn.simulation.run.fixed_step import FixedStep
 from tests.long import long
+from tests.user_parts import Push
 
 DOUBLE = rd.load("planar_2r")
 UR5 = rd.load("ur5")
@@ -43,15 +44,6 @@ class Interrupted(Stateless):
         if isinstance(self.ending, BaseException):
             raise self.ending
         return np.array([0.1, self.ending])
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class InterruptedEffect(Active):
-    def torque(self, dynamics, t, q, v):
-        if t > 0.05:
-            raise KeyboardInterrupt
-        return 0 * v
 
 
 def slack(method, period: float) -> float:
@@ -102,35 +94,35 @@ def test_stiff_gains_at_too_large_a_step_diverge_and_the_run_says_what_to_do(met
     assert "diverged" in run.summary
 
 
-@pytest.mark.parametrize("period", [0.0, 0.01])
-@pytest.mark.parametrize("method", METHODS, ids=name)
-def test_an_interrupted_run_keeps_its_samples(method, period: float) -> None:
-    law = Interrupted(KeyboardInterrupt(), period_s=period)
-    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, controller=law, integrator=method)
-    assert run.outcome.ending == "stopped"
-    assert run.outcome.advice
-    assert run.error is None
-    check_kept(run, 0.05 + period, slack(method, period))  # a sampled controller is asked at its next tick
-
-
 def test_an_effect_may_be_interrupted_too() -> None:
-    run = rd.simulate(rd.Plant(DOUBLE, [InterruptedEffect()]), **START, duration_s=0.2)
+    def interrupts(t, q, v):
+        if t > 0.05:
+            raise KeyboardInterrupt
+        return 0 * v
+
+    run = rd.simulate(rd.Plant(DOUBLE, [Push(interrupts)]), **START, duration_s=0.2)
     assert run.outcome.ending == "stopped"
     check_kept(run, 0.05)
 
 
 @pytest.mark.parametrize(
     ("ending", "period"),
-    [(STRETCHED, 0.01), (np.nan, 0.0), *long([(STRETCHED, 0.0), (np.nan, 0.01), (np.inf, 0.0), (np.inf, 0.01)])],
+    [
+        *((KeyboardInterrupt(), 0.0), (KeyboardInterrupt(), 0.01), (STRETCHED, 0.01), (np.nan, 0.0)),
+        *long([(STRETCHED, 0.0), (np.nan, 0.01), (np.inf, 0.0), (np.inf, 0.01)]),
+    ],
 )
 @pytest.mark.parametrize("method", METHODS, ids=name)
-def test_a_controller_that_fails_ends_the_run_where_it_fails(method, period: float, ending) -> None:
+def test_a_controller_that_fails_or_is_interrupted_ends_the_run_where_it_does(method, period: float, ending) -> None:
     """At 50 ms, or the tick after it; the outcome names that time, not the start, and no foreign error leaves."""
     law = Interrupted(ending, period_s=period)
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, controller=law, integrator=method)
-    assert run.outcome.ending == "diverged"
-    assert run.outcome.t == pytest.approx(0.05 + period, abs=slack(method, period))
     check_kept(run, 0.05 + period, slack(method, period))
+    if isinstance(ending, KeyboardInterrupt):
+        assert run.outcome.ending == "stopped" and run.outcome.advice and run.error is None
+    else:
+        assert run.outcome.ending == "diverged"
+        assert run.outcome.t == pytest.approx(0.05 + period, abs=slack(method, period))
     if isinstance(ending, rd.RobotDynError):
         assert "stretched out" in run.outcome.advice
 
@@ -175,17 +167,6 @@ def test_a_setup_without_meaning_is_refused(options: dict, message: str) -> None
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Blow(Active):
-    """An effect that returns what it is told to."""
-
-    given: object
-
-    def torque(self, dynamics, t, q, v):
-        return self.given
-
-
-@final
 class Law(Stateless):
     """A controller that returns what it is told to."""
 
@@ -214,8 +195,8 @@ class Law(Stateless):
 )
 def test_code_of_ones_own_returns_one_number_for_each_joint(given: object, found: str) -> None:
     """Told with the name of its class; a scalar or (1, n) would else be broadcast without a word."""
-    with pytest.raises(EffectError, match=rf"Blow\.torque returned {found} for 2 joints"):
-        rd.Setup(rd.Plant(DOUBLE, [Blow(given)]), [0.3, -0.4])
+    with pytest.raises(EffectError, match=rf"Push\.torque returned {found} for 2 joints"):
+        rd.Setup(rd.Plant(DOUBLE, [Push(lambda t, q, v: given)]), [0.3, -0.4])
     with pytest.raises(ControlError, match=rf"Law\.torque returned {found} for 2 joints"):
         rd.Setup(rd.Plant(DOUBLE), [0.3, -0.4], controller=Law(given))
 
