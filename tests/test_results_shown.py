@@ -51,16 +51,10 @@ def texts(result: Answer) -> list[str]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_repr_of_a_result_is_its_text_and_no_arrays(name: str) -> None:
-    text = repr(made(name))
-    assert "array(" not in text and len(text) < MOST_TEXT
+def test_a_result_says_its_text_as_text_and_as_html_that_needs_nothing_else(name: str) -> None:
+    text, page = repr(made(name)), made(name)._repr_html_()
+    assert "array(" not in text and len(text) < MOST_TEXT and len(page) < MOST_HTML
     assert all(each in text for each in texts(made(name)))
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_html_of_a_result_says_its_text_and_needs_nothing_else(name: str) -> None:
-    page = made(name)._repr_html_()
-    assert len(page) < MOST_HTML
     assert not re.search(r"<script|<\?xml|(href|src)=\"(?!#)|url\((?!#)|javascript:|@import", page)
     tree = html.fragment_fromstring(page)
     shown = " ".join(tree.text_content().split()).replace("−", "-")
