@@ -143,9 +143,7 @@ def test_an_overflow_in_a_users_code_is_an_outcome_of_the_run() -> None:
     def runaway(t, q, v):
         return ARM.inverse_dynamics(q, v, 1e4 * v)
 
-    run = rd.simulate(
-        rd.Plant(ARM), q0=Q, v0=V, duration_s=0.2, controller=runaway, integrator=rd.integrate.method("rk4")
-    )
+    run = rd.simulate(ARM, Q, V, duration_s=0.2, controller=runaway, integrator="rk4")
     assert run.outcome.ending == "diverged" and len(run.t) > 1
 
 

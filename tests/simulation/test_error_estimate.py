@@ -95,9 +95,7 @@ def test_estimate_of_a_sampled_controller_is_that_of_the_same_ticks() -> None:
     plant, _, q0, v0, duration, _ = SCENES["planar_2r with friction"]
     law = rd.control.PD(rd.control.quintic(q0, [0.9, 0.2], 0.5), [60.0, 20.0], [4.0, 1.0], period_s=0.05)
     run = rd.simulate(setup(plant, law, q0, v0, duration, 5e-3))
-    exact = rd.simulate(
-        setup(plant, law, q0, v0, duration, 5e-3), integrator=rd.integrate.method("order_8"), step_s=2e-3
-    )
+    exact = rd.simulate(setup(plant, law, q0, v0, duration, 5e-3), integrator="order_8", step_s=2e-3)
     assert run.error is not None
     assert run.error.note == ""
     error = np.abs(run.q[-1] - exact.q[-1]).max()
@@ -119,9 +117,7 @@ def test_chaos_at_a_coarse_step_is_not_resolved(step: float) -> None:
     """The double pendulum from 2.5 rad tumbles: errors grow e-fold in less than 1 s, up to the size of the motion."""
     chaos = setup(rd.Plant(DOUBLE), None, [2.5, 0.7], [0.3, 0.5], 20.0, step)
     run = rd.simulate(chaos)
-    reference = rd.simulate(
-        chaos, integrator=rd.integrate.method("order_8"), step_s=step / 10, record_period_s=step, estimate_error=False
-    )
+    reference = rd.simulate(chaos, integrator="order_8", step_s=step / 10, record_period_s=step, estimate_error=False)
     error, estimate = true_error(run, reference), run.error
     assert error[-1] > 1.0  # the end of the run is fiction
     assert estimate is not None

@@ -272,9 +272,7 @@ def test_a_tick_within_rounding_of_a_switch_moves_onto_it() -> None:
 def test_control_at_the_default_step_is_estimated() -> None:
     """1 kHz control has one step a tick: only shorter steps can tell, and they do."""
     law = rd.control.PD(rd.control.hold(READY), *rd.control.gains_from(np.diag(PANDA.M(READY)), 10.0), period_s=1e-3)
-    setup = rd.Setup(
-        rd.Plant(PANDA), READY + 0.1, duration_s=0.1, controller=law, integrator=rd.integrate.method("midpoint")
-    )
+    setup = rd.Setup(rd.Plant(PANDA), READY + 0.1, duration_s=0.1, controller=law, integrator="midpoint")
     run = rd.simulate(setup)
     error = np.abs(run.q - truth(setup, run.t)).max()
     assert run.error.note == ""
@@ -314,9 +312,7 @@ def test_a_usable_run_with_stiff_friction_is_bounded_not_refused() -> None:
 @pytest.mark.parametrize("far", [1e13, *long([1e9, 1e16])])
 def test_rounding_of_a_far_position_is_in_the_estimate(far: float) -> None:
     """Q += h v loses what is below half a unit of q's last place, in every step and every companion run alike."""
-    run = rd.simulate(
-        rd.Plant(RAIL), q0=[far], v0=[0.7], duration_s=1.0, integrator=rd.integrate.method("semi_implicit_euler")
-    )
+    run = rd.simulate(RAIL, [far], [0.7], duration_s=1.0, integrator="semi_implicit_euler")
     error = abs(run.q[-1, 0] - (far + 0.7))
     assert run.error.at(run.error.until_s) >= LEAST * error or "rounding" in run.error.note
     assert (far == 1e9) == (run.error.note == "")
@@ -351,9 +347,7 @@ def upright(start: float, times: np.ndarray) -> np.ndarray:
 
 def test_turns_that_no_step_can_see_have_no_estimate() -> None:
     """A whole turn in each step: gravity is sampled at one angle, in all companions alike."""
-    run = rd.simulate(
-        rd.Plant(rd.load("pendulum")), q0=[0.0], v0=[400 * np.pi], duration_s=0.5, integrator="rk4", step_s=5e-3
-    )
+    run = rd.simulate(rd.load("pendulum"), [0.0], [400 * np.pi], duration_s=0.5, integrator="rk4", step_s=5e-3)
     assert run.error.verdict is Verdict.NONE
     assert "turns by 6.28 rad in a step" in run.error.note
 
