@@ -145,6 +145,11 @@ ROBOT = rd.load("planar_2r")
         (lambda: PD(MOTION, 1.0, [1.0, 2.0]), r"kd must be one number or of shape \(3,\), got \(2,\)"),
         (lambda: PD(MOTION, "stiff", 1.0), "kp must be real numbers"),
         (lambda: PD(MOTION, 1.0, np.inf), "kd must be finite"),
+        # names of joints: a controller such as PD knows none, so that nothing could resolve them later
+        *(
+            (lambda gain=gain: PD(MOTION, gain, KD), "kp must be real numbers, one or of shape")
+            for gain in ({"joint_1": 5.0}, "urdf", None)
+        ),
         (lambda: PD(MOTION, 1.0, 1.0, period_s=-0.1), "period_s must be a positive number of seconds"),
         (lambda: PD([0.0], 1.0, 1.0), "reference must be a PiecewisePolynomial"),
         (lambda: PID(MOTION, 1.0, -1.0, 1.0), "ki must not be negative"),
@@ -161,13 +166,6 @@ ROBOT = rd.load("planar_2r")
 def test_controllers_without_meaning_are_refused(make, message: str) -> None:
     with pytest.raises(ControlError, match=message):
         make()
-
-
-@pytest.mark.parametrize("gain", [{"joint_1": 5.0}, "urdf", None])
-def test_gains_by_joint_name_are_refused(gain) -> None:
-    """A controller such as PD knows no names of joints, so that nothing could resolve them later."""
-    with pytest.raises(ControlError, match="kp must be real numbers, one or of shape"):
-        PD(MOTION, gain, KD)
 
 
 @dataclass(frozen=True, eq=False)
