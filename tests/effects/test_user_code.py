@@ -158,8 +158,6 @@ def test_a_torque_of_a_wrong_shape_is_an_error_of_the_library() -> None:
 
     with pytest.raises(EffectError, match="wide does not fit 2 joints"):
         rd.Plant(ARM, [Wide()]).torque(0.0, Q, V)
-    with pytest.raises(EffectError, match=r"Wide.torque returned shape \(3,\)"):
-        rd.Setup(rd.Plant(ARM, [Wide()]), Q)
     broken, plant = rd.effects.ViscousFriction(0.1), rd.Plant(ARM)
     object.__setattr__(broken, "damping", np.ones(3))
     object.__setattr__(plant, "effects", (broken,))

@@ -113,6 +113,8 @@ def test_a_step_that_was_not_given_is_one_millisecond_and_stands_in_the_way_of_n
     setup = rd.Setup(PLANT, Q, duration_s=0.05, integrator="rk4", estimate_error=False)
     assert setup.taken_step_s == pytest.approx(1e-3, rel=1e-12)
     assert rd.simulate(replace(setup, integrator="DOP853")).statistics.method == "DOP853"
+    stepped = replace(setup, step_s=2e-3)  # a step for the other method
+    assert rd.simulate(stepped, integrator="DOP853").statistics.step_s == 0
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.dtype(np.float32), np.float64, np.dtype("f8")], ids=str)

@@ -11,7 +11,6 @@ from robot_dyn.foundations import CatalogError, ControlError, EditError, EffectE
 
 ARM = rd.load("planar_2r")
 UR5 = rd.load("ur5")
-START = {"q0": [0.3, -0.4], "duration_s": 0.1}
 
 
 # --- effects
@@ -83,12 +82,6 @@ def test_folders_of_packages_that_are_none_are_refused(tmp_path) -> None:
 
 
 # --- runs
-
-
-def test_a_step_for_one_method_is_none_for_another() -> None:
-    stepped = rd.Setup(rd.Plant(ARM), **START, integrator="rk4", step_s=2e-3)
-    adaptive = rd.simulate(stepped, integrator="DOP853", estimate_error=False)  # the step was for the other method
-    assert adaptive.statistics.step_s == 0
 
 
 def test_a_controller_whose_model_has_other_joints_than_the_plant_is_refused() -> None:
