@@ -15,13 +15,8 @@ from tests.user_parts import Push
 
 ARM = rd.load("planar_2r")
 FAST = rd.Compiled(ARM)
-PUSHED = rd.Plant(
-    ARM,
-    [
-        rd.effects.ViscousFriction(0.3),
-        rd.effects.ExternalWrench("tip", [1.0, 0, 2, 0, -0.5, 0], start_s=0.2, end_s=0.6),
-    ],
-)
+WINDOW = rd.effects.ExternalWrench("tip", [1.0, 0, 2, 0, -0.5, 0], start_s=0.2, end_s=0.6)
+PUSHED = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3), WINDOW])
 PLANT = rd.Compiled(PUSHED)
 FAR = 2 * np.pi * 40_000
 

@@ -418,10 +418,6 @@ def test_models_of_ones_own_controller_have_the_right_angles_of_the_machine_code
 
     options = {"duration_s": 0.5, "record_period_s": 0.01, "engine": "compiled", "estimate_error": False}
     run = rd.simulate(_Stiff.arm, _Stiff.start, controller=Law(_Stiff.plan, _Stiff.arm), **options)
-    same = rd.simulate(
-        _Stiff.arm,
-        _Stiff.start,
-        controller=rd.control.PDGravity(_Stiff.arm, _Stiff.plan, _Stiff.kp, _Stiff.kd),
-        **options,
-    )
+    built_in = rd.control.PDGravity(_Stiff.arm, _Stiff.plan, _Stiff.kp, _Stiff.kd)
+    same = rd.simulate(_Stiff.arm, _Stiff.start, controller=built_in, **options)
     assert run.statistics.engine == "compiled" and np.abs(run.q - same.q).max() < 1e-12

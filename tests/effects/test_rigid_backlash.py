@@ -143,14 +143,8 @@ def test_a_motor_that_rests_at_an_end_is_an_armature(engine: str) -> None:
     drive = rd.effects.RigidBacklash({"joint_2": 0.01}, {"joint_2": 0.05}, {"joint_2": 4.0})
     run = rd.simulate(rd.Plant(ARM, [drive]), Q, duration_s=0.25, record_period_s=0.1, **options)
     (hit,) = run.events
-    rest = rd.simulate(
-        ARM.with_(armature={"joint_2": 0.05 * 16}),
-        hit.q,
-        hit.v,
-        duration_s=0.25 - hit.t,
-        record_period_s=0.0,
-        **options,
-    )
+    heavy = ARM.with_(armature={"joint_2": 0.05 * 16})
+    rest = rd.simulate(heavy, hit.q, hit.v, duration_s=0.25 - hit.t, record_period_s=0.0, **options)
     assert hit.name == "joint_2 strikes the forward end of its backlash"
     np.testing.assert_allclose(run.q[-1], rest.q[-1], atol=1e-10)
     np.testing.assert_allclose(run.a[-1], rest.a[-1], atol=1e-8)

@@ -187,11 +187,9 @@ def test_stops_that_are_struck_in_turn_come_to_rest_together() -> None:
     arm = rd.load("cart_pole")
     stops = rd.effects.RigidStops([-0.6556, 0.5434], [-0.0705, 0.9402], [0.6, 0.0])
     drive = rd.control.PD(rd.control.hold([-0.7727, 0.6249]), [370.0, 4.3], [17.3, 1.14])
-    run = rd.simulate(
-        rd.Plant(arm, [rd.effects.ViscousFriction([3.6, 0.52]), stops]), [-0.5163, 0.7435], [0.6811, 0.9512],
-        duration_s=1.0,
-        controller=drive, estimate_error=False, integrator=rd.integrate.Adaptive(rtol=1e-4, atol=1e-6),
-    )  # fmt: skip
+    plant = rd.Plant(arm, [rd.effects.ViscousFriction([3.6, 0.52]), stops])
+    loose = {"integrator": rd.integrate.Adaptive(rtol=1e-4, atol=1e-6), "estimate_error": False}
+    run = rd.simulate(plant, [-0.5163, 0.7435], [0.6811, 0.9512], duration_s=1.0, controller=drive, **loose)
     assert run.outcome.ending == "finished"
     assert len(run.events) < 300
     assert (np.diff(run.ledger.work["rigid_stops"]) <= 1e-12).all()

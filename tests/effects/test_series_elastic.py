@@ -17,6 +17,7 @@ TIGHT = rd.integrate.Adaptive("DOP853", 1e-12, 1e-14)
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 K, J, RATIO, D, B = 80.0, 0.002, 9.0, 0.4, 0.3  # of the slider, in [N/m], [kg], 1, [N s/m], [N s/m]
 REFLECTED = RATIO**2 * J
+OFTEN = {"integrator": TIGHT, "record_period_s": 0.01, "estimate_error": False}
 
 
 def slide(effect: rd.effects.SeriesElastic, engine: str = "interpreted", **options) -> rd.Trajectory:
@@ -143,11 +144,8 @@ def test_beyond_the_gap_of_a_backlash_the_spring_turns_what_moved_freely_within_
     beta, F = 0.02, 1.3
     drive = rd.effects.SeriesElastic(K, J, RATIO, backlash=beta)
     push = rd.effects.ExternalWrench("cart", [F, 0, 0, 0, 0, 0])
-    run = rd.simulate(
-        rd.Plant(SLIDER, [drive] if side == 1 else [drive, push]), [0.0], duration_s=2.0,
-        controller=Ramp(F if side == 1 else 0.0), integrator=TIGHT, engine=engine, record_period_s=0.01,
-        estimate_error=False,
-    )  # fmt: skip
+    plant, law = rd.Plant(SLIDER, [drive] if side == 1 else [drive, push]), Ramp(F if side == 1 else 0.0)
+    run = rd.simulate(plant, [0.0], duration_s=2.0, controller=law, engine=engine, **OFTEN)
     free, omega = F / (REFLECTED if side == 1 else MASS), np.sqrt(K * (1 / MASS + 1 / REFLECTED))
     t1 = np.sqrt(2 * beta / free)
     s, c = free / omega**2, free * t1 / omega
@@ -173,11 +171,8 @@ def test_dry_friction_of_a_joint_holds_it_until_its_spring_has_the_load() -> Non
     """A motor at constant speed behind a spring: the joint sticks until k δ reaches the friction of rest; 1e-9."""
     speed, level = 0.3, 2.0
     drive = rd.effects.SeriesElastic(K, J, RATIO, friction=1e3)  # its friction keeps the speed u/b, to 1e-3 of it
-    run = rd.simulate(
-        rd.Plant(SLIDER, [drive, rd.effects.DryFriction(1.0, level)]), [0.0], duration_s=0.2,
-        controller=Ramp(1e3 * speed),
-        integrator=TIGHT, record_period_s=0.01, estimate_error=False,
-    )  # fmt: skip
+    plant = rd.Plant(SLIDER, [drive, rd.effects.DryFriction(1.0, level)])
+    run = rd.simulate(plant, [0.0], duration_s=0.2, controller=Ramp(1e3 * speed), **OFTEN)
     first = next(each for each in run.events if each.name == "slide slides")
     assert first.q == (0.0,)
     row = np.searchsorted(run.t, first.t)

@@ -212,16 +212,9 @@ def test_a_function_is_the_controller_of_the_same_law() -> None:
     def law(t, q, v):
         return 4.0 * (Q - 0.2 - q) - 1.5 * v
 
-    setup = rd.Setup(
-        rd.Plant(ARM),
-        Q,
-        V,
-        0.1,
-        rd.control.PD(rd.control.hold(Q - 0.2), 4.0, 1.5),
-        engine="interpreted",
-        integrator="rk4",
-    )
-    run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.1, controller=law, integrator="rk4")
+    pd = rd.control.PD(rd.control.hold(Q - 0.2), 4.0, 1.5)
+    setup = rd.Setup(rd.Plant(ARM), Q, V, 0.1, pd, "rk4", engine="interpreted")
+    run = rd.simulate(ARM, Q, V, duration_s=0.1, controller=law, integrator="rk4")
     assert np.array_equal(run.q, rd.simulate(setup).q)
     assert run.statistics.engine.startswith("interpreted (law declares no thresholds: give a class")
     compiled = rd.simulate(setup, controller=law, engine="compiled")

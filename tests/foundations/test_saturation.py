@@ -159,11 +159,8 @@ def test_what_is_held_stays_held_when_a_limit_is_no_longer_looked_for() -> None:
 def test_sweeps_of_the_limit_are_cut_as_single_runs_are() -> None:
     """A limit of none for the first, and two that are reached."""
     controller, _ = control("computed_torque")
-    setup = rd.Setup(
-        rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), START, controller=controller, duration_s=1.0,
-        record_period_s=0.25,
-        estimate_error=False,
-    )  # fmt: skip
+    plant, options = rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), {"record_period_s": 0.25, "estimate_error": False}
+    setup = rd.Setup(plant, START, None, 1.0, controller, **options)
     limits = np.array([[np.inf, np.inf], [18.0, 5.0], [25.0, 8.0]])
     runs = rd.rollouts(setup, params={"effort_limit.limit": limits})
     for i, limit in enumerate(limits):

@@ -181,15 +181,9 @@ def test_progress_is_told_and_an_interrupt_keeps_the_samples() -> None:
 def test_a_reference_that_jumps_between_rests() -> None:
     """Steps end at the jump, so that both engines see the same constant on either side."""
     jump = rd.control.PiecewisePolynomial([0, 0.1, 0.2], [[Q], [Q + 1]])
-    setup = rd.Setup(
-        rd.Plant(ARM),
-        Q,
-        duration_s=0.2,
-        controller=rd.control.PD(jump, 10.0, 1.0),
-        estimate_error=False,
-        integrator="rk4",
-    )
-    run = rd.simulate(replace(setup, engine="interpreted"))
+    law = rd.control.PD(jump, 10.0, 1.0)
+    setup = rd.Setup(rd.Plant(ARM), Q, None, 0.2, law, "rk4", estimate_error=False)
+    run = rd.simulate(setup, engine="interpreted")
     assert np.abs(run.q[-1] - Q).max() > 0.01
     check_equal(rd.simulate(setup, engine="compiled"), run, 1e-12)
 

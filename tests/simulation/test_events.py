@@ -156,12 +156,8 @@ def test_a_start_on_a_stop_and_one_within_it() -> None:
 def test_two_joints_that_meet_their_stops_at_once() -> None:
     """Two equal blocks on two rails: both events, at one time, and equal motion afterwards."""
     pair = slides(("j1", "base", "b1", 1.0), ("j2", "base", "b2", 1.0), axes=("0 0 1",) * 2)
-    run = rd.simulate(
-        rd.Plant(pair, rd.effects.joint_stops([-0.5, -0.5], [9.0, 9.0], 1e6, 0.0)),
-        [0.0, 0.0],
-        duration_s=1.0,
-        integrator=TIGHT,
-    )
+    plant = rd.Plant(pair, rd.effects.joint_stops([-0.5, -0.5], [9.0, 9.0], 1e6, 0.0))
+    run = rd.simulate(plant, [0.0, 0.0], duration_s=1.0, integrator=TIGHT)
     times = [each.t for each in run.events]
     assert len(times) >= 4
     assert times[0] == pytest.approx(np.sqrt(1.0 / G), abs=1e-13)
