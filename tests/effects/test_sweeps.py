@@ -75,6 +75,7 @@ def changed(effects: Any, values: dict[str, Any], k: int) -> list[Any]:
 @pytest.mark.parametrize(("effects", "scene", "params"), CASES)
 def test_each_run_is_that_of_the_effect_with_its_value(effects: Any, scene: Any, params: dict[str, Any]) -> None:
     """In both engines: 1e-12 of positions, 1e-10 of what stiff effects make of them. Rollouts keep no states."""
+    works = 1e-11 if effects is DRIVE else 1e-10
     given = {name: np.array(x) for name, x in params.items()}
     runs = rd.rollouts(setup(effects, scene), params=given, record=("q", "v", "u", "work"))
     for k in range(2):
@@ -86,7 +87,7 @@ def test_each_run_is_that_of_the_effect_with_its_value(effects: Any, scene: Any,
         one = runs[k]
         np.testing.assert_array_equal(one.u, runs.u[k])
         for name, work in alone.ledger.work.items():
-            np.testing.assert_allclose(runs.work[name][k], work, atol=1e-10)
-            np.testing.assert_allclose(one.ledger.work[name], work, atol=1e-10)
+            np.testing.assert_allclose(runs.work[name][k], work, atol=works)
+            np.testing.assert_allclose(one.ledger.work[name], work, atol=works)
         assert np.isnan(one.a).all() == bool(alone.effect_states)
-    assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-6
+    assert np.abs(runs.q[1] - runs.q[0]).max() > (1e-3 if effects is DRIVE else 1e-5 if effects is STATES else 1e-6)
