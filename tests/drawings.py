@@ -15,8 +15,6 @@ from robot_dyn.view import Drawing, drawing
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 
-FLOAT32 = 1e-6  # [m]: coordinates of a few metres at most, in float32
-
 
 def urdf(visual: str, more: str = "", collision: str = "") -> bytes:
     """A pendulum whose link has this <visual>."""

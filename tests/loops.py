@@ -6,31 +6,23 @@ x' = A x + B u;   u_k = law(k, what was measured at t_k − τ_m) acts on [t_k +
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
-from math import ceil
 
 import numpy as np
 from scipy.linalg import expm
 
 import robot_dyn as rd
+from tests.short_loops import Arm, ShortLoop
+from tests.slides import slides
 
 Law = Callable[[int, np.ndarray, np.ndarray], np.ndarray]
-ARM = """<robot name="slides"><link name="base"/>
-<link name="one"><inertial><mass value="1.3"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="two"><inertial><mass value="0.7"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="a" type="prismatic"><parent link="base"/><child link="one"/><axis xyz="1 0 0"/>
-<limit effort="1e6" velocity="1e6" lower="-9" upper="9"/></joint>
-<joint name="b" type="prismatic"><parent link="one"/><child link="two"/><axis xyz="0.6 0.8 0"/>
-<limit effort="1e6" velocity="1e6" lower="-9" upper="9"/></joint></robot>"""
+ARM = slides(("a", "base", "one", 1.3), ("b", "one", "two", 0.7), axes=("1 0 0", "0.6 0.8 0"))
 STIFFNESS, DAMPING = np.array([7.0, 3.0]), np.array([0.4, 0.9])
 Q0, V0 = np.array([0.31, -0.23]), np.array([0.7, -0.4])
 
 
 def plant() -> rd.Plant:
     """Two coupled slides on springs and dampers: a linear plant whose M is constant and not diagonal."""
-    robot = rd.Robot.from_text(ARM).with_(gravity=(0.0, 0.0, 0.0))
+    robot = ARM.with_(gravity=(0.0, 0.0, 0.0))
     return rd.Plant(robot, [rd.effects.Spring(STIFFNESS), rd.effects.ViscousFriction(DAMPING)])
 
 
@@ -90,30 +82,10 @@ def exact(law: Law, period: float, periods: int, measured_late: float = 0.0, act
 def growth(
     arm: rd.Robot, q: np.ndarray, gains: tuple[np.ndarray, np.ndarray], period: float, late: tuple[float, float]
 ) -> float:
-    """ρ of the exact map of a period of an arm at rest under PD, by the definition of delays (measured, acting).
-
-    Its state is (x_k, u_{k−1}, u_{k−2}, …, and the samples that are on their way, the newest first).
-    """
-    n, e = arm.n, 1e-6
-    M = arm.M(q)
+    """ρ of the exact map of a period of an arm at rest under PD, by the definition of delays (measured, acting)."""
+    n, e, M = arm.n, 1e-6, arm.M(q)
     slope = np.array([(arm.N(q + e * d) - arm.N(q - e * d)) / (2 * e) for d in np.eye(n)]).T
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, slope), np.zeros((n, n))]])
-    both = np.block([[A, np.vstack([np.zeros((n, n)), np.linalg.inv(M)])], [np.zeros((n, 3 * n))]])
-    waiting, acting = ceil(late[0]), ceil(late[1])
-    size = 2 * n + (acting + 1) * n + waiting * 2 * n
-    rows = iter(np.eye(size).reshape(-1, n, size))
-    x = np.vstack([next(rows), next(rows)])
-    torques = [next(rows) for _ in range(acting + 1)]
-    samples = [np.vstack([next(rows), next(rows)]) for _ in range(waiting)]
-    law = -np.hstack([np.diag(each) for each in gains])
-    torques.insert(0, law @ (samples[-1] if waiting else x))
-    passes, measures = late[1] % 1, -late[0] % 1
-    times = sorted({0.0, passes, measures, 1.0})
-    for a, b in pairwise(times):
-        if waiting and a == measures:
-            newest = x
-        u = torques[acting] if a < passes else torques[int(late[1])]
-        flow = expm(both * (b - a) * period)
-        x = flow[: 2 * n, : 2 * n] @ x + flow[: 2 * n, 2 * n :] @ u
-    made = [x, *torques[: acting + 1], *([newest, *samples[:-1]] if waiting else [])]
-    return float(np.abs(np.linalg.eigvals(np.vstack(made))).max())
+    B = np.vstack([np.zeros((n, n)), np.linalg.inv(M)])
+    about = Arm("at rest", rd.Plant(arm), A, B, np.diag(M), q, q, 0 * q)
+    return ShortLoop(about, gains[0], None, gains[1], late, False, 0, 1.0, 1).radius(period)

@@ -21,14 +21,10 @@ import pinocchio as pin
 from scipy.linalg import expm
 
 import robot_dyn as rd
+from tests.slides import slides as chain
 
 ABOVE, BELOW, CLOSE = 1.001, 0.999, 1e-3  # of a radius that must not be called stable, or unstable; of a limit
 ARMS = ("ur5", "panda")
-_LINK = (
-    '<link name="l{i}"><inertial><mass value="{m!r}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-    '</inertial></link><joint name="j{i}" type="prismatic"><parent link="l{p}"/><child link="l{i}"/><axis xyz="{e}"/>'
-    '<limit lower="-1e9" upper="1e9" effort="1e9" velocity="1e9"/></joint>'
-)
 
 
 @dataclass(frozen=True)
@@ -146,9 +142,9 @@ def slides(rng: np.random.Generator) -> Arm:
     M = np.array([[tail[max(i, j)] * (axes[i] @ axes[j]) for j in range(n)] for i in range(n)])
     k = 10 ** rng.uniform(0, 3, n) * mass * (rng.random() < 0.5)
     d = 10 ** rng.uniform(-1.5, 1.5, n) * mass * (rng.random() < 0.5)
-    each = zip(mass.tolist(), (" ".join(map(repr, e)) for e in axes.tolist()), strict=True)
-    links = "".join(_LINK.format(i=i + 1, p=i, m=m, e=e) for i, (m, e) in enumerate(each))
-    robot = rd.Robot.from_text(f'<robot name="slides"><link name="l0"/>{links}</robot>').with_(gravity=(0, 0, 0))
+    names = ["base", *(f"l{i + 1}" for i in range(n))]
+    blocks = [(f"j{i + 1}", names[i], names[i + 1], m) for i, m in enumerate(mass.tolist())]
+    robot = chain(*blocks, axes=tuple(" ".join(map(repr, e)) for e in axes.tolist())).with_(gravity=(0, 0, 0))
     effects = [rd.effects.Spring(k)] * bool(k.any()) + [rd.effects.ViscousFriction(d)] * bool(d.any())
     inverse, zero = np.linalg.inv(M), np.zeros((n, n))
     A = np.block([[zero, np.eye(n)], [-inverse * k, -inverse * d]])

@@ -124,14 +124,6 @@ def test_axes_are_those_of_pinocchio_by_their_names(engine, name: str) -> None:
         np.testing.assert_allclose(engine(robot).jacobian_rate(q, v, frame, expressed_in=axes), rate, atol=1e-12)
 
 
-@pytest.mark.parametrize("axes", ["globe", "Local", 1, None, pin.BODY])
-def test_other_axes_are_refused(axes) -> None:
-    robot = rd.load("pendulum")
-    for engine in (robot, rd.Lagrangian(robot)):
-        with pytest.raises(QueryError, match="no expressed_in"):
-            engine.jacobian([0.3], robot.frame_names[-1], expressed_in=axes)
-
-
 @pytest.mark.parametrize("engine", [lambda robot: robot, rd.Lagrangian, rd.Compiled], ids=["Robot", "own", "compiled"])
 def test_the_frame_of_a_joint_is_that_of_its_child_link(engine) -> None:
     """Also of fixed and locked joints."""

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from importlib import import_module
 from inspect import signature
 from operator import attrgetter
@@ -75,10 +73,3 @@ def test_options_by_keyword_complete_in_a_session() -> None:
 def test_an_unknown_name_of_a_room_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match=r"module 'robot_dyn\.effects' has no attribute 'Friction'"):
         rd.effects.Friction  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
-
-
-def test_importing_the_rooms_imports_no_numpy() -> None:
-    rooms = ", ".join(f"robot_dyn.{each}" for each in ROOMS)
-    code = f"import sys, {rooms}; print('numpy' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert done.stdout.strip() == "False"

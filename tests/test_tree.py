@@ -73,19 +73,3 @@ def test_no_rooms_of_a_run_import_in_a_circle() -> None:
         graph.squash_module(room)
     imported = {room: graph.find_modules_directly_imported_by(room) for room in of_run}
     assert not {x for x in of_run if any(graph.chain_exists(importer=y, imported=x) for y in imported[x])}
-
-
-@pytest.mark.parametrize("code", ["rd.load('ur5').M([0.0] * 6)", "rd.load('ur5').C([0.1] * 6, [0.2] * 6)"])
-def test_a_query_loads_what_it_needs(code: str) -> None:
-    """M and C of a robot load neither a compiler nor anything that draws, proves or simulates."""
-    heavy = ("numba", "llvmlite", "casadi", "flint", "matplotlib", "scipy", "meshcat", "trimesh", "pydantic", "typer")
-    program = f"import sys, robot_dyn as rd; {code}; print([m for m in {heavy} if m in sys.modules])"
-    program += "; print(sorted({m.split('.')[1] for m in sys.modules if m.startswith('robot_dyn.')}))"
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=60, check=True
-    )
-    loaded, modules = done.stdout.splitlines()
-    assert loaded == "[]"
-    assert not {"simulation", "codegen", "effects", "control", "view", "accuracy", "tools", "lagrange"} & set(
-        ast.literal_eval(modules)
-    )

@@ -10,18 +10,13 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.effects import Active
 from robot_dyn.foundations import QueryError, TraceError
+from tests.user_parts import Push
 
 ARM = rd.load("planar_2r")
 FAST = rd.Compiled(ARM)
-PUSHED = rd.Plant(
-    ARM,
-    [
-        rd.effects.ViscousFriction(0.3),
-        rd.effects.ExternalWrench("tip", [1.0, 0, 2, 0, -0.5, 0], start_s=0.2, end_s=0.6),
-    ],
-)
+WINDOW = rd.effects.ExternalWrench("tip", [1.0, 0, 2, 0, -0.5, 0], start_s=0.2, end_s=0.6)
+PUSHED = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3), WINDOW])
 PLANT = rd.Compiled(PUSHED)
 FAR = 2 * np.pi * 40_000
 
@@ -137,24 +132,14 @@ def test_a_plant_that_was_used_can_be_pickled() -> None:
     np.testing.assert_array_equal(again.forward_dynamics(0.3, *state(False)), right)
 
 
-class Odd(Active):
-    """An effect that does what no trace can follow."""
-
-    def __init__(self, does) -> None:
-        self.does = does
-
-    def torque(self, dynamics, t, q, v):
-        return self.does(q, v)
-
-
 @pytest.mark.parametrize(
     "does",
-    [lambda q, v: None, lambda q, v: v[q > 0], lambda q, v: np.sort(np.concatenate([q, v] * 4))[:2]],
+    [lambda t, q, v: None, lambda t, q, v: v[q > 0], lambda t, q, v: np.sort(np.concatenate([q, v] * 4))[:2]],
     ids=["None", "index", "branches"],
 )
 def test_an_effect_that_cannot_be_traced_is_named(does) -> None:
-    with pytest.raises(TraceError, match="effect odd cannot be compiled"):
-        rd.Compiled(rd.Plant(ARM, [Odd(does)])).torque(0.0, *state(False)[:2])
+    with pytest.raises(TraceError, match="effect push cannot be compiled"):
+        rd.Compiled(rd.Plant(ARM, [Push(does)])).torque(0.0, *state(False)[:2])
 
 
 def test_one_sided_stops_are_compiled_exactly() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import weakref
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,9 +13,8 @@ import robot_dyn as rd
 from robot_dyn import Compiled
 from robot_dyn.codegen import CompiledPlant, Trace
 from robot_dyn.codegen.llvm import machine_code
-from robot_dyn.effects import Active
-from robot_dyn.foundations import TraceError
 from tests.codegen.arms import states
+from tests.user_parts import Push
 
 ROBOT = rd.load("planar_2r")
 WINDOW = rd.effects.ExternalWrench(ROBOT.frame_names[-1], [1, 2, 3, 0.1, 0.2, 0.3], start_s=0.2, end_s=0.7)
@@ -99,36 +97,18 @@ def test_what_is_off_costs_no_instruction() -> None:
     assert set(full.instructions_by_effect) == {effect.name for effect in full.plant.forces}
 
 
-@dataclass(frozen=True)
-class Kick(Active):
-    """A force of the user's own, with an if and a comparison of arrays."""
-
-    def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:
-        if t > 0.5 and q[..., 0] < 1:
-            return np.where(v > 0, 1.0, -2.0) * q
-        return 0 * q
-
-
-class Opaque(Active):
-    """A force that needs numbers."""
-
-    def torque(self, dynamics: Any, t: float, q: Any, v: Any) -> Any:
-        return np.interp(q, [0, 1], [0, 1])
+def kick(t: float, q: Any, v: Any) -> Any:
+    """A force with an if and a comparison of arrays."""
+    return np.where(v > 0, 1.0, -2.0) * q if t > 0.5 and q[..., 0] < 1 else 0 * q
 
 
 def test_an_effect_with_branches_is_followed_both_ways() -> None:
     """Its `if` is in the kernel, not decided while tracing."""
-    compiled = plant([Kick()])
+    compiled = plant([Push(kick)])
     for t in (0.2, 0.8):
         for q0 in (0.5, 1.5):
             q, v = np.array([q0, 0.3]), np.array([-0.4, 0.7])
             assert np.allclose(compiled.torque(t, q, v), compiled.interpreted.torque(t, q, v), atol=1e-15)
-
-
-def test_an_effect_that_cannot_be_traced_is_named() -> None:
-    """And the remedy is said."""
-    with pytest.raises(TraceError, match="effect opaque cannot be compiled"):
-        plant([Opaque()]).forward_dynamics(0.0, *np.ones((3, 2)))
 
 
 def test_machine_code_does_not_keep_the_plant_that_it_was_made_for() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import linecache
 import os
 import subprocess
 import sys
@@ -18,6 +17,7 @@ from robot_dyn.foundations.values import LRUByIdentity
 from robot_dyn.simulation import StateEquation, machine_code
 from robot_dyn.simulation.compiled import cache
 from robot_dyn.simulation.compiled.structure import structure
+from tests.codegen.cells import cell
 from tests.codegen.test_kernel import Memory
 
 ARM = rd.load("planar_2r")
@@ -129,16 +129,6 @@ EDITS = {
     "an error that is caught": ("except IndexError", "except ValueError"),
     "a function of this library": ("import tanh", "import sin as tanh"),
 }
-
-
-def cell(text: str) -> Any:
-    """The module of a notebook's cell."""
-    file = f"<cell {hash(text)}>"
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-    module = ModuleType("a_notebook")
-    sys.modules["a_notebook"] = module  # dataclasses look there
-    exec(compile(text, file, "exec", dont_inherit=True), module.__dict__)
-    return module
 
 
 def edited(where: str) -> str:

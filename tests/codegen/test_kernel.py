@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 
 from robot_dyn.codegen import Kernel, program_of
-from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.llvm.sine_groups import in_groups
 from robot_dyn.codegen.program import Kind
@@ -230,16 +229,6 @@ class Memory(dict[str, bytes]):
 
     def save(self, key: str, payload: bytes, about: str = "") -> None:
         self[key] = payload
-
-
-def test_a_call_is_restored_from_a_store(double: Kernel, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In the same machine code, without the function that was compiled."""
-    memory, y = Memory(), np.empty(3)
-    for _ in range(2):
-        monkeypatch.setattr(machine_code, "_loaded", {})  # as in another process
-        assert Kernel(double.program, (3,), store=memory).call(np.arange(3.0), y) == Status.FINE
-        assert np.array_equal(y, [0, 2, 4])
-    assert len(memory) == 1
 
 
 def test_what_is_loaded_is_kept_once(double: Kernel) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import linecache
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,6 +12,7 @@ from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.loops import dependencies as of_loops
 from robot_dyn.codegen.loops.kinds import kind_of
 from robot_dyn.codegen.store import keys as identity
+from tests.codegen.cells import cell
 from tests.codegen.test_kernel import Memory
 
 HELPERS = """
@@ -74,10 +73,7 @@ EDITS = {
 
 def built(text: str, factor: Any = 3.0) -> Any:
     """The loop of the source of a notebook's cell."""
-    file = f"<cell {hash(text)}>"
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-    module = ModuleType("a_users_module")
-    exec(compile(text, file, "exec", dont_inherit=True), module.__dict__)
+    module = cell(text)
     return module.make(factor, module.added)
 
 

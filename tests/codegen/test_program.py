@@ -11,6 +11,7 @@ from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.codegen.llvm.one_state import Status
 from robot_dyn.codegen.program import Kind, Op, Program, Programs
 from robot_dyn.codegen.trace.from_casadi import OperationError, instructions
+from tests.codegen.test_kernel import Memory
 
 
 def sample() -> ca.Function:
@@ -133,29 +134,26 @@ def test_an_operation_without_code_is_refused() -> None:
         program_of(ca.Function("f", [x], [ca.erf(x)]))
 
 
-def test_machine_code_is_restored_from_a_store(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("way", ["one state", "a batch"])
+def test_machine_code_is_restored_from_a_store(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second kernel compiles nothing and gives the same bits; a damaged payload is compiled anew."""
-
-    class Memory(dict[str, bytes]):
-        def load(self, key: str) -> bytes | None:
-            return self.get(key)
-
-        def save(self, key: str, payload: bytes, about: str = "") -> None:
-            self[key] = payload
-
     memory, program = Memory(), program_of(sample())
-    first, y = np.empty((100, 9)), np.empty((100, 9))
-    arguments = [np.ones((100, 3)), np.ones((100, 2))]
-    Kernel(program, (9,), store=memory).many(arguments, first)
+
+    def answer() -> np.ndarray:
+        monkeypatch.setattr(machine_code, "_loaded", {})  # as in another process
+        kernel, y = Kernel(program, (9,), store=memory), np.empty((100, 9) if way == "a batch" else 9)
+        if way == "a batch":
+            assert kernel.many([np.ones((100, 3)), np.ones((100, 2))], y) is Status.FINE
+        else:
+            assert kernel.call(np.ones(3), np.ones(2), y) == Status.FINE
+        return y
+
+    first = answer()
     (key,) = memory
-    monkeypatch.setattr(machine_code, "_loaded", {})  # as in another process
-    Kernel(program, (9,), store=memory).many(arguments, y)
-    assert np.array_equal(first, y)
+    assert np.array_equal(first, answer())
     assert len(memory) == 1
     payload = memory[key]
     for damaged in (b"damaged", payload[:-1], payload[:900] + bytes([payload[900] ^ 1]) + payload[901:]):
         memory[key] = damaged
-        monkeypatch.setattr(machine_code, "_loaded", {})
-        Kernel(program, (9,), store=memory).many(arguments, y)
-        assert np.array_equal(first, y)
+        assert np.array_equal(first, answer())
         assert memory[key] == payload

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import linecache
 import math
 import random
 import sys
@@ -19,6 +18,7 @@ from robot_dyn.codegen.loops.expressions import EXPRESSIONS
 from robot_dyn.codegen.loops.source import SubsetError
 from robot_dyn.codegen.loops.statements import STATEMENTS
 from robot_dyn.foundations import MachineCodeError, TraceError
+from tests.codegen.cells import cell
 from tests.long import long, stress
 
 
@@ -26,18 +26,9 @@ def compiled(function: Any) -> Any:
     return MachineFunction(function, INSTEAD, lambda: None, "").calls()
 
 
-_count = 0
-
-
 def defined(text: str, **known: Any) -> Any:
     """A function of a source that can be read, as of a cell of a notebook."""
-    global _count
-    _count += 1
-    file = f"<cell {_count}>"
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-    scope: dict[str, Any] = {"np": np, "frexp": frexp, **known}
-    exec(compile(text, file, "exec", dont_inherit=True), scope)
-    return scope["f"]
+    return cell(text, np=np, frexp=frexp, **known).f
 
 
 class Writer:
@@ -308,7 +299,7 @@ def test_a_failure_passes_through_the_functions_that_call() -> None:
     ],
 )  # fmt: skip
 def test_what_is_outside_the_subset_is_refused_with_line_and_remedy(text: str, message: str) -> None:
-    with pytest.raises(SubsetError, match=rf"<cell \d+>, line \d+, in f: .*({message}).*; \w+"):
+    with pytest.raises(SubsetError, match=rf"<cell -?\d+>, line \d+, in f: .*({message}).*; \w+"):
         compiled(defined(f"def f(x):\n    {text}\n"))(np.ones(3))
 
 

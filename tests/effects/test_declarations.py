@@ -248,37 +248,40 @@ def reads(t, q, v):
     return -v * np.loadtxt([str(STATE["gain"])])
 
 
-def test_what_has_changed_since_an_earlier_run_is_found() -> None:
-    """What a file or a global variable holds is a constant of the code: it is compared before each run."""
-    law = Law(reads)
-    STATE["gain"] = 2.0
-    assert engine_of(law) == "compiled"
-    STATE["gain"] = 3.0
-    assert "Law differs" in engine_of(law)
-    made = run(law, "auto", duration_s=0.1)
-    assert np.array_equal(made.q, run(law, "interpreted", duration_s=0.1).q)
-
-
-LEVEL = [0.3]
-
-
 def crosses(t, q, v):
-    return q[0] - LEVEL[0]
+    return q[0] - STATE["gain"] / 10
 
 
-def test_an_event_that_has_changed_since_an_earlier_run_is_found() -> None:
-    options = {
-        "duration_s": 0.1,
-        "engine": "compiled",
-        "estimate_error": False,
-        "integrator": "rk4",
-        "events": [rd.Event(crosses)],
-    }
-    plant, LEVEL[0] = rd.Plant(ARM), 0.3
-    rd.simulate(plant, Q, V, **options)
-    LEVEL[0] = 0.2
-    with pytest.raises(MachineError, match="crosses differs from the interpreted one"):
-        rd.simulate(plant, Q, V, **options)
+class Changing(rd.effects.Active):
+    """An effect whose coefficient its owner changes between two runs."""
+
+    stiffness = 2.0
+
+    def torque(self, dynamics, t, q, v):
+        return -self.stiffness * q
+
+
+OWNED = Changing()
+CHANGED: dict[str, tuple[Any, dict[str, Any]]] = {
+    "an attribute of an effect": ([OWNED], {}),
+    "what a controller reads": ((), {"controller": Law(reads)}),
+    "a global of an event": ((), {"events": [rd.Event(crosses)]}),
+}
+
+
+@pytest.mark.parametrize("what", CHANGED)
+def test_what_has_changed_since_an_earlier_run_is_found(what: str) -> None:
+    """What an attribute, a file or a global holds is a constant of the code: it is compared before each run."""
+    effects, parts = CHANGED[what]
+    options = {"duration_s": 0.1, "integrator": "rk4", "estimate_error": False} | parts
+    setup = rd.Setup(rd.Plant(ARM, effects), Q, V, **options)
+    OWNED.stiffness = STATE["gain"] = 2.0
+    rd.simulate(setup, engine="compiled")
+    OWNED.stiffness = STATE["gain"] = 3.0
+    for method in ("rk4", "DOP853"):
+        with pytest.raises(MachineError, match=r"(changing|Law|crosses) differs from the interpreted one"):
+            rd.simulate(setup, engine="compiled", integrator=method)
+    assert np.array_equal(rd.simulate(setup).q, rd.simulate(setup, engine="interpreted").q)
 
 
 @pytest.mark.parametrize(
@@ -415,10 +418,6 @@ def test_models_of_ones_own_controller_have_the_right_angles_of_the_machine_code
 
     options = {"duration_s": 0.5, "record_period_s": 0.01, "engine": "compiled", "estimate_error": False}
     run = rd.simulate(_Stiff.arm, _Stiff.start, controller=Law(_Stiff.plan, _Stiff.arm), **options)
-    same = rd.simulate(
-        _Stiff.arm,
-        _Stiff.start,
-        controller=rd.control.PDGravity(_Stiff.arm, _Stiff.plan, _Stiff.kp, _Stiff.kd),
-        **options,
-    )
+    built_in = rd.control.PDGravity(_Stiff.arm, _Stiff.plan, _Stiff.kp, _Stiff.kd)
+    same = rd.simulate(_Stiff.arm, _Stiff.start, controller=built_in, **options)
     assert run.statistics.engine == "compiled" and np.abs(run.q - same.q).max() < 1e-12

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -10,15 +10,10 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations import EffectError
 from tests.long import long
+from tests.slides import slides
 
 MASS = 0.7
-SLIDER = rd.Robot.from_text(
-    f"""<robot name="slider"><link name="base"/>
-<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
-<limit lower="-99" upper="99" effort="99" velocity="99"/></joint>
-<link name="cart"><inertial><mass value="{MASS}"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
-)
+SLIDER = slides(("slide", "base", "cart", MASS))
 ARM = rd.load("planar_2r")
 Q = np.array([0.1, 0.2])
 FRICTION = rd.effects.LuGreFriction(120.0, [1.0, 0.8], 0.8, [1.0, 0.5], 1.5, 0.1)
@@ -151,31 +146,6 @@ def test_both_engines_make_the_same_run_of_effects_with_states(method: str, peri
     np.testing.assert_allclose(equation_of_motion, ours.u - torque, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("name", "values"),
-    [
-        ("actuator_lag.time_constant", np.array([[0.05, 0.02], [0.01, 0.08]])),
-        *long([("lugre_friction.coulomb", np.array([[1.0, 0.5], [0.3, 1.2]]))]),
-        ("lugre_friction.bristle_stiffness", np.array([120.0, 60.0])),
-    ],
-)
-def test_effects_with_states_run_in_rollouts(name: str, values: np.ndarray) -> None:
-    """Each run is that of the setup with its value, 1e-12."""
-    base = setup("auto")
-    runs = rd.rollouts(base, params={name: values}, record=("q", "v", "u", "work"))
-    part, _, key = name.partition(".")
-    for k, value in enumerate(values):
-        effects = [replace(x, **{key: value}) if x.name == part else x for x in base.plant.effects]  # pyright: ignore
-        alone = rd.simulate(replace(base, plant=rd.Plant(ARM, effects)), engine="interpreted")
-        np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-12)
-        np.testing.assert_allclose(runs.u[k], alone.u, atol=1e-10)
-        one = runs[k]
-        np.testing.assert_array_equal(one.u, runs.u[k])
-        np.testing.assert_allclose(one.ledger.work["lugre_friction"], alone.ledger.work["lugre_friction"], atol=1e-10)
-        assert np.isnan(one.a).all()  # it depends on states that rollouts do not record
-    assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-5
-
-
 def test_passive_bristles_only_take_energy() -> None:
     """With σ₂ ≥ σ₁ (f_s/f_c − 1), work done on it minus what it stores never falls; without storage it would."""
     friction = rd.effects.LuGreFriction(200.0, 0.5, 0.4, 1.0, 1.6, 0.1)
@@ -238,5 +208,3 @@ def test_states_that_do_not_fit_are_refused() -> None:
 
     with pytest.raises(EffectError, match="both is Conservative and has states"):
         rd.Plant(ARM, [Both()])
-    with pytest.raises(EffectError, match="breakaway must not be less than coulomb"):
-        rd.effects.LuGreFriction(1.0, 1.0, 1.0, 2.0, 1.5, 0.1)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from pathlib import Path
-from typing import final
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from robot_dyn import Plant
 from robot_dyn.effects import Active, Bound, Conservative, Dissipative, Effect, Force, Stateful
 from robot_dyn.foundations import EffectError, QueryError
 from tests.effect_examples import EFFECTS, arguments, example
+from tests.user_parts import counted
 
 ROBOT = rd.load("cart_pole")
 B, F, V_S = np.array([0.7, 0.2]), np.array([1.4, 0.3]), np.array([0.05, 0.2])
@@ -186,31 +186,18 @@ def test_effort_limit_cuts_the_actuation() -> None:
     assert np.array_equal(cut, ROBOT.forward_dynamics(still, still, np.array([1.0, 2.0])))
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Counted(Active):
-    """A constant push that counts how often it is evaluated."""
-
-    calls: list[float] = field(default_factory=list)
-
-    def torque(self, dynamics, t, q, v):
-        self.calls.append(t)
-        return np.full(np.shape(v), 0.5)
-
-
-def test_what_is_off_is_evaluated_zero_times_and_what_is_on_once() -> None:
-    on, off = Counted(), Counted()
+def test_an_effect_is_evaluated_once_in_a_query_that_has_torques() -> None:
+    on, calls = counted()
     (q,), (v,) = states(1)
     plant = Plant(ROBOT, [on])
     plant.forward_dynamics(1.5, q, v, v)
-    assert on.calls == [1.5]
+    assert calls == [1.5]
     plant.inverse_dynamics(2.0, q, v, v)
     plant.N(2.5, q, v)
-    assert on.calls == [1.5, 2.0, 2.5]
+    assert calls == [1.5, 2.0, 2.5]
     plant.M(q)
     plant.C(q, v)
-    assert len(on.calls) == 3
-    assert off.calls == []
+    assert len(calls) == 3
 
 
 @pytest.mark.parametrize("engine", [ROBOT, rd.Lagrangian(ROBOT)], ids=["Robot", "Lagrangian"])
@@ -226,48 +213,6 @@ def test_plant_keeps_the_equation_of_motion(engine, batch) -> None:
     np.testing.assert_allclose(plant.forward_dynamics(0.2, q, v, u), a, rtol=1e-12, atol=1e-12)
     full_N = engine.N(q) - sum(FORMULAS[effect](0.2, q, v) for effect in FORMULAS)
     np.testing.assert_allclose(plant.N(0.2, q, v), full_N, rtol=1e-13, atol=1e-13)
-
-
-def test_plant_without_effects_is_its_dynamics() -> None:
-    (q,), (v,) = states(1)
-    plant = Plant(ROBOT)
-    assert np.array_equal(plant.forward_dynamics(0.0, q, v, list(v)), ROBOT.forward_dynamics(q, v, v))
-    assert np.array_equal(plant.N(0.0, q, v), ROBOT.N(q))
-
-
-def test_urdf_effects_are_what_the_file_states() -> None:
-    viscous, dry = Plant(ROBOT, "urdf").effects
-    np.testing.assert_array_equal(viscous.damping, [0.8, 0.02])
-    np.testing.assert_array_equal(dry.friction, [1.5, 0.01])
-    assert Plant(rd.load("ur5"), effects="urdf").effects == ()
-
-
-def test_friction_of_coupled_joints_counts_by_virtual_work() -> None:
-    """mimic_chain: q2 = q1/2 + …, q3 = −3/8 q1 + …; b = Σ s² b_i and f = Σ |s| f_i, from the file's 0.01 and 0.02."""
-    finger = rd.load("mimic_chain")
-    np.testing.assert_allclose(finger.damping, [0.01 * (1 + 0.25 + 0.375**2), 0.0], rtol=1e-15)
-    np.testing.assert_allclose(finger.friction, [0.02 * (1 + 0.5 + 0.375), 0.0], rtol=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: rd.effects.ViscousFriction(-0.1), "damping must not be negative"),
-        (lambda: rd.effects.ViscousFriction([0.1, np.nan]), "damping must be finite"),
-        (lambda: rd.effects.ViscousFriction("much"), "damping must be real numbers"),
-        (lambda: rd.effects.RegularisedCoulombFriction(1.0, 0.0), "velocity_scale must be positive"),
-        (lambda: rd.effects.JointStopSpring(1.0, 0.5, 3.0), "lower stops must lie below"),
-        (lambda: rd.effects.ExternalWrench("pole", [1, 2, 3]), r"shape \(6,\)"),
-        (lambda: rd.effects.ExternalWrench("pole", WRENCH, start_s=2.0, end_s=1.0), "end_s must lie after"),
-        (lambda: rd.effects.EffortLimit(-1.0), "limit must not be negative"),
-        (lambda: Plant(ROBOT, "friction"), "give effects, or 'urdf'"),
-        (lambda: Plant(ROBOT, [3]), "3 is neither a Force nor a Bound"),
-        (lambda: Plant(object(), "urdf"), "give a robot, such as rd.load"),
-    ],
-)
-def test_meaningless_coefficients_are_refused(make, message: str) -> None:
-    with pytest.raises(EffectError, match=message):
-        make()
 
 
 @pytest.mark.parametrize("method", ["N", "forward_dynamics", "inverse_dynamics", "torque"])

@@ -29,6 +29,9 @@ def test_what_is_not_named_is_free() -> None:
 
 
 def test_urdf_is_what_the_file_states() -> None:
+    viscous, dry = rd.Plant(ROBOT, "urdf").effects
+    np.testing.assert_array_equal([viscous.damping, dry.friction], [[0.8, 0.02], [1.5, 0.01]])
+    assert rd.Plant(rd.load("ur5"), effects="urdf").effects == ()
     np.testing.assert_array_equal(only(rd.effects.ViscousFriction("urdf")).damping, [0.8, 0.02])
     np.testing.assert_array_equal(only(rd.effects.RegularisedCoulombFriction("urdf")).friction, [1.5, 0.01])
     np.testing.assert_array_equal(only(rd.effects.EffortLimit("urdf")).limit, [100.0, np.inf])

@@ -10,7 +10,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations import EffectError
 from robot_dyn.simulation import Ending
-from tests.long import long
+from tests.slides import slides
 
 TREE = rd.load("skew_tree")
 K, C, LENGTH = 320.0, 7.0, 0.45
@@ -20,12 +20,7 @@ BETWEEN = rd.effects.LineSpringDamper(
 TO_WORLD = replace(BETWEEN, other_frame=None, other_point=[0.9, -0.3, 0.7])
 BOTH = pytest.mark.parametrize("effect", [BETWEEN, TO_WORLD], ids=["two frames", "frame and world"])
 
-BODY = """<joint name="to_{0}" type="prismatic"><parent link="base"/><child link="{0}"/><axis xyz="1 0 0"/>
-<limit lower="-9" upper="9" effort="9" velocity="9"/></joint>
-<link name="{0}"><inertial><mass value="{1}"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-"""
-MASSES = f'<robot name="two_masses"><link name="base"/>{BODY.format("a", 2.0)}{BODY.format("b", 0.5)}</robot>'
+MASSES = slides(("to_a", "base", "a", 2.0), ("to_b", "base", "b", 0.5)).with_(gravity=(0.0, 0.0, 0.0))
 
 
 def state(seed: int = 4) -> tuple[np.ndarray, np.ndarray]:
@@ -75,7 +70,6 @@ def test_the_damper_takes_the_power_of_its_force(effect: rd.effects.LineSpringDa
 def test_two_masses_move_as_the_damped_oscillator() -> None:
     """The excess x = ℓ − ℓ₀ obeys μ x'' + c x' + k x = 0 with the reduced mass μ; the centre moves uniformly."""
     m, k, c, length, t_end = np.array([2.0, 0.5]), 37.0, 1.3, 0.8, 1.7
-    robot = rd.Robot.from_text(MASSES).with_(gravity=(0.0, 0.0, 0.0))
     strut = rd.effects.LineSpringDamper(
         "b", "a", [0.1, 0.0, 0.0], [-0.2, 0.0, 0.0], stiffness=k, damping=c, length=length
     )
@@ -89,54 +83,13 @@ def test_two_masses_move_as_the_damped_oscillator() -> None:
     expected = centre + gap * np.array([-m[1], m[0]]) / m.sum()
     for engine in ("interpreted", "compiled"):
         run = rd.simulate(
-            rd.Plant(robot, [strut]), q0=q0, v0=v0, duration_s=t_end, integrator="order_8", step_s=0.01, engine=engine,
+            rd.Plant(MASSES, [strut]), q0=q0, v0=v0, duration_s=t_end, integrator="order_8", step_s=0.01, engine=engine,
             estimate_error=False, record_period_s=0.1,
         )  # fmt: skip
         np.testing.assert_allclose(run.q[-1], expected, atol=1e-12)
         spent = m @ v0**2 / 2 + k * x0**2 / 2 - m @ run.v[-1] ** 2 / 2 - k * x**2 / 2
         assert -run.ledger.work["line_spring_damper"][-1] == pytest.approx(spent, rel=1e-9)
         assert np.abs(run.ledger.residual).max() < 1e-11
-
-
-NUMBERS = {
-    "stiffness": np.array([100.0, 400.0]), "damping": np.array([2.0, 9.0]), "length": np.array([0.2, 0.9]),
-    "point": np.array([[0.1, 0.2, 0.3], [-0.3, 0.1, 0.2]]),
-    "other_point": np.array([[0.8, 0.2, 0.3], [0.6, 0.1, 1]]),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("effect", "names"),
-    [(BETWEEN, [*NUMBERS]), *long([*((BETWEEN, [name]) for name in NUMBERS), (TO_WORLD, ["other_point"])])],
-)
-def test_it_compiles_in_runs_and_rollouts_with_every_number_an_input(
-    effect: rd.effects.LineSpringDamper, names: list[str]
-) -> None:
-    """The engines agree to rounding over 100 steps; a run of rollouts is that of the effect with its values."""
-    q, v = state()
-
-    def setup(effect: rd.effects.LineSpringDamper, engine: str) -> rd.Setup:
-        plant = rd.Plant(TREE, [effect])
-        return rd.Setup(plant, q, v, 0.05, None, rd.integrate.method("rk4"), 1e-3, 0.01, False, engine=engine)
-
-    runs = rd.rollouts(setup(effect, "auto"), params={f"line_spring_damper.{name}": NUMBERS[name] for name in names})
-    for k in range(2):
-        alone = rd.simulate(setup(replace(effect, **{name: NUMBERS[name][k] for name in names}), "interpreted"))
-        np.testing.assert_allclose(runs.q[k], alone.q, atol=1e-12)
-    assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-6
-
-
-def test_of_two_the_numbers_differ_from_run_to_run_under_their_numbers() -> None:
-    """Each run is that of the plant whose second one has the value, in both of its parts."""
-    q, v = state()
-    options = {"q0": q, "v0": v, "duration_s": 0.05, "integrator": "rk4"}
-    points = np.array([[0.8, 0.2, 0.3], [0.6, 0.1, 1.0]])
-    params = {"line_spring_damper 2.other_point": points, "line_spring_damper 1.stiffness": [50.0, 90.0]}
-    runs = rd.rollouts(rd.Plant(TREE, [BETWEEN, TO_WORLD]), params=params, **options)
-    for k, k1 in enumerate((50.0, 90.0)):
-        both = [replace(BETWEEN, stiffness=k1), replace(TO_WORLD, other_point=points[k])]
-        alone = rd.simulate(rd.Plant(TREE, both), engine="interpreted", estimate_error=False, **options)
-        np.testing.assert_allclose(runs.q[k][-1], alone.q[-1], atol=1e-12)
 
 
 def test_it_runs_in_balls_that_hold_the_float_value() -> None:
@@ -148,11 +101,10 @@ def test_it_runs_in_balls_that_hold_the_float_value() -> None:
 
 def test_where_the_points_meet_there_is_no_direction() -> None:
     """An error that says so; a run that comes there in either engine ends, with the same words."""
-    robot = rd.Robot.from_text(MASSES).with_(gravity=(0.0, 0.0, 0.0))
-    plant = rd.Plant(robot, [rd.effects.LineSpringDamper("a", "b", stiffness=3.0, damping=1.0, length=0.1)])
+    plant = rd.Plant(MASSES, [rd.effects.LineSpringDamper("a", "b", stiffness=3.0, damping=1.0, length=0.1)])
     with pytest.raises(EffectError, match="line_spring_damper: its points of 'a' and 'b' meet"):
         plant.torque(0.0, np.zeros(2), np.zeros(2))
-    apart = rd.Plant(robot, [rd.effects.LineSpringDamper("a", "b", stiffness=0.0, damping=0.0, length=0.1)])
+    apart = rd.Plant(MASSES, [rd.effects.LineSpringDamper("a", "b", stiffness=0.0, damping=0.0, length=0.1)])
     for engine in ("interpreted", "compiled"):
         run = rd.simulate(
             apart, q0=[-0.5, 0.5], v0=[1.0, -1.0], duration_s=1.0, integrator="explicit_euler", step_s=0.125,
@@ -160,13 +112,3 @@ def test_where_the_points_meet_there_is_no_direction() -> None:
         )  # fmt: skip
         assert run.outcome.ending is Ending.DIVERGED
         assert "has no direction" in run.outcome.advice
-
-
-def test_ends_that_mean_nothing_are_refused() -> None:
-    numbers = {"stiffness": 1.0, "damping": 1.0, "length": 1.0}
-    with pytest.raises(EffectError, match="line_spring_damper: no frame 'left_tol'"):
-        rd.Plant(TREE, [rd.effects.LineSpringDamper("left_tol", None, **numbers)])
-    with pytest.raises(EffectError, match="both points are fixed to 'torso'"):
-        rd.effects.LineSpringDamper("torso", "torso", **numbers)
-    with pytest.raises(EffectError, match="stiffness must not be negative"):
-        rd.effects.LineSpringDamper("torso", None, **(numbers | {"stiffness": -1.0}))

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations import EffectError, QueryError
 from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 from tests.long import long
+from tests.slides import slides
 
 ARM = rd.load("planar_2r")
 Q = np.array([0.3, -0.5])
@@ -65,40 +63,20 @@ def test_a_pushed_motor_bounces_at_an_end_of_the_gap_like_a_ball(restitution: fl
         np.testing.assert_allclose(run.a[-1], force / (MASS + REFLECTED), rtol=1e-13)
 
 
-@dataclass(frozen=True, eq=False)
-class Beats(rd.control.Stateless):
+def beats(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """A force of two frequencies on the motor, and on the joint as well where both are coordinates."""
-
-    joints: int = 1
-    period_s: float = 0.0
-
-    @property
-    def n(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
-        return self.joints
-
-    def torque(self, t, q, v, z):
-        return np.stack([3.0 * np.cos(9.1 * t + 0.3) + 1.5 * np.cos(23.0 * t)] * self.joints)
+    return np.stack([3.0 * np.cos(9.1 * t + 0.3) + 1.5 * np.cos(23.0 * t)] * len(q))
 
 
 @pytest.mark.parametrize("restitution", [0.3, *long([0.9])])
 def test_a_motor_in_a_backlash_is_a_body_between_rigid_stops(restitution: float) -> None:
     """The same as a second slider on the first one, whose coordinate is δ, between its rigid stops; 1e-10."""
-    both = rd.Robot.from_text(
-        f"""<robot name="two"><link name="base"/>
-<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
-<limit lower="-99" upper="99" effort="99" velocity="99"/></joint>
-<joint name="play" type="prismatic"><parent link="cart"/><child link="motor"/><axis xyz="1 0 0"/>
-<limit lower="-99" upper="99" effort="99" velocity="99"/></joint>
-<link name="cart"><inertial><mass value="{MASS}"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="motor"><inertial><mass value="{REFLECTED}"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
-    )
+    both = slides(("slide", "base", "cart", MASS), ("play", "cart", "motor", REFLECTED))
     options = {"duration_s": 3.0, "integrator": TIGHT, "record_period_s": 0.01, "estimate_error": False}
     stops = rd.effects.RigidStops([-np.inf, -GAP], [np.inf, GAP], [0.0, restitution])
-    theirs = rd.simulate(rd.Plant(both, [stops]), [0.0, 0.0], controller=Beats(2), **options)
+    theirs = rd.simulate(rd.Plant(both, [stops]), [0.0, 0.0], controller=beats, **options)
     ours = rd.simulate(
-        rd.Plant(SLIDER, [rd.effects.RigidBacklash(GAP, J, RATIO, restitution)]), [0.0], controller=Beats(), **options
+        rd.Plant(SLIDER, [rd.effects.RigidBacklash(GAP, J, RATIO, restitution)]), [0.0], controller=beats, **options
     )
     names = " ".join(each.name for each in ours.events)
     assert all(word in names for word in ("strikes the forward end", "strikes the backward end"))
@@ -165,14 +143,8 @@ def test_a_motor_that_rests_at_an_end_is_an_armature(engine: str) -> None:
     drive = rd.effects.RigidBacklash({"joint_2": 0.01}, {"joint_2": 0.05}, {"joint_2": 4.0})
     run = rd.simulate(rd.Plant(ARM, [drive]), Q, duration_s=0.25, record_period_s=0.1, **options)
     (hit,) = run.events
-    rest = rd.simulate(
-        ARM.with_(armature={"joint_2": 0.05 * 16}),
-        hit.q,
-        hit.v,
-        duration_s=0.25 - hit.t,
-        record_period_s=0.0,
-        **options,
-    )
+    heavy = ARM.with_(armature={"joint_2": 0.05 * 16})
+    rest = rd.simulate(heavy, hit.q, hit.v, duration_s=0.25 - hit.t, record_period_s=0.0, **options)
     assert hit.name == "joint_2 strikes the forward end of its backlash"
     np.testing.assert_allclose(run.q[-1], rest.q[-1], atol=1e-10)
     np.testing.assert_allclose(run.a[-1], rest.a[-1], atol=1e-8)
@@ -191,20 +163,3 @@ def test_a_payload_that_a_pushed_joint_picks_up_is_an_impact_of_its_motor_too(en
     np.testing.assert_allclose(run.effect_states["rigid_backlash"][-1, :3], [GAP, 0.0, run.v[-1, 0]], atol=1e-13)
     assert np.abs(run.ledger.residual).max() < 1e-12
     assert next(each.name for each in run.events if each.t >= at) == "payload on cart picked up at rest"
-
-
-def test_what_is_not_supported_is_refused_by_name() -> None:
-    plant = rd.Plant(ARM, [rd.effects.RigidBacklash(0.01, 0.1)])
-    for method in ("gauss_4", "time_stepping"):
-        with pytest.raises(QueryError, match="rigid_backlash: "):
-            rd.Setup(plant, Q, integrator=method)
-    with pytest.raises(QueryError, match="cuts=False: rigid_backlash holds joints"):
-        rd.rollouts(plant, q0=[Q, Q], duration_s=0.1, integrator="rk4", cuts=False)
-    with pytest.raises(QueryError, match="advise: rigid_backlash frees and couples motors by turns"):
-        rd.advise(plant, Q)
-    with pytest.raises(EffectError, match="rigid_backlash: gap is 0 for all joints"):
-        rd.Plant(ARM, [rd.effects.RigidBacklash(0.0, 0.1)])
-    with pytest.raises(EffectError, match="restitution must not be greater than 1"):
-        rd.effects.RigidBacklash(0.1, 0.1, restitution=1.5)
-    with pytest.raises(EffectError, match="joint 'joint_1' has two drives"):
-        rd.Setup(rd.Plant(ARM, [rd.effects.RigidBacklash(0.1, 0.1), rd.effects.SeriesElastic(9.0, 0.1)]), Q)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import robot_dyn as rd
-from robot_dyn.foundations import EffectError, QueryError
 from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 from tests.long import long
 
@@ -20,6 +17,7 @@ TIGHT = rd.integrate.Adaptive("DOP853", 1e-12, 1e-14)
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 K, J, RATIO, D, B = 80.0, 0.002, 9.0, 0.4, 0.3  # of the slider, in [N/m], [kg], 1, [N s/m], [N s/m]
 REFLECTED = RATIO**2 * J
+OFTEN = {"integrator": TIGHT, "record_period_s": 0.01, "estimate_error": False}
 
 
 def slide(effect: rd.effects.SeriesElastic, engine: str = "interpreted", **options) -> rd.Trajectory:
@@ -146,11 +144,8 @@ def test_beyond_the_gap_of_a_backlash_the_spring_turns_what_moved_freely_within_
     beta, F = 0.02, 1.3
     drive = rd.effects.SeriesElastic(K, J, RATIO, backlash=beta)
     push = rd.effects.ExternalWrench("cart", [F, 0, 0, 0, 0, 0])
-    run = rd.simulate(
-        rd.Plant(SLIDER, [drive] if side == 1 else [drive, push]), [0.0], duration_s=2.0,
-        controller=Ramp(F if side == 1 else 0.0), integrator=TIGHT, engine=engine, record_period_s=0.01,
-        estimate_error=False,
-    )  # fmt: skip
+    plant, law = rd.Plant(SLIDER, [drive] if side == 1 else [drive, push]), Ramp(F if side == 1 else 0.0)
+    run = rd.simulate(plant, [0.0], duration_s=2.0, controller=law, engine=engine, **OFTEN)
     free, omega = F / (REFLECTED if side == 1 else MASS), np.sqrt(K * (1 / MASS + 1 / REFLECTED))
     t1 = np.sqrt(2 * beta / free)
     s, c = free / omega**2, free * t1 / omega
@@ -172,39 +167,12 @@ def test_beyond_the_gap_of_a_backlash_the_spring_turns_what_moved_freely_within_
     assert np.abs(run.ledger.residual).max() < 1e-11
 
 
-@pytest.mark.parametrize("period", [*long([0.0]), 0.005])
-def test_both_engines_and_rollouts_make_the_same_run(period: float) -> None:
-    """A stiffness of each run, with backlash; beside an actuator lag and an effort limit, the second joint direct."""
-    drive = rd.effects.SeriesElastic([200.0, 0.0], 0.02, 6.0, 0.5, 0.2, 1e-3)
-    effects = [rd.effects.EffortLimit(30.0), rd.effects.ActuatorLag(0.02), drive]
-    base = rd.Setup(
-        rd.Plant(ARM, effects), Q, [0.2, 0.1], duration_s=0.3, record_period_s=0.01, integrator="rk4", step_s=5e-4,
-        controller=rd.control.PD(rd.control.quintic(Q, [0.6, -0.3], 0.3), 90.0, 15.0, period_s=period),
-        estimate_error=False,
-    )  # fmt: skip
-    values = np.array([[200.0, 0.0], [90.0, 0.0]])
-    runs = rd.rollouts(base, params={"series_elastic.stiffness": values}, record=("q", "u", "work"))
-    for k, value in enumerate(values):
-        plant = rd.Plant(ARM, [*effects[:2], replace(drive, stiffness=value)])
-        theirs = rd.simulate(replace(base, plant=plant), engine="interpreted")
-        ours = rd.simulate(replace(base, plant=plant), engine="compiled")
-        assert theirs.effect_states["series_elastic"].shape == (31, 2)
-        np.testing.assert_allclose(ours.q, theirs.q, atol=1e-12)
-        np.testing.assert_allclose(runs.q[k], theirs.q, atol=1e-12)
-        np.testing.assert_allclose(runs.work["control"][k], theirs.ledger.work["control"], atol=1e-11)
-        np.testing.assert_allclose(runs.work["series_elastic"][k], theirs.ledger.work["series_elastic"], atol=1e-11)
-    assert np.abs(runs.q[1] - runs.q[0]).max() > 1e-3
-
-
 def test_dry_friction_of_a_joint_holds_it_until_its_spring_has_the_load() -> None:
     """A motor at constant speed behind a spring: the joint sticks until k δ reaches the friction of rest; 1e-9."""
     speed, level = 0.3, 2.0
     drive = rd.effects.SeriesElastic(K, J, RATIO, friction=1e3)  # its friction keeps the speed u/b, to 1e-3 of it
-    run = rd.simulate(
-        rd.Plant(SLIDER, [drive, rd.effects.DryFriction(1.0, level)]), [0.0], duration_s=0.2,
-        controller=Ramp(1e3 * speed),
-        integrator=TIGHT, record_period_s=0.01, estimate_error=False,
-    )  # fmt: skip
+    plant = rd.Plant(SLIDER, [drive, rd.effects.DryFriction(1.0, level)])
+    run = rd.simulate(plant, [0.0], duration_s=0.2, controller=Ramp(1e3 * speed), **OFTEN)
     first = next(each for each in run.events if each.name == "slide slides")
     assert first.q == (0.0,)
     row = np.searchsorted(run.t, first.t)
@@ -220,16 +188,3 @@ def test_a_plant_that_is_asked_takes_relaxed_springs() -> None:
     expected = ARM.forward_dynamics(Q, v, [3.0, 0.0])
     np.testing.assert_allclose(plant.forward_dynamics(0.0, Q, v, [3.0, 5.0]), expected, rtol=1e-13)
     np.testing.assert_allclose(rd.Compiled(plant).forward_dynamics(0.0, Q, v, [3.0, 5.0]), expected, rtol=1e-12)
-
-
-def test_what_has_no_meaning_is_refused() -> None:
-    with pytest.raises(EffectError, match="series_elastic: stiffness is 0 for all joints"):
-        rd.Plant(ARM, [rd.effects.SeriesElastic(0.0, 0.1)])
-    with pytest.raises(EffectError, match="joint 'joint_2' has two drives; keep one"):
-        rd.Setup(
-            rd.Plant(ARM, [rd.effects.SeriesElastic({"joint_2": 9.0}, 1.0), rd.effects.SeriesElastic(9.0, 1.0)]), Q
-        )
-    with pytest.raises(QueryError, match="series_elastic: time_stepping takes no motors of a drive"):
-        rd.Setup(rd.Plant(ARM, [rd.effects.SeriesElastic(9.0, 1.0)]), Q, integrator="time_stepping")
-    with pytest.raises(EffectError, match="inertia must be positive"):
-        rd.effects.SeriesElastic(9.0, 0.0)

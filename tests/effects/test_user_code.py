@@ -13,12 +13,11 @@ import pytest
 import robot_dyn as rd
 from robot_dyn import export
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SceneError, TraceError
-from robot_dyn.simulation import MachineError
 from tests.long import long
 
 ARM = rd.load("planar_2r")
 Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.9])
-METHODS = (rd.integrate.method("rk4"), rd.integrate.method("gauss_4"), rd.integrate.Adaptive())
+METHODS = ("rk4", "gauss_4", "DOP853")
 KINDS = (
     rd.control.Controller,
     rd.control.Stateless,
@@ -101,7 +100,7 @@ PARTS = [
 
 
 @pytest.mark.parametrize(("named", "parts"), [x[1:] for x in PARTS], ids=[x[0] for x in PARTS])
-@pytest.mark.parametrize("integrator", METHODS, ids=lambda m: str(m)[:5])
+@pytest.mark.parametrize("integrator", METHODS)
 def test_an_exception_of_a_users_code_reaches_the_user_with_its_line_and_the_parts_name(
     named, parts, integrator
 ) -> None:
@@ -133,7 +132,7 @@ class Mistaken(rd.control.Stateless):
 
 
 @pytest.mark.parametrize("period_s", [0.0, 0.01])
-@pytest.mark.parametrize("integrator", METHODS, ids=lambda m: str(m)[:5])
+@pytest.mark.parametrize("integrator", METHODS)
 def test_what_the_library_refuses_a_users_code_is_no_divergence(period_s: float, integrator) -> None:
     setup = rd.Setup(rd.Plant(ARM), Q, V, 0.2, Mistaken(period_s), integrator)
     with pytest.raises(QueryError, match=r"q must have shape .* got \(1,\)"):
@@ -144,9 +143,7 @@ def test_an_overflow_in_a_users_code_is_an_outcome_of_the_run() -> None:
     def runaway(t, q, v):
         return ARM.inverse_dynamics(q, v, 1e4 * v)
 
-    run = rd.simulate(
-        rd.Plant(ARM), q0=Q, v0=V, duration_s=0.2, controller=runaway, integrator=rd.integrate.method("rk4")
-    )
+    run = rd.simulate(ARM, Q, V, duration_s=0.2, controller=runaway, integrator="rk4")
     assert run.outcome.ending == "diverged" and len(run.t) > 1
 
 
@@ -161,8 +158,6 @@ def test_a_torque_of_a_wrong_shape_is_an_error_of_the_library() -> None:
 
     with pytest.raises(EffectError, match="wide does not fit 2 joints"):
         rd.Plant(ARM, [Wide()]).torque(0.0, Q, V)
-    with pytest.raises(EffectError, match=r"Wide.torque returned shape \(3,\)"):
-        rd.Setup(rd.Plant(ARM, [Wide()]), Q)
     broken, plant = rd.effects.ViscousFriction(0.1), rd.Plant(ARM)
     object.__setattr__(broken, "damping", np.ones(3))
     object.__setattr__(plant, "effects", (broken,))
@@ -217,16 +212,9 @@ def test_a_function_is_the_controller_of_the_same_law() -> None:
     def law(t, q, v):
         return 4.0 * (Q - 0.2 - q) - 1.5 * v
 
-    setup = rd.Setup(
-        rd.Plant(ARM),
-        Q,
-        V,
-        0.1,
-        rd.control.PD(rd.control.hold(Q - 0.2), 4.0, 1.5),
-        engine="interpreted",
-        integrator="rk4",
-    )
-    run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.1, controller=law, integrator="rk4")
+    pd = rd.control.PD(rd.control.hold(Q - 0.2), 4.0, 1.5)
+    setup = rd.Setup(rd.Plant(ARM), Q, V, 0.1, pd, "rk4", engine="interpreted")
+    run = rd.simulate(ARM, Q, V, duration_s=0.1, controller=law, integrator="rk4")
     assert np.array_equal(run.q, rd.simulate(setup).q)
     assert run.statistics.engine.startswith("interpreted (law declares no thresholds: give a class")
     compiled = rd.simulate(setup, controller=law, engine="compiled")
@@ -259,7 +247,7 @@ def test_recorded_controller_states_obey_their_equation(
     """dz/dt = ki e without a limit; sampled, z⁺ = z + T ki e at each tick, exactly."""
     ki = 3.0
     pid = rd.control.PID(rd.control.hold(Q - 0.2), 8.0, ki, 2.0, period_s=period_s)
-    method = rd.integrate.method("gauss_4" if canonical else "rk4")
+    method = "gauss_4" if canonical else "rk4"
     run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.2, controller=pid, engine=engine, integrator=method)
     z, e = run.controller_states, Q - 0.2 - run.q
     assert z is not None and z.shape == (len(run.t), 2)
@@ -336,30 +324,6 @@ def test_wrong_keys_of_an_effect_of_a_users_own_are_told(keys: str, said: str, t
         rd.read_scene(path, effects={"drag": Drag})
     with pytest.raises(SceneError, match="'spring' is a kind that scenes have"):
         rd.read_scene(path, effects={"spring": Drag})
-
-
-@dataclass(eq=False)
-class Changing(rd.effects.Active):
-    """An effect whose coefficient its owner changes between two runs."""
-
-    stiffness: float
-
-    def torque(self, dynamics, t, q, v):
-        return -self.stiffness * q
-
-
-def test_machine_code_of_a_part_that_has_changed_since_is_refused() -> None:
-    """Constants are in the code: another value is found by the self check of each run of a user's own parts."""
-    effect = Changing(3.0)
-    setup = rd.Setup(
-        rd.Plant(ARM, [effect]), [0.3, -0.4], duration_s=0.05, engine="compiled", estimate_error=False, integrator="rk4"
-    )
-    rd.simulate(setup)
-    effect.stiffness = 5.0
-    with pytest.raises(MachineError, match="differs from the interpreted one"):
-        rd.simulate(setup)
-    with pytest.raises(MachineError, match="differs from the interpreted one"):
-        rd.simulate(setup, integrator=rd.integrate.Adaptive())
 
 
 @pytest.mark.parametrize(

@@ -59,25 +59,40 @@ def test_balls_of_more_bits_lie_inside_balls_of_fewer(name: str) -> None:
             assert narrow.max() <= 1e-44 * wide.max()
 
 
+IN_FLOATS = {
+    "Pinocchio": lambda robot: robot,
+    **{
+        np.dtype(each).name: lambda robot, each=each: rd.Lagrangian(robot, each)
+        for each in (np.float32, np.float64, np.longdouble)
+    },
+}
+
+
 @pytest.mark.parametrize("name", ARMS)
-@pytest.mark.parametrize("bits", [53, 200])
-def test_pinocchio_lies_within_its_rounding_bound_of_the_balls(name: str, bits: int) -> None:
-    """|Pinocchio − exact| ≤ 128 n u · (terms added into the entry), u = 2⁻⁵³, to first order in u.
+@pytest.mark.parametrize(("engine", "bits"), [("Pinocchio", 53), *((engine, 200) for engine in IN_FLOATS)])
+def test_each_implementation_lies_within_its_rounding_bound_of_the_balls(name: str, engine: str, bits: int) -> None:
+    """|value − exact| ≤ 128 n u · (terms added into the entry), u of its precision, to first order in u.
 
     A joint's placement has an error of at most 20 u: the literals u; rpy by a quaternion 12 u; sin, cos and the
     product with the rotation 6 u. Along n joints that is 20 n u on orientations, and on levers as part of their length.
     A term of M has two Jacobian columns, 40 n u, and an inertia (literals, turned and merged, 30 u) with products of
     depth 6, 12 u; one of C has a third column, 60 n u. A sum over n bodies and 3 indices adds 4 n u. For n ≥ 1 all
-    stay below 128 n u. What the ball itself does not know is added: its radius.
+    stay below 128 n u. What the ball itself does not know is added: its radius. Compared at a q that float32 holds
+    exactly; values are split into two float64 so that flint takes longdouble exactly.
     """
     robot = arm(name)
-    q, v, _ = general_state(robot)
+    q, v, _ = general_state(robot).astype(np.float32).astype(np.float64)
     size = magnitudes(rd.Lagrangian(robot).linkage, q)
     scale = {"M": size.M, "C": size.C(v), "N": size.N}
-    exact, pinocchio = terms(rd.Lagrangian(robot, Ball(bits)), q, v), terms(robot, q, v)
+    exact, got = terms(rd.Lagrangian(robot, Ball(bits)), q, v), terms(IN_FLOATS[engine](robot), q, v)
     for key, balls in exact.items():
-        bound = 128 * robot.n * U * scale[key] + rd.accuracy.radius(balls)
-        assert np.all(distance(pinocchio[key], balls) <= bound), key
+        assert engine in ("Pinocchio", got[key].dtype.name)
+        high = got[key].astype(np.float64)
+        with ctx.workprec(200):
+            low = np.vectorize(lambda x: arb(float(x)), otypes=[object])(got[key] - high)
+            error = distance(high, balls - low)
+        bound = 128 * robot.n * float(np.finfo(got[key].dtype).eps / 2) * scale[key] + rd.accuracy.radius(balls)
+        assert np.all(error <= bound), key
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -89,28 +104,6 @@ def test_the_rounding_bound_is_no_wider_than_the_cross_check_needs(name: str) ->
     balls = rd.Lagrangian(robot, Ball(200)).N(q)
     moved = robot.N(q) + 1e-11 * size.N
     assert np.all((distance(moved, balls) > 128 * robot.n * U * size.N)[size.N > 0])
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.longdouble])
-def test_each_float_errs_by_its_own_rounding(dtype) -> None:
-    """The same lines in each precision: error within 128 n u of that precision, on the scale of the terms.
-
-    Compared at a q that float32 holds exactly; longdouble is split into two float64 so that flint takes it exactly.
-    """
-    robot = arm("panda")
-    q, v, _ = general_state(robot).astype(np.float32).astype(np.float64)
-    size = magnitudes(rd.Lagrangian(robot).linkage, q)
-    scale = {"M": size.M, "C": size.C(v), "N": size.N}
-    exact, got = terms(rd.Lagrangian(robot, Ball(200)), q, v), terms(rd.Lagrangian(robot, dtype), q, v)
-    u = float(np.finfo(dtype).eps / 2)
-    for key, balls in exact.items():
-        assert got[key].dtype == dtype
-        high = got[key].astype(np.float64)
-        low = (got[key] - high).astype(np.float64)
-        with ctx.workprec(200):
-            left = np.vectorize(lambda x, y, ball: float(abs(arb(x) + arb(y) - ball).upper()), otypes=[float])
-            error = left(high, low, balls)
-        assert np.all(error <= 128 * robot.n * u * scale[key])
 
 
 def test_balls_follow_the_literals_of_the_file_not_their_float64() -> None:

@@ -29,11 +29,8 @@ def panda() -> rd.Robot:
 @pytest.mark.parametrize("load", [1.0, *long([0.3])])
 def test_what_friction_holds_stays_for_any_number_of_steps(load: float) -> None:
     """A block on a rail for an hour, with the load at its limit to the last bit too: 0.0."""
-    run = rd.simulate(
-        rd.Plant(RAIL, [rd.effects.DryFriction(G / load)]), [0.25], duration_s=3600.0, step_s=1e-3,
-        record_period_s=900.0,
-        engine="compiled", **FIXED,
-    )  # fmt: skip
+    plant, options = rd.Plant(RAIL, [rd.effects.DryFriction(G / load)]), {"record_period_s": 900.0} | FIXED
+    run = rd.simulate(plant, [0.25], duration_s=3600.0, step_s=1e-3, engine="compiled", **options)
     assert run.statistics.steps == 3_600_000
     assert (run.q == 0.25).all()
     assert (run.v == 0).all()
@@ -89,16 +86,9 @@ def test_an_impact_turns_the_velocity_by_its_restitution(e: float) -> None:
 
 def test_works_close_the_ledger_where_the_mass_is_constant() -> None:
     """½ v² + g q − Σ W changes by rounding alone: impulses work at the mean velocity, two frictions by their shares."""
-    plant = rd.Plant(
-        RAIL,
-        [
-            rd.effects.DryFriction(2.0),
-            rd.effects.RigidStops(0.0, 0.6, 0.4),
-            rd.effects.DryFriction(1.0),
-            rd.effects.ViscousFriction(0.7),
-        ],
-    )
-    run = rd.simulate(plant, [0.3], [2.4], duration_s=2.0, step_s=1e-3, **FIXED)
+    dry = rd.effects.DryFriction
+    effects = [dry(2.0), rd.effects.RigidStops(0.0, 0.6, 0.4), dry(1.0), rd.effects.ViscousFriction(0.7)]
+    run = rd.simulate(rd.Plant(RAIL, effects), [0.3], [2.4], duration_s=2.0, step_s=1e-3, **FIXED)
     ledger = run.ledger
     total = ledger.kinetic + ledger.potential - sum(ledger.work.values())
     assert np.abs(total - total[0]).max() <= 1e-12

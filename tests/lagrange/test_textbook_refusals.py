@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from typing import Any, cast
 
 import casadi as ca
@@ -108,9 +106,3 @@ def test_batches_are_the_states_one_by_one() -> None:
     np.testing.assert_array_equal(got, one_by_one)
     assert arm.M(0.0, np.zeros((0, 2)), np.zeros(2)).shape == (0, 2, 2)
     assert arm.energy(0.0, q, v).shape == (4, 3)
-
-
-def test_casadi_is_imported_when_it_is_used() -> None:
-    code = "import sys, robot_dyn.lagrange.generalized_force; print('casadi' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"

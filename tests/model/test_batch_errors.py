@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 
 import robot_dyn as rd
 from robot_dyn.description import check
-from robot_dyn.foundations import EditError, NotFiniteError, OverflowedError, QueryError, SingularError, UndecidedError
+from robot_dyn.foundations import EditError, NotFiniteError, OverflowedError, QueryError, UndecidedError
 from robot_dyn.lagrange import articulated_body
 from robot_dyn.queries import EQUATION
 from tests.codegen.arms import compiled
@@ -146,12 +146,3 @@ def test_a_pivot_lost_in_rounding_accuses_no_joint(n: int, dtype: Any, rounding:
         with own.arithmetic.scope(), pytest.raises(UndecidedError, match=rounding):
             articulated_body(own.linkage, *(own.arithmetic.array(x) for x in (q, v, tau)))
     np.testing.assert_allclose(answer, robot.forward_dynamics(q, v, tau), rtol=0, atol=1e-8 * np.abs(answer).max())
-
-
-def test_a_joint_without_inertia_stops_a_run_before_it_starts() -> None:
-    """With the joint and the remedy, rather than as a run that diverged."""
-    with pytest.warns(rd.ModelWarning):
-        robot = rd.load("massless_tip")
-    for dynamics in (robot, rd.Lagrangian(robot)):
-        with pytest.raises(SingularError, match="'pointer_joint' carries no inertia"):
-            rd.simulate(rd.Plant(dynamics), q0=[0.1, 0.2], duration_s=0.1)

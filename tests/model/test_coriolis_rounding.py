@@ -78,19 +78,14 @@ def test_rounding_is_below_its_bound_on_the_catalog(name: str) -> None:
     )  # 0/0 of a joint without inertia
 
 
-@settings(max_examples=25)
-@given(trees(), SEEDS)
-def test_rounding_is_below_its_bound_on_random_trees(tree: RandomTree, seed: int) -> None:
-    robot = tree.robot
-    assert excess(robot, regrouped(robot.model), seed, 2) <= 1
+@pytest.mark.parametrize(("examples", "states"), [(25, 2), *stress([(200, 8)])])
+def test_rounding_is_below_its_bound_on_random_trees(examples: int, states: int) -> None:
+    @settings(max_examples=examples)
+    @given(trees(), SEEDS)
+    def law(tree: RandomTree, seed: int) -> None:
+        assert excess(tree.robot, regrouped(tree.robot.model), seed, states) <= 1
 
-
-@pytest.mark.stress
-@settings(max_examples=200)
-@given(trees(), SEEDS)
-def test_rounding_is_below_its_bound_on_200_random_trees(tree: RandomTree, seed: int) -> None:
-    robot = tree.robot
-    assert excess(robot, regrouped(robot.model), seed, 8) <= 1
+    law()
 
 
 @pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,41 +11,37 @@ from numpy.testing import assert_allclose, assert_array_equal
 import robot_dyn as rd
 from robot_dyn import ModelWarning
 from robot_dyn.foundations import OverflowedError, SingularError
+from tests.hostile.kinds import BODY, POINT, joint
 from tests.queries import general
 
 INERTIA = ((0.02, 0.001, -0.002), (0.001, 0.03, 0.003), (-0.002, 0.003, 0.04))
 
 
-def urdf(tmp_path: Path, links: dict[str, str], joints: dict[str, tuple[str, str, str]]) -> Path:
-    """A file of links (name → content) and joints (name → parent, child, content)."""
+Z = '<axis xyz="0 0 1"/>'
+
+
+def arm(links: dict[str, str], *joints: str) -> rd.Robot:
+    """The robot of links (name → content) and joints."""
     parts = [f'<link name="{name}">{content}</link>' for name, content in links.items()]
-    parts += [
-        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>{content}</joint>'
-        for name, (parent, child, content) in joints.items()
-    ]
-    path = tmp_path / "arm.urdf"
-    path.write_text(f'<robot name="arm">{"".join(parts)}</robot>')
-    return path
+    return rd.Robot.from_text(f'<robot name="arm">{"".join(parts + list(joints))}</robot>')
 
 
 def point_mass(xyz: str) -> str:
-    moments = " ".join(f'{key}="0"' for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
-    return f'<inertial><origin xyz="{xyz}"/><mass value="1"/><inertia {moments}/></inertial>'
+    return POINT.replace("<inertial>", f'<inertial><origin xyz="{xyz}"/>')
 
 
 # --- where M is singular
 
 
 @pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
-def test_a_zero_on_the_diagonal_of_M_decides_that_it_is_singular(tmp_path: Path) -> None:
+def test_a_zero_on_the_diagonal_of_M_decides_that_it_is_singular() -> None:
     """Three parallel axes and a point mass on the last: M = m (l₁₂ᵀ l₁₂ …) with M₃₃ = 0, of rank 1.
 
     Which of the first two pivots is positive is lost in rounding; the third joint carries no inertia at any q.
     """
     links = {"base": "", "l0": "", "l1": "", "l2": point_mass("0 0 0")}
     offset = '<origin xyz="0 0.1 0"/>'
-    joints = {"j0": ("base", "l0", ""), "j1": ("l0", "l1", ""), "j2": ("l1", "l2", offset)}
-    robot = rd.load(urdf(tmp_path, links, joints))
+    robot = arm(links, joint("j0", "base", "l0"), joint("j1", "l0", "l1"), joint("j2", "l1", "l2", offset))
     assert robot.joint_without_inertia == "j2"
     assert robot.findings[0].startswith("link 'l0' moves but has no mass")
     assert_allclose(robot.M(np.array([0.3, 0.9, -0.4])), np.pad(np.full((2, 2), 0.01), (0, 1)), rtol=0, atol=1e-17)
@@ -68,11 +63,10 @@ def test_massless_tip_has_no_forward_dynamics_until_it_is_held_or_loaded():
 
 
 @pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
-def test_M_that_is_singular_where_the_mass_lies_on_the_outer_axis(tmp_path: Path):
+def test_M_that_is_singular_where_the_mass_lies_on_the_outer_axis():
     """M = diag(m l² sin² q₂, m l²) for a point mass on the z axis at q₂ = 0."""
     links = {"base": "", "yoke": "", "bob": point_mass("0 0 0.5")}
-    joints = {"pan": ("base", "yoke", '<axis xyz="0 0 1"/>'), "tilt": ("yoke", "bob", '<axis xyz="0 1 0"/>')}
-    robot = rd.load(urdf(tmp_path, links, joints))
+    robot = arm(links, joint("pan", "base", "yoke", Z), joint("tilt", "yoke", "bob", '<axis xyz="0 1 0"/>'))
     v, tau = np.array([0.3, -0.4]), np.array([0.6, 0.7])
     assert_allclose(robot.M(np.array([0.7, 0.9])), np.diag([0.25 * np.sin(0.9) ** 2, 0.25]), rtol=0, atol=1e-16)
     for tilt in (0.9, 0.1, -0.1, 2.0):
@@ -85,12 +79,11 @@ def test_M_that_is_singular_where_the_mass_lies_on_the_outer_axis(tmp_path: Path
 
 @pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 @pytest.mark.parametrize(("l1", "l2"), [(0.3, 0.7), (0.67, 0.34), (0.83, 0.92)])
-def test_M_that_is_singular_where_the_arm_is_straight(tmp_path: Path, l1: float, l2: float):
+def test_M_that_is_singular_where_the_arm_is_straight(l1: float, l2: float):
     """M has det M = m² l₁² l₂² sin² q₂ for a point mass at the tip alone; rounding decides how ABA fails at q₂ = 0."""
     links = {"base": "", "upper": "", "lower": point_mass(f"{l2} 0 0")}
-    z = '<axis xyz="0 0 1"/>'
-    joints = {"shoulder": ("base", "upper", z), "elbow": ("upper", "lower", f'<origin xyz="{l1} 0 0"/>{z}')}
-    robot = rd.load(urdf(tmp_path, links, joints))
+    elbow = joint("elbow", "upper", "lower", f'<origin xyz="{l1} 0 0"/>{Z}')
+    robot = arm(links, joint("shoulder", "base", "upper", Z), elbow)
     v, tau = np.array([0.3, -0.4]), np.array([0.6, 0.7])
     q = np.array([0.2, 0.9])
     assert_allclose(robot.inverse_dynamics(q, v, robot.forward_dynamics(q, v, tau)), tau, rtol=1e-10)
@@ -145,25 +138,18 @@ def test_huge_arguments_with_a_finite_answer_are_answered_without_a_warning():
 @pytest.mark.parametrize(
     "name", ["kinetic_energy", "coriolis_torque", "coriolis_transpose", "inverse_dynamics", "regressor"]
 )
-def test_products_of_four_numbers_that_overflow_are_refused(name: str, follower: bool, tmp_path: Path) -> None:
+def test_products_of_four_numbers_that_overflow_are_refused(name: str, follower: bool) -> None:
     """A slide at 4e99 m that turns at 5e99 rad/s: m q² v² is 4e398, as an array, as a list and by `errors`."""
-    body = '<inertial><origin xyz="0.1 0.2 0.3"/><mass value="1"/><inertia ixx="1" iyy="1" izz="1" '
-    body += 'ixy="0" ixz="0" iyz="0"/></inertial>'
+    body = BODY.replace("<inertial>", '<inertial><origin xyz="0.1 0.2 0.3"/>')
     limits = '<axis xyz="1 0 0"/><limit lower="-1e120" upper="1e120" effort="1" velocity="1"/>'
+    tilts = '<axis xyz="0 1 0"/>'
     joints = [
-        ("turn", "continuous", "base", "l1", '<axis xyz="0 0 1"/>'),
-        ("tilt", "continuous", "l1", "l2", '<axis xyz="0 1 0"/>'),
-        ("slide", "prismatic", "l2", "l3", limits),
-    ]
-    if follower:
-        tilts = '<axis xyz="0 1 0"/><mimic joint="tilt" multiplier="-1"/>'
-        joints.append(("follow", "continuous", "l1", "l4", tilts))
-    links = [f'<link name="{child}">{body}</link>' for _, _, _, child, _ in joints]
-    text = "".join(
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{rest}</joint>'
-        for name, kind, parent, child, rest in joints
-    )
-    robot = rd.Robot.from_text(f'<robot name="arm"><link name="base"/>{"".join(links)}{text}</robot>')
+        joint("turn", "base", "l1", Z, "continuous"),
+        joint("tilt", "l1", "l2", tilts, "continuous"),
+        joint("slide", "l2", "l3", limits, "prismatic"),
+        joint("follow", "l1", "l4", f'{tilts}<mimic joint="tilt" multiplier="-1"/>', "continuous"),
+    ][: 4 if follower else 3]
+    robot = arm({"base": ""} | {f"l{i + 1}": body for i in range(len(joints))}, *joints)
     q, v = np.array([0.3, 0.7, 4.5e99]), np.array([4e99, 5e99, 3e99])
     given = [q, v, v][: 3 if name in ("inverse_dynamics", "regressor") else 2]
     for state in (given, [x.tolist() for x in given]):

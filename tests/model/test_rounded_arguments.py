@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.effects import Active
 from robot_dyn.foundations import OverflowedError, midpoint
+from tests.user_parts import Push
 
 ARM = rd.load("ur5")
 NEAR = np.array([0.3, -0.2, 0.5, 0.7, -0.4, 0.9])
@@ -55,17 +55,10 @@ def test_a_float32_is_one_angle_however_large(name: str, far: float) -> None:
         assert difference < 64 * np.finfo(np.float32).eps / 2 * np.abs(exact).max()
 
 
-class Ramp(Active):
-    """A torque in proportion to the time."""
-
-    def torque(self, dynamics: Any, t: Any, q: Any, v: Any) -> Any:
-        return 0 * v + t
-
-
 @pytest.mark.parametrize("rows", [0, 1, 20])
 def test_a_time_that_rounding_hides_is_refused_by_machine_code(rows: int) -> None:
     """float32 tells 1e9 s to 64 s; what it holds, 2^30 s, it takes."""
-    plant = rd.Compiled(rd.Plant(ARM, [Ramp()]), dtype="float32")
+    plant = rd.Compiled(rd.Plant(ARM, [Push(lambda t, q, v: 0 * v + t)]), dtype="float32")
     q = np.tile(NEAR, (rows, 1) if rows else 1).astype(np.float32)
 
     def torque(t: float) -> Any:

@@ -10,6 +10,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError
 from tests.long import long
+from tests.user_parts import Push
 
 BODY = rd.Payload("tool0", 5.0, (0.1, 0.0, 0.2))
 ROUNDING = 1e-12  # of the largest torque
@@ -135,19 +136,12 @@ def test_a_run_without_what_its_effects_exerted_says_so() -> None:
         replace(run, a=run.a * np.nan).causes()
 
 
-class Wind(E.Active):
-    """An effect of a user."""
-
-    def torque(self, dynamics, t, q, v):
-        return 0.3 + 0 * v
-
-
 def test_a_users_effect_is_a_cause_and_is_not_called_again_later() -> None:
     """It may change after the run: what it exerted is known when simulate returns. Without an estimate it is not."""
-    plant = rd.Plant(rd.load("planar_2r"), [Wind()])
+    plant = rd.Plant(rd.load("planar_2r"), [Push(lambda t, q, v: 0.3 + 0 * v)])
     run = rd.simulate(plant, [0.3, 0.4], duration_s=0.05, integrator="rk4")
     assert "effect_torques" in vars(run)
-    np.testing.assert_array_equal(run.causes().torques["wind"], np.full_like(run.q, -0.3))
+    np.testing.assert_array_equal(run.causes().torques["push"], np.full_like(run.q, -0.3))
     brief = rd.simulate(plant, [0.3, 0.4], duration_s=0.05, integrator="rk4", estimate_error=False)
     with pytest.raises(QueryError, match="simulate it again with its error estimate"):
         brief.causes()

@@ -5,15 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from dataclasses import dataclass, replace
-from typing import Any, final
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.control import Stateless
-from robot_dyn.effects import Active
 from robot_dyn.foundations import QueryError, TraceError
 from robot_dyn.integrate import FIXED_STEP
 from robot_dyn.model import completed
@@ -24,6 +22,7 @@ from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.watch import Watch
 from tests.long import long
 from tests.own_method import OwnImplicit
+from tests.user_parts import Push
 
 ARM = rd.load("planar_2r")
 UR5 = completed(rd.load("ur5"))[0]  # its file states right angles with too few digits
@@ -179,54 +178,20 @@ def test_progress_is_told_and_an_interrupt_keeps_the_samples() -> None:
     assert np.isfinite(run.q).all()
 
 
-@final
-@dataclass(frozen=True)
-class Elsewhere(Stateless):
-    """A controller written elsewhere, which traces nonetheless."""
-
-    n: int = 2
-    period_s: float = 0.0
-
-    def torque(self, t, q, v, z):
-        return -4.0 * q if t < 0.05 else 0 * q
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Table(Active):
-    """An effect that looks its torque up, which symbols cannot."""
-
-    def torque(self, dynamics, t, q, v):
-        return np.array([0.1, 0.2])[int(10 * t) % 2] * v
-
-
-def test_an_undeclared_controller_runs_interpreted_unless_it_is_asked_for() -> None:
-    setup = rd.Setup(rd.Plant(ARM), Q, controller=Elsewhere(), duration_s=0.1, estimate_error=False, integrator="rk4")
-    run = rd.simulate(setup)
-    assert run.statistics.engine.startswith("interpreted (Elsewhere declares no thresholds")
-    assert run.statistics.engine in run.summary
-    check_equal(rd.simulate(setup, engine="compiled"), run, 1e-12)
-
-
 def test_a_reference_that_jumps_between_rests() -> None:
     """Steps end at the jump, so that both engines see the same constant on either side."""
     jump = rd.control.PiecewisePolynomial([0, 0.1, 0.2], [[Q], [Q + 1]])
-    setup = rd.Setup(
-        rd.Plant(ARM),
-        Q,
-        duration_s=0.2,
-        controller=rd.control.PD(jump, 10.0, 1.0),
-        estimate_error=False,
-        integrator="rk4",
-    )
-    run = rd.simulate(replace(setup, engine="interpreted"))
+    law = rd.control.PD(jump, 10.0, 1.0)
+    setup = rd.Setup(rd.Plant(ARM), Q, None, 0.2, law, "rk4", estimate_error=False)
+    run = rd.simulate(setup, engine="interpreted")
     assert np.abs(run.q[-1] - Q).max() > 0.01
     check_equal(rd.simulate(setup, engine="compiled"), run, 1e-12)
 
 
 def test_what_cannot_be_compiled_is_named() -> None:
-    with pytest.raises(TraceError, match=r"effect table cannot be compiled .*engine='interpreted'"):
-        rd.simulate(rd.Plant(ARM, [Table()]), q0=Q, engine="compiled")
+    looked_up = Push(lambda t, q, v: np.array([0.1, 0.2])[int(10 * t) % 2] * v)
+    with pytest.raises(TraceError, match=r"effect push cannot be compiled .*engine='interpreted'"):
+        rd.simulate(rd.Plant(ARM, [looked_up]), q0=Q, engine="compiled")
     with pytest.raises(QueryError, match="no engine 'fast'; nearest: auto"):
         rd.Setup(rd.Plant(ARM), Q, engine="fast")
 
@@ -287,16 +252,6 @@ def test_a_machine_that_disagrees_is_refused(monkeypatch) -> None:
         MachineError, match=r"differs from the interpreted one by .* allowed: take engine='interpreted'"
     ):
         check(other, setup)
-
-
-def test_interpreted_runs_import_no_compiler(tmp_path) -> None:
-    """Where no machine code is in the store."""
-    code = (
-        "import sys, robot_dyn as rd, numpy as np;"
-        "rd.simulate(rd.Plant(rd.load('planar_2r')), q0=[0.1, 0.2], duration_s=0.05);"
-        "assert not {'casadi', 'llvmlite'} & set(sys.modules), 'imported'"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True, env=os.environ | {"ROBOT_DYN_CACHE": str(tmp_path)})
 
 
 class Borrowed:

@@ -76,32 +76,26 @@ def test_estimate_is_within_a_factor_of_ten_of_the_true_error(scene) -> None:
     assert f"{estimate.largest:.1e}" in run.summary
 
 
-@pytest.mark.parametrize("name", ["midpoint", *long(["rosenbrock_5", "gauss_4", "explicit_euler"])])
-def test_estimate_holds_for_methods_of_every_order(name: str) -> None:
-    plant, law, q0, v0, duration, _ = SCENES["planar_2r with friction"]
-    step = {"explicit_euler": 5e-4, "midpoint": 2e-3}.get(name, 4e-3)
-    run = rd.simulate(setup(plant, law, q0, v0, duration, step), integrator=rd.integrate.method(name))
-    tight = rd.simulate(
-        setup(plant, law, q0, v0, duration, step), integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-14)
-    )
+SAMPLED = rd.control.PD(rd.control.quintic([0.4, -0.7], [0.9, 0.2], 0.5), [60.0, 20.0], [4.0, 1.0], period_s=0.05)
+
+
+@pytest.mark.parametrize(
+    ("method", "step", "law"),
+    [
+        *(("midpoint", 2e-3, None), ("rk4", 5e-3, SAMPLED)),
+        *long([("rosenbrock_5", 4e-3, None), ("gauss_4", 4e-3, None), ("explicit_euler", 5e-4, None)]),
+    ],
+)
+def test_estimate_holds_for_methods_of_every_order(method: str, step: float, law: rd.control.PD | None) -> None:
+    """Also of sampled control: companions take longer steps, never fewer ticks, and order 4 shows at its jumps."""
+    plant, _, q0, v0, duration, _ = SCENES["planar_2r with friction"]
+    base = setup(plant, law, q0, v0, duration, step)
+    run = rd.simulate(base, integrator=method)
+    tight = rd.simulate(base, integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False)
     error = np.abs(run.q[-1] - tight.q[-1]).max()
-    assert run.error is not None
+    assert run.error is not None and run.error.note == ""
     assert run.error.until_s == duration
     assert error / 10 < run.error.largest < 10 * max(error, 1e-12)
-
-
-def test_estimate_of_a_sampled_controller_is_that_of_the_same_ticks() -> None:
-    """Companions take longer steps, never fewer ticks: order 4 shows although the torque jumps."""
-    plant, _, q0, v0, duration, _ = SCENES["planar_2r with friction"]
-    law = rd.control.PD(rd.control.quintic(q0, [0.9, 0.2], 0.5), [60.0, 20.0], [4.0, 1.0], period_s=0.05)
-    run = rd.simulate(setup(plant, law, q0, v0, duration, 5e-3))
-    exact = rd.simulate(
-        setup(plant, law, q0, v0, duration, 5e-3), integrator=rd.integrate.method("order_8"), step_s=2e-3
-    )
-    assert run.error is not None
-    assert run.error.note == ""
-    error = np.abs(run.q[-1] - exact.q[-1]).max()
-    assert error / 10 < run.error.largest < 10 * error
 
 
 @pytest.mark.parametrize("scene", [CASES[1], CASES[4], *long([CASES[0], *CASES[2:4]])])
@@ -119,9 +113,7 @@ def test_chaos_at_a_coarse_step_is_not_resolved(step: float) -> None:
     """The double pendulum from 2.5 rad tumbles: errors grow e-fold in less than 1 s, up to the size of the motion."""
     chaos = setup(rd.Plant(DOUBLE), None, [2.5, 0.7], [0.3, 0.5], 20.0, step)
     run = rd.simulate(chaos)
-    reference = rd.simulate(
-        chaos, integrator=rd.integrate.method("order_8"), step_s=step / 10, record_period_s=step, estimate_error=False
-    )
+    reference = rd.simulate(chaos, integrator="order_8", step_s=step / 10, record_period_s=step, estimate_error=False)
     error, estimate = true_error(run, reference), run.error
     assert error[-1] > 1.0  # the end of the run is fiction
     assert estimate is not None

@@ -13,6 +13,7 @@ import robot_dyn as rd
 from robot_dyn.foundations import QueryError, TraceError
 from tests.campaigns.estimates.scenes import arms
 from tests.long import long
+from tests.slides import slides
 
 G = 9.80665
 BALL = arms()["rail"]  # 1 kg on a vertical rail
@@ -154,17 +155,9 @@ def test_a_start_on_a_stop_and_one_within_it() -> None:
 
 def test_two_joints_that_meet_their_stops_at_once() -> None:
     """Two equal blocks on two rails: both events, at one time, and equal motion afterwards."""
-    text = """<robot name="rails"><link name="base"/>{}</robot>"""
-    one = """<link name="b{0}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
-    </inertial></link><joint name="j{0}" type="prismatic"><parent link="base"/><child link="b{0}"/><axis xyz="0 0 1"/>
-    <limit lower="-9" upper="9" effort="9" velocity="9"/></joint>"""
-    pair = rd.Robot.from_text(text.format(one.format(1) + one.format(2)))
-    run = rd.simulate(
-        rd.Plant(pair, rd.effects.joint_stops([-0.5, -0.5], [9.0, 9.0], 1e6, 0.0)),
-        [0.0, 0.0],
-        duration_s=1.0,
-        integrator=TIGHT,
-    )
+    pair = slides(("j1", "base", "b1", 1.0), ("j2", "base", "b2", 1.0), axes=("0 0 1",) * 2)
+    plant = rd.Plant(pair, rd.effects.joint_stops([-0.5, -0.5], [9.0, 9.0], 1e6, 0.0))
+    run = rd.simulate(plant, [0.0, 0.0], duration_s=1.0, integrator=TIGHT)
     times = [each.t for each in run.events]
     assert len(times) >= 4
     assert times[0] == pytest.approx(np.sqrt(1.0 / G), abs=1e-13)

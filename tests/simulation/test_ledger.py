@@ -194,13 +194,9 @@ def test_nothing_moves_and_nothing_is_exchanged() -> None:
 def test_gauss_keeps_the_energy_of_a_long_swing_and_euler_does_not() -> None:
     """Symplectic in (q, p): no drift over 20 s, the error of E stays within twice that of the first 4 s."""
     start = {"q0": [-1.0, 0.5], "v0": [0.0, 0.0], "step_s": 0.01, "estimate_error": False}
-    gauss = rd.simulate(
-        rd.Plant(DOUBLE), **start, duration_s=20.0, integrator=rd.integrate.method("gauss_4")
-    ).ledger.residual
+    gauss = rd.simulate(DOUBLE, **start, duration_s=20.0, integrator="gauss_4").ledger.residual
     assert np.abs(gauss[1600:]).max() < 2 * np.abs(gauss[:400]).max() < 1e-4
-    euler = rd.simulate(
-        rd.Plant(DOUBLE), **start, duration_s=5.0, integrator=rd.integrate.method("explicit_euler")
-    ).ledger
+    euler = rd.simulate(DOUBLE, **start, duration_s=5.0, integrator="explicit_euler").ledger
     assert euler.residual[-1] > 1.0
 
 
@@ -260,9 +256,7 @@ def test_rounding_at_rest_is_no_leak() -> None:
 def test_an_arm_that_stands_exchanges_no_energy() -> None:
     """Held by its own weight's torque: what is left of power is rounding, and no part of it is stated."""
     q = np.array([0.4, -0.7])
-    held = rd.simulate(
-        rd.Plant(DOUBLE), q, duration_s=0.2, controller=rd.control.PDGravity(DOUBLE, rd.control.hold(q), 9, 3)
-    )
+    held = rd.simulate(DOUBLE, q, duration_s=0.2, controller=rd.control.PDGravity(DOUBLE, rd.control.hold(q), 9, 3))
     assert not held.ledger.exchanges
     assert "J, no energy exchanged" in held.summary
     moved = rd.simulate(rd.Plant(DOUBLE), q, [1e-3, 0.0], duration_s=0.2)

@@ -8,6 +8,7 @@ from scipy.linalg import expm
 
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError
+from tests.slides import slides
 
 G = 9.80665
 PENDULUM = rd.load("pendulum")  # I = 1/3 kg m², m g l/2 = G/2
@@ -138,21 +139,13 @@ def test_a_state_without_meaning_is_refused(state, message: str) -> None:
         rd.linearise(rd.Plant(DOUBLE), *state)
 
 
-@pytest.mark.parametrize("scale", [1e-2, 1e-3, 1e-4])
-def test_steep_friction_is_linearised_too(scale: float) -> None:
-    """∂a/∂v = −f/(v_s M) at rest, M = 1/3: the step of the difference shrinks until two agree to 1e-6."""
-    plant = rd.Plant(rd.load("pendulum"), [rd.effects.RegularisedCoulombFriction(0.1, scale)])
-    A, _ = rd.linearise(plant, [0.1], [0.0], [0.0])
-    assert A[1, 1] == pytest.approx(-0.3 / scale, rel=1e-6)
-
-
 def test_a_kink_has_no_linearisation() -> None:
     with pytest.raises(rd.RobotDynError, match="no derivative"):
         rd.linearise(rd.Plant(rd.load("pendulum"), [rd.effects.EffortLimit(5.0)]), [0.1], [0.0], [5.0])
 
 
 @pytest.mark.parametrize("velocity", [0.0, 1e-3, 1.0, 30.0])
-@pytest.mark.parametrize("scale", [1e-5, 1e-6, 1e-8])
+@pytest.mark.parametrize("scale", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8])
 def test_thin_layers_of_friction_are_resolved(scale: float, velocity: float) -> None:
     """∂a/∂v = −f/(v_s I) sech²(v/v_s), I = 1/3; 1e-9 of the slope at rest is 100 times what differences leave."""
     plant = rd.Plant(PENDULUM, [rd.effects.RegularisedCoulombFriction(0.1, scale)])
@@ -160,16 +153,7 @@ def test_thin_layers_of_friction_are_resolved(scale: float, velocity: float) -> 
     assert A[1, 1] == pytest.approx(-0.3 / scale / np.cosh(velocity) ** 2, abs=1e-9 * 0.3 / scale)
 
 
-SLIDES = rd.Robot.from_text(
-    "<robot name='slides'><link name='base'/>"
-    + "".join(
-        f"<link name='{name}'><inertial><mass value='2'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/>"
-        f"</inertial></link><joint name='j{name}' type='prismatic'><parent link='{parent}'/><child link='{name}'/>"
-        "<axis xyz='1 0 0'/><limit lower='-9' upper='9' effort='1' velocity='1'/></joint>"
-        for parent, name in (("base", "a"), ("a", "b"))
-    )
-    + "</robot>"
-)
+SLIDES = slides(("ja", "base", "a", 2.0), ("jb", "a", "b", 2.0))
 
 
 @pytest.mark.parametrize("q", [[0.5, 0.3], [1e5, -3e5]])

@@ -41,18 +41,8 @@ def setup(x: float, kind: str = "computed torque") -> rd.Setup:
         "computed torque": rd.control.ComputedTorque(model, reference, 60.0 + x, [9.0, 8.0 + x]),
         "PID": rd.control.PID(reference, 60.0 + x, 20.0 + x, 9.0, effort_limit=25.0 + x, period_s=0.01),
     }
-    return rd.Setup(
-        rd.Plant(arm, effects),
-        Q,
-        V,
-        0.2,
-        controllers[kind],
-        rd.integrate.method("rk4"),
-        1e-3,
-        0.01,
-        False,
-        engine="compiled",
-    )
+    plant, steps = rd.Plant(arm, effects), ("rk4", 1e-3, 0.01, False)
+    return rd.Setup(plant, Q, V, 0.2, controllers[kind], *steps, engine="compiled")
 
 
 def compiles_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -79,22 +69,14 @@ def test_other_numbers_compile_nothing(kind: str, monkeypatch: pytest.MonkeyPatc
 
 def test_another_structure_is_compiled() -> None:
     """What is not a number, such as a locked joint or the link that a wrench acts on, is not taken for one."""
-    at = {name: rd.effects.ExternalWrench(name, [1.0, 0.2, 0.7, 0.1, 0.4, 0.2]) for name in ARM.frame_names[1:3]}
-    ends = {
-        name: rd.simulate(plant_with(each), q0=Q, duration_s=0.1, engine="compiled", integrator="rk4").q[-1]
-        for name, each in at.items()
-    }
-    theirs = {
-        name: rd.simulate(plant_with(each), q0=Q, duration_s=0.1, engine="interpreted", integrator="rk4")
-        for name, each in at.items()
-    }
-    for name, q in ends.items():
-        assert np.abs(q - theirs[name].q[-1]).max() < 1e-13
-    assert np.abs(np.subtract(*ends.values())).max() > 1e-3
-
-
-def plant_with(effect: rd.effects.Active) -> rd.Plant:
-    return rd.Plant(ARM, [effect])
+    ends = []
+    for frame in ARM.frame_names[1:3]:
+        setup = rd.Setup(rd.Plant(ARM, [rd.effects.ExternalWrench(frame, [1.0, 0.2, 0.7, 0.1, 0.4, 0.2])]), Q)
+        options = {"duration_s": 0.1, "integrator": "rk4"}
+        ours, theirs = (rd.simulate(setup, engine=x, **options).q[-1] for x in ("compiled", "interpreted"))
+        assert np.abs(ours - theirs).max() < 1e-13
+        ends.append(ours)
+    assert np.abs(np.subtract(*ends)).max() > 1e-3
 
 
 @pytest.mark.parametrize(
@@ -197,16 +179,8 @@ def test_parts_of_a_users_own_have_all_of_it() -> None:
     by_name = rd.Plant(ARM, [Drag({ARM.joint_names[1]: 0.5})])
     np.testing.assert_array_equal(by_name.effects[0].strength, [0.0, 0.5])
     path = rd.control.quintic(Q, Q + 0.2, 0.1)
-    base = rd.Setup(
-        by_name,
-        Q,
-        V,
-        0.2,
-        Follower(path, ARM, 50.0),
-        rd.integrate.method("rk4"),
-        record_period_s=0.01,
-        estimate_error=False,
-    )
+    options = {"record_period_s": 0.01, "estimate_error": False}
+    base = rd.Setup(by_name, Q, V, 0.2, Follower(path, ARM, 50.0), "rk4", **options)
     theirs = rd.simulate(base, engine="interpreted")
     assert np.abs(rd.simulate(base, engine="compiled").q - theirs.q).max() < 1e-12
     assert theirs.desired is not None and np.abs(theirs.desired - path.at(theirs.t)[0]).max() == 0
@@ -249,10 +223,7 @@ def test_operational_space_is_compiled(turn: str) -> None:
     control = rd.control.OperationalSpace(
         UR5, "tool0", rd.control.line(p, p + np.array([0.1, 0.05, -0.1]), 0.2, **turns[turn]), 100.0, 20.0
     )
-    base = rd.Setup(
-        rd.Plant(UR5), START, duration_s=0.2, controller=control, integrator=rd.integrate.method("rk4"), step_s=2e-3,
-        estimate_error=False,
-    )  # fmt: skip
+    base = rd.Setup(rd.Plant(UR5), START, None, 0.2, control, "rk4", 2e-3, estimate_error=False)
     ours, theirs = rd.simulate(base, engine="compiled"), rd.simulate(base, engine="interpreted")
     assert np.abs(ours.q - theirs.q).max() < 1e-10  # of 1 rad: κ(M) is 1e3, of the task 1e2
 

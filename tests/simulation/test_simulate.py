@@ -26,14 +26,7 @@ def test_pendulum_swings_with_the_exact_period(amplitude: float) -> None:
     """θ = 2 asin(k cd(ω₀ t, k)), T = 4 K(k)/ω₀, k = sin(θ₀/2), ω₀² = 3 g / (2 l); 1e-10, the step's own error."""
     k, omega = np.sin(amplitude / 2), np.sqrt(1.5 * G)
     period = 4 * ellipk(k**2) / omega
-    run = rd.simulate(
-        rd.Plant(PENDULUM),
-        q0=[amplitude],
-        v0=[0.0],
-        duration_s=period,
-        integrator=rd.integrate.method("order_8"),
-        step_s=0.01,
-    )
+    run = rd.simulate(PENDULUM, [amplitude], duration_s=period, integrator="order_8", step_s=0.01)
     _, cn, dn, _ = ellipj(omega * run.t, k**2)
     np.testing.assert_allclose(run.q[:, 0], 2 * np.arcsin(k * cn / dn), atol=1e-10)
     np.testing.assert_allclose([run.q[-1, 0], run.v[-1, 0]], [amplitude, 0.0], atol=1e-10)
@@ -45,10 +38,7 @@ def test_pendulum_swings_with_the_exact_period(amplitude: float) -> None:
 def test_free_fall_on_a_rail_is_a_parabola(name: str) -> None:
     """Motion x = x₀ + v₀ t + g t²/2, a polynomial that order 2 keeps exactly: rounding of some 100 steps, 1e-13."""
     falling = rd.Plant(CART.with_(gravity=(1.7, 0.0, -G)))
-    method = rd.integrate.method(name)
-    run = rd.simulate(
-        falling, q0=[0.3], v0=[-0.8], duration_s=1.0, integrator=method, step_s=0.01, estimate_error=False
-    )
+    run = rd.simulate(falling, [0.3], [-0.8], duration_s=1.0, integrator=name, step_s=0.01, estimate_error=False)
     np.testing.assert_allclose(run.q[:, 0], 0.3 - 0.8 * run.t + 1.7 * run.t**2 / 2, atol=1e-13)
     np.testing.assert_allclose(run.v[:, 0], -0.8 + 1.7 * run.t, atol=1e-13)
     np.testing.assert_allclose(run.a, 1.7, rtol=1e-12)
@@ -57,10 +47,8 @@ def test_free_fall_on_a_rail_is_a_parabola(name: str) -> None:
 def test_cart_with_spring_and_damper_is_the_damped_oscillator() -> None:
     """The law m ẍ + b ẋ + k (x − x₀) = 0; order 8 at 5 ms leaves rounding, 1e-12."""
     m, b, k, rest, x0, v0 = 6.2, 2.5, 80.0, 0.15, 0.5, -0.4
-    run = rd.simulate(
-        rd.Plant(CART, [rd.effects.ViscousFriction(b), rd.effects.Spring(k, rest)]),
-        q0=[x0], v0=[v0], duration_s=2.0, integrator=rd.integrate.method("order_8"), step_s=5e-3, estimate_error=False,
-    )  # fmt: skip
+    plant = rd.Plant(CART, [rd.effects.ViscousFriction(b), rd.effects.Spring(k, rest)])
+    run = rd.simulate(plant, [x0], [v0], duration_s=2.0, integrator="order_8", step_s=5e-3, estimate_error=False)
     decay, t, away = b / (2 * m), run.t, x0 - rest
     omega = np.sqrt(k / m - decay**2)
     wave = away * np.cos(omega * t) + (v0 + decay * away) / omega * np.sin(omega * t)
@@ -69,15 +57,13 @@ def test_cart_with_spring_and_damper_is_the_damped_oscillator() -> None:
 
 def test_cart_pole_keeps_the_momentum_along_its_rail() -> None:
     """No force acts along x: p_x is constant (to rounding if it is a coordinate), the centre of mass uniform."""
-    run = rd.simulate(rd.Plant(CART_POLE), q0=[0.1, 0.8], v0=[0.3, -0.5], duration_s=1.0, estimate_error=False)
+    options = {"q0": [0.1, 0.8], "v0": [0.3, -0.5], "duration_s": 1.0, "estimate_error": False}
+    run = rd.simulate(CART_POLE, **options)
     momentum = CART_POLE.momentum(run.q, run.v)[:, 0]
     centre = run.q[:, 0] + 1.2 * 0.6 * np.sin(run.q[:, 1]) / 6.2
     np.testing.assert_allclose(centre, centre[0] + momentum[0] / 6.2 * run.t, atol=1e-10)  # not kept: error O(h⁴)
     assert np.ptp(run.q[:, 1]) > 1.0
-    canonical = rd.simulate(
-        rd.Plant(CART_POLE), q0=[0.1, 0.8], v0=[0.3, -0.5], duration_s=1.0, integrator=rd.integrate.method("gauss_4"),
-        step_s=0.01, estimate_error=False,
-    )  # fmt: skip
+    canonical = rd.simulate(CART_POLE, **options, integrator="gauss_4", step_s=0.01)
     np.testing.assert_allclose(CART_POLE.momentum(canonical.q, canonical.v)[:, 0], momentum[0], rtol=1e-12)
 
 
@@ -155,34 +141,28 @@ def test_a_wrench_window_is_three_runs_one_after_the_other() -> None:
     assert np.array_equal(whole.power["external_wrench"] != 0, acts)
 
 
-def test_samples_lie_at_multiples_of_the_record_period() -> None:
-    every = rd.simulate(SMOOTH, **START, duration_s=0.1, integrator="rk4", step_s=1e-3)
+def test_samples_lie_at_multiples_of_the_record_period_whatever_the_step() -> None:
+    """Also where steps do not divide it: 34 of 3 ms, made 36; a sample may not come a step late."""
+    options = {**START, "duration_s": 0.1}
+    every = rd.simulate(SMOOTH, **options, integrator="rk4", step_s=1e-3)
     np.testing.assert_allclose(every.t, np.arange(101) * 1e-3, atol=1e-15)
-    for options in ({"integrator": "rk4", "step_s": 1e-3}, {"integrator": "DOP853"}):
-        some = rd.simulate(SMOOTH, **START, duration_s=0.1, record_period_s=0.03, **options)
+    for steps in ({"integrator": "rk4", "step_s": 1e-3}, {"integrator": "DOP853"}):
+        some = rd.simulate(SMOOTH, **options, record_period_s=0.03, **steps)
         np.testing.assert_allclose(some.t, [0.0, 0.03, 0.06, 0.09, 0.1], atol=1e-15)
         np.testing.assert_allclose(some.q, every.q[[0, 30, 60, 90, 100]], atol=1e-9)
-    assert some.t[-1] == 0.1
+        assert some.t[-1] == 0.1
+    uneven = rd.simulate(SMOOTH, **options, integrator="rk4", step_s=3e-3, record_period_s=0.01)
+    np.testing.assert_allclose(uneven.t, np.arange(11) * 0.01, atol=1e-12)
 
 
-def test_samples_lie_at_multiples_of_the_record_period_whatever_the_step() -> None:
-    """Steps that do not divide the record period: 34 of 3 ms, made 36; a sample may not come a step late."""
-    run = rd.simulate(SMOOTH, **START, duration_s=0.1, integrator="rk4", step_s=3e-3, record_period_s=0.01)
-    np.testing.assert_allclose(run.t, np.arange(11) * 0.01, atol=1e-12)
-
-
-def test_a_setup_and_its_options_are_one() -> None:
-    setup = rd.Setup(SMOOTH, integrator="rk4", **START, duration_s=0.05)
+def test_progress_is_told_at_each_step_and_in_the_companion_runs() -> None:
     times: list[float] = []
-    one, other = (
-        rd.simulate(setup, integrator="rk4", step_s=2e-3, engine="interpreted", on_progress=times.append),
-        rd.simulate(SMOOTH, **START, duration_s=0.05, integrator="rk4", step_s=2e-3, engine="interpreted"),
-    )
-    assert np.array_equal(one.q, other.q)
-    assert np.array_equal(times[: len(one.t)], one.t)
-    assert set(times[len(one.t) :]) == {one.t[-1]}  # told in the companion runs of the error estimate
-    assert one.joint_names == DOUBLE.joint_names
-    assert [array.shape for array in (one.q, one.v, one.a, one.u)] == [(len(one.t), 2)] * 4
+    options = {"integrator": "rk4", "step_s": 2e-3, "engine": "interpreted", "on_progress": times.append}
+    run = rd.simulate(SMOOTH, **START, duration_s=0.05, **options)
+    assert np.array_equal(times[: len(run.t)], run.t)
+    assert set(times[len(run.t) :]) == {run.t[-1]}
+    assert run.joint_names == DOUBLE.joint_names
+    assert [array.shape for array in (run.q, run.v, run.a, run.u)] == [(len(run.t), 2)] * 4
 
 
 def test_a_frame_that_follows_a_circle_has_a_deviation_in_metres() -> None:

@@ -11,7 +11,6 @@ import pytest
 from lxml import html
 
 import robot_dyn as rd
-from robot_dyn.foundations import QueryError
 from robot_dyn.scene import starter
 from tests.command import document, said
 from tests.long import long
@@ -41,11 +40,6 @@ def test_each_one_can_be_swept_and_has_the_value_of_the_setup(every: int) -> Non
         swept = end(given, params={each.name: each.value[None]})
         np.testing.assert_allclose(swept, alone, rtol=0, atol=1e-13, err_msg=each.name)
     assert {"kp", "spring 2.rest", "payload_mass:pole", "pole.mass", "model.mass_scale"} <= {x.name for x in known}
-
-
-def test_no_other_name_is_taken_and_near_ones_are_told() -> None:
-    with pytest.raises(QueryError, match=r"params: no 'viscous_friction.damp'; nearest: viscous_friction.damping"):
-        rd.rollouts(setup(), params={"viscous_friction.damp": [0.1]})
 
 
 def test_units_are_those_of_the_joints() -> None:

@@ -16,12 +16,16 @@ ROUGH = rd.control.PiecewisePolynomial(  # its velocity jumps
 FRICTION = rd.effects.LuGreFriction([60.0, 40.0], [2.0, 1.0], [1.0, 0.5], [1.5, 0.8], [2.0, 1.0], 1.0)
 PD = rd.control.PD(rd.control.quintic([0.1, 0.2], [0.9, -0.4], 0.5), [150.0, 60.0], [12.0, 5.0])
 PUSH = rd.effects.ExternalWrench("tip", [30.0, -20.0, 0.0, 0.0, 0.0, 2.0], "world_aligned", 0.3137, 0.3149)
+FAR, LIMIT = rd.control.quintic([0.1, 0.2], [1.3, -0.7], 0.8), [18.0, 5.0]
 SCENES = {
     "break of the reference": ([], rd.control.PD(ROUGH, [150.0, 60.0], [12.0, 5.0])),
     "window shorter than a step": ([PUSH], PD),
     "stops struck": (rd.effects.joint_stops([-1.2, -0.9], [0.35, 0.8], 2e3, 20.0), None),
     "bristles that reverse": ([FRICTION], PD),
+    "limits reached and left": ([rd.effects.EffortLimit(LIMIT)], rd.control.ComputedTorque(ARM, FAR, 144.0, 24.0)),
+    "limits, with back-calculation": ([], rd.control.PID(FAR, [120.0, 60.0], [300.0, 150.0], [20.0, 8.0], LIMIT)),
 }
+LIMITED = {"limits reached and left": 7, "limits, with back-calculation": 3}  # events
 
 
 def run(scene: str, **options) -> rd.Trajectory:
@@ -35,15 +39,20 @@ def test_halved_steps_keep_the_order(scene: str) -> None:
     """The same events, and in the mean of five halvings order 4 ± 0.15; order 8 down to 7.5, or to rounding."""
     exact = run(scene, integrator=rd.integrate.Adaptive("DOP853", 1e-13, 1e-13))
     names = [each.name for each in exact.events]
-    assert (len(names) > 1) is (scene in ("stops struck", "bristles that reverse"))
+    assert (len(names) > 1) is (scene in ("stops struck", "bristles that reverse", *LIMITED))
+    assert len(names) == LIMITED.get(scene, len(names))
     errors = []
     for h in 5e-3 / 2 ** np.arange(6):
         made = run(scene, integrator="rk4", step_s=h)
         assert [each.name for each in made.events] == names
         errors.append(np.abs(made.q[-1] - exact.q[-1]).max())
     assert -np.polyfit(np.arange(6), np.log2(errors), 1)[0] == pytest.approx(4, abs=0.15)
-    coarse, fine = (np.abs(run(scene, integrator="order_8", step_s=h).q - exact.q).max() for h in (0.005, 0.0025))
-    assert fine < max(coarse / 2**7.5, 1e-13)
+    steps, floor = ((0.02, 0.01), 0.0) if scene in LIMITED else ((0.005, 0.0025), 1e-13)
+    coarse, fine = (np.abs(run(scene, integrator="order_8", step_s=h).q - exact.q).max() for h in steps)
+    assert fine < max(coarse / 2**7.5, floor)
+    for tolerance in (1e-6, 1e-9) if scene in LIMITED else ():
+        loose = run(scene, integrator=rd.integrate.Adaptive(rtol=tolerance, atol=tolerance))
+        assert np.abs(loose.q[-1] - exact.q[-1]).max() < tolerance
 
 
 def test_bristles_at_rest_reverse_no_more() -> None:

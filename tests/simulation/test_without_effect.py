@@ -11,7 +11,6 @@ from robot_dyn.foundations import CatalogError, ControlError, EditError, EffectE
 
 ARM = rd.load("planar_2r")
 UR5 = rd.load("ur5")
-START = {"q0": [0.3, -0.4], "duration_s": 0.1}
 
 
 # --- effects
@@ -83,22 +82,6 @@ def test_folders_of_packages_that_are_none_are_refused(tmp_path) -> None:
 
 
 # --- runs
-
-
-def test_an_unknown_option_of_simulate_is_answered_with_the_nearest() -> None:
-    for what in (ARM, rd.Setup(rd.Plant(ARM), **START)):
-        with pytest.raises(QueryError, match="simulate: no option 'duration'; nearest: duration_s"):
-            rd.simulate(what, q0=[0.3, -0.4], duration=0.1)
-
-
-def test_a_step_for_a_method_that_chooses_its_own_is_refused() -> None:
-    with pytest.raises(QueryError, match=r"step_s has no effect on DOP853, .* rd.integrate.Adaptive\(max_step_s=…\)"):
-        rd.Setup(rd.Plant(ARM), **START, integrator=rd.integrate.Adaptive(), step_s=2e-3)
-    stepped = rd.Setup(rd.Plant(ARM), **START, integrator="rk4", step_s=2e-3)
-    adaptive = rd.simulate(
-        stepped, integrator=rd.integrate.Adaptive(), estimate_error=False
-    )  # the step was for the other method
-    assert adaptive.statistics.step_s == 0
 
 
 def test_a_controller_whose_model_has_other_joints_than_the_plant_is_refused() -> None:

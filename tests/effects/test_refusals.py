@@ -1,0 +1,106 @@
+"""What no effect means, and what no method, query or plant takes of one, is refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import robot_dyn as rd
+from robot_dyn.effects import (
+    CarriedPayload,
+    DryFriction,
+    EffortLimit,
+    ExternalWrench,
+    JointStopSpring,
+    LineSpringDamper,
+    LuGreFriction,
+    RegularisedCoulombFriction,
+    RigidBacklash,
+    RigidStops,
+    SeriesElastic,
+    ViscousFriction,
+)
+from robot_dyn.foundations import EffectError, QueryError
+
+ARM, TREE, CART, UR5 = (rd.load(name) for name in ("planar_2r", "skew_tree", "cart_pole", "ur5"))
+Q = np.array([0.3, -0.5])
+LINE = {"stiffness": 1.0, "damping": 1.0, "length": 1.0}
+DRY, PLAY, SOFT = DryFriction(1.0), RigidBacklash(0.01, 0.1), SeriesElastic(9.0, 0.1)
+BODY = CarriedPayload(rd.Payload("tip", 0.8), 0.1, 0.2)
+STOPS = RigidStops([-1.0, -1.0], [1.0, 1.0])
+
+
+def plant(*effects: Any, arm: Any = ARM) -> rd.Plant:
+    return rd.Plant(arm, effects)
+
+
+def setup(*effects: Any, **options: Any) -> rd.Setup:
+    return rd.Setup(plant(*effects), Q, duration_s=0.3, **options)
+
+
+CONSTRUCTED = [
+    (lambda: ViscousFriction(-0.1), "damping must not be negative"),
+    (lambda: ViscousFriction([0.1, np.nan]), "damping must be finite"),
+    (lambda: ViscousFriction("much"), "damping must be real numbers"),
+    (lambda: RegularisedCoulombFriction(1.0, 0.0), "velocity_scale must be positive"),
+    (lambda: JointStopSpring(1.0, 0.5, 3.0), "lower stops must lie below"),
+    (lambda: ExternalWrench("pole", [1, 2, 3]), r"shape \(6,\)"),
+    (lambda: ExternalWrench("pole", np.ones(6), start_s=2.0, end_s=1.0), "end_s must lie after"),
+    (lambda: EffortLimit(-1.0), "limit must not be negative"),
+    (lambda: RigidStops(-1.0, 1.0, 1.5), "restitution must not be greater than 1"),
+    (lambda: RigidStops(1.0, -1.0), "must lie below"),
+    (lambda: DryFriction(2.0, 1.0), "static must not be less"),
+    (lambda: DryFriction(2.0, stribeck_velocity=0.1), "no effect without static"),
+    (lambda: RigidBacklash(0.1, 0.1, restitution=1.5), "restitution must not be greater than 1"),
+    (lambda: SeriesElastic(9.0, 0.0), "inertia must be positive"),
+    (lambda: LuGreFriction(1.0, 1.0, 1.0, 2.0, 1.5, 0.1), "breakaway must not be less than coulomb"),
+    (lambda: LineSpringDamper("torso", "torso", **LINE), "both points are fixed to 'torso'"),
+    (lambda: LineSpringDamper("torso", None, **LINE | {"stiffness": -1.0}), "stiffness must not be negative"),
+    (lambda: CarriedPayload(BODY.payload, 0.2, 0.1), "end_s must lie after start_s, got 0.2 and 0.1"),
+]
+IN_A_PLANT = [
+    (lambda: rd.Plant(CART, "friction"), "give effects, or 'urdf'"),
+    (lambda: plant(3), "3 is neither a Force nor a Bound"),
+    (lambda: rd.Plant(object(), "urdf"), "give a robot, such as rd.load"),
+    (lambda: plant(RigidStops(7.0, "urdf"), arm=UR5), "must lie below"),
+    (lambda: plant(RigidBacklash(0.0, 0.1)), "rigid_backlash: gap is 0 for all joints"),
+    (lambda: plant(SeriesElastic(0.0, 0.1)), "series_elastic: stiffness is 0 for all joints"),
+    (lambda: plant(LineSpringDamper("left_tol", None, **LINE), arm=TREE), "line_spring_damper: no frame 'left_tol'"),
+    (lambda: plant(CarriedPayload(rd.Payload("tipp", 1.0))), "carried_payload: .*'tipp'"),
+    (lambda: plant(BODY, arm=rd.Lagrangian(ARM)), "carried_payload: needs a Robot, got Lagrangian"),
+    (lambda: setup(SeriesElastic({"joint_2": 9.0}, 1.0), SOFT), "joint 'joint_2' has two drives; keep one"),
+    (lambda: setup(PLAY, SOFT), "joint 'joint_1' has two drives"),
+]
+IN_A_RUN = [
+    (lambda: rd.simulate(plant(STOPS), [0.3, 1.2]), r"q0: 'joint_2' is 0\.2 beyond its upper stop"),
+    (lambda: setup(PLAY, integrator="gauss_4"), "rigid_backlash: "),
+    (lambda: setup(PLAY, integrator="time_stepping"), "rigid_backlash: "),
+    (lambda: setup(SOFT, integrator="time_stepping"), "series_elastic: time_stepping takes no motors of a drive"),
+    (lambda: setup(BODY, integrator="gauss_4"), "carried_payload: .* changes momenta, which gauss_4 integrates"),
+    (lambda: rd.advise(plant(PLAY), Q), "advise: rigid_backlash frees and couples motors by turns"),
+    (lambda: rd.advise(plant(BODY), Q), "advise: carried_payload changes the bodies"),
+    *(
+        (lambda ask=ask, method=method: ask(plant(DRY), Q, integrator=method), f"dry_friction: .* {why}.*DOP853")
+        for ask in (rd.simulate, rd.rollouts)
+        for method, why in (("gauss_4", "momenta"), ("explicit_euler", "order 1"))
+    ),
+    *(
+        (lambda effect=effect: rd.rollouts(plant(effect), Q, integrator="rk4", cuts=False), f"cuts=False: {why}")
+        for effect, why in (
+            (DRY, "dry_friction holds joints and lets them go, where steps must"),
+            (PLAY, "rigid_backlash holds joints"),
+            (BODY, "carried_payload comes and goes, where steps must end"),
+        )
+    ),
+]
+REFUSED = [(make, EffectError, message) for make, message in CONSTRUCTED + IN_A_PLANT]
+REFUSED += [(make, QueryError, message) for make, message in IN_A_RUN]
+
+
+@pytest.mark.parametrize(("make", "error", "message"), REFUSED)
+def test_what_has_no_meaning_is_refused(make: Callable[[], Any], error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        make()
