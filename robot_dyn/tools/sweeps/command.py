@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from robot_dyn.cli import Force, Json, app, bar, say, say_json, to_stderr
+from robot_dyn.cli import Force, Json, bar, command, say, say_json, to_stderr
 from robot_dyn.foundations import SweepError, nearest, shorten
 
 if TYPE_CHECKING:
@@ -18,52 +18,49 @@ if TYPE_CHECKING:
 ACTIONS = ("run", "status", "verify", "report", "export")
 
 
-@app.command(rich_help_panel="Run it", short_help="Run a scene many times, with what varies, into a folder.")
+@command("Run it")
 def sweep(
-    what: Annotated[
-        str, typer.Argument(metavar="SCENE.toml|ACTION", help=f"A scene to sweep; or {', '.join(ACTIONS)} of a FOLDER.")
-    ],
-    folder: Annotated[str | None, typer.Argument(metavar="FOLDER", help="Of a sweep, for an action.")] = None,
-    output: Annotated[
-        str | None,
-        typer.Option("-o", "--output", metavar="PATH", help="Folder to fill; or the file of report, export."),
-    ] = None,
-    runs: Annotated[int | None, typer.Option(help="Number of runs.")] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=DISTRIBUTION", help="What varies, as 'kp=uniform(low=50, high=100)'; repeated."),
-    ] = None,
-    figure: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=FIGURE", help="What is kept of each run, as 'peak=peak(\"u\")'; repeated."),
-    ] = None,
-    samples: Annotated[
-        str | None,
-        typer.Option(metavar="SAMPLES", help="Samples to keep: q, v or u of all runs, or 'samples(\"q\", every=10)'."),
-    ] = None,
-    design: Annotated[str | None, typer.Option(help="random, sobol, halton, latin, saltelli or grid.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Of the design.")] = None,
-    threads: Annotated[int | None, typer.Option(help="Of this process; all processors unless given.")] = None,
-    cluster: Annotated[
-        str | None, typer.Option(help="Workers of Dask in place of threads: local:2, or tls://host:8786.")
-    ] = None,
-    share: Annotated[str | None, typer.Option(metavar="3/16", help="The part of one job of an array.")] = None,
-    scene: Annotated[
-        str | None,
-        typer.Option(help="Of a folder: where its scene lies now, or the function module:function that makes it."),
-    ] = None,
-    chunk: Annotated[int | None, typer.Option(help="Runs of a file; about 2 s of work unless given.")] = None,
-    probability: Annotated[
-        list[str] | None,
-        typer.Option(metavar="EVENT", help="Say how likely it is, as 'failed | error > 0.1'; repeated."),
-    ] = None,
+    what: str,
+    folder: str | None = None,
+    /,
+    output: str | None = None,
+    runs: int | None = None,
+    vary: list[str] | None = None,
+    figure: list[str] | None = None,
+    samples: str | None = None,
+    design: str | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+    cluster: str | None = None,
+    share: str | None = None,
+    scene: str | None = None,
+    chunk: int | None = None,
+    probability: list[str] | None = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Run a scene many times, with what varies, into a folder; again, it is resumed.
+    """Run a scene many times, with what varies, into a folder.
 
-    Ctrl-C drops the chunks under way, and the folder keeps the others. `sweep run FOLDER` resumes it, `status` says
-    what is left, `verify` reads all files, `report` writes a page, `export` a table as .csv or .parquet.
+    Repeat the command to resume. Ctrl-C drops the chunks under way, and the folder keeps the others. `sweep run FOLDER`
+    resumes it, `status` says what is left, `verify` reads all files, `report` writes a page, `export` a table as .csv
+    or .parquet.
+
+    Options:
+        what (SCENE.toml|ACTION): A scene to sweep; or run, status, verify, report, export of a FOLDER.
+        folder (FOLDER): Of a sweep, for an action.
+        output (PATH): Folder to fill; or the file of report, export.
+        runs: Number of runs.
+        vary (NAME=DISTRIBUTION): What varies, as 'kp=uniform(low=50, high=100)'; repeated.
+        figure (NAME=FIGURE): What is kept of each run, as 'peak=peak("u")'; repeated.
+        samples (SAMPLES): Samples to keep: q, v or u of all runs, or 'samples("q", every=10)'.
+        design: random, sobol, halton, latin, saltelli or grid.
+        seed: Of the design.
+        threads: Of this process; all processors unless given.
+        cluster: Workers of Dask in place of threads: local:2, or tls://host:8786.
+        share (3/16): The part of one job of an array.
+        scene: Of a folder: where its scene lies now, or the function module:function that makes it.
+        chunk: Runs of a file; about 2 s of work unless given.
+        probability (EVENT): Say how likely it is, as 'failed | error > 0.1'; repeated.
     """
     from robot_dyn.tools import sweeps as sw
 
