@@ -34,7 +34,7 @@ class Hold(Reference):
 
     kind: Literal["hold"]
     q: PerJoint | None = None
-    """Position; that of the start by default."""
+    """Position, in rad, or m for a prismatic joint; that of the start by default."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         return hold(q0 if self.q is None else per_joint("q", self.q, robot))
@@ -45,7 +45,7 @@ class Quintic(Reference):
 
     kind: Literal["quintic"]
     q: PerJoint
-    """Position at the end."""
+    """Position at the end, in rad, or m for a prismatic joint."""
     duration_s: Positive
     """Time from the start to q."""
     start_s: NotNegative = 0.0

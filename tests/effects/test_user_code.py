@@ -323,8 +323,8 @@ def test_a_scene_names_effects_that_its_reader_names(keys: str, c: Any, tmp_path
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ("", r"effect 1 \(drag\): drag: missing a required argument: 'c'; keys: c, on"),
-        ("c = 1.0\nd = 2.0", "unexpected keyword argument 'd'"),
+        ("", r"effect 1 \(drag\).c: is missing; give it"),
+        ("c = 1.0\nd = 2.0", r"effect 1 \(drag\).d: is not a key here; known: kind, c, on"),
         ("c = inf", "c must be"),
         ("c = {elbow = 1.0}", "elbow"),
     ],
