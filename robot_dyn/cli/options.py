@@ -88,7 +88,7 @@ class FileOptions:
         """Arguments of the functions that read a file."""
         return {
             "package_dirs": self.package_dir or (),
-            "xacro": None if self.xacro is None else arguments.expansion(self.xacro),
+            "xacro": None if self.xacro is None else arguments.pairs("--xacro", list(filter(None, self.xacro))),
             "mass": arguments.assignments("--mass", self.mass, "link") if self.mass else None,
             "total_mass": self.total_mass,
             "density": self.density,

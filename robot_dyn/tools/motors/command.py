@@ -90,7 +90,8 @@ def budget(
             raise QueryError(f"{what}: give its motion as well, a CSV file with a column t [s] and one for each joint")
         robot = options.load(what)
         times = time if period is None else period
-        motion = rd.control.from_samples(robot, plan, time=times, joints=_columns(joint), unit=unit, ends=ends)
+        columns = arguments.pairs("--joint", joint, "JOINT=COLUMN") or None
+        motion = rd.control.from_samples(robot, plan, time=times, joints=columns, unit=unit, ends=ends)
         bodies = [arguments.payload(each) for each in payload or ()] or None
         with bar(what="asking for the torque"):
             found = rd.tools.motors.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)
@@ -99,11 +100,6 @@ def budget(
     results.give(found, paths, judged[-1], **more)
     if not all(each.fits for each in judged):
         raise typer.Exit(1)
-
-
-def _columns(texts: list[str] | None) -> dict[str, str] | None:
-    """Headings by joint."""
-    return dict(arguments.pair("--joint", each, "JOINT=COLUMN") for each in texts) if texts else None
 
 
 def _run(path: str) -> Trajectory:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from robot_dyn.cli import Force, Json, bar, command, say, say_json, to_stderr
-from robot_dyn.foundations import SweepError, nearest, shorten
+from robot_dyn.cli import Force, Json, arguments, bar, command, say, say_json, to_stderr
+from robot_dyn.foundations import SweepError, nearest
 
 if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.plan.sweep import Sweep
@@ -65,12 +65,14 @@ def sweep(
     from robot_dyn.tools import sweeps as sw
 
     verified: list[str] = []
+    figures = arguments.pairs("--figure", figure)
     options: dict[str, Any] = {"threads": threads, "cluster": cluster, "share": share}
     if what.lower().endswith(".toml"):
         if folder is not None or output is None:
             raise SweepError("give the folder to fill with -o FOLDER")
         given = {"runs": runs, "design": design, "seed": seed, "samples": samples}
-        stated = _stated(what, given, vary or [], figure or [])
+        changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        stated = sw.from_scene(what, vary=arguments.pairs("--vary", vary), figures=figures, **changes)
         result = _run(stated, output, options | {"chunk": chunk})
     else:
         if what not in ACTIONS:
@@ -79,7 +81,7 @@ def sweep(
             )
         if folder is None:
             raise SweepError(f"{what}: of which folder? robot-dyn sweep {what} FOLDER")
-        result = sw.read(folder, scene, _assignments("--figure", figure or []))
+        result = sw.read(folder, scene, figures)
         if what == "run":
             result = _run(result.sweep, folder, options)
         elif what == "verify":
@@ -97,25 +99,6 @@ def sweep(
         say(result, *verified, *answers)
     if result.status["missing"] and what != "status" and share is None:
         raise typer.Exit(130)
-
-
-def _stated(scene: str, given: dict[str, Any], vary: list[str], figure: list[str]) -> Sweep:
-    """The sweep of a scene and of options, which take the place of what its table states."""
-    from robot_dyn.tools import sweeps as sw
-
-    changes = {name: value for name, value in given.items() if value is not None}
-    return sw.from_scene(scene, vary=_assignments("--vary", vary), figures=_assignments("--figure", figure), **changes)
-
-
-def _assignments(option: str, texts: list[str]) -> dict[str, str]:
-    """Names and values of texts NAME=VALUE; SweepError if one has another form."""
-    values = {}
-    for text in texts:
-        name, equals, value = text.partition("=")
-        if not equals or not name.strip():
-            raise SweepError(f"{option} must be NAME=VALUE, got {shorten(text)!r}")
-        values[name.strip()] = value.strip()
-    return values
 
 
 def _run(stated: Sweep, folder: str, options: dict[str, Any]) -> SweepResult:
