@@ -8,7 +8,6 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import Block, Differences, Noise, Quantisation, RateLimit, name_of
@@ -19,12 +18,11 @@ from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import numbers
 from robot_dyn.effects.actuator import stated_efforts
 from robot_dyn.foundations.coefficients import URDF
-from robot_dyn.foundations.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
 from robot_dyn.scene.effects import AnyEdit, bare
 from robot_dyn.scene.messages import part
-from robot_dyn.scene.references import Reference, frame_of
+from robot_dyn.scene.references import Reference
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Stated, one_of, per_joint, wrong_key
 
 _BLOCKS: dict[str, tuple[type[Block], ...]] = {  # of each line
@@ -67,9 +65,6 @@ KINDS: dict[str, type[Controller]] = {
     "computed_torque": ComputedTorque,
     "operational_space": OperationalSpace,
 }
-
-
-_WITH_MODEL = {"pd_gravity": PDGravity, "feed_forward": FeedForward, "computed_torque": ComputedTorque}
 
 
 class Control(Part):
@@ -137,11 +132,7 @@ class Control(Part):
         return [(line, each) for line in LINES for each in getattr(self, line)]
 
     def build(self, loaded: Robot, robot: Robot, q0: np.ndarray, reference: Reference) -> Controller:
-        """Return the controller for a reference.
-
-        Raises:
-            SceneError: If its kind does not follow this kind of reference.
-        """
+        """Return the controller for a reference."""
         controller = self._controller(loaded, robot, q0, reference)
         if not (self.measurement_delay_periods or self.actuation_delay_periods or self.blocks):
             return controller
@@ -156,15 +147,10 @@ class Control(Part):
         model = self.model.build(loaded, robot)
         with part("reference"):
             desired = reference.build(robot, q0, self.frame)
-        cartesian = isinstance(desired, CartesianReference)
-        if cartesian != (self.kind == "operational_space"):
-            need = "line or circle" if self.kind == "operational_space" else "hold, quintic, via_points or samples"
-            with part("reference"):
-                raise SceneError(f"reference.kind: {self.kind} follows {need}, got {reference.kind!r}")
         kp, kd = self._gains(model, q0)
-        if cartesian:
+        if self.kind == "operational_space":
             return OperationalSpace(
-                model, frame_of(self.frame), desired, kp, kd, q0, kp.max() / 10, 2 * np.sqrt(kp.max() / 10),
+                model, str(self.frame), desired, kp, kd, q0, kp.max() / 10, 2 * np.sqrt(kp.max() / 10),
                 period_s=self.period_s,
             )  # fmt: skip
         if self.kind == "pid":
@@ -173,7 +159,7 @@ class Control(Part):
             return PID(desired, kp, kp * self.integral_rate_per_s, kd, limit, period_s=self.period_s)
         if self.kind == "pd":
             return PD(desired, kp, kd, self.period_s)
-        return _WITH_MODEL[self.kind](model, desired, kp, kd, self.period_s)
+        return KINDS[self.kind](model, desired, kp, kd, self.period_s)  # pyright: ignore[reportCallIssue]
 
     def _gains(self, model: Robot, q0: np.ndarray) -> tuple[Any, Any]:
         """Stiffness and damping, as stated or from ω and ζ."""

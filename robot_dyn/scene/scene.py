@@ -25,7 +25,7 @@ from robot_dyn.scene.control import Control
 from robot_dyn.scene.declared import callable_part
 from robot_dyn.scene.effects import ACTING, BY_KIND, EDITS, AnyEffect, DeclaredEffect, Edit, bare
 from robot_dyn.scene.messages import line, part, validation_message
-from robot_dyn.scene.references import AnyReference, Hold, Sampled, ViaPoints
+from robot_dyn.scene.references import AnyReference, Circle, Hold, Line, Sampled, ViaPoints
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Truth, one_of, per_joint, wrong_key
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
@@ -126,6 +126,13 @@ class Scene(Part):
         if unused := [key for key in of_other_methods if key in stated]:
             kind = "chooses its own step" if self.method in ADAPTIVE else "has a fixed step"
             raise wrong_key(unused[0], f"has no effect because {self.method} {kind}; remove it, or name another method")
+        if self.control is not None:
+            kind, of_frame = self.control.kind, self.control.kind == "operational_space"
+            if of_frame != isinstance(self.reference, Line | Circle):
+                need = "line or circle" if of_frame else "hold, quintic, via_points or samples"
+                raise wrong_key("reference.kind", f"{kind} follows {need}, got {self.reference.kind!r}")
+            if of_frame and self.control.frame is None:
+                raise wrong_key("control.frame", "name the link that follows a line or a circle")
         of_model = None if self.control is None else self.control.model.effects
         for place, effects in (("effect", self.effect), ("control.model.effects", of_model or ())):
             kinds = [effect.kind for effect in effects]
