@@ -35,6 +35,14 @@ OF_MANY_KEYS_OR_OF_TOMLLIB = {  # texts that grow with the library, or are of Py
 }
 
 
+HEAD, ROWS = "t [s],q hinge [rad],q slide [m]\n", "0.5,0.4,0.1\n0.9,-0.2,0.3\n1.6,0.7,0.2\n"
+FILES = {
+    "rig.urdf": URDF, "rig.xml": MJCF, "way.csv": HEAD + ROWS, "text.csv": f"{HEAD}0.5,0.4,x\n",
+    "short.csv": f"{HEAD}\n0.5,0.4\n", "nan.csv": f"{HEAD}0.5,0.4,nan\n", "back.csv": f"{HEAD}{ROWS}0.2,1,1\n",
+    "early.csv": f"{HEAD}-1,0.4,1\n", "empty.csv": HEAD, "lacking.csv": "t,q hinge\n0.5,1\n0.6,1\n",
+    "speeds.csv": "t,q hinge,q slide,v hinge,v slide\n1,1,1,1,1\n2,2,2,1,1\n",
+    "long.csv": HEAD + "".join(f"{k},0,0\n" for k in range(1, 3001)),
+}  # fmt: skip
 MISTAKES = json.loads((FOLDER / "scene_mistakes.json").read_text(encoding="utf-8"))
 
 
@@ -42,7 +50,7 @@ MISTAKES = json.loads((FOLDER / "scene_mistakes.json").read_text(encoding="utf-8
 @pytest.mark.parametrize("mistake", [*MISTAKES, *OF_MANY_KEYS_OR_OF_TOMLLIB])
 def test_a_mistake_is_told_as_people_count(tmp_path: Path, mistake: str) -> None:
     """By the file, the line of the key or table at the top if it is there, key, value and remedy."""
-    for name, text in {"rig.urdf": URDF, "rig.xml": MJCF}.items():
+    for name, text in FILES.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     scene = mistake if "robot" in mistake else BASE + mistake
     (tmp_path / "scene.toml").write_text(scene, encoding="utf-8")
