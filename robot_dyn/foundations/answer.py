@@ -123,7 +123,7 @@ def html_of(blocks: Iterable[Block]) -> Iterator[str]:
         if of_text:
             yield display.text("\n".join(line for each in some for line in _lines(each)).strip("\n"))
         else:
-            yield from (display.table(each.heading, each.rows, each.right) for each in some if isinstance(each, Table))
+            yield from (display.table(each) for each in some if isinstance(each, Table))
 
 
 def _lines(block: Block) -> Iterable[str]:
