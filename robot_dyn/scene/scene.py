@@ -141,15 +141,11 @@ class Scene(Part):
                     raise wrong_key(place, f"{kind} is named {count} times, and only the last would act; keep one")
         return self
 
-    def loaded(self, folder: Path) -> Robot:
-        """Return the robot of its file."""
-        beside = folder / self.robot
-        return self.load.robot(beside if os.path.isfile(beside) else self.robot)
-
     def setup(self, folder: Path, about: dict[str, str]) -> Setup:
         """Return the setup it describes; paths are relative to `folder`."""
         with part("robot"):
-            loaded = self.loaded(folder)
+            file = folder / self.robot
+            loaded = self.load.robot(file if os.path.isfile(file) else self.robot)
         robot = bare(loaded)
         acting: list[Effect] = []
         for k, effect in sorted(enumerate(self.effect), key=lambda pair: not isinstance(pair[1], Edit)):  # edits first
