@@ -91,20 +91,23 @@ def _type(known: Coefficient) -> Any:
     """Return the type of a key: a value by joint, three numbers, one, or any for other shapes."""
     if known.of_joints:
         return Stated if known.stated else PerJoint
-    if () not in known.shapes and known.shapes != ((3,),):
-        return Any
-    return Vector3 if known.shapes == ((3,),) else Number if known.least is None else NotNegative
+    if known.shapes == ((3,),):
+        return Vector3
+    return Any if known.shapes != ((),) else Number if known.least is None else NotNegative
 
 
 def callable_part(base: type[Table], kind: str, factory: Callable[..., Any]) -> type[Table]:
     """The part of a scene whose keys are the arguments of a class or function; coefficients are spelled with units."""
     classes = (factory,) if isinstance(factory, type) else ()
-    coefficients = {name for name, _ in _keys_of(factory, *classes).values()}
+    known = _keys_of(factory, *classes)
+    coefficients = {name for name, _ in known.values()}
     others = {
         name: (Any, ... if parameter.default is Parameter.empty else None)
         for name, parameter in signature(factory).parameters.items()
         if name not in coefficients and parameter.kind not in (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
     }
+    if kept := [key for key in (*known, *others) if key.startswith("_") or key == "kind" or hasattr(base, key)]:
+        raise SceneError(f"effects: {kept[0]!r} of {kind!r} is a name that tables of scenes need; rename the argument")
     return declared_part(base, kind, *classes, factory=factory, others=others)
 
 

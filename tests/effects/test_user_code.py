@@ -336,6 +336,8 @@ def test_wrong_keys_of_an_effect_of_a_users_own_are_told(keys: str, said: str, t
         rd.read_scene(path, effects={"drag": Drag})
     with pytest.raises(SceneError, match="'spring' is a kind that scenes have"):
         rd.read_scene(path, effects={"spring": Drag})
+    with pytest.raises(SceneError, match="'copy' of 'own' is a name that tables of scenes need; rename"):
+        rd.read_scene(path, effects={"own": lambda copy: Drag(copy)})
 
 
 @dataclass(eq=False)
