@@ -9,7 +9,7 @@ import pytest
 from lxml import html
 
 import robot_dyn as rd
-from robot_dyn.foundations import Table, display
+from robot_dyn.foundations import display, table
 
 
 def curves_of(page: html.HtmlElement) -> list[np.ndarray]:
@@ -61,14 +61,14 @@ def test_a_batch_shows_the_range_of_its_runs() -> None:
 
 
 def test_text_of_a_file_is_text_of_the_page() -> None:
-    page = read(display.page("<b>", display.table(Table(("<i>", "k"), (("<u>", 1e-3),))), display.text("<s>")))
+    page = read(display.page("<b>", table(("<i>", "k"), [("<u>", 1e-3)]), display.text("<s>")))
     assert not list(page.iter("b", "i", "u", "s"))
     assert page.text_content().endswith("<b><i>k<u>0.001<s>")
 
 
 def test_a_long_table_scrolls_and_is_whole() -> None:
     for count in (40, 41):
-        page = read(display.page("long", display.table(Table(("k",), tuple((k,) for k in range(count))))))
+        page = read(display.page("long", table(("k",), [(k,) for k in range(count)])))
         assert len(list(page.iter("tr"))) == count + 1
         assert bool(page.find_class("l")) is (count > 40)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from html import escape
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,6 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from robot_dyn.foundations.answer import Table
 
 INK = "#010203"  # in a figure: the colour of the text of a page
 GRID = "#80808055"
@@ -54,12 +53,12 @@ def text(lines: str | Iterable[str]) -> str:
     return f"<pre>{escape(lines if isinstance(lines, str) else chr(10).join(lines))}</pre>"
 
 
-def table(shown: Table) -> str:
-    """Return a table with the cells that its text has; columns of numbers stand at the right."""
-    kinds = ["" if name in shown.words else " class=n" for name in shown.heading]
+def grid(heading: Sequence[str], cells: Iterable[Sequence[str]], words: Collection[str]) -> str:
+    """Return a table of texts; the columns that are not of words stand at the right."""
+    kinds = ["" if name in words else " class=n" for name in heading]
     head, *body = (
         "".join(f"<{tag}{kind}>{escape(cell)}</{tag}>" for kind, cell in zip(kinds, row, strict=True))
-        for tag, row in (("th", shown.heading), *(("td", row) for row in shown.cells))
+        for tag, row in (("th", heading), *(("td", row) for row in cells))
     )
     rows = "".join(f"<tr>{row}</tr>" for row in body)
     whole = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"

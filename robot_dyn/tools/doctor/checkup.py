@@ -80,11 +80,11 @@ class Checkup(Answer):
         yield from (f"  {report.sentence(each)}" for each in report.grouped(self.findings))
 
     def _repr_html_(self) -> str:
-        from robot_dyn.foundations import Table, page, table
+        from robot_dyn.foundations import page, table
 
-        rows = tuple((x.severity.value, x.where, str(x.line or ""), x.what, x.remedy) for x in self.findings)
-        whole = Table(("", "where", "line", "what", "remedy"), rows, right=("line",))
-        return page(self.sentence, table(whole) if rows else "")
+        rows = ((x.severity.value, x.where, str(x.line or ""), x.what, x.remedy) for x in self.findings)
+        heading = ("", "where", "line", "what", "remedy")
+        return page(self.sentence, table(heading, rows, right=("line",)) if self.findings else "")
 
 
 def check(

@@ -13,6 +13,7 @@ from robot_dyn.foundations import Answer, FileKind, html_of, inline, page, side_
 from robot_dyn.foundations import table as html_table
 from robot_dyn.report import PAGE, ink, styled
 from robot_dyn.tools.sweeps.estimate import Estimate
+from robot_dyn.tools.sweeps.estimate import text as number
 from robot_dyn.tools.sweeps.folder.rows import FINISHED
 from robot_dyn.tools.sweeps.sensitivity import Sensitivity, bins
 
@@ -99,9 +100,10 @@ def _of_figure(figure: FigureReport, repeat: str) -> Iterator[str]:
     """Distribution, quantiles and worst runs of a figure."""
     yield f"<h2>{escape(figure.heading)}</h2>"
     first, finite = figure.quantiles[0], figure.values[np.isfinite(figure.values)]
-    rows = [(each.statistic, each.estimate, each.low, each.high) for each in figure.quantiles]
+    rows = [(each.statistic, *map(number, (each.estimate, each.low, each.high))) for each in figure.quantiles]
     level = f"{100 * first.level:g} % interval from"
-    parts = [html_table(("", "estimate", level, "to"), rows), text(f"{first.n} runs, {first.failed} failed")]
+    columns = ("estimate", level, "to")
+    parts = [html_table(("", *columns), rows, right=columns), text(f"{first.n} runs, {first.failed} failed")]
     worst = [(i, float(figure.values[i]), f"{repeat}({i})") for i in figure.worst]
     yield side_by_side([*([_histogram(figure.heading, finite)] if len(finite) else []), f"<div>{''.join(parts)}</div>"])
     yield html_table(("worst runs that finished", figure.heading, "repeat it by"), worst)
