@@ -2,7 +2,6 @@
 from robot_dyn.cli import arguments as arguments
 from robot_dyn.cli import completion as completion
 from robot_dyn.cli.application import GROUPS as GROUPS
-from robot_dyn.cli.application import app as app
 from robot_dyn.cli.application import bar as bar
 from robot_dyn.cli.application import command as command
 from robot_dyn.cli.application import program as program

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.main import get_command
 
-from robot_dyn.cli.options import with_fields
+from robot_dyn.cli.options import with_options
 from robot_dyn.cli.terminal import put
 from robot_dyn.foundations.errors import escaped
 
@@ -35,7 +35,7 @@ def command(group: str, name: str | None = None) -> Callable[[Callable[..., Any]
     """Register a function as a command of a group; --help lists it with the first paragraph of its docstring."""
 
     def register(function: Callable[..., Any]) -> Callable[..., Any]:
-        return app.command(name, rich_help_panel=group)(with_fields(function))
+        return app.command(name, rich_help_panel=group)(with_options(function))
 
     return register
 

@@ -5,18 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from robot_dyn.foundations.errors import QueryError, nearest
+from robot_dyn.foundations.errors import QueryError, nearest, shorten
 
 if TYPE_CHECKING:
     import numpy as np
 
     from robot_dyn.description.edits import Payload
     from robot_dyn.simulation.setup.setup import Setup
-
-
-def expansion(xacro: list[str]) -> dict[str, str]:
-    """The arguments of xacro by name."""
-    return dict(pair("--xacro", text) for text in xacro if text)
 
 
 def scene(what: str, given: Mapping[str, object]) -> Setup | None:
@@ -32,25 +27,19 @@ def scene(what: str, given: Mapping[str, object]) -> Setup | None:
 
 def assignments(option: str, texts: list[str], what: str = "joint") -> dict[str, float]:
     """Values by joint, or link, of several joint=value; QueryError if one comes twice."""
-    pairs = [assignment(option, text, what) for text in texts]
-    values = dict(pairs)
-    if len(values) < len(pairs):
+    values = {name: number(option, value) for name, value in pairs(option, texts, f"{what.upper()}=VALUE").items()}
+    if len(values) < len(texts):
         raise QueryError(f"{option} names a {what} twice: {', '.join(texts)}")
     return values
 
 
-def assignment(option: str, text: str, what: str = "joint") -> tuple[str, float]:
-    """Name and value of joint=value."""
-    name, value = pair(option, text, f"{what.upper()}=VALUE")
-    return name, number(option, value)
-
-
-def pair(option: str, text: str, form: str = "NAME=VALUE") -> tuple[str, str]:
-    """What stands before and after the first =."""
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise QueryError(f"{option} must be {form}, got {text!r}")
-    return name.strip(), value
+def pairs(option: str, texts: list[str] | None, form: str = "NAME=VALUE") -> dict[str, str]:
+    """What stands before and after the first = of each text."""
+    parts = {text: text.partition("=") for text in texts or ()}
+    for text, (name, equals, _) in parts.items():
+        if not (equals and name.strip()):
+            raise QueryError(f"{option} must be {form}, got {shorten(text)!r}")
+    return {name.strip(): value for name, _, value in parts.values()}
 
 
 def payload(text: str) -> Payload:

@@ -1,21 +1,24 @@
-"""Options that commands share, one by one and in groups.
+"""Options of commands, described by their docstrings, and groups of options that commands share.
 
     @command("Trust it")
-    def certify(robot: Name, options: RobotOptions = AS_STATED, results: Results = PRINTED): ...
+    def certify(robot: Name, /, samples: int = 10_000, options: RobotOptions = AS_STATED, results: Results = PRINTED):
+        # its docstring has a line "samples (COUNT): Number of random states."
 
-has the fields of `RobotOptions` and of `Results` as options, instead of `options` and `results`.
+has the argument ROBOT, the option `--samples COUNT`, and the fields of `RobotOptions` and of `Results` as options.
 """
 
 from __future__ import annotations
 
 import inspect
 import os
+import re
 import warnings
 from collections.abc import Callable, Iterable
+from copy import copy
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, final, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, final, get_args, get_origin, get_type_hints
 
 import typer
 
@@ -56,70 +59,55 @@ class FileOptions:
     """How a URDF or MJCF file is read, each None unless given.
 
     With a mass, a total mass or a density, links without inertia get that of their shape.
+
+    Options:
+        package_dir: Folder in which ROS packages are searched; may be repeated.
+        xacro (NAME=VALUE): Expand a xacro file, which runs its expressions; may be repeated; '' for no argument.
+        mass (LINK=KG): Mass of a link without inertia, which its shape gives; may be repeated.
+        total_mass (KG): Mass of the robot, shared by links without inertia, from shapes.
+        density (KG/M³): Density of links without inertia, from shapes.
+        allow_overlap: Count what closed parts of a mesh share as often as they fill it.
     """
 
-    package_dir: Annotated[
-        list[str] | None, typer.Option(help="Folder in which ROS packages are searched; may be repeated.")
-    ] = None
-    xacro: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE",
-            help="Expand a xacro file, which runs its expressions; may be repeated; '' for no argument.",
-        ),
-    ] = None
-    mass: Annotated[
-        list[str] | None,
-        typer.Option(metavar="LINK=KG", help="Mass of a link without inertia, which its shape gives; may be repeated."),
-    ] = None
-    total_mass: Annotated[
-        float | None,
-        typer.Option(metavar="KG", help="Mass of the robot, shared by links without inertia, from shapes."),
-    ] = None
-    density: Annotated[
-        float | None, typer.Option(metavar="KG/M³", help="Density of links without inertia, from shapes.")
-    ] = None
-    allow_overlap: Annotated[
-        bool | None,
-        typer.Option("--allow-overlap", help="Count what closed parts of a mesh share as often as they fill it."),
-    ] = None
+    package_dir: list[str] | None = None
+    xacro: list[str] | None = None
+    mass: list[str] | None = None
+    total_mass: float | None = None
+    density: float | None = None
+    allow_overlap: bool = False
 
     @property
     def stated(self) -> dict[str, object]:
         """Value by option, of those that are given."""
-        values = {f"--{field.name.replace('_', '-')}": getattr(self, field.name) for field in fields(self)}
-        return {option: value for option, value in values.items() if value is not None and value != []}
+        values = {field: getattr(self, field.name) for field in fields(self)}
+        stated = {field.name: value for field, value in values.items() if value not in (field.default, [])}
+        return {f"--{name.replace('_', '-')}": value for name, value in stated.items()}
 
     @property
     def reading(self) -> dict[str, Any]:
         """Arguments of the functions that read a file."""
         return {
             "package_dirs": self.package_dir or (),
-            "xacro": None if self.xacro is None else arguments.expansion(self.xacro),
+            "xacro": None if self.xacro is None else arguments.pairs("--xacro", list(filter(None, self.xacro))),
             "mass": arguments.assignments("--mass", self.mass, "link") if self.mass else None,
             "total_mass": self.total_mass,
             "density": self.density,
-            "allow_overlap": self.allow_overlap or False,
+            "allow_overlap": self.allow_overlap,
         }
 
 
 @final
 @dataclass(frozen=True)
 class RobotOptions(FileOptions):
-    """How the robot of a command is read, each None unless given."""
+    """How the robot of a command is read, each None unless given.
 
-    lock: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="JOINT=VALUE",
-            help="Lock a joint at a value in rad or m; may be repeated.",
-            autocompletion=completion.locks,
-        ),
-    ] = None
-    without: Annotated[
-        str | None,
-        typer.Option(metavar="WHAT,…", help="What is left out of MJCF: tendon, equality, free, ball."),
-    ] = None
+    Options:
+        lock (JOINT=VALUE): Lock a joint at a value in rad or m; may be repeated.
+        without (WHAT,…): What is left out of MJCF: tendon, equality, free, ball.
+    """
+
+    lock: Annotated[list[str] | None, typer.Option(autocompletion=completion.locks)] = None
+    without: str | None = None
 
     def load(self, name: str, *, quiet: bool = False) -> Robot:
         """Return the robot of a name or path; `quiet` suppresses its warnings."""
@@ -138,12 +126,15 @@ class RobotOptions(FileOptions):
 @final
 @dataclass(frozen=True)
 class Results:
-    """What becomes of the result of a command: a figure, a table, text or JSON."""
+    """What becomes of the result of a command: a figure, a table, text or JSON.
 
-    output: Annotated[
-        str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="Draw it, as a .png, .svg or .pdf.")
-    ] = None
-    csv: Annotated[str | None, typer.Option("--csv", metavar="TABLE.csv", help="Write its rows as a table.")] = None
+    Options:
+        output (PLOT.png): Draw it, as a .png, .svg or .pdf.
+        csv (TABLE.csv): Write its rows as a table.
+    """
+
+    output: str | None = None
+    csv: str | None = None
     dark: Dark = False
     force: Force = False
     as_json: Json = False
@@ -173,28 +164,51 @@ FILE_AS_STATED, AS_STATED = FileOptions(), RobotOptions()  # defaults of the par
 PRINTED = Results()
 
 
-def with_fields(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function in which the fields of options stand for each parameter whose default is a group of options."""
-    hints, stated = get_type_hints(function, include_extras=True), inspect.signature(function).parameters
-    groups = {name: each.default for name, each in stated.items() if is_dataclass(each.default)}
+_DESCRIBED = re.compile(r"^    (\w+)(?: \(([^)]+)\))?: (.+(?:\n {5,}.+)*)", re.MULTILINE)
+_SHORT = {"output": ("-o",)}
+
+
+def with_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function of keywords alone, as typer takes it: options are described, and groups stand as their fields.
+
+    Parameters before `/` are arguments. "name (VALUE): text" in a docstring describes a parameter or field, and VALUE.
+    """
+    stated, groups, parameters = inspect.signature(function).parameters.values(), dict[str, Any](), []
+    arguments = [parameter.name for parameter in stated if parameter.kind is parameter.POSITIONAL_ONLY]
+    for parameter in stated:
+        if is_dataclass(kind := type(parameter.default)):
+            groups[parameter.name] = kind
+            options = [parameter.replace(name=field.name, default=field.default) for field in fields(kind)]
+            parameters += [_described(option, *reversed(kind.__mro__)) for option in options]
+        else:
+            parameters.append(_described(parameter, function))
 
     @wraps(function)
     def replaced(**given: Any) -> Any:
-        for name, group in groups.items():
-            given[name] = type(group)(**{each.name: given.pop(each.name) for each in fields(group)})
-        return function(**given)
+        for name, kind in groups.items():
+            given[name] = kind(**{field.name: given.pop(field.name) for field in fields(kind)})
+        values = [given.pop(name) for name in arguments]
+        return function(*values, **given)
 
-    defaults: dict[str, Any] = {}
-    for name, each in stated.items():
-        if name in groups:
-            hints |= get_type_hints(type(each.default), include_extras=True)
-            defaults |= {field.name: field.default for field in fields(each.default)}
-        else:
-            defaults[name] = each.default
-    parameters = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hints[name])
-        for name, default in defaults.items()
-    ]
     replaced.__signature__ = inspect.Signature(parameters)  # pyright: ignore[reportAttributeAccessIssue]
-    replaced.__annotations__ = {name: hints[name] for name in defaults}
+    replaced.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    replaced.__doc__ = inspect.cleandoc(function.__doc__ or "").partition("\n\nOptions:")[0]
     return replaced
+
+
+def _described(parameter: inspect.Parameter, *where: Any) -> inspect.Parameter:
+    """Return a parameter as typer takes it, with what the docstrings of a function or of classes state of it."""
+    name, default = parameter.name, parameter.default
+    annotation = get_type_hints(where[-1], include_extras=True)[name]
+    docstrings = "\n".join(inspect.cleandoc(source.__doc__ or "") for source in where)
+    texts = {name: (form, " ".join(text.split())) for name, form, text in _DESCRIBED.findall(docstrings)}
+    if name in texts:
+        kind, *stated = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
+        is_argument = parameter.kind is parameter.POSITIONAL_ONLY
+        info = copy(stated[0]) if stated else typer.Argument() if is_argument else typer.Option()
+        if not (is_argument or default is True):  # typer itself adds --no-… where that is the default
+            info.param_decls = (*_SHORT.get(name, ()), f"--{name.strip('_').replace('_', '-')}")
+        form, info.help = texts[name]
+        info.metavar = form or None
+        annotation = Annotated[kind, info]
+    return parameter.replace(kind=parameter.KEYWORD_ONLY, annotation=annotation)

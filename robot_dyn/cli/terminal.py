@@ -35,7 +35,7 @@ def open_streams() -> None:
         stream.reconfigure(errors="replace")  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def say(*renderables: Any) -> None:
+def say(*answers: Answer | Table | str) -> None:
     """Print answers, tables, and texts of one line each.
 
     A pipe that its reader has closed is not an error: the rest is dropped.
@@ -43,24 +43,29 @@ def say(*renderables: Any) -> None:
     Raises:
         OutputError: If standard output cannot be written.
     """
-    from rich.console import Console
-    from rich.text import Text
-
-    class Safe(Console):
-        def render_str(self, text: str, **options: Any) -> Text:  # a cell of a table, to measure and to print
-            return super().render_str(escaped(text), **options)
-
-    terminal = sys.stdout.isatty()
-    width = None if terminal else 1000  # lines in a pipe are not wrapped
-    console = Safe(highlight=False, markup=False, emoji=False, width=width)
-    for each in (part for one in renderables for part in (one.blocks() if isinstance(one, Answer) else (one,))):
-        if isinstance(each, Table) and terminal:
-            for part in each.within(console.width):  # a number that is cut off is another number
-                _guarded(lambda part=part: console.print(_grid(part)))
-        elif isinstance(each, Table | str):
-            put("\n".join([*each.lines, ""] if isinstance(each, Table) else [escaped(each), ""]))
+    for block in (part for one in answers for part in (one.blocks() if isinstance(one, Answer) else (one,))):
+        if isinstance(block, str):
+            put(f"{escaped(block)}\n")
+        elif sys.stdout.isatty():
+            _guarded(lambda table=block: _draw(table))
         else:
-            _guarded(lambda each=each: console.print(each))
+            put("\n".join([*block.lines, ""]))
+
+
+def _draw(table: Table) -> None:
+    """Print a table on a terminal: texts begin at the left and may be broken, numbers stand whole at the right."""
+    from rich.console import Console
+    from rich.table import Table as Grid
+
+    console = Console(highlight=False, markup=False, emoji=False)
+    for part in table.within(console.width):  # a number that is cut off is another number
+        grid = Grid(box=None, pad_edge=False, header_style="bold")
+        for heading in part.heading:
+            word = heading in part.words
+            grid.add_column(heading, no_wrap=not word, overflow="fold", justify="left" if word else "right")
+        for row in part.cells:
+            grid.add_row(*row)
+        console.print(grid)
 
 
 def show(
@@ -94,19 +99,6 @@ def show(
         to_stderr(f"written: {path}")
     if getattr(answer, "interrupted", False):
         raise typer.Exit(130)
-
-
-def _grid(table: Table) -> Any:
-    """A table for a terminal: texts begin at the left and may be broken, numbers stand whole at the right."""
-    from rich.table import Table as Grid
-
-    grid = Grid(box=None, pad_edge=False, header_style="bold")
-    for heading in table.heading:
-        word = heading in table.words
-        grid.add_column(heading, no_wrap=not word, overflow="fold", justify="left" if word else "right")
-    for row in table.cells:
-        grid.add_row(*row)
-    return grid
 
 
 def say_written(file: Path) -> None:

@@ -4,6 +4,7 @@ from robot_dyn.foundations.answer import Block as Block
 from robot_dyn.foundations.answer import Table as Table
 from robot_dyn.foundations.answer import html_of as html_of
 from robot_dyn.foundations.answer import number_or_dash as number_or_dash
+from robot_dyn.foundations.answer import table as table
 from robot_dyn.foundations.arithmetic import FLOAT64 as FLOAT64
 from robot_dyn.foundations.arithmetic import Arithmetic as Arithmetic
 from robot_dyn.foundations.arithmetic import Array as Array
@@ -22,7 +23,6 @@ from robot_dyn.foundations.display import inline as inline
 from robot_dyn.foundations.display import legend as legend
 from robot_dyn.foundations.display import page as page
 from robot_dyn.foundations.display import plot as plot
-from robot_dyn.foundations.display import table as table
 from robot_dyn.foundations.errors import CatalogError as CatalogError
 from robot_dyn.foundations.errors import ControlError as ControlError
 from robot_dyn.foundations.errors import DescriptionError as DescriptionError

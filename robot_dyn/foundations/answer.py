@@ -123,7 +123,12 @@ def html_of(blocks: Iterable[Block]) -> Iterator[str]:
         if of_text:
             yield display.text("\n".join(line for each in some for line in _lines(each)).strip("\n"))
         else:
-            yield from (display.table(each.heading, each.rows, each.right) for each in some if isinstance(each, Table))
+            yield from (display.grid(each.heading, each.cells, each.words) for each in some if isinstance(each, Table))
+
+
+def table(heading: Iterable[str], rows: Iterable[Iterable[str | float]], right: Iterable[str] = ()) -> str:
+    """Return a table as HTML, with the cells that its text has."""
+    return "".join(html_of([Table(tuple(heading), tuple(map(tuple, rows)), right=tuple(right))]))
 
 
 def _lines(block: Block) -> Iterable[str]:

@@ -17,6 +17,7 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+
 INK = "#010203"  # in a figure: the colour of the text of a page
 GRID = "#80808055"
 MOST_JOINTS = 8  # whose curves are drawn
@@ -52,30 +53,16 @@ def text(lines: str | Iterable[str]) -> str:
     return f"<pre>{escape(lines if isinstance(lines, str) else chr(10).join(lines))}</pre>"
 
 
-def table(heading: Sequence[str], rows: Iterable[Sequence[Any]], right: Collection[str] = ()) -> str:
-    """A table; numbers and the columns `right` stand at the right, and what is None is left empty."""
-    rows = list(rows)
-    ends = {k for k, each in enumerate(heading) if each in right}
-    numbers = ends | {k for row in rows for k, x in enumerate(row) if _is_number(x)}
-    head = "".join(f"<th{' class=n' * (k in numbers)}>{escape(each)}</th>" for k, each in enumerate(heading))
-    body = "".join(f"<tr>{''.join(_cell(x, k in ends) for k, x in enumerate(row))}</tr>" for row in rows)
-    whole = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-    return whole if len(rows) <= _MOST_ROWS else f'<div class="l" tabindex="0">{whole}</div>'
-
-
-def _cell(value: Any, right: bool) -> str:
-    number = _is_number(value)
-    shown = number_text(float(value)) if number else "" if value is None else str(value)
-    return f"<td{' class=n' * (number or right)}>{escape(shown)}</td>"
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
-
-
-def number_text(value: float) -> str:
-    """A number in four digits."""
-    return f"{value:.4g}".replace("-", "−") if isfinite(value) else "∞" if value > 0 else "−∞" if value < 0 else "nan"
+def grid(heading: Sequence[str], cells: Iterable[Sequence[str]], words: Collection[str]) -> str:
+    """Return a table of texts; the columns that are not of words stand at the right."""
+    kinds = ["" if name in words else " class=n" for name in heading]
+    head, *body = (
+        "".join(f"<{tag}{kind}>{escape(cell)}</{tag}>" for kind, cell in zip(kinds, row, strict=True))
+        for tag, row in (("th", heading), *(("td", row) for row in cells))
+    )
+    rows = "".join(f"<tr>{row}</tr>" for row in body)
+    whole = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    return whole if len(body) <= _MOST_ROWS else f'<div class="l" tabindex="0">{whole}</div>'
 
 
 def side_by_side(parts: Iterable[str]) -> str:

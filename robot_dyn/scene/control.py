@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
 
-from robot_dyn.control.cartesian import CartesianReference
 from robot_dyn.control.computed_torque import ComputedTorque, FeedForward, PDGravity
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import Block, Differences, Noise, Quantisation, RateLimit, name_of
@@ -18,13 +18,12 @@ from robot_dyn.control.operational_space import OperationalSpace
 from robot_dyn.control.reference import numbers
 from robot_dyn.effects.actuator import stated_efforts
 from robot_dyn.foundations.coefficients import URDF
-from robot_dyn.foundations.errors import SceneError
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.declared import Declared, declared_part
 from robot_dyn.scene.effects import AnyEdit, bare
 from robot_dyn.scene.messages import part
-from robot_dyn.scene.references import Reference, frame_of
-from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Stated, one_of, per_joint
+from robot_dyn.scene.references import Reference
+from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Stated, one_of, per_joint, wrong_key
 
 _BLOCKS: dict[str, tuple[type[Block], ...]] = {  # of each line
     "position": (Noise, Quantisation, LowPass),
@@ -34,7 +33,7 @@ _BLOCKS: dict[str, tuple[type[Block], ...]] = {  # of each line
 _ORDER: dict[type[Block], dict[str, Any]] = {LowPass: {"order": (Literal[1, 2], Field(2, description="Order."))}}
 BLOCKS: dict[str, tuple[type[Declared], ...]] = {
     line: tuple(
-        declared_part(Declared, name_of(each), each, signal=SIGNALS[line], **_ORDER.get(each, {})) for each in classes
+        declared_part(Declared, name_of(each), each, signal=SIGNALS[line], others=_ORDER.get(each)) for each in classes
     )
     for line, classes in _BLOCKS.items()
 }
@@ -66,9 +65,6 @@ KINDS: dict[str, type[Controller]] = {
     "computed_torque": ComputedTorque,
     "operational_space": OperationalSpace,
 }
-
-
-_WITH_MODEL = {"pd_gravity": PDGravity, "feed_forward": FeedForward, "computed_torque": ComputedTorque}
 
 
 class Control(Part):
@@ -112,40 +108,33 @@ class Control(Part):
     """Seed of noise; other seeds give other noise of the same kind."""
 
     @property
-    def unused(self) -> set[str]:
-        """Keys that have no effect with this kind and these gains."""
-        of_others = {key for key, kinds in _OF_ONE_KIND.items() if self.kind not in kinds}
-        damping_ratio = set() if self.kp is None else {"damping_ratio"}
-        return of_others | damping_ratio | (set() if self._draws_noise else {"noise_seed"})
+    def unused(self) -> dict[str, str]:
+        """Keys that have no effect with this kind, these gains and these blocks, each with the reason."""
+        kinds = {key: kind for key, kind in _OF_ONE_KIND.items() if self.kind != kind}
+        reasons = {key: f"on {self.kind}, only on {kind}" for key, kind in kinds.items()}
+        if self.kp is not None:
+            reasons["damping_ratio"] = "beside kp and kd"
+        if not any(block.factory.random for _, block in self.blocks):  # pyright: ignore[reportFunctionMemberAccess]
+            reasons["noise_seed"] = "without a block of kind noise"
+        return reasons
 
-    @property
-    def _draws_noise(self) -> bool:
-        """Whether a block draws noise."""
-        return any(each.factory.random for _, each in self.blocks)  # pyright: ignore[reportFunctionMemberAccess]
+    @model_validator(mode="after")
+    def _every_key_has_an_effect_and_gains_are_stated_once(self) -> Self:
+        if len({self.kp is None, self.kd is None, self.frequency_rad_per_s is not None}) > 1:
+            raise PydanticCustomError("wrong_key", "give frequency_rad_per_s, or both kp and kd")
+        for key in self.unused.keys() & self.model_fields_set:
+            raise wrong_key(key, f"has no effect {self.unused[key]}; remove it")
+        return self
 
     @property
     def blocks(self) -> list[tuple[str, Any]]:
         """The blocks of the loop, each with its line."""
         return [(line, each) for line in LINES for each in getattr(self, line)]
 
-    @property
-    def loops(self) -> bool:
-        """Whether delays or blocks stand between arm and controller."""
-        return bool(self.measurement_delay_periods or self.actuation_delay_periods or self.blocks)
-
     def build(self, loaded: Robot, robot: Robot, q0: np.ndarray, reference: Reference) -> Controller:
-        """Return the controller for a reference.
-
-        Raises:
-            SceneError: If the gains are stated twice or not at all, or its kind does not follow this kind of reference.
-        """
-        for key, kinds in _OF_ONE_KIND.items():
-            if key in self.model_fields_set and self.kind not in kinds:
-                raise SceneError(f"control.{key}: has no effect on {self.kind}, only on {', '.join(kinds)}; remove it")
-        if "noise_seed" in self.model_fields_set and not self._draws_noise:
-            raise SceneError("control.noise_seed: has no effect without a block of kind noise; remove it")
+        """Return the controller for a reference."""
         controller = self._controller(loaded, robot, q0, reference)
-        if not self.loops:
+        if not (self.measurement_delay_periods or self.actuation_delay_periods or self.blocks):
             return controller
         lines: Any = {line: [each.call(robot) for each in getattr(self, line)] for line in LINES}
         return Loop(
@@ -158,15 +147,10 @@ class Control(Part):
         model = self.model.build(loaded, robot)
         with part("reference"):
             desired = reference.build(robot, q0, self.frame)
-        cartesian = isinstance(desired, CartesianReference)
-        if cartesian != (self.kind == "operational_space"):
-            need = "line or circle" if self.kind == "operational_space" else "hold, quintic, via_points or samples"
-            with part("reference"):
-                raise SceneError(f"reference.kind: {self.kind} follows {need}, got {reference.kind!r}")
         kp, kd = self._gains(model, q0)
-        if cartesian:
+        if self.kind == "operational_space":
             return OperationalSpace(
-                model, frame_of(self.frame), desired, kp, kd, q0, kp.max() / 10, 2 * np.sqrt(kp.max() / 10),
+                model, str(self.frame), desired, kp, kd, q0, kp.max() / 10, 2 * np.sqrt(kp.max() / 10),
                 period_s=self.period_s,
             )  # fmt: skip
         if self.kind == "pid":
@@ -175,16 +159,11 @@ class Control(Part):
             return PID(desired, kp, kp * self.integral_rate_per_s, kd, limit, period_s=self.period_s)
         if self.kind == "pd":
             return PD(desired, kp, kd, self.period_s)
-        return _WITH_MODEL[self.kind](model, desired, kp, kd, self.period_s)
+        return KINDS[self.kind](model, desired, kp, kd, self.period_s)  # pyright: ignore[reportCallIssue]
 
     def _gains(self, model: Robot, q0: np.ndarray) -> tuple[Any, Any]:
         """Stiffness and damping, as stated or from ω and ζ."""
-        stated = self.kp is not None
-        if stated != (self.kd is not None) or stated == (self.frequency_rad_per_s is not None):
-            raise SceneError("control: give frequency_rad_per_s, or both kp and kd")
-        if stated and "damping_ratio" in self.model_fields_set:
-            raise SceneError("control.damping_ratio: has no effect beside kp and kd; remove it")
-        names = ("kp", "kd") if stated else ("frequency_rad_per_s", "damping_ratio")
+        names = ("kp", "kd") if self.kp is not None else ("frequency_rad_per_s", "damping_ratio")
         of_frame = self.kind == "operational_space"
         first, second = (
             numbers(f"control.{name}", getattr(self, name), (), ("n",), least=0)
@@ -192,10 +171,10 @@ class Control(Part):
             else per_joint(name, getattr(self, name), model)
             for name in names
         )
-        if stated:
+        if self.kp is not None:
             return first, second
         return gains_from(1.0 if of_frame or self.kind == "computed_torque" else np.diag(model.M(q0)), first, second)
 
 
-# Keys that other kinds of control do not read.
-_OF_ONE_KIND = {"integral_rate_per_s": ("pid",), "effort_limit_N_m": ("pid",), "frame": ("operational_space",)}
+# Keys that one kind of control reads.
+_OF_ONE_KIND = {"integral_rate_per_s": "pid", "effort_limit_N_m": "pid", "frame": "operational_space"}

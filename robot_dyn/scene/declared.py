@@ -12,6 +12,8 @@ from pydantic import ConfigDict, Field, create_model
 
 from robot_dyn.control.digital_loop.block import SIGNAL
 from robot_dyn.foundations.coefficients import URDF, Coefficient, declared
+from robot_dyn.foundations.errors import SceneError
+from robot_dyn.foundations.validate import number, numbers
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Stated, Vector3, per_joint
 
@@ -29,13 +31,22 @@ class Declared(Part):
     """By key: the argument, and what is declared of it."""
 
     def call(self, robot: Robot) -> Any:
-        """What the factory returns for the values of the table."""
-        values = ((name, getattr(self, key), each) for key, (name, each) in self.keys.items())
-        return type(self).factory(**{
-            name: value if each is None or value is None or not each.of_joints
-            else per_joint(name, value, robot, elsewhere=each.elsewhere)
-            for name, value, each in values
-        })  # fmt: skip
+        """Return what the factory returns for the values of the table."""
+        arguments, parameters = dict[str, Any](), signature(type(self).factory).parameters
+        for key, (name, known) in self.keys.items():
+            if key in self.model_fields_set or parameters[name].default is Parameter.empty:
+                arguments[name] = _argument(name, getattr(self, key), robot, known)
+        return type(self).factory(**arguments)
+
+
+def _argument(key: str, value: Any, robot: Robot, known: Coefficient | None) -> Any:
+    """Return a number, an array for a list, an array (n,) for a value by joint; texts and truth values as they are."""
+    of_joints = known is not None and known.of_joints and value is not None
+    if of_joints or isinstance(value, dict):
+        return per_joint(key, value, robot, elsewhere=0.0 if known is None else known.elsewhere)
+    if isinstance(value, list):
+        return numbers(key, value, ("k",), ("k", "m"), error=SceneError)
+    return number(key, value, error=SceneError) if isinstance(value, float) else value
 
 
 Table = TypeVar("Table", bound=Declared)
@@ -48,7 +59,7 @@ def declared_part(
     factory: Callable[..., Any] | None = None,
     text: str = "",
     signal: str = "",
-    **others: Any,
+    others: Mapping[str, Any] | None = None,
 ) -> type[Table]:
     """The part of a scene that describes objects of some classes.
 
@@ -59,31 +70,48 @@ def declared_part(
         factory: Called with the coefficients; the only class unless given.
         text: Its description; that of the first class unless given.
         signal: The unit that stands for `SIGNAL` in the units of the coefficients.
-        **others: Arguments that are not coefficients, each with its pydantic field.
+        others: Arguments that are not coefficients, each with its type and default or pydantic field.
     """
-    factory = factory or classes[0]
-    keys, parameters = keys_of(factory, *classes, signal=signal), signature(factory).parameters
-    fields: dict[str, Any] = {"kind": (Literal[kind], ...)} | others  # pyright: ignore[reportInvalidTypeForm]
+    factory, others = factory or classes[0], others or {}
+    keys, parameters = _keys_of(factory, *classes, signal=signal), signature(factory).parameters
+    fields: dict[str, Any] = {"kind": (Literal[kind], ...), **others}  # pyright: ignore[reportInvalidTypeForm]
     for key, (name, each) in keys.items():
         default = parameters[name].default
         default = (URDF if each.stated else ...) if default is Parameter.empty else default
         none = f"; joints left out have {'none' if isinf(each.elsewhere) else f'{each.elsewhere:g}'}"
         none = none if each.elsewhere else ""
         fields[key] = (_type(each), Field(default, description=f"{each.symbol}{none}."))
-    text = text or (getdoc(classes[0]) or "").partition("\n\nAttributes:")[0]
+    text = text or (getdoc(factory) or kind).partition("\n\nAttributes:")[0]
     part = create_model(kind, __base__=base, __doc__=text, **fields)
     part.factory, part.keys = staticmethod(factory), keys | {name: (name, None) for name in others}
     return part
 
 
 def _type(known: Coefficient) -> Any:
-    """The type of a key: a value by joint, three numbers, or one."""
+    """Return the type of a key: a value by joint, three numbers, one, or any for other shapes."""
     if known.of_joints:
         return Stated if known.stated else PerJoint
-    return Vector3 if known.shapes == ((3,),) else Number if known.least is None else NotNegative
+    if known.shapes == ((3,),):
+        return Vector3
+    return Any if known.shapes != ((),) else Number if known.least is None else NotNegative
 
 
-def keys_of(factory: Callable[..., Any], *classes: type, signal: str = SIGNAL) -> dict[str, tuple[str, Coefficient]]:
+def callable_part(base: type[Table], kind: str, factory: Callable[..., Any]) -> type[Table]:
+    """The part of a scene whose keys are the arguments of a class or function; coefficients are spelled with units."""
+    classes = (factory,) if isinstance(factory, type) else ()
+    known = _keys_of(factory, *classes)
+    coefficients = {name for name, _ in known.values()}
+    others = {
+        name: (Any, ... if parameter.default is Parameter.empty else None)
+        for name, parameter in signature(factory).parameters.items()
+        if name not in coefficients and parameter.kind not in (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
+    }
+    if kept := [key for key in (*known, *others) if key.startswith("_") or key == "kind" or hasattr(base, key)]:
+        raise SceneError(f"effects: {kept[0]!r} of {kind!r} is a name that tables of scenes need; rename the argument")
+    return declared_part(base, kind, *classes, factory=factory, others=others)
+
+
+def _keys_of(factory: Callable[..., Any], *classes: type, signal: str = SIGNAL) -> dict[str, tuple[str, Coefficient]]:
     """The keys of the coefficients that classes declare and `factory` takes, with the argument of each."""
     stated = {name: known for kind in reversed(classes) for name, known in declared(kind).items()}
     known = {name: replace(known, unit=known.unit.replace(SIGNAL, signal)) for name, known in stated.items()}

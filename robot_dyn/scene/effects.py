@@ -191,8 +191,10 @@ _JOINT_STOPS = declared_part(
 )  # fmt: skip
 _LINE = declared_part(
     DeclaredEffect, "line_spring_damper", LineSpringDamper,
-    frame=(str, Field(description="A frame of the arm.")),
-    other_frame=(str | None, Field(None, description="Another one; the world unless given.")),
+    others={
+        "frame": (str, Field(description="A frame of the arm.")),
+        "other_frame": (str | None, Field(None, description="Another one; the world unless given.")),
+    },
 )  # fmt: skip
 _OTHERS: dict[str, type[Acting]] = {kinds_of(part)[0]: part for part in (_JOINT_STOPS, _LINE, Wrench, Carried)}
 """By kind, the tables that are not made of the coefficients of one class."""

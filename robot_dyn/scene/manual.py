@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -11,7 +12,6 @@ from pydantic.fields import FieldInfo
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.methods import FIXED_STEP
 from robot_dyn.scene.control import BLOCKS, KINDS, Control, Model
-from robot_dyn.scene.declared import Declared
 from robot_dyn.scene.effects import ACTING, EDITS
 from robot_dyn.scene.references import KINDS as REFERENCES
 from robot_dyn.scene.scene import Loading, Scene, Start, tool_tables
@@ -30,15 +30,6 @@ integrates, and where each number comes from. This page is written from the sche
 - `"urdf"` takes what the file of the robot states.
 - Numbers are finite. A key that is not listed here is refused.
 """
-# of keys that no class declares, by the end of a key, the longest first
-_UNITS = {
-    "_rad_per_s": "rad/s", "_periods": "periods", "_kg_m2": "kg m²", "_m_s2": "m/s²", "_per_s": "1/s", "_N_m": "N m",
-    "_kg_per_m3": "kg/m³", "_kg": "kg", "_N": "N", "_m": "m", "_s": "s",
-}  # fmt: skip
-_UNITS_OF_KEYS = {
-    "q": "rad", "v": "rad/s", "joints": "rad", "points": "rad", "kp": "N m/rad", "kd": "N m s/rad",
-    "atol": "rad, rad/s",
-}  # fmt: skip
 _LINES = {
     "position": "measured position, from the joints to the controller",
     "velocity": "measured velocity, from the joints to the controller",
@@ -88,24 +79,14 @@ def _section(title: str, text: str, part: type[Part], level: int = 2) -> Iterato
     yield f"{'#' * level} {title}\n\n{text}\n"
     fields = {key: field for key, field in part.model_fields.items() if key != "kind" or part is Control}
     if fields:
-        yield "| key | value | unit | default | meaning |\n|---|---|---|---|---|"
+        yield "| key | value | default | meaning |\n|---|---|---|---|"
         schemas = part.model_json_schema()["properties"]
-        yield from (_row(key, field, schemas[key], _unit(part, key)) for key, field in fields.items())
+        yield from (_row(key, field, schemas[key]) for key, field in fields.items())
         yield ""
 
 
-def _unit(part: type[Part], key: str) -> str:
-    """The unit that a coefficient declares, or that the name of the key ends with."""
-    _, known = part.keys.get(key, ("", None)) if issubclass(part, Declared) else ("", None)
-    if known is not None:
-        return known.unit
-    return _UNITS_OF_KEYS.get(key) or next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
-
-
-def _row(key: str, field: FieldInfo, schema: dict[str, Any], unit: str) -> str:
-    form = _form(schema)
-    unit = "" if "text" in form else unit
-    return f"| `{key}` | {_cell(form)} | {unit} | {_default(field)} | {_cell(field.description or '')} |"
+def _row(key: str, field: FieldInfo, schema: dict[str, Any]) -> str:
+    return f"| `{key}` | {_cell(_form(schema))} | {_default(field)} | {_cell(field.description or '')} |"
 
 
 def _form(schema: dict[str, Any]) -> str:
@@ -113,7 +94,7 @@ def _form(schema: dict[str, Any]) -> str:
     if "anyOf" in schema:  # a value, or nothing
         return _form(schema["anyOf"][0])
     if "const" in schema or "enum" in schema:
-        return " or ".join(f"`{_toml(value)}`" for value in schema.get("enum", [schema.get("const")]))
+        return " or ".join(f"`{json.dumps(value)}`" for value in schema.get("enum", [schema.get("const")]))
     if schema.get("type") == "array":
         return f"list of {_several(_form(schema['items']))}"
     if "additionalProperties" in schema:
@@ -134,13 +115,7 @@ def _default(field: FieldInfo) -> str:
     default = field.default
     if default is None or isinstance(default, Part) or default in ((), {}):
         return ""
-    return f"`{_toml(default)}`"
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool | str):
-        return f'"{value}"' if isinstance(value, str) else str(value).lower()
-    return f"[{', '.join(map(_toml, value))}]" if isinstance(value, tuple) else f"{value:g}"
+    return f"`{json.dumps(default)}`"
 
 
 def _text(part: type[Part]) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from robot_dyn.foundations.errors import RobotDynError, SceneError, shorten
+from robot_dyn.foundations.errors import RobotDynError, shorten
 
 _WORDS = {
     "Input should be": "must be", "Field required": "is missing; give it", "valid tuple": "list", "valid list": "list",
@@ -20,27 +20,14 @@ _WORDS = {
 _TABLE = re.compile(r"^[ \t]*\[+[ \t]*[A-Za-z_\"']", re.MULTILINE)  # the header of one
 
 
-class PlacedError(SceneError):
-    """An error with the path of keys to the part of a scene that it is about."""
-
-    path: Sequence[str | int] = ()
-
-
 @contextmanager
 def part(*path: str | int) -> Iterator[None]:
-    """Give errors of the library the path of the part that is built, such as ("effect", 1); that of an inner one stays.
-
-    Raises:
-        PlacedError: For each of them, with its message.
-    """
+    """Note in errors the path of the part that is built, such as ("effect", 1); that of an inner part stays."""
     try:
         yield
-    except PlacedError:
-        raise
     except RobotDynError as error:
-        placed = PlacedError(str(error))
-        placed.path = path
-        raise placed from None
+        vars(error).setdefault("part", path)
+        raise
 
 
 def validation_message(error: ValidationError, table: Mapping[str, Any], text: str) -> str:

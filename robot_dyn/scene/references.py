@@ -34,7 +34,7 @@ class Hold(Reference):
 
     kind: Literal["hold"]
     q: PerJoint | None = None
-    """Position; that of the start by default."""
+    """Position, in rad, or m for a prismatic joint; that of the start by default."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         return hold(q0 if self.q is None else per_joint("q", self.q, robot))
@@ -45,7 +45,7 @@ class Quintic(Reference):
 
     kind: Literal["quintic"]
     q: PerJoint
-    """Position at the end."""
+    """Position at the end, in rad, or m for a prismatic joint."""
     duration_s: Positive
     """Time from the start to q."""
     start_s: NotNegative = 0.0
@@ -129,6 +129,13 @@ class Sampled(Reference):
         return plan.reference
 
 
+def _start(robot: Robot, q0: np.ndarray, frame: str | None, hold: bool) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return the position of the frame under control at the start, and its rotation if that is held."""
+    with part("control"):  # which names the frame
+        g = robot.placement(q0, str(frame))
+    return g[:3, 3], g[:3, :3] if hold else None
+
+
 class Line(Reference):
     """A straight line of the frame under control from where it is at the start; for operational_space."""
 
@@ -143,10 +150,8 @@ class Line(Reference):
     """Whether the orientation of the start is kept; otherwise it is free."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> CartesianReference:
-        with part("control"):
-            g = robot.placement(q0, frame_of(frame))
-        R = g[:3, :3] if self.hold_orientation else None
-        return line(g[:3, 3], g[:3, 3] + self.by_m, self.duration_s, rotation=R, start_s=self.start_s)
+        p, R = _start(robot, q0, frame, self.hold_orientation)
+        return line(p, p + self.by_m, self.duration_s, rotation=R, start_s=self.start_s)
 
 
 class Circle(Reference):
@@ -167,15 +172,13 @@ class Circle(Reference):
     """Whether the orientation of the start is kept; otherwise it is free."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> CartesianReference:
-        with part("control"):
-            g = robot.placement(q0, frame_of(frame))
+        p, R = _start(robot, q0, frame, self.hold_orientation)
         axis, direction = np.array(self.normal), np.array(self.to_centre)
         if not np.linalg.norm(np.cross(axis, direction)) > 0:
             raise SceneError("reference.to_centre: must not be zero, nor along reference.normal")
         direction = direction - axis * (axis @ direction) / (axis @ axis)  # into the plane of the circle
         direction = direction / np.linalg.norm(direction)
-        centre = g[:3, 3] + self.radius_m * direction
-        R = g[:3, :3] if self.hold_orientation else None
+        centre = p + self.radius_m * direction
         return circle(
             centre, self.radius_m, self.normal, self.period_s, turns=self.turns, toward=-direction, rotation=R
         )
@@ -183,10 +186,3 @@ class Circle(Reference):
 
 KINDS = Hold, Quintic, ViaPoints, Sampled, Line, Circle
 AnyReference = one_of(*KINDS)
-
-
-def frame_of(frame: str | None) -> str:
-    """Return the link under control; SceneError if none is named."""
-    if frame is None:
-        raise SceneError("control.frame: name the link that follows a line or a circle")
-    return frame

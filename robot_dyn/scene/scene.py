@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 import re
 import tomllib
+from collections.abc import Callable, Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, ValidationError, WrapValidator, create_model, model_validator
+from pydantic import AfterValidator, ValidationError, create_model, model_validator
 
 from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.errors import RobotDynError, SceneError, nearest, shorten
+from robot_dyn.foundations.errors import RobotDynError, SceneError, nearest, shorten, shown
 from robot_dyn.foundations.files import FileKind, read
 from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
 from robot_dyn.integrate.integrator import Integrator
@@ -21,13 +22,14 @@ from robot_dyn.integrate.methods import METHODS, method
 from robot_dyn.model.loading import load
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.control import Control
-from robot_dyn.scene.effects import BY_KIND, AnyEffect, Edit, bare
-from robot_dyn.scene.messages import PlacedError, line, part, validation_message
-from robot_dyn.scene.references import AnyReference, Hold, Sampled, ViaPoints
-from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Truth, per_joint, wrong_key
-from robot_dyn.scene.user_effects import Factories, check_factories, user_defined_or
+from robot_dyn.scene.declared import callable_part
+from robot_dyn.scene.effects import ACTING, BY_KIND, EDITS, AnyEffect, DeclaredEffect, Edit, bare
+from robot_dyn.scene.messages import line, part, validation_message
+from robot_dyn.scene.references import AnyReference, Circle, Hold, Line, Sampled, ViaPoints
+from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Truth, one_of, per_joint, wrong_key
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
+Factories = Mapping[str, Callable[..., Effect]]
 MAX_BYTES = 2**20
 SCENE = FileKind("a scene", ".toml")
 
@@ -60,9 +62,9 @@ class Start(Part):
     """The state at the start; 0 by default."""
 
     q: PerJoint = 0.0
-    """Position."""
+    """Position, in rad, or m for a prismatic joint."""
     v: PerJoint = 0.0
-    """Velocity."""
+    """Velocity, in rad/s, or m/s for a prismatic joint."""
 
 
 def _known_method(name: str) -> str:
@@ -98,7 +100,7 @@ class Scene(Part):
     """Which loop runs; "auto" compiles where that is worthwhile."""
     start: Start = Start()
     """The state at the start."""
-    effect: tuple[Annotated[AnyEffect, WrapValidator(user_defined_or)], ...] = ()  # pyright: ignore[reportInvalidTypeForm]
+    effect: tuple[AnyEffect, ...] = ()  # pyright: ignore[reportInvalidTypeForm]
     """What acts, gravity included; nothing by default."""
     control: Control | None = None
     """What drives the joints; nothing by default."""
@@ -124,6 +126,13 @@ class Scene(Part):
         if unused := [key for key in of_other_methods if key in stated]:
             kind = "chooses its own step" if self.method in ADAPTIVE else "has a fixed step"
             raise wrong_key(unused[0], f"has no effect because {self.method} {kind}; remove it, or name another method")
+        if self.control is not None:
+            kind, of_frame = self.control.kind, self.control.kind == "operational_space"
+            if of_frame != isinstance(self.reference, Line | Circle):
+                need = "line or circle" if of_frame else "hold, quintic, via_points or samples"
+                raise wrong_key("reference.kind", f"{kind} follows {need}, got {self.reference.kind!r}")
+            if of_frame and self.control.frame is None:
+                raise wrong_key("control.frame", "name the link that follows a line or a circle")
         of_model = None if self.control is None else self.control.model.effects
         for place, effects in (("effect", self.effect), ("control.model.effects", of_model or ())):
             kinds = [effect.kind for effect in effects]
@@ -132,15 +141,11 @@ class Scene(Part):
                     raise wrong_key(place, f"{kind} is named {count} times, and only the last would act; keep one")
         return self
 
-    def loaded(self, folder: Path) -> Robot:
-        """Return the robot of its file."""
-        beside = folder / self.robot
-        return self.load.robot(beside if os.path.isfile(beside) else self.robot)
-
     def setup(self, folder: Path, about: dict[str, str]) -> Setup:
         """Return the setup it describes; paths are relative to `folder`."""
         with part("robot"):
-            loaded = self.loaded(folder)
+            file = folder / self.robot
+            loaded = self.load.robot(file if os.path.isfile(file) else self.robot)
         robot = bare(loaded)
         acting: list[Effect] = []
         for k, effect in sorted(enumerate(self.effect), key=lambda pair: not isinstance(pair[1], Edit)):  # edits first
@@ -190,7 +195,7 @@ def read_scene(path: str | Path, *, effects: Factories | None = None) -> Setup:
     Raises:
         SceneError: If the file cannot be read, or a key or value of it is not allowed.
     """
-    return read_both(path, {} if effects is None else check_factories(effects, set(BY_KIND)))[1]
+    return read_both(path, effects)[1]
 
 
 def read_both(path: str | Path, effects: Factories | None = None) -> tuple[Scene, Setup]:
@@ -204,8 +209,8 @@ def read_both(path: str | Path, effects: Factories | None = None) -> tuple[Scene
     try:
         return scene, scene.setup(Path(path).parent, {"scene": text})
     except RobotDynError as error:
-        place = error.path if isinstance(error, PlacedError) else ()
-        raise SceneError(f"{path}: {line(text, scene.model_fields_set, place)}{error}") from None
+        place = line(text, scene.model_fields_set, vars(error).get("part", ()))
+        raise SceneError(f"{path}: {place}{error}") from None
 
 
 def parse_scene(text: str, source: str, effects: Factories | None = None) -> Scene:
@@ -220,11 +225,25 @@ def parse_scene(text: str, source: str, effects: Factories | None = None) -> Sce
         raise SceneError(f"{source}: {_syntax(error)}; correct the file") from None
     tables = tool_tables()
     used: Any = {key: (tables[key].load() | None, None) for key in table if key in tables}
+    if effects is not None:
+        parts = [callable_part(DeclaredEffect, kind, effects[kind]) for kind in _user_kinds(effects)]
+        used["effect"] = (tuple[one_of(*EDITS, *ACTING, *parts), ...], ())
     schema = create_model("Scene", __base__=Scene, **used) if used else Scene
     try:
-        return schema.model_validate(table, context=dict(effects or {}))
+        return schema.model_validate(table)
     except ValidationError as error:
         raise SceneError(f"{source}: {validation_message(error, table, text)}") from None
+
+
+def _user_kinds(effects: Any) -> Iterable[str]:
+    """Return the kinds of user-defined effects; SceneError if one is not callable, or has a name of scenes."""
+    if not isinstance(effects, Mapping) or not all(
+        isinstance(kind, str) and callable(effects[kind]) for kind in effects
+    ):
+        raise SceneError(f"effects: give classes of effects by kind, as {{'stribeck': Stribeck}}, got {shown(effects)}")
+    if both := BY_KIND.keys() & effects.keys():
+        raise SceneError(f"effects: {min(both)!r} is a kind that scenes have; take another name")
+    return effects.keys()
 
 
 def _syntax(error: Exception) -> str:

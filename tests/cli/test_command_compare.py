@@ -8,8 +8,7 @@ import re
 import pytest
 
 from robot_dyn import Lagrangian
-from tests.command import MAIN, ROOT, document, refusal, run, said, spawn
-from tests.snapshots import assert_text
+from tests.command import MAIN, ROOT, document, run, said, spawn
 
 
 def test_compare_agrees():
@@ -66,16 +65,3 @@ def test_a_implementation_that_says_nan_disagrees_in_valid_json(monkeypatch: pyt
     done = run("compare", "ur5", "--samples", "1", "--json")
     assert done.returncode == 1
     assert json.loads(done.stdout, parse_constant=pytest.fail)["robots"]["ur5"]["quantities"]["N"]["error"] is None
-
-
-@pytest.mark.parametrize(
-    "args",
-    [
-        [],
-        ["ur5", "--all"],
-        ["ur5", "ur6", "--samples", "1"],
-        ["pendulum", "--seed", "-1"],
-    ],
-)
-def test_compare_without_meaning_is_refused_in_one_line(args: list[str]):
-    assert_text("refused_studies", " ".join(["compare", *args]), refusal(["compare", *args]))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 import robot_dyn as rd
 from robot_dyn.scene import starter
 from tests.command import ROOT, document
@@ -51,20 +53,13 @@ def test_query():
     assert {key for share in why["why"]["shares"] for key in share} == set(re.findall(r"`(\w+)`", inside))
 
 
-def test_explain(tmp_path: Path):
-    keys = promised("explain")
+@pytest.mark.parametrize(("command", "part"), [("explain", "effects"), ("sweepable", "parameters")])
+def test_of_a_scene(command: str, part: str, tmp_path: Path):
+    keys = promised(command)
     (tmp_path / "scene.toml").write_text(starter("cart_pole"), encoding="utf-8")
-    explained = document("explain", tmp_path / "scene.toml")
-    assert explained.keys() == keys.keys()
-    assert {key for each in explained["effects"] for key in each} == names(keys["effects"])
-
-
-def test_sweepable(tmp_path: Path):
-    keys = promised("sweepable")
-    (tmp_path / "scene.toml").write_text(starter("cart_pole"), encoding="utf-8")
-    listed = document("sweepable", tmp_path / "scene.toml")
+    listed = document(command, tmp_path / "scene.toml")
     assert listed.keys() == keys.keys()
-    assert {key for each in listed["parameters"] for key in each} == names(keys["parameters"])
+    assert {key for each in listed[part] for key in each} == names(keys[part])
 
 
 def test_compare():

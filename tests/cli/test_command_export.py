@@ -8,7 +8,7 @@ import pytest
 from rich.filesize import decimal
 
 import robot_dyn as rd
-from tests.command import refusal, run
+from tests.command import run
 
 
 @pytest.fixture
@@ -36,25 +36,3 @@ def test_the_suffix_says_the_format(files: Path, suffix: str, package: str) -> N
     done = run("export", "run.npz", "-o", f"x.{suffix}")
     assert done.returncode == 0, done.stderr
     assert (files / f"x.{suffix}").read_bytes() == rd.export(rd.load_run("run.npz"), f"y.{suffix}").read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (
-            ["run.npz", "-o", "run.npz"],
-            "'.npz' is not the suffix of a table of a run; end the name with .csv, .parquet",
-        ),
-        (["run.npz", "-o", "old.csv"], "old.csv: exists; add --force"),
-        (["runs.npz", "-o", "x.mcap"], "end the name with .csv, .parquet, .nc"),
-        (["none.npz", "-o", "x.csv"], "none.npz: there is no such file"),
-        (["old.csv", "-o", "x.csv"], "old.csv: cannot be read as a run file"),
-        (["run.npz", "-o", "link.csv", "--force"], "is the same file as run.npz, which would be lost"),
-    ],
-)
-def test_what_cannot_be_exported_is_refused(files: Path, arguments: list[str], message: str) -> None:
-    (files / "old.csv").write_text("t [s],q\n", encoding="utf-8")
-    (files / "link.csv").symlink_to("run.npz")
-    before = {path.name: path.read_bytes() for path in files.iterdir()}
-    assert message in refusal(["export", *arguments])
-    assert {path.name: path.read_bytes() for path in files.iterdir()} == before

@@ -14,7 +14,6 @@ import pytest
 import robot_dyn as rd
 from tests.command import MAIN, interrupted_at_work, refusal, run, said, spawn
 from tests.long import long
-from tests.snapshots import assert_text
 
 COMMANDS = ("list", "info", "query", "compare", "demo")
 
@@ -55,26 +54,6 @@ def test_list_prints_every_name():
 
 
 # --- errors
-
-
-@pytest.mark.parametrize(
-    "args",
-    [
-        ["info", "ur6"],
-        ["query", "pandas"],
-        ["info", "nowhere/arm.urdf"],
-        ["info", "/"],
-        ["info", "hector"],
-        ["info", "ur5", "--lock", "elbow=0"],
-        ["info", "ur5", "--lock", "elbow_joint"],
-        ["info", "ur5", "--lock", "elbow_joint=bent"],
-        ["info", "ur5", "--lock", "elbow_joint=nan"],
-        ["info", "ur5", "--lock", "elbow_joint=1", "--lock", "elbow_joint=2"],
-        ["info", "pendulum", "--lock", "pivot=0"],
-    ],
-)
-def test_refused_in_one_line(args: list[str]):
-    assert_text("refused_commands", " ".join(args), refusal(args))
 
 
 @pytest.mark.parametrize(

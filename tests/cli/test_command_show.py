@@ -13,7 +13,7 @@ from robot_dyn import RobotDynError
 from robot_dyn.cli.commands import demo
 from robot_dyn.view import PLOTS
 from tests.browser import opened
-from tests.command import run, said
+from tests.command import said
 
 PROGRAMS = {"scipy": "SciPy", "mujoco": "MuJoCo", "pydrake": "Drake", "heyoka": "heyoka"}
 
@@ -73,25 +73,3 @@ def test_a_plot_is_written_beside_the_run_unless_told(file, tmp_path) -> None:
 def test_help_names_every_plot() -> None:
     text = said("plot", "--help")
     assert all(name in text.replace("\n", " ") for name in PLOTS)
-
-
-@pytest.mark.parametrize(
-    ("args", "text"),
-    [
-        (["--only", "jonts"], "no plot 'jonts'; nearest: joints"),
-        (["--joint", "elbo"], "no joint 'elbo'"),
-        (["-o", "out.bmp"], "'.bmp' is not the suffix of a plot; end the name with .png, .svg, .pdf"),
-        (["-o", "none/out.png"], "there is no folder"),
-        (["--only", "tracking"], "it followed no reference"),
-    ],
-)
-def test_plots_without_meaning_are_refused_in_one_line(file, args: list[str], text: str) -> None:
-    done = run("plot", file, "--force", *args)
-    assert done.returncode == 2
-    assert text in done.stderr and done.stderr.count("\n") == 1
-
-
-def test_a_demo_that_cannot_write_says_so(tmp_path) -> None:
-    (tmp_path / "file").write_text("")
-    done = run("demo", "--output", tmp_path / "file" / "demo")
-    assert done.returncode == 2 and "name a folder that can be written" in done.stderr

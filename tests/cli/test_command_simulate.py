@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import subprocess
@@ -13,12 +12,11 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.scene import starter, starter_names
-from tests.command import interrupted_at_work, refusal, run
+from tests.cli.test_command_documents import promised
+from tests.command import document, interrupted_at_work, run
 from tests.long import long
-from tests.snapshots import assert_text
 
 COMMAND = [sys.executable, "-c", "from robot_dyn.cli import main; main()"]
-DOCUMENT = (Path(__file__).parents[2] / "docs" / "reference" / "json.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -40,43 +38,6 @@ def test_simulate_prints_a_summary_and_keeps_the_run(scene, tmp_path) -> None:
         assert said in done.stdout
     assert rd.load_run(tmp_path / "run.npz").summary in done.stdout
     assert (tmp_path / "run.csv").is_file()
-
-
-@pytest.mark.parametrize(
-    "outputs",
-    [
-        ["-o", "scene.toml"],
-        ["-o", "run.txt"],
-        ["-o", "run.npz", "--csv", "run.npz"],
-        ["-o", "link.npz", "--force"],
-        ["-o", "run.npz", "--csv", "to_run.csv"],
-        ["-o", "none/run.npz"],
-        ["-o", "old.npz"],
-        ["--csv", "old.npz.csv"],
-        ["--csv", "other.csv", "--force"],
-        ["-o", "pipe.npz", "--force"],
-        ["-o", "."],
-    ],
-)
-def test_an_output_that_would_destroy_something_is_refused_before_the_run(
-    scene, tmp_path, monkeypatch, outputs: list[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(rd, "simulate", None)
-    (tmp_path / "link.npz").symlink_to(scene)
-    (tmp_path / "to_run.csv").symlink_to("run.npz")
-    (tmp_path / "old.npz").write_bytes(b"")
-    (tmp_path / "old.npz.csv").write_bytes(b"")
-    (tmp_path / "other.csv").write_text("x,y")
-    os.mkfifo(tmp_path / "pipe.npz")
-
-    def state() -> dict[str, tuple[int, ...]]:
-        status = {path.name: path.lstat() for path in tmp_path.iterdir()}
-        return {name: (each.st_mode, each.st_ino, each.st_size, each.st_mtime_ns) for name, each in status.items()}
-
-    before = state()
-    assert_text("refused_outputs", " ".join(outputs), refusal(["simulate", scene, *outputs]))
-    assert state() == before
 
 
 def test_force_replaces(scene, tmp_path) -> None:
@@ -101,15 +62,7 @@ def test_a_run_is_written_whatever_becomes_of_the_output(scene, tmp_path, redire
 
 
 def test_document_has_the_keys_that_are_promised(scene) -> None:
-    document = json.loads(run("simulate", scene, "--json").stdout)
-    section = DOCUMENT.split("## `robot-dyn simulate")[1].split("\n## ")[0]
-    promised = {
-        key
-        for line in section.splitlines()
-        if line.startswith("| `")
-        for key in re.findall(r"`(\w+)`", line.split("|")[1])
-    }
-    assert set(document) == promised
+    assert document("simulate", scene).keys() == promised("simulate").keys()
 
 
 def test_explain_shows_the_equation(scene) -> None:
@@ -123,17 +76,6 @@ def test_scene_prints_starters() -> None:
     assert [name for name, _ in listed] == list(starter_names())
     assert all(starter(name).startswith(f"# {what}\n") for name, what in listed)
     assert run("scene", "pendulum").stdout == starter("pendulum")
-    wrong = run("scene", "pendulun")
-    assert wrong.returncode == 2
-    assert "nearest: pendulum" in wrong.stderr
-
-
-def test_a_scene_with_a_mistake_is_an_error_of_one_line(scene) -> None:
-    scene.write_text(scene.read_text().replace("hinge", "hing"))
-    done = run("simulate", scene)
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert re.fullmatch(r"robot-dyn: error: .*scene\.toml: .*'hing'.*nearest: hinge.*\n", done.stderr)
 
 
 def test_a_run_that_diverges_says_when_and_what_to_do(scene) -> None:

@@ -47,6 +47,14 @@ def test_what_takes_no_value_has_no_type_in_help(name: str) -> None:
     assert re.search(r"--help\s+-h\s+Show this", text) and "bool" not in text
 
 
+@pytest.mark.parametrize("name", commands())
+def test_every_argument_and_option_is_described(name: str) -> None:
+    """By its docstring, which names no other."""
+    command = program().commands[name]
+    assert [option.name for option in command.params if not option.help] == []
+    assert "Options:" not in command.help
+
+
 def test_a_command_keeps_its_own_help() -> None:
     assert "exit code is 1 if it diverges" in re.sub(r"\s+", " ", said("simulate", "--help"))
 

@@ -68,22 +68,26 @@ def test_a_run_may_be_interrupted_at_any_moment(method: str, estimate: str, dela
         assert out == "" or out.startswith("stopped at t = ")
 
 
-def test_an_interrupt_while_machine_code_is_made_comes_after_it() -> None:
-    seen = []
+@pytest.fixture
+def raised() -> Iterator[None]:
+    """Ctrl-C raises KeyboardInterrupt."""
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            with interrupts_later():
-                signal.raise_signal(signal.SIGINT)
-                seen.append("made")
-            seen.append("never")
-        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    finally:
-        signal.signal(signal.SIGINT, handler)
+    yield
+    signal.signal(signal.SIGINT, handler)
+
+
+def test_an_interrupt_while_machine_code_is_made_comes_after_it(raised: None) -> None:
+    seen = []
+    with pytest.raises(KeyboardInterrupt):
+        with interrupts_later():
+            signal.raise_signal(signal.SIGINT)
+            seen.append("made")
+        seen.append("never")
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     assert seen == ["made"]
 
 
-def test_an_interrupt_during_a_trace_comes_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_during_a_trace_comes_after_it(raised: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """NumPy calls the operators of symbols back from C, where no exception can be raised."""
     from robot_dyn.codegen.trace import symbol
 
@@ -98,24 +102,16 @@ def test_an_interrupt_during_a_trace_comes_after_it(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(symbol, "_symbol", interrupting)
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     robot = rd.load("planar_2r").with_(mass_scale=1.0123)  # none that is compiled already
-    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            rd.simulate(rd.Plant(robot), q0=[0.3, -0.4], duration_s=0.01, engine="compiled")
-    finally:
-        signal.signal(signal.SIGINT, handler)
+    with pytest.raises(KeyboardInterrupt):
+        rd.simulate(rd.Plant(robot), q0=[0.3, -0.4], duration_s=0.01, engine="compiled")
     assert len(calls) > 20
 
 
-def test_an_interrupt_comes_too_where_nothing_can_be_made() -> None:
+def test_an_interrupt_comes_too_where_nothing_can_be_made(raised: None) -> None:
     """Machine code that ends in an error, as of a part that cannot be traced, does not take the interrupt with it."""
-    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt), interrupts_later():
-            signal.raise_signal(signal.SIGINT)
-            raise rd.RobotDynError("cannot be traced")
-    finally:
-        signal.signal(signal.SIGINT, handler)
+    with pytest.raises(KeyboardInterrupt), interrupts_later():
+        signal.raise_signal(signal.SIGINT)
+        raise rd.RobotDynError("cannot be traced")
 
 
 AT_IMPORT = """

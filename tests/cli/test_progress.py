@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from robot_dyn.cli import bar, progress
-from tests.command import MAIN, run, said
+from tests.command import MAIN, said
 
 SCENE = """
 robot = "pendulum"
@@ -68,8 +68,3 @@ def test_work_that_begins_again_is_shown_again(capsys: pytest.CaptureFixture[str
             advance(done)
     assert list(progress(["a", "b"], "looking at")) == ["a", "b"]
     assert capsys.readouterr() == ("", "")
-
-
-def test_the_end_of_the_bar_is_that_of_an_error(scene: Path) -> None:
-    done = run("prove", scene.with_name("gone.toml"))
-    assert done.returncode == 2 and done.stderr.startswith("robot-dyn: error: ")

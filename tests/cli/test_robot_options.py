@@ -12,7 +12,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.cli import RobotOptions
-from tests.command import refusal, run
+from tests.command import run
 from tests.scene.test_scene_loading import MJCF, URDF
 
 pytestmark = pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
@@ -60,21 +60,3 @@ def test_what_is_left_out_of_mjcf_is_told() -> None:
     assert "tendon 'cable': tendons are not taken; left out" in run("info", "rig.xml", "--without", "tendon").stdout
     done = run("show", "rig.xml", "--without", "tendon, equality", "--html", "rig.html")
     assert done.returncode == 0 and "left out" in done.stderr
-    assert "tendon 'cable'" in refusal(["info", "rig.xml"])
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (["info", "rig.xml", "--without", "cable"], "without must be some of tendon, equality, free, ball"),
-        (["info", "rig.urdf", "--without", "tendon"], "is for files of MJCF"),
-        (["info", "rig.xml", "--without", "tendon", "--total-mass", "3"], "MuJoCo takes those"),
-        (["query", "rig.urdf", "--mass", "one"], "--mass must be LINK=VALUE"),
-        (["query", "rig.urdf", "--mass", "one=1", "--mass", "one=2"], "--mass names a link twice"),
-        (["query", "rig.urdf", "--total-mass", "3", "--density", "3"], "contradict each other"),
-        (["query", "scene.toml", "--density", "3"], "--density: is for a robot; a scene states its own"),
-        (["query", "scene.toml", "--without", "tendon"], "--without: is for a robot"),
-    ],
-)
-def test_mistakes_are_named(given: list[str], message: str) -> None:
-    assert message in refusal(given)

@@ -311,8 +311,8 @@ def test_a_scene_names_effects_that_its_reader_names(keys: str, c: Any, tmp_path
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ("", r"effect 1 \(drag\): drag: missing a required argument: 'c'; keys: c, on"),
-        ("c = 1.0\nd = 2.0", "unexpected keyword argument 'd'"),
+        ("", r"effect 1 \(drag\).c: is missing; give it"),
+        ("c = 1.0\nd = 2.0", r"effect 1 \(drag\).d: is not a key here; known: kind, c, on"),
         ("c = inf", "c must be"),
         ("c = {elbow = 1.0}", "elbow"),
     ],
@@ -324,6 +324,8 @@ def test_wrong_keys_of_an_effect_of_a_users_own_are_told(keys: str, said: str, t
         rd.read_scene(path, effects={"drag": Drag})
     with pytest.raises(SceneError, match="'spring' is a kind that scenes have"):
         rd.read_scene(path, effects={"spring": Drag})
+    with pytest.raises(SceneError, match="'copy' of 'own' is a name that tables of scenes need; rename"):
+        rd.read_scene(path, effects={"own": lambda copy: Drag(copy)})
 
 
 @pytest.mark.parametrize(

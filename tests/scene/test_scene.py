@@ -184,31 +184,6 @@ length_m = 0.7
     assert "c = 2 N s/m" in said[3]
 
 
-REFERENCE = PD.split("[reference]")
-MISTAKES = [  # those of keys and types are in test_scene_mistakes.py
-    (SCENE.replace("0.1", "-1.0"), "duration_s: must be positive, got -1.0"),
-    (SCENE.replace("0.1", "nan"), "duration_s: .*nan"),
-    (SCENE.replace("planar_2r", "planar_3r"), "planar_3r.*nearest: planar_2r"),
-    ('method = "rk5"' + SCENE, "method: no method 'rk5'; nearest: rk4"),
-    (SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"\nforce_N = [1, 0, 0]', "tipp.*nearest: tip"),
-    (f"{SCENE}[reference]{REFERENCE[1]}", r"reference: .*\[control\]"),
-    (
-        f'{SCENE}{REFERENCE[0]}[reference]\nkind = "via_points"\ntimes_s = [0.1, 0.2]\npoints = [[1, 2]]',
-        "2 times_s for 1 points",
-    ),
-    (
-        SCENE + PD.replace('"pd"', '"operational_space"\nframe = "tip"'),
-        "reference.kind: .* line or circle, got 'quintic'",
-    ),
-]
-
-
-@pytest.mark.parametrize(("text", "message"), MISTAKES)
-def test_a_mistake_is_told_by_file_key_and_value(write, text: str, message: str) -> None:
-    with pytest.raises(SceneError, match=f"scene.toml: .*{message}"):
-        rd.read_scene(write(text))
-
-
 def test_a_missing_scene_is_told(tmp_path) -> None:
     with pytest.raises(SceneError, match="there is no such file; see robot-dyn scene"):
         rd.read_scene(tmp_path / "none.toml")

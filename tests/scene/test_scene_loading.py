@@ -90,24 +90,3 @@ def test_explanations_of_a_scene_name_what_acts_of_its_file(tmp_path: Path) -> N
     """Armature that a file of MJCF states and a scene does not name is not simulated, and listed so."""
     answer = rd.explain(scene(tmp_path, "rig.xml", 'without = ["tendon"]'))
     assert {"armature", "gravity"} <= {*answer.absent}
-
-
-@pytest.mark.parametrize(
-    ("file", "load", "effects", "message"),
-    [
-        ("rig.urdf", "total_mass_kg = 7.0", "", "are for inertia='from_shapes'; add it"),
-        ("rig.urdf", 'inertia = "from_shapes"', "", "need a mass: give mass by link, total_mass or density"),
-        ("rig.urdf", 'inertia = "from_shapes"\ntotal_mass_kg = -1.0', "", "load.total_mass_kg: must be positive"),
-        ("rig.urdf", 'inertia = "from_shapes"\nmass_kg = {three = 1.0}', "", "no link 'three'"),
-        ("rig.urdf", 'without = ["tendon"]', "", "is for files of MJCF"),
-        ("rig.xml", 'without = ["cable"]', "", "load.without 1: must be 'tendon'"),
-        ("rig.urdf", LOAD["total"][0], '[[effect]]\nkind = "armature"\ninertia_kg_m2 = "urdf"', "states no armature"),
-        (
-            "rig.xml", 'without = ["tendon"]',
-            '[[effect]]\nkind = "armature"\ninertia_kg_m2 = "urdf"\ngear_ratio = 100.0', "after gears; leave it out",
-        ),
-    ],
-)  # fmt: skip
-def test_mistakes_are_named(file: str, load: str, effects: str, message: str, tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=message):
-        rd.read_scene(scene(tmp_path, file, load, effects))

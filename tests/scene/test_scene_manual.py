@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations import SceneError
 from robot_dyn.scene import BY_KIND, Part, control, effects, references, scene, starter, starter_names
 from robot_dyn.scene.manual import manual
 
@@ -83,21 +82,3 @@ def test_operational_space_takes_gains_of_the_frame(tmp_path) -> None:
     circle += "\nto_centre = [1.0, 0.0, 0.0]"
     law = built(tmp_path, "operational_space", f"kp = 100.0\nkd = 20.0\n{circle}")
     assert (law.kp, law.kd, law.posture_kp) == (100.0, 20.0, 10.0)
-    with pytest.raises(SceneError, match=r"kp must be real numbers, one or of shape \(n,\), got {'joint_1': 1.0}"):
-        built(tmp_path, "operational_space", f"kp = {{joint_1 = 1.0}}\nkd = 20.0\n{circle}")
-
-
-@pytest.mark.parametrize(
-    ("gains", "message"),
-    [
-        ("", "control: give frequency_rad_per_s, or both kp and kd"),
-        ("kp = 1.0", "control: give frequency_rad_per_s, or both"),
-        ("kd = 1.0", "control: give frequency_rad_per_s, or both"),
-        ("kp = [1.0, 2.0]\nkd = [1.0, 1.0]\nfrequency_rad_per_s = 3.0", "control: give frequency_rad_per_s, or both"),
-        ("kp = 1.0\nkd = 1.0\ndamping_ratio = 1.0", "control.damping_ratio: has no effect beside kp and kd"),
-        ("kp = -1.0\nkd = 1.0", "kp must not be negative"),
-    ],
-)
-def test_gains_are_stated_once(tmp_path, gains: str, message: str) -> None:
-    with pytest.raises(SceneError, match=message):
-        built(tmp_path, "pd", gains)

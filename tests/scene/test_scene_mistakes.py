@@ -1,4 +1,7 @@
-"""What is said of a mistake in a scene: its line, the key as people count, what it must be, and the keys there are."""
+"""What is said of a mistake in a scene: its line, the key as people count, what it must be, and the keys there are.
+
+Mistakes and messages are tests/snapshots/scene_mistakes.json, scenes after the two lines BASE unless they name a robot.
+"""
 
 from __future__ import annotations
 
@@ -8,42 +11,17 @@ import re
 from pathlib import Path
 
 import pytest
-from rich.table import Table
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError
 from robot_dyn.cli import terminal
-from robot_dyn.foundations import SceneError, escaped
+from robot_dyn.foundations import SceneError, Table, escaped
 from tests.command import refusal
-from tests.snapshots import assert_text
+from tests.scene.test_scene_loading import MJCF, URDF
+from tests.snapshots import FOLDER, assert_text
 
 BASE = 'robot = "cart_pole"\nduration_s = 1.0\n'
-GRAVITY = '[[effect]]\nkind = "gravity"\n'
-PD = '[control]\nkind = "pd"\nfrequency_rad_per_s = 3\n'
-LOCK = "[[effect]]\nkind = 'lock'\njoints = {hinge = 0.0}\n"
-LINE = "[reference]\nkind = 'line'\nby_m = [0.1, 0, 0]\nduration_s = 1.0\n"
 
-MISTAKES = [
-    GRAVITY + '\n[[effect]]\nkind = "sprng"\n',
-    '[[effect]]\nkind = "spring"\n',
-    GRAVITY + '[[effect]]\nkind = "spring"\nstiffness_N_m_per_rad = 1.0\nrest = 1\n',
-    '[start]\nq = "x"\n',
-    '[start]\nq = [1.0, "x"]\n',
-    'start = {q = {hinge = "x"}}\n',
-    "[start]\nq = [1, 2, 3]\n",
-    GRAVITY + "acceleration_m_s2 = [0, 0]\n",
-    GRAVITY + "acceleration_m_s2 = [\n0,\n0, 0, 0]\n",
-    'engine = "fast"\n',
-    'estimate_error = "maybe"\n',
-    "start = 3\n",
-    "effect = 3\n",
-    PD + "[control.model]\nmass = 3\n",
-    PD
-    + "[[control.model.effects]]\nkind = 'gravity'\n"
-    + "[[control.model.effects]]\nkind = 'payload'\nframe = 'x'\nmass_kg = -2",
-    PD + "[reference]\nkind = 'via_points'\ntimes_s = [1, 2]\npoints = [\n[1, 2],\n[1, 'b']]\n",
-    GRAVITY + "[[effect]]\nkind = 'spring'\nstiffness_N_m_per_rad = {hing = 1}\n",
-]
 OF_MANY_KEYS_OR_OF_TOMLLIB = {  # texts that grow with the library, or are of Python's version
     '[[effect]]\nkin = "gravity"\n': "line 3: effect 1.kind: is missing; give one of gravity, lock, .*viscous_friction",
     "color = 3\n": "line 3: color: is not a key here; nearest: control",
@@ -57,9 +35,25 @@ OF_MANY_KEYS_OR_OF_TOMLLIB = {  # texts that grow with the library, or are of Py
 }
 
 
+HEAD, ROWS = "t [s],q hinge [rad],q slide [m]\n", "0.5,0.4,0.1\n0.9,-0.2,0.3\n1.6,0.7,0.2\n"
+FILES = {
+    "rig.urdf": URDF, "rig.xml": MJCF, "way.csv": HEAD + ROWS, "text.csv": f"{HEAD}0.5,0.4,x\n",
+    "short.csv": f"{HEAD}\n0.5,0.4\n", "nan.csv": f"{HEAD}0.5,0.4,nan\n", "back.csv": f"{HEAD}{ROWS}0.2,1,1\n",
+    "early.csv": f"{HEAD}-1,0.4,1\n", "empty.csv": HEAD, "lacking.csv": "t,q hinge\n0.5,1\n0.6,1\n",
+    "speeds.csv": "t,q hinge,q slide,v hinge,v slide\n1,1,1,1,1\n2,2,2,1,1\n",
+    "long.csv": HEAD + "".join(f"{k},0,0\n" for k in range(1, 3001)),
+}  # fmt: skip
+MISTAKES = json.loads((FOLDER / "scene_mistakes.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.filterwarnings("ignore::robot_dyn.ModelWarning")
 @pytest.mark.parametrize("mistake", [*MISTAKES, *OF_MANY_KEYS_OR_OF_TOMLLIB])
 def test_a_mistake_is_told_as_people_count(tmp_path: Path, mistake: str) -> None:
-    (tmp_path / "scene.toml").write_text(BASE + mistake, encoding="utf-8")
+    """By the file, the line of the key or table at the top if it is there, key, value and remedy."""
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    scene = mistake if "robot" in mistake else BASE + mistake
+    (tmp_path / "scene.toml").write_text(scene, encoding="utf-8")
     with pytest.raises(SceneError) as caught:
         rd.read_scene(tmp_path / "scene.toml")
     told = str(caught.value)
@@ -70,55 +64,6 @@ def test_a_mistake_is_told_as_people_count(tmp_path: Path, mistake: str) -> None
         assert_text("scene_mistakes", mistake, told)
     for voice in ("input", "extra", "pydantic", "none is not", "should"):
         assert voice not in told.lower(), told
-
-
-def test_a_key_at_the_top_is_told_with_its_line(tmp_path: Path) -> None:
-    """The same for tables at the top: the second [[effect]] is the second line that begins one."""
-    path = tmp_path / "scene.toml"
-    for line, mistake in (
-        (4, "\naccuracy = 'x'\n"),
-        (5, GRAVITY + "[[effect]]\nkind = 'sprng'\n"),
-        (3, "[start]\nq=''\n"),
-    ):
-        path.write_text(BASE + mistake, encoding="utf-8")
-        with pytest.raises(SceneError, match=f"scene.toml: line {line}: "):
-            rd.read_scene(path)
-
-
-@pytest.mark.parametrize(
-    ("line", "text"),
-    [
-        (2, BASE.replace("robot", "\nrobot").replace("cart_pole", "none")),
-        (3, BASE + "step_s = 1e-3\nmethod = 'DOP853'\n"),
-        (3, BASE + "rtol = 1e-3\nmethod = 'rk4'\n"),
-        (4, BASE + "accuracy = 1e-3\nstep_s = 1e-3\n"),
-        (4, BASE + "\n[reference]\nkind = 'hold'\n"),
-        (4, BASE + "\n[start]\nq = [1, 2, 3]\n"),
-        (3, BASE + "start.q = [1, 2, 3]\n"),
-        (6, BASE + GRAVITY + "\n[[effect]]\nkind = 'payload'\nframe = 'none'\nmass_kg = 1.0\n"),
-        (5, BASE + GRAVITY + "[[effect]]\nkind = 'spring'\nstiffness_N_m_per_rad = {none = 1}\n" + LOCK),
-        (3, BASE + GRAVITY + GRAVITY),
-        (3, BASE + PD + "damping_ratio = 1.0\nkp = 1.0\nkd = 1.0\n"),
-        (6, BASE + PD + "[reference]\nkind = 'quintic'\nto = [1, 2, 3]\nduration_s = 1.0\n"),
-        (3, BASE + PD + "[[control.model.effects]]\nkind = 'gravity'\n" * 2),
-        (4, BASE + PD.replace("[control]", "\n[control]").replace("pd", "operational_space") + LINE),
-        (4, BASE + PD.replace("[control]", "\n[control]\nframe = 'none'").replace("pd", "operational_space") + LINE),
-        (7, BASE + PD.replace("pd", "operational_space") + "\n[reference]\nkind = 'hold'\n"),
-    ],
-)
-def test_a_mistake_is_told_with_its_line(tmp_path: Path, line: int, text: str) -> None:
-    """That of the key or table at the top, found by the schema or on the robot; [control] if its frame is wrong."""
-    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(SceneError, match=f"scene.toml: line {line}: "):
-        rd.read_scene(tmp_path / "scene.toml")
-
-
-@pytest.mark.parametrize("text", ['robot = "cart_pole"\n' + LINE, "duration_s = 1.0\n[control]\nrobot = 3\n"])
-def test_a_missing_key_has_no_line(tmp_path: Path, text: str) -> None:
-    """Also where a table has one of its name."""
-    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(SceneError, match=r"scene.toml: (robot|duration_s): is missing"):
-        rd.read_scene(tmp_path / "scene.toml")
 
 
 def test_a_scene_is_read_within_bounds(tmp_path: Path) -> None:
@@ -151,15 +96,14 @@ def test_messages_hold_no_control_characters() -> None:
 def test_tables_and_documents_hold_no_control_characters(capsys) -> None:
     """What a terminal would execute is shown instead; a document is the same to a program."""
     evil = "x\x1b[31m\x9b\x07\x7f\u202e\U000e0001"
-    table = Table(evil, box=None)
-    table.add_row(evil)
+    table = Table(("name",), ((evil,),))
     terminal.say(table, evil, "τ", table)
     terminal.say_json({evil: [evil, "τ"]})
     terminal.to_stderr(evil + "\n")
     out, err = capsys.readouterr()
     assert all(letter.isprintable() or letter == "\n" for letter in out + err)
     shown = r"x\x1b[31m\x9b\x07\x7f\u202e\U000e0001"
-    assert out.count(shown) == out.count(r"x\x1b") == 5 and err == shown + r"\n" + "\n" and out.count("τ") == 2
+    assert out.count(shown) == out.count(r"x\x1b") == 3 and err == shown + r"\n" + "\n" and out.count("τ") == 2
     assert json.loads(out[out.index("{") :]) == {evil: [evil, "τ"]}
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from robot_dyn.cli.application import FILES, command
 from robot_dyn.cli.options import Json
@@ -15,11 +13,12 @@ from robot_dyn.foundations.answer import Table
 
 
 @command(FILES)
-def cache(
-    clear: Annotated[bool, typer.Option("--clear", help="Remove them; each is compiled again when needed.")] = False,
-    as_json: Json = False,
-) -> None:
-    """List or remove the compiled kernels that are kept on disk."""
+def cache(clear: bool = False, as_json: Json = False) -> None:
+    """List or remove the compiled kernels that are kept on disk.
+
+    Options:
+        clear: Remove them; each is compiled again when needed.
+    """
     from robot_dyn.codegen.store.cache import default_store
 
     store = default_store()

@@ -19,29 +19,29 @@ _DURATION_S = 1.0
 
 @command(TRUST)
 def accuracy(
-    what: Annotated[
-        str,
-        typer.Argument(
-            metavar="SCENE.toml|ROBOT",
-            help="A scene file; or a robot, which then swings freely.",
-            autocompletion=completion.robots,
-        ),
-    ],
+    what: Annotated[str, typer.Argument(autocompletion=completion.robots)],
+    /,
     budget: Budget = 30.0,
     repeats: Repeats = 25,
-    method: Annotated[
-        list[str] | None, typer.Option(metavar="METHOD", help="Only this method; may be repeated; all by default.")
-    ] = None,
-    peers: Annotated[bool, typer.Option(help="Run other programs that are installed beside, where they can.")] = True,
-    q: Annotated[str | None, typer.Option(help="Start of a robot: as of query; random by default.")] = None,
-    v: Annotated[str | None, typer.Option(help="Its velocities; 0 by default.")] = None,
-    duration: Annotated[float | None, typer.Option(metavar="SECONDS", help="Of its motion; 1 by default.")] = None,
+    method: list[str] | None = None,
+    peers: bool = True,
+    q: str | None = None,
+    v: str | None = None,
+    duration: float | None = None,
     options: RobotOptions = AS_STATED,
     results: Results = PRINTED,
 ) -> None:
     """Show what each digit of a motion costs in time.
 
     By method and program. Ctrl-C ends it and keeps its runs.
+
+    Options:
+        what (SCENE.toml|ROBOT): A scene file; or a robot, which then swings freely.
+        method (METHOD): Only this method; may be repeated; all by default.
+        peers: Run other programs that are installed beside, where they can.
+        q: Start of a robot: as of query; random by default.
+        v: Its velocities; 0 by default.
+        duration (SECONDS): Of its motion; 1 by default.
     """
     paths = results.files(rd.accuracy.WorkPrecision, what)
     setup = _setup(what, q, v, duration, options)
@@ -53,12 +53,7 @@ def accuracy(
 
 
 @command(ASK)
-def cost(
-    scene: Scene,
-    budget: Budget = 10.0,
-    repeats: Repeats = 25,
-    results: Results = PRINTED,
-) -> None:
+def cost(scene: Scene, /, budget: Budget = 10.0, repeats: Repeats = 25, results: Results = PRINTED) -> None:
     """Count and time what effects, control and terms cost.
 
     Each is switched on and off; algorithms are compared with each other.
@@ -73,19 +68,29 @@ def cost(
 @command(TRUST)
 def certify(
     robot: Name,
-    samples: Annotated[int, typer.Option(help="Number of random states.")] = 10_000,
-    seed: Annotated[int, typer.Option(help="Of the random states.")] = 0,
-    repeats: Annotated[int, typer.Option(min=1, help="How often each query is timed.")] = 7,
-    q: Annotated[str | None, typer.Option(help="A state to look at too: as of query.")] = None,
-    v: Annotated[str | None, typer.Option(help="Its velocities; 0 by default.")] = None,
-    a: Annotated[str | None, typer.Option(help="Its accelerations, of inverse dynamics; 0 by default.")] = None,
-    tau: Annotated[str | None, typer.Option(help="Its torques, of forward dynamics; 0 by default.")] = None,
+    /,
+    samples: int = 10000,
+    seed: int = 0,
+    repeats: Annotated[int, typer.Option(min=1)] = 7,
+    q: str | None = None,
+    v: str | None = None,
+    a: str | None = None,
+    tau: str | None = None,
     options: RobotOptions = AS_STATED,
     results: Results = PRINTED,
 ) -> None:
     """Count the digits of M, C, N and dynamics that are true.
 
     By program and numbers, with times.
+
+    Options:
+        samples: Number of random states.
+        seed: Of the random states.
+        repeats: How often each query is timed.
+        q: A state to look at too: as of query.
+        v: Its velocities; 0 by default.
+        a: Its accelerations, of inverse dynamics; 0 by default.
+        tau: Its torques, of forward dynamics; 0 by default.
     """
     paths = results.files(rd.accuracy.Certificate, robot)
     arm = options.load(robot)
@@ -97,7 +102,7 @@ def certify(
 
 
 @command(RUN)
-def advise(scene: Scene, as_json: Json = False) -> None:
+def advise(scene: Scene, /, as_json: Json = False) -> None:
     """Say whether step and control period are short enough.
 
     Also what error to expect. The exit code is 1 if they are not short enough.

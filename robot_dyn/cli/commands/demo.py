@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -20,13 +19,13 @@ _BUDGET_S = 8.0  # compiling not counted, which happens once for a version of th
 
 
 @command(LOOK)
-def demo(
-    output: Annotated[str, typer.Option("-o", "--output", metavar="FOLDER", help="Where its files go.")] = "demo",
-    force: Force = False,
-) -> None:
+def demo(output: str = "demo", force: Force = False) -> None:
     """Load, compare, simulate, replay and plot a real arm.
 
     At the end it prints what 1e-8 rad takes here, by this library and by other programs that are installed.
+
+    Options:
+        output (FOLDER): Where its files go.
     """
     from robot_dyn.cli import report
     from robot_dyn.scene.scene import SCENE, SceneError

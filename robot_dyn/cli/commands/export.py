@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 import robot_dyn as rd
 from robot_dyn.cli.application import FILES, bar, command
@@ -17,17 +15,14 @@ if TYPE_CHECKING:
 
 
 @command(FILES)
-def export(
-    run: Annotated[str, typer.Argument(metavar="RUN.npz", help="A file of a run, or of rollouts.")],
-    output: Annotated[
-        str,
-        typer.Option("-o", "--output", metavar="FILE", help="A .csv, .parquet, .nc (netCDF) or .mcap (ROS 2) file."),
-    ],
-    force: Force = False,
-) -> None:
+def export(run: str, /, output: str, force: Force = False) -> None:
     """Write a run as CSV, Parquet, netCDF or a log of ROS 2.
 
     The runs of a batch are one table.
+
+    Options:
+        run (RUN.npz): A file of a run, or of rollouts.
+        output (FILE): A .csv, .parquet, .nc (netCDF) or .mcap (ROS 2) file.
     """
     from robot_dyn.simulation.export.export import kinds
     from robot_dyn.simulation.results.run_file import RunFileError

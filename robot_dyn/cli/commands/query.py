@@ -25,15 +25,12 @@ def list_(as_json: Json = False) -> None:
 
 
 @command(LOOK)
-def info(
-    robot: Name,
-    compiled: Annotated[
-        bool, typer.Option("--compiled", help="Also trace each quantity, and say which formulation is compiled.")
-    ] = False,
-    options: RobotOptions = AS_STATED,
-    as_json: Json = False,
-) -> None:
-    """Show a robot: joints, limits, friction, mass, findings."""
+def info(robot: Name, /, compiled: bool = False, options: RobotOptions = AS_STATED, as_json: Json = False) -> None:
+    """Show a robot: joints, limits, friction, mass, findings.
+
+    Options:
+        compiled: Also trace each quantity, and say which formulation is compiled.
+    """
     from robot_dyn.cli import report
     from robot_dyn.foundations.result import plain
 
@@ -49,35 +46,15 @@ def info(
 
 @command(ASK)
 def query(
-    what: Annotated[
-        str,
-        typer.Argument(
-            metavar="ROBOT|SCENE.toml",
-            help="A robot; or a scene file, with its robot, effects and start.",
-            autocompletion=completion.robots,
-        ),
-    ],
+    what: Annotated[str, typer.Argument(autocompletion=completion.robots)],
+    /,
     q: Positions = None,
-    v: Annotated[str | None, typer.Option(help="Velocities in rad/s or m/s, in the same form.")] = None,
-    a: Annotated[str | None, typer.Option(help="Accelerations in rad/s² or m/s²: the torque is computed.")] = None,
-    tau: Annotated[str | None, typer.Option(help="Torques in N m or N: the acceleration is computed.")] = None,
-    why: Annotated[
-        str | None,
-        typer.Option(
-            metavar="JOINT", help="Split this joint's torque by link and cause.", autocompletion=completion.joints
-        ),
-    ] = None,
-    quantity: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="Add another query of the rigid bodies, such as momentum; may be repeated.",
-            autocompletion=completion.quantities,
-        ),
-    ] = None,
-    frame: Annotated[
-        str | None, typer.Option(metavar="LINK", help="The frame of --quantity jacobian and others.")
-    ] = None,
+    v: str | None = None,
+    a: str | None = None,
+    tau: str | None = None,
+    why: Annotated[str | None, typer.Option(autocompletion=completion.joints)] = None,
+    quantity: Annotated[list[str] | None, typer.Option(autocompletion=completion.quantities)] = None,
+    frame: str | None = None,
     effects: Effects = None,
     payload: Payloads = None,
     options: RobotOptions = AS_STATED,
@@ -86,6 +63,15 @@ def query(
     """Ask for M, C, N, torques and accelerations at a state.
 
     Of a scene: at its start, under the actuation of its control; what dry friction and rigid stops hold is listed.
+
+    Options:
+        what (ROBOT|SCENE.toml): A robot; or a scene file, with its robot, effects and start.
+        v: Velocities in rad/s or m/s, in the same form.
+        a: Accelerations in rad/s² or m/s²: the torque is computed.
+        tau: Torques in N m or N: the acceleration is computed.
+        why (JOINT): Split this joint's torque by link and cause.
+        quantity (NAME): Add another query of the rigid bodies, such as momentum; may be repeated.
+        frame (LINK): The frame of --quantity jacobian and others.
     """
     from robot_dyn.cli import report
     from robot_dyn.effects.plant_state import plant_state
@@ -128,31 +114,36 @@ def _actuation(setup: rd.Setup, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 @command(TRUST)
 def compare(
-    robots: Annotated[
-        list[str] | None, typer.Argument(metavar="ROBOT...", help="Names or paths.", autocompletion=completion.robots)
-    ] = None,
-    every: Annotated[bool, typer.Option("--all", help="All robots of `robot-dyn list` that load.")] = False,
-    samples: Annotated[int, typer.Option(min=1, help="Random states for each robot.")] = 20,
-    seed: Annotated[int, typer.Option(help="Seed of the random states.")] = 0,
+    robots: Annotated[list[str] | None, typer.Argument(autocompletion=completion.robots)] = None,
+    /,
+    all_: bool = False,
+    samples: Annotated[int, typer.Option(min=1)] = 20,
+    seed: int = 0,
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
     """Compare Pinocchio with the library's own Lagrangian.
 
     The exit code is 1 if they disagree.
+
+    Options:
+        robots (ROBOT...): Names or paths.
+        all_: All robots of `robot-dyn list` that load.
+        samples: Random states for each robot.
+        seed: Seed of the random states.
     """
     from robot_dyn.cli import report
 
-    if robots and every:
+    if robots and all_:
         raise QueryError("give the names of robots or --all, not both")
-    if not (robots or every):
+    if not (robots or all_):
         raise QueryError("nothing to compare; give the names of robots, or --all")
     results, refused = [], {}
-    for name in progress(rd.list_robots() if every else robots or (), "comparing"):
+    for name in progress(rd.list_robots() if all_ else robots or (), "comparing"):
         try:
-            results.append((name, rd.compare(options.load(name, quiet=every), samples=samples, seed=seed)))
+            results.append((name, rd.compare(options.load(name, quiet=all_), samples=samples, seed=seed)))
         except RobotDynError as error:
-            if not every:
+            if not all_:
                 raise
             refused[name] = str(error)
     document = report.comparison(results, refused)

@@ -25,17 +25,21 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True)
 class PageOptions:
-    """How a page is drawn, and whether it is written or served."""
+    """How a page is drawn, and whether it is written or served.
 
-    html: Annotated[
-        str | None, typer.Option(metavar="OUT.html", help="Write one file that needs no server, and end.")
-    ] = None
-    inertia: Annotated[bool, typer.Option("--inertia", help="Draw each link's equivalent inertia box.")] = False
-    meshes: Annotated[str, typer.Option(help="full, the triangles of their files, or coarse, for a smaller page.")] = (
-        "full"
-    )
-    port: Annotated[int | None, typer.Option(min=1, max=65535, help="Where to listen; a free one by default.")] = None
-    browse: Annotated[bool, typer.Option("--open", help="Open the page in your browser.")] = False
+    Options:
+        html (OUT.html): Write one file that needs no server, and end.
+        inertia: Draw each link's equivalent inertia box.
+        meshes: full, the triangles of their files, or coarse, for a smaller page.
+        port: Where to listen; a free one by default.
+        open_: Open the page in your browser.
+    """
+
+    html: str | None = None
+    inertia: bool = False
+    meshes: str = "full"
+    port: Annotated[int | None, typer.Option(min=1, max=65535)] = None
+    open_: bool = False
     force: Force = False
 
     @property
@@ -69,7 +73,7 @@ class PageOptions:
         self._open(file.absolute().as_uri())
 
     def _open(self, address: str) -> None:
-        if self.browse:
+        if self.open_:
             import webbrowser
 
             webbrowser.open(address)
@@ -79,7 +83,7 @@ SERVED = PageOptions()
 
 
 @command(LOOK, "show")
-def show_(robot: Name, q: Positions = None, view: PageOptions = SERVED, options: RobotOptions = AS_STATED) -> None:
+def show_(robot: Name, /, q: Positions = None, view: PageOptions = SERVED, options: RobotOptions = AS_STATED) -> None:
     """Show a robot in the browser, or as one HTML file.
 
     The browser has it live on this machine until Ctrl-C.
@@ -92,29 +96,27 @@ def show_(robot: Name, q: Positions = None, view: PageOptions = SERVED, options:
 
 @command(LOOK)
 def replay(
-    runs: Annotated[
-        list[str], typer.Argument(metavar="RUN.npz...", help="Run files; those after the first are drawn transparent.")
-    ],
-    video: Annotated[
-        str | None,
-        typer.Option(metavar="OUT.mp4", help="Write an .mp4 or .gif, drawn by an installed Chrome, Chromium or Edge."),
-    ] = None,
-    fps: Annotated[
-        int | None, typer.Option(help="Frames a second of the video: frame k shows t = k / fps; 60, or 25 of a .gif.")
-    ] = None,
-    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of the video.")] = "1280x720",
+    runs: list[str],
+    /,
+    video: str | None = None,
+    fps: int | None = None,
+    size: str = "1280x720",
     dark: Dark = False,
-    frame: Annotated[
-        str | None, typer.Option(metavar="LINK", help="Link whose path is drawn; the tip by default.")
-    ] = None,
+    frame: str | None = None,
     view: PageOptions = SERVED,
-    package_dir: Annotated[
-        list[str] | None, typer.Option(help="Folder in which ROS packages are searched; may be repeated.")
-    ] = None,
+    package_dir: list[str] | None = None,
 ) -> None:
     """Replay runs in the browser, or as one HTML file or a video.
 
     The browser has them live on this machine until Ctrl-C.
+
+    Options:
+        runs (RUN.npz...): Run files; those after the first are drawn transparent.
+        video (OUT.mp4): Write an .mp4 or .gif, drawn by an installed Chrome, Chromium or Edge.
+        fps: Frames a second of the video: frame k shows t = k / fps; 60, or 25 of a .gif.
+        size (WIDTHxHEIGHT): Pixels of the video.
+        frame (LINK): Link whose path is drawn; the tip by default.
+        package_dir: Folder in which ROS packages are searched; may be repeated.
     """
     file = view.file(runs)
     film = None if video is None else _film(video, size, view, runs)
@@ -130,26 +132,27 @@ def replay(
 
 @command(LOOK)
 def plot(
-    run: Annotated[str, typer.Argument(metavar="RUN.npz", help="A run file, as `robot-dyn simulate … -o` writes.")],
-    output: Annotated[
-        str | None, typer.Option("-o", "--output", metavar="PLOT.png", help="A .png, .svg or .pdf; RUN.png by default.")
-    ] = None,
-    only: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--only",
-            metavar="PART",
-            help="overview, joints, torques, energy, tracking, phase or error_growth; may be repeated; by default the"
-            " overview.",
-        ),
-    ] = None,
-    joint: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Show this joint; may be repeated.")] = None,
-    width_mm: Annotated[float, typer.Option("--width-mm", help="Width in mm; text keeps its size.")] = 180.0,
-    paper: Annotated[bool, typer.Option("--paper", help="For a paper: thin lines, no title, legible in grey.")] = False,
+    run: str,
+    /,
+    output: str | None = None,
+    only: list[str] | None = None,
+    joint: list[str] | None = None,
+    width_mm: float = 180.0,
+    paper: bool = False,
     dark: Dark = False,
     force: Force = False,
 ) -> None:
-    """Draw a run: joints, torques, energy, tracking, phase, error."""
+    """Draw a run: joints, torques, energy, tracking, phase, error.
+
+    Options:
+        run (RUN.npz): A run file, as `robot-dyn simulate … -o` writes.
+        output (PLOT.png): A .png, .svg or .pdf; RUN.png by default.
+        only (PART): overview, joints, torques, energy, tracking, phase or error_growth; may be repeated; by
+            default the overview.
+        joint (JOINT): Show this joint; may be repeated.
+        width_mm: Width in mm; text keeps its size.
+        paper: For a paper: thin lines, no title, legible in grey.
+    """
     from robot_dyn.view.plots.plots import PICTURES, PlotError
 
     path = target(output or Path(run).with_suffix(".png"), PICTURES, PlotError, [run], force)

@@ -21,20 +21,21 @@ from robot_dyn.foundations.files import target
 @command(RUN)
 def simulate(
     scene: Scene,
-    output: Annotated[
-        str | None, typer.Option("-o", "--output", metavar="RUN.npz", help="Write the run to a file.")
-    ] = None,
-    csv: Annotated[str | None, typer.Option(metavar="TABLE.csv", help="Write the samples as a table.")] = None,
-    accuracy: Annotated[
-        float | None,
-        typer.Option(metavar="ERROR", help="Largest error of q to have, in rad and m; pilot runs choose the method."),
-    ] = None,
+    /,
+    output: str | None = None,
+    csv: str | None = None,
+    accuracy: float | None = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Run a scene.
 
     The exit code is 1 if it diverges. Ctrl-C ends the run and keeps its samples.
+
+    Options:
+        output (RUN.npz): Write the run to a file.
+        csv (TABLE.csv): Write the samples as a table.
+        accuracy (ERROR): Largest error of q to have, in rad and m; pilot runs choose the method.
     """
     from robot_dyn.cli import report
     from robot_dyn.simulation.export.export import TABLE
@@ -58,29 +59,25 @@ def simulate(
 
 
 @command(ASK)
-def explain(scene: Scene, as_json: Json = False) -> None:
+def explain(scene: Scene, /, as_json: Json = False) -> None:
     """Say what a scene integrates, and where numbers came from."""
     show(rd.explain(Path(scene)), as_json=as_json)
 
 
 @command(ASK)
-def sweepable(scene: Scene, as_json: Json = False) -> None:
+def sweepable(scene: Scene, /, as_json: Json = False) -> None:
     """List the parameters that runs of a scene can sweep."""
     show(rd.sweepable(rd.read_scene(scene)), as_json=as_json)
 
 
 @command(FILES)
-def scene(
-    name: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="NAME", help="Name of a starter; without a name, they are listed.", autocompletion=completion.scenes
-        ),
-    ] = None,
-) -> None:
+def scene(name: Annotated[str | None, typer.Argument(autocompletion=completion.scenes)] = None, /) -> None:
     """Print a scene file to start from.
 
     For example `robot-dyn scene pendulum > pendulum.toml`.
+
+    Options:
+        name (NAME): Name of a starter; without a name, they are listed.
     """
     from robot_dyn.scene.starters import opening, starter, starter_names
 

@@ -82,8 +82,9 @@ class Checkup(Answer):
     def _repr_html_(self) -> str:
         from robot_dyn.foundations import page, table
 
-        rows = ((x.severity.value, x.where, x.line, x.what, x.remedy) for x in self.findings)
-        return page(self.sentence, table(("", "where", "line", "what", "remedy"), rows) if self.findings else "")
+        rows = ((x.severity.value, x.where, str(x.line or ""), x.what, x.remedy) for x in self.findings)
+        heading = ("", "where", "line", "what", "remedy")
+        return page(self.sentence, table(heading, rows, right=("line",)) if self.findings else "")
 
 
 def check(

@@ -28,17 +28,11 @@ class RepairError(RobotDynError):
 
 @command("Files")
 def check(
-    files: Annotated[
-        list[str],
-        typer.Argument(metavar="FILE...", help="URDF files, or names of robots.", autocompletion=completion.robots),
-    ],
-    fix: Annotated[
-        bool, typer.Option("--fix", help="Write NAME.fixed.urdf here, with every change in a comment.")
-    ] = False,
-    units: Annotated[
-        bool, typer.Option("--units", help="With --fix: convert what seems to be in another unit, such as kg mm².")
-    ] = False,
-    every: Annotated[bool, typer.Option("--all", help="Print each finding, not one line for each kind.")] = False,
+    files: Annotated[list[str], typer.Argument(autocompletion=completion.robots)],
+    /,
+    fix: bool = False,
+    units: bool = False,
+    all_: bool = False,
     force: Force = False,
     options: FileOptions = FILE_AS_STATED,
     as_json: Json = False,
@@ -47,6 +41,12 @@ def check(
 
     Inertias, units, limits, names and shapes are checked. The exit code is 1 if errors are left. Masses, densities,
     --allow-overlap and --units need --fix.
+
+    Options:
+        files (FILE...): URDF files, or names of robots.
+        fix: Write NAME.fixed.urdf here, with every change in a comment.
+        units: With --fix: convert what seems to be in another unit, such as kg mm².
+        all_: Print each finding, not one line for each kind.
     """
     from robot_dyn.foundations import plain
     from robot_dyn.tools.doctor.finding import Severity
@@ -65,7 +65,7 @@ def check(
             written[file] = str(save(to, lambda stream, text=text: stream.write(text), RepairError))
     checked = [(file, each, written.get(file)) for file, each in zip(files, checkups, strict=True)]
     document = {"files": [{"file": file, "written": to} | plain(each) for file, each, to in checked]}
-    show([line for each in checked for line in _lines(*each, every)], as_json=as_json, document=document)
+    show([line for each in checked for line in _lines(*each, all_)], as_json=as_json, document=document)
     if fix and not as_json:
         for file in files:
             if file not in written:

@@ -30,55 +30,20 @@ _RUNS = ".toml", ".npz"
 
 @command("Ask for its dynamics")
 def budget(
-    what: Annotated[
-        str,
-        typer.Argument(
-            metavar="ROBOT|SCENE.toml|RUN.npz",
-            help="A robot, with a plan; a scene, which is simulated; or a run file.",
-            autocompletion=completion.robots,
-        ),
-    ],
-    plan: Annotated[
-        str | None,
-        typer.Argument(metavar="[PLAN.csv]", help="Way points or samples: a column t in s, and one for each joint."),
-    ] = None,
+    what: Annotated[str, typer.Argument(autocompletion=completion.robots)],
+    plan: str | None = None,
+    /,
     payload: Payloads = None,
     effects: Effects = None,
-    limits: Annotated[
-        str | None,
-        typer.Option(
-            metavar="MOTORS.csv",
-            help="Motors: joint, peak, continuous, speed, gear_ratio, …, with units; else the robot's file.",
-        ),
-    ] = None,
-    max_payload: Annotated[
-        str | None,
-        typer.Option("--max-payload", metavar="LINK@X,Y,Z", help="Find the largest payload there that still fits."),
-    ] = None,
-    fastest: Annotated[
-        bool,
-        typer.Option(
-            "--fastest", help="Move along the same path as fast as the limits allow; -o and --csv are then of it."
-        ),
-    ] = False,
-    share: Annotated[
-        float | None, typer.Option(help="With --fastest: of the peak torques that it may take, up to 1.")
-    ] = None,
-    unit: Annotated[str | None, typer.Option(help="rad or deg, of angles in the plan whose heading says none.")] = None,
-    period: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Time between rows of a plan without times.")
-    ] = None,
-    time: Annotated[
-        str | None, typer.Option(metavar="COLUMN", help="Heading of the times in the plan, unless it is t or time.")
-    ] = None,
-    ends: Annotated[
-        str | None,
-        typer.Option(help="rest or measured: whether the plan stops at its ends, or is cut from a longer motion."),
-    ] = None,
-    joint: Annotated[
-        list[str] | None,
-        typer.Option(metavar="JOINT=COLUMN", help="Heading of a joint in the plan, for each; others are left out."),
-    ] = None,
+    limits: str | None = None,
+    max_payload: str | None = None,
+    fastest: bool = False,
+    share: float | None = None,
+    unit: str | None = None,
+    period: float | None = None,
+    time: str | None = None,
+    ends: str | None = None,
+    joint: list[str] | None = None,
     options: RobotOptions = AS_STATED,
     results: Results = PRINTED,
 ) -> None:
@@ -87,6 +52,20 @@ def budget(
     It compares the demand on each motor with its limits, by cause. The exit code is 1 if a motor is too small.
     With --fastest it is 1 if one is too small for the given motion or for the fastest one.
     Torque and speed peaks, rms torque, power, energy, and the torque at which dry friction breaks away.
+
+    Options:
+        what (ROBOT|SCENE.toml|RUN.npz): A robot, with a plan; a scene, which is simulated; or a run file.
+        plan ([PLAN.csv]): Way points or samples: a column t in s, and one for each joint.
+        limits (MOTORS.csv): Motors: joint, peak, continuous, speed, gear_ratio, …, with units; else the
+            robot's file.
+        max_payload (LINK@X,Y,Z): Find the largest payload there that still fits.
+        fastest: Move along the same path as fast as the limits allow; -o and --csv are then of it.
+        share: With --fastest: of the peak torques that it may take, up to 1.
+        unit: rad or deg, of angles in the plan whose heading says none.
+        period (SECONDS): Time between rows of a plan without times.
+        time (COLUMN): Heading of the times in the plan, unless it is t or time.
+        ends: rest or measured: whether the plan stops at its ends, or is cut from a longer motion.
+        joint (JOINT=COLUMN): Heading of a joint in the plan, for each; others are left out.
     """
     from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 
@@ -111,7 +90,7 @@ def budget(
             raise QueryError(f"{what}: give its motion as well, a CSV file with a column t [s] and one for each joint")
         robot = options.load(what)
         times = time if period is None else period
-        columns = dict(arguments.pair("--joint", text, "JOINT=COLUMN") for text in joint) if joint else None
+        columns = arguments.pairs("--joint", joint, "JOINT=COLUMN") or None
         motion = rd.control.from_samples(robot, plan, time=times, joints=columns, unit=unit, ends=ends)
         bodies = [arguments.payload(each) for each in payload or ()] or None
         with bar(what="asking for the torque"):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import typer
 
 import robot_dyn as rd
@@ -13,16 +11,20 @@ from robot_dyn.cli import Json, Scene, bar, command, show
 @command("Trust it")
 def prove(
     scene: Scene,
-    until: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Time up to which to prove; that of the scene unless given.")
-    ] = None,
-    bits: Annotated[int, typer.Option(help="Precision of the balls.")] = 100,
-    budget: Annotated[float, typer.Option(metavar="SECONDS", help="Time that it may take.")] = 60.0,
+    /,
+    until: float | None = None,
+    bits: int = 100,
+    budget: float = 60.0,
     as_json: Json = False,
 ) -> None:
     """Prove where the arm of a scene will be.
 
     It prints balls that hold q and v. The exit code is 1 if the proof does not reach the end.
+
+    Options:
+        until (SECONDS): Time up to which to prove; that of the scene unless given.
+        bits: Precision of the balls.
+        budget (SECONDS): Time that it may take.
     """
     setup = rd.read_scene(scene)
     with bar(setup.duration_s if until is None else until, "proving") as advance:

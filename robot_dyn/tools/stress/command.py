@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from functools import partial
-from typing import Annotated
 
 import typer
 
@@ -16,16 +15,12 @@ from robot_dyn.foundations import target
 @command("Trust it")
 def stress(
     robot: Name,
-    output: Annotated[
-        str | None,
-        typer.Option("-o", "--output", metavar="RESULT.json", help="Write all that was found, as of --json."),
-    ] = None,
-    samples: Annotated[int, typer.Option(help="Number of random states.")] = 10_000,
-    runs: Annotated[int, typer.Option(help="Number of random runs.")] = 7,
-    seed: Annotated[int, typer.Option(help="Of the random states and runs.")] = 0,
-    budget: Annotated[
-        float, typer.Option(metavar="SECONDS", help="Time to spend; what is not looked at by then is named.")
-    ] = 90.0,
+    /,
+    output: str | None = None,
+    samples: int = 10000,
+    runs: int = 7,
+    seed: int = 0,
+    budget: float = 90.0,
     force: Force = False,
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
@@ -34,6 +29,13 @@ def stress(
 
     Worst configurations, step, gain, speed and payload; the exit code is 1 on failures.
     Ctrl-C ends it and keeps what was found.
+
+    Options:
+        output (RESULT.json): Write all that was found, as of --json.
+        samples: Number of random states.
+        runs: Number of random runs.
+        seed: Of the random states and runs.
+        budget (SECONDS): Time to spend; what is not looked at by then is named.
     """
     from robot_dyn.report import JSON, ResultError
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from robot_dyn.cli import Force, Json, app, bar, say, say_json, to_stderr
-from robot_dyn.foundations import SweepError, nearest, shorten
+from robot_dyn.cli import Force, Json, arguments, bar, command, say, say_json, to_stderr
+from robot_dyn.foundations import SweepError, nearest
 
 if TYPE_CHECKING:
     from robot_dyn.tools.sweeps.result import SweepResult
@@ -18,64 +18,62 @@ if TYPE_CHECKING:
 ACTIONS = ("run", "status", "verify", "report", "export")
 
 
-@app.command(rich_help_panel="Run it", short_help="Run a scene many times, with what varies, into a folder.")
+@command("Run it")
 def sweep(
-    what: Annotated[
-        str, typer.Argument(metavar="SCENE.toml|ACTION", help=f"A scene to sweep; or {', '.join(ACTIONS)} of a FOLDER.")
-    ],
-    folder: Annotated[str | None, typer.Argument(metavar="FOLDER", help="Of a sweep, for an action.")] = None,
-    output: Annotated[
-        str | None,
-        typer.Option("-o", "--output", metavar="PATH", help="Folder to fill; or the file of report, export."),
-    ] = None,
-    runs: Annotated[int | None, typer.Option(help="Number of runs.")] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=DISTRIBUTION", help="What varies, as 'kp=uniform(low=50, high=100)'; repeated."),
-    ] = None,
-    figure: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=FIGURE", help="What is kept of each run, as 'peak=peak(\"u\")'; repeated."),
-    ] = None,
-    samples: Annotated[
-        str | None,
-        typer.Option(metavar="SAMPLES", help="Samples to keep: q, v or u of all runs, or 'samples(\"q\", every=10)'."),
-    ] = None,
-    design: Annotated[str | None, typer.Option(help="random, sobol, halton, latin, saltelli or grid.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Of the design.")] = None,
-    threads: Annotated[int | None, typer.Option(help="Of this process; all processors unless given.")] = None,
-    cluster: Annotated[
-        str | None, typer.Option(help="Workers of Dask in place of threads: local:2, or tls://host:8786.")
-    ] = None,
-    share: Annotated[str | None, typer.Option(metavar="3/16", help="The part of one job of an array.")] = None,
-    scene: Annotated[
-        str | None,
-        typer.Option(help="Of a folder: where its scene lies now, or the function module:function that makes it."),
-    ] = None,
-    chunk: Annotated[int | None, typer.Option(help="Runs of a file; about 2 s of work unless given.")] = None,
-    probability: Annotated[
-        list[str] | None,
-        typer.Option(metavar="EVENT", help="Say how likely it is, as 'failed | error > 0.1'; repeated."),
-    ] = None,
+    what: str,
+    folder: str | None = None,
+    /,
+    output: str | None = None,
+    runs: int | None = None,
+    vary: list[str] | None = None,
+    figure: list[str] | None = None,
+    samples: str | None = None,
+    design: str | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+    cluster: str | None = None,
+    share: str | None = None,
+    scene: str | None = None,
+    chunk: int | None = None,
+    probability: list[str] | None = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Run a scene many times, with what varies, into a folder; again, it is resumed.
+    """Run a scene many times, with what varies, into a folder.
 
-    Ctrl-C drops the chunks under way, and the folder keeps the others. `sweep run FOLDER` resumes it, `status` says
-    what is left, `verify` reads all files, `report` writes a page, `export` a table as .csv or .parquet.
+    Repeat the command to resume. Ctrl-C drops the chunks under way, and the folder keeps the others. `sweep run FOLDER`
+    resumes it, `status` says what is left, `verify` reads all files, `report` writes a page, `export` a table as .csv
+    or .parquet.
+
+    Options:
+        what (SCENE.toml|ACTION): A scene to sweep; or run, status, verify, report, export of a FOLDER.
+        folder (FOLDER): Of a sweep, for an action.
+        output (PATH): Folder to fill; or the file of report, export.
+        runs: Number of runs.
+        vary (NAME=DISTRIBUTION): What varies, as 'kp=uniform(low=50, high=100)'; repeated.
+        figure (NAME=FIGURE): What is kept of each run, as 'peak=peak("u")'; repeated.
+        samples (SAMPLES): Samples to keep: q, v or u of all runs, or 'samples("q", every=10)'.
+        design: random, sobol, halton, latin, saltelli or grid.
+        seed: Of the design.
+        threads: Of this process; all processors unless given.
+        cluster: Workers of Dask in place of threads: local:2, or tls://host:8786.
+        share (3/16): The part of one job of an array.
+        scene: Of a folder: where its scene lies now, or the function module:function that makes it.
+        chunk: Runs of a file; about 2 s of work unless given.
+        probability (EVENT): Say how likely it is, as 'failed | error > 0.1'; repeated.
     """
     from robot_dyn.tools import sweeps as sw
 
     verified: list[str] = []
+    figures = arguments.pairs("--figure", figure)
     options: dict[str, Any] = {"threads": threads, "cluster": cluster, "share": share}
     if what.lower().endswith(".toml"):
         if folder is not None or output is None:
             raise SweepError("give the folder to fill with -o FOLDER")
-        changes: dict[str, Any] = {"runs": runs, "design": design, "seed": seed, "samples": samples}
-        changes = {name: value for name, value in changes.items() if value is not None}
-        changes |= {"vary": _assignments("--vary", vary), "figures": _assignments("--figure", figure)}
-        result = _run(sw.from_scene(what, **changes), output, options | {"chunk": chunk})
+        given = {"runs": runs, "design": design, "seed": seed, "samples": samples}
+        changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        stated = sw.from_scene(what, vary=arguments.pairs("--vary", vary), figures=figures, **changes)
+        result = _run(stated, output, options | {"chunk": chunk})
     else:
         if what not in ACTIONS:
             raise SweepError(
@@ -83,7 +81,7 @@ def sweep(
             )
         if folder is None:
             raise SweepError(f"{what}: of which folder? robot-dyn sweep {what} FOLDER")
-        result = sw.read(folder, scene, _assignments("--figure", figure))
+        result = sw.read(folder, scene, figures)
         if what == "run":
             result = _run(result.sweep, folder, options)
         elif what == "verify":
@@ -101,17 +99,6 @@ def sweep(
         say(result, *verified, *answers)
     if result.status["missing"] and what != "status" and share is None:
         raise typer.Exit(130)
-
-
-def _assignments(option: str, texts: list[str] | None) -> dict[str, str]:
-    """Names and values of texts NAME=VALUE; SweepError if one has another form."""
-    values = {}
-    for text in texts or ():
-        name, equals, value = text.partition("=")
-        if not equals or not name.strip():
-            raise SweepError(f"{option} must be NAME=VALUE, got {shorten(text)!r}")
-        values[name.strip()] = value.strip()
-    return values
 
 
 def _run(stated: Sweep, folder: str, options: dict[str, Any]) -> SweepResult:

@@ -23,12 +23,11 @@ from robot_dyn.tools.stress.runs import FAMILIES, scenes
 from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import BY_PD, FASTEST, pd_gains, shrunk, worst, worst_configurations
 from tests.cli.test_command_documents import promised
-from tests.command import refusal, run
+from tests.command import run
 from tests.hostile.kinds import AXIS, LIMIT
 from tests.hostile.kinds import arm as altered
 from tests.long import long
 from tests.short_stress import short_stress
-from tests.snapshots import assert_text
 
 MORE = ("planar_2r", "cart_pole", "mimic_chain", "ur5")
 ARMS = ["pendulum", *(pytest.param(each, marks=pytest.mark.long) for each in MORE)]
@@ -379,19 +378,3 @@ def test_failures_are_told_loudly(monkeypatch) -> None:
     monkeypatch.setattr(rd.tools.stress, "stress", lambda *arguments, **options: wrong)
     done = run("stress", "pendulum")
     assert done.returncode == 1 and "\nFAILURE: gain PD" in done.stdout
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        ["--samples", "10"],
-        ["--runs", "-1"],
-        ["--budget", "0"],
-        ["-o", "found.txt"],
-        ["-o", "old.json"],
-    ],
-)
-def test_mistakes_are_told_in_one_line_before_the_work(tmp_path, monkeypatch, given: list[str]) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "old.json").write_text('{\n "robot": "pendulum"\n}')
-    assert_text("refused_studies", " ".join(["stress", *given]), refusal(["stress", "pendulum", *given]))
