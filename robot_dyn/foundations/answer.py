@@ -30,6 +30,10 @@ class Table:
     right: tuple[str, ...] = ()
     wrap: bool = False
 
+    def __post_init__(self) -> None:
+        for name in ("heading", "right"):  # of files, too: a terminal would execute their control characters
+            object.__setattr__(self, name, tuple(map(escaped, getattr(self, name))))
+
     @property
     def words(self) -> tuple[str, ...]:
         """Headings of the columns that hold texts; the others hold numbers."""
