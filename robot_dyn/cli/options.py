@@ -202,13 +202,13 @@ def _described(parameter: inspect.Parameter, *where: Any) -> inspect.Parameter:
     annotation = get_type_hints(where[-1], include_extras=True)[name]
     docstrings = "\n".join(inspect.cleandoc(source.__doc__ or "") for source in where)
     texts = {name: (form, " ".join(text.split())) for name, form, text in _DESCRIBED.findall(docstrings)}
-    if name in texts:
-        kind, *stated = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
-        is_argument = parameter.kind is parameter.POSITIONAL_ONLY
-        info = copy(stated[0]) if stated else typer.Argument() if is_argument else typer.Option()
-        if not (is_argument or default is True):  # typer itself adds --no-… where that is the default
-            info.param_decls = (*_SHORT.get(name, ()), f"--{name.strip('_').replace('_', '-')}")
+    kind, *stated = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
+    is_argument = parameter.kind is parameter.POSITIONAL_ONLY
+    info = copy(stated[0]) if stated else typer.Argument() if is_argument else typer.Option()
+    named = isinstance(info.default, str)  # where typer keeps the name of Option("--json")
+    if not (named or is_argument or default is True):  # typer itself adds --no-… where that is the default
+        info.param_decls = (*_SHORT.get(name, ()), f"--{name.strip('_').replace('_', '-')}")
+    if name in texts:  # none under python -OO
         form, info.help = texts[name]
         info.metavar = form or None
-        annotation = Annotated[kind, info]
-    return parameter.replace(kind=parameter.KEYWORD_ONLY, annotation=annotation)
+    return parameter.replace(kind=parameter.KEYWORD_ONLY, annotation=Annotated[kind, info])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from importlib.metadata import entry_points
 
@@ -9,7 +10,7 @@ import pytest
 
 from robot_dyn.cli import GROUPS, program
 from robot_dyn.cli.application import app
-from tests.command import said
+from tests.command import said, spawn
 
 TOOLS = sorted(command.name for command in entry_points(group="robot_dyn.commands"))
 
@@ -53,6 +54,18 @@ def test_every_argument_and_option_is_described(name: str) -> None:
     command = program().commands[name]
     assert [option.name for option in command.params if not option.help] == []
     assert "Options:" not in command.help
+
+
+NAMES = """import json
+from robot_dyn.cli import program
+commands = program().commands.items()
+print(json.dumps({name: [[each.opts, each.secondary_opts] for each in command.params] for name, command in commands}))
+"""
+
+
+def test_options_have_their_names_without_docstrings() -> None:
+    """Python -OO drops them."""
+    assert json.loads(spawn(code=NAMES, PYTHONOPTIMIZE="2").stdout) == json.loads(spawn(code=NAMES).stdout)
 
 
 def test_a_command_keeps_its_own_help() -> None:
