@@ -17,6 +17,8 @@ from robot_dyn.foundations.validate import number, numbers
 from robot_dyn.model.robot import Robot
 from robot_dyn.scene.schema import NotNegative, Number, Part, PerJoint, Stated, Vector3, per_joint
 
+_SEVERAL = Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD
+_BY_KEYWORD = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
 _SPELLED = {" ": "_", "/": "_per_", "²": "2", "(": "", ")": ""}
 
 
@@ -28,25 +30,29 @@ class Declared(Part):
     factory: ClassVar[Callable[..., Any]]
     """The class or function that is called with the coefficients."""
     keys: ClassVar[Mapping[str, tuple[str, Coefficient | None]]] = {}
-    """By key: the argument, and what is declared of it."""
+    """By field: the argument, and what is declared of it."""
 
     def call(self, robot: Robot) -> Any:
         """Return what the factory returns for the values of the table."""
-        arguments, parameters = dict[str, Any](), signature(type(self).factory).parameters
-        for key, (name, known) in self.keys.items():
-            if key in self.model_fields_set or parameters[name].default is Parameter.empty:
-                arguments[name] = _argument(name, getattr(self, key), robot, known)
-        return type(self).factory(**arguments)
+        values = [(name, getattr(self, field), known) for field, (name, known) in self.keys.items()]
+        values += [(name, value, _UNDECLARED) for name, value in (self.model_extra or {}).items()]
+        stated = [(name, value, known) for name, value, known in values if value is not None or known is None]
+        return type(self).factory(**{name: _argument(name, value, robot, known) for name, value, known in stated})
 
 
-def _argument(key: str, value: Any, robot: Robot, known: Coefficient | None) -> Any:
+_UNDECLARED = Coefficient(shapes=((), ("k",), ("k", "m")))
+
+
+def _argument(name: str, value: Any, robot: Robot, known: Coefficient | None) -> Any:
     """Return a number, an array for a list, an array (n,) for a value by joint; texts and truth values as they are."""
-    of_joints = known is not None and known.of_joints and value is not None
-    if of_joints or isinstance(value, dict):
-        return per_joint(key, value, robot, elsewhere=0.0 if known is None else known.elsewhere)
+    if known is None:
+        return value
+    if known.of_joints or isinstance(value, dict):
+        return per_joint(name, value, robot, elsewhere=known.elsewhere)
     if isinstance(value, list):
-        return numbers(key, value, ("k",), ("k", "m"), error=SceneError)
-    return number(key, value, error=SceneError) if isinstance(value, float) else value
+        return numbers(name, value, ("k",), ("k", "m"), error=SceneError)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number(name, value, error=SceneError) if is_number else value
 
 
 Table = TypeVar("Table", bound=Declared)
@@ -97,26 +103,39 @@ def _type(known: Coefficient) -> Any:
 
 
 def callable_part(base: type[Table], kind: str, factory: Callable[..., Any]) -> type[Table]:
-    """The part of a scene whose keys are the arguments of a class or function; coefficients are spelled with units."""
-    classes = (factory,) if isinstance(factory, type) else ()
-    known = _keys_of(factory, *classes)
-    coefficients = {name for name, _ in known.values()}
-    others = {
-        name: (Any, ... if parameter.default is Parameter.empty else None)
-        for name, parameter in signature(factory).parameters.items()
-        if name not in coefficients and parameter.kind not in (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
-    }
-    if kept := [key for key in (*known, *others) if key.startswith("_") or key == "kind" or hasattr(base, key)]:
-        raise SceneError(f"effects: {kept[0]!r} of {kind!r} is a name that tables of scenes need; rename the argument")
-    return declared_part(base, kind, *classes, factory=factory, others=others)
+    """The part of a scene whose keys are the arguments of a class or function; coefficients are spelled with units.
+
+    Raises:
+        SceneError: If an argument that it needs cannot be a key.
+    """
+    parameters = signature(factory).parameters
+    keys = _keys_of(factory, *((factory,) if isinstance(factory, type) else ()), undeclared=_UNDECLARED)
+    keys.pop("kind", None)
+    needed = [
+        name for name, each in parameters.items() if each.default is Parameter.empty and each.kind not in _SEVERAL
+    ]
+    if lost := [name for name in needed if name not in dict(keys.values())]:
+        raise SceneError(f"effects: {lost[0]!r} of {kind!r} cannot be a key of a scene; rename it or give it a default")
+    fields: dict[str, Any] = {}
+    for k, (key, (name, known)) in enumerate(keys.items()):  # fields by number: pydantic needs many names for itself
+        default = None if name not in needed else URDF if known.stated else ...
+        fields[f"argument_{k}"] = (_type(known), Field(default, alias=key))
+    others = "allow" if any(each.kind is Parameter.VAR_KEYWORD for each in parameters.values()) else "forbid"
+    is_kind: Any = (Literal[kind], ...)  # pyright: ignore[reportInvalidTypeForm]
+    part = create_model(kind, __base__=base, __cls_kwargs__={"extra": others}, kind=is_kind, **fields)
+    part.factory, part.keys = staticmethod(factory), dict(zip(fields, keys.values(), strict=True))
+    return part
 
 
-def _keys_of(factory: Callable[..., Any], *classes: type, signal: str = SIGNAL) -> dict[str, tuple[str, Coefficient]]:
-    """The keys of the coefficients that classes declare and `factory` takes, with the argument of each."""
+def _keys_of(
+    factory: Callable[..., Any], *classes: type, signal: str = SIGNAL, undeclared: Coefficient | None = None
+) -> dict[str, tuple[str, Coefficient]]:
+    """The keys of the arguments of `factory` that classes declare, or of all, with what is declared of each."""
     stated = {name: known for kind in reversed(classes) for name, known in declared(kind).items()}
     known = {name: replace(known, unit=known.unit.replace(SIGNAL, signal)) for name, known in stated.items()}
-    names = [name for name in signature(factory).parameters if name in known]
-    return {_key(name, known[name].unit): (name, known[name]) for name in names}
+    names = [name for name, each in signature(factory).parameters.items() if each.kind in _BY_KEYWORD]
+    found = [(name, each) for name in names if (each := known.get(name, undeclared))]
+    return {_key(name, each.unit): (name, each) for name, each in found}
 
 
 def _key(name: str, unit: str) -> str:

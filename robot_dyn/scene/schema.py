@@ -25,14 +25,15 @@ class Part(BaseModel):
     @classmethod
     def valid_keys(cls) -> tuple[str, ...]:
         """Return the keys that the table may have."""
-        return tuple(cls.model_fields)
+        return tuple(field.alias or name for name, field in cls.model_fields.items())
 
     @model_validator(mode="before")
     @classmethod
     def _table_of_valid_keys(cls, value: Any) -> Any:
+        known = cls.valid_keys()
         for key in _table(value):
-            if key not in cls.model_fields:
-                raise wrong_key(key, f"is not a key here; {nearest(key, cls.valid_keys())}")
+            if key not in known and cls.model_config.get("extra") != "allow":
+                raise wrong_key(key, f"is not a key here; {nearest(key, known)}")
         return value
 
 

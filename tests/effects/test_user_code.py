@@ -13,6 +13,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn import export
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SceneError, TraceError
+from robot_dyn.scene.effects import DeclaredEffect
 from tests.long import long
 
 ARM = rd.load("planar_2r")
@@ -313,6 +314,8 @@ def test_a_scene_names_effects_that_its_reader_names(keys: str, c: Any, tmp_path
     [
         ("", r"effect 1 \(drag\).c: is missing; give it"),
         ("c = 1.0\nd = 2.0", r"effect 1 \(drag\).d: is not a key here; known: kind, c, on"),
+        ("c = 1.0\nargument_0 = 2.0", r"effect 1 \(drag\).argument_0: is not a key here"),
+        ("c = 1" + "0" * 400, "c must be .* too large for a float"),
         ("c = inf", "c must be"),
         ("c = {elbow = 1.0}", "elbow"),
     ],
@@ -324,8 +327,35 @@ def test_wrong_keys_of_an_effect_of_a_users_own_are_told(keys: str, said: str, t
         rd.read_scene(path, effects={"drag": Drag})
     with pytest.raises(SceneError, match="'spring' is a kind that scenes have"):
         rd.read_scene(path, effects={"spring": Drag})
-    with pytest.raises(SceneError, match="'copy' of 'own' is a name that tables of scenes need; rename"):
-        rd.read_scene(path, effects={"own": lambda copy: Drag(copy)})
+
+
+def test_arguments_of_an_effect_of_a_users_own_have_any_names(tmp_path) -> None:
+    """Those of pydantic, too: each reaches the factory as a float; a wrong value is told by its key."""
+    path, got = tmp_path / "scene.toml", list[Any]()
+    expected = {name: k + 2.0 for k, name in enumerate([*dir(DeclaredEffect), "self", "argument_0", "_c", "__c__"])}
+    passed = ", ".join(f"{name!r}: {name}" for name in expected)
+
+    def of_any(**given: Any) -> Drag:
+        got.append(given)
+        return Drag(0.1)
+
+    of_each = eval(f"lambda {', '.join(expected)}: of_any(**{{{passed}}})", {"of_any": of_any})
+    for factory in (of_each, of_any):
+        text = "".join(f"{name} = {value:.0f}\n" for name, value in expected.items())
+        path.write_text(f'{SCENE}[[effect]]\nkind = "own"\n{text}', encoding="utf-8")
+        rd.read_scene(path, effects={"own": factory})
+        path.write_text(path.read_text(encoding="utf-8").replace("\ncopy = ", "\ncopy = nan # "), encoding="utf-8")
+        with pytest.raises(SceneError, match=r"scene\.toml: line 6: .*: copy must be"):
+            rd.read_scene(path, effects={"own": factory})
+    assert got == [expected, expected] and {type(value) for given in got for value in given.values()} == {float}
+
+
+@pytest.mark.parametrize("factory", [lambda kind: Drag(kind), lambda c, /: Drag(c)], ids=["kind", "by position"])
+def test_an_argument_that_cannot_be_a_key_of_a_scene_needs_a_default(factory: Any, tmp_path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    with pytest.raises(SceneError, match=r"'(kind|c)' of 'own' cannot be a key"):
+        rd.read_scene(path, effects={"own": factory})
 
 
 @pytest.mark.parametrize(
