@@ -84,8 +84,9 @@ def vector(option: str, text: str | None, joint_names: tuple[str, ...]) -> np.nd
     words = (text or "").replace(",", " ").split()
     if any("=" in word for word in words):
         values = assignments(option, words)
-        for name in values.keys() - set(joint_names):
-            raise QueryError(f"{option}: no joint {name!r}; {nearest(name, joint_names)}")
+        for name in values:
+            if name not in joint_names:
+                raise QueryError(f"{option}: no joint {name!r}; {nearest(name, joint_names)}")
         return np.array([values.get(name, 0.0) for name in joint_names])
     if text is None:
         return np.zeros(len(joint_names))

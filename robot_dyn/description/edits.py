@@ -91,8 +91,9 @@ class Edits:
 
     def with_(self, joint_names: tuple[str, ...], **changes: Unpack[Changes]) -> Edits:
         """These edits and more, as `Robot.with_`; `joint_names` are the joints that can be named."""
-        for name in changes.keys() - Changes.__annotations__.keys():
-            raise EditError(f"no edit {name!r}; {nearest(name, Changes.__annotations__)}")
+        for name in changes:
+            if name not in Changes.__annotations__:
+                raise EditError(f"no edit {name!r}; {nearest(name, Changes.__annotations__)}")
         new = self
         if "gravity" in changes:
             gravity = changes["gravity"]

@@ -113,8 +113,9 @@ class Structure:
     def _fixed_below(self) -> dict[str, list[str]]:
         """The links fixed to each link by a joint below it."""
         below: dict[str, list[str]] = {name: [] for name in self.links}
-        for name in self.joints.keys() - set(self.moving):
-            below[self.joints[name].parent].append(self.joints[name].child)
+        for name, joint in self.joints.items():
+            if name not in self.moving:
+                below[joint.parent].append(joint.child)
         return below
 
     @cached_property

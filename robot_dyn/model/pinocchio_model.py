@@ -98,8 +98,9 @@ def state_edits(robot: Any, edits: Edits) -> None:
     links = {link.get("name"): link.find("inertial") for link in robot.iterfind("link")}
     known = [name for name, inertial in links.items() if inertial is not None]
     for what, names in (("masses", dict(edits.masses)), ("inertias", dict(edits.inertias))):
-        for name in names.keys() - set(known):
-            raise EditError(f"{what}: no link {name!r} with a mass in the file; {nearest(name, known)}")
+        for name in names:
+            if name not in known:
+                raise EditError(f"{what}: no link {name!r} with a mass in the file; {nearest(name, known)}")
     for name, mass in edits.masses:
         links[name].find("mass").set("value", repr(float(mass)))
     for name, inertia in edits.inertias:

@@ -122,8 +122,9 @@ class Control(Part):
     def _every_key_has_an_effect_and_gains_are_stated_once(self) -> Self:
         if len({self.kp is None, self.kd is None, self.frequency_rad_per_s is not None}) > 1:
             raise PydanticCustomError("wrong_key", "give frequency_rad_per_s, or both kp and kd")
-        for key in self.unused.keys() & self.model_fields_set:
-            raise wrong_key(key, f"has no effect {self.unused[key]}; remove it")
+        for key, reason in self.unused.items():
+            if key in self.model_fields_set:
+                raise wrong_key(key, f"has no effect {reason}; remove it")
         return self
 
     @property

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,8 @@ import robot_dyn as rd
 from robot_dyn import RobotDynError
 from robot_dyn.cli import terminal
 from robot_dyn.foundations import SceneError, Table, escaped
-from tests.command import refusal
+from robot_dyn.foundations.answer import html_of
+from tests.command import refusal, spawn
 from tests.scene.test_scene_loading import MJCF, URDF
 from tests.snapshots import FOLDER, assert_text
 
@@ -35,6 +37,7 @@ OF_MANY_KEYS_OR_OF_TOMLLIB = {  # texts that grow with the library, or are of Py
 }
 
 
+UNUSED = 'noise_seed = 1\nframe = "tool0"\ndamping_ratio = 0.7\neffort_limit_N_m = 3.0\nintegral_rate_per_s = 2.0\n'
 HEAD, ROWS = "t [s],q hinge [rad],q slide [m]\n", "0.5,0.4,0.1\n0.9,-0.2,0.3\n1.6,0.7,0.2\n"
 FILES = {
     "rig.urdf": URDF, "rig.xml": MJCF, "way.csv": HEAD + ROWS, "text.csv": f"{HEAD}0.5,0.4,x\n",
@@ -82,6 +85,14 @@ def test_a_long_name_of_a_robot_is_cut(tmp_path: Path) -> None:
     assert len(refusal(["info", "b/" * 20_000])) < 400
 
 
+def test_of_several_keys_without_effect_the_first_in_the_schema_is_told(tmp_path: Path) -> None:
+    """Not one that changes with the hashes of a process."""
+    (tmp_path / "scene.toml").write_text(f'{BASE}[control]\nkind = "pd"\nperiod_s = 0.01\nkp = 1\nkd = 1\n{UNUSED}')
+    read = f"import robot_dyn as rd; rd.read_scene({str(tmp_path / 'scene.toml')!r})"
+    for seed in ("1", "2", "3"):
+        assert b"control.integral_rate_per_s: " in spawn(code=read, PYTHONHASHSEED=seed).stderr
+
+
 # --- control characters
 
 
@@ -93,18 +104,22 @@ def test_messages_hold_no_control_characters() -> None:
     assert str(RobotDynError(fine)) == fine
 
 
-def test_tables_and_documents_hold_no_control_characters(capsys) -> None:
-    """What a terminal would execute is shown instead; a document is the same to a program."""
+@pytest.mark.parametrize("on_terminal", [False, True])
+def test_tables_and_documents_hold_no_control_characters(on_terminal: bool, capsys, monkeypatch) -> None:
+    """What a terminal would execute is shown instead, headings too; a document is the same to a program."""
     evil = "x\x1b[31m\x9b\x07\x7f\u202e\U000e0001"
-    table = Table(("name",), ((evil,),))
+    shown = r"x\x1b[31m\x9b\x07\x7f\u202e\U000e0001"
+    table = Table((evil,), ((evil,),))
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: on_terminal)
+    monkeypatch.setenv("TERM", "dumb")  # no bold headings
     terminal.say(table, evil, "τ", table)
     terminal.say_json({evil: [evil, "τ"]})
     terminal.to_stderr(evil + "\n")
     out, err = capsys.readouterr()
     assert all(letter.isprintable() or letter == "\n" for letter in out + err)
-    shown = r"x\x1b[31m\x9b\x07\x7f\u202e\U000e0001"
-    assert out.count(shown) == out.count(r"x\x1b") == 3 and err == shown + r"\n" + "\n" and out.count("τ") == 2
+    assert out.count(shown) == out.count(r"x\x1b") == 5 and err == shown + r"\n" + "\n" and out.count("τ") == 2
     assert json.loads(out[out.index("{") :]) == {evil: [evil, "τ"]}
+    assert "".join(html_of([table])).count(shown) == 2
 
 
 def test_a_name_of_a_file_is_told_escaped(tmp_path: Path) -> None:
