@@ -21,7 +21,6 @@ __all__: list[str]
 from robot_dyn.accuracy.advice import advice_about as advice_about
 from robot_dyn.accuracy.advice import at_rest as at_rest
 from robot_dyn.accuracy.certificate.digit_count import DigitCount as DigitCount
-from robot_dyn.accuracy.certificate.digit_count import Held as Held
 from robot_dyn.accuracy.certificate.digit_count import Implementation as Implementation
 from robot_dyn.accuracy.certificate.digit_count import evaluate as evaluate
 from robot_dyn.accuracy.certificate.digit_count import implementations as implementations

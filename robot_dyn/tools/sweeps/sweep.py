@@ -51,7 +51,7 @@ class Sweep(Answer, Value):
     scene: str
     runs: int
     vary: dict[str, Distribution]
-    figures: dict[str, Figure | UserFigure] = field(default_factory=dict)
+    figures: Mapping[str, Figure | UserFigure] = field(default_factory=dict)
     design: Any = "random"
     seed: int = 0
     samples: Samples | None = None
