@@ -248,13 +248,16 @@ class UserFigure(Value):
 
     @property
     def record(self) -> tuple[str, ...]:
+        """Return the names of what the function needs recorded."""
         names = getattr(self.function, "record", ("q", "v"))
         return tuple(choice(f"record of {self.path}", name, _RECORDS, error=SweepError) for name in names)
 
     def unit(self, setup: Setup | None = None) -> str:
+        """Return the unit that the function states; empty if it states none."""
         return str(getattr(self.function, "unit", "")) if self.stated is None else self.stated[1]
 
     def of(self, runs: Runs) -> np.ndarray:
+        """Return the numbers of finished runs, (B,); SweepError if the function returns no number."""
         values = list(map(self.function, runs))
         for value in values:
             if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
@@ -265,6 +268,7 @@ class UserFigure(Value):
         return self.path
 
     def to_dict(self) -> dict[str, Any]:
+        """Return the import path, the SHA-256 of its module, and the unit."""
         digest = digest_of(self.path) if self.stated is None else self.stated[0]
         return {"figure": self.path, "sha256": digest, "unit": self.unit()}
 
