@@ -50,7 +50,9 @@ def test_searched_states_are_no_better_than_random_ones_and_shrunk_ones_keep_nin
 
 def test_a_state_that_cannot_be_judged_while_shrinking_does_not_lose_the_worst_one() -> None:
     """A measure without a value where an entry is 0, the first that shrinking tries."""
-    errors = iter([np.linalg.LinAlgError("singular"), FloatingPointError("overflow"), *[rd.RobotDynError("none")] * 400])
+    errors = iter(
+        [np.linalg.LinAlgError("singular"), FloatingPointError("overflow"), *[rd.RobotDynError("none")] * 400]
+    )
 
     def measure(batch: dict[str, np.ndarray]) -> np.ndarray:
         if (batch["q"] == 0).any():
