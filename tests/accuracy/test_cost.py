@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 from dataclasses import replace
@@ -16,10 +17,11 @@ from robot_dyn import RobotDynError
 from robot_dyn.accuracy.costs import step_cost
 from robot_dyn.accuracy.costs.ab_comparison import ABComparison, Version, take_turns
 from robot_dyn.accuracy.costs.cost import cost_rows
+from robot_dyn.accuracy.costs.diagram import draw
 from robot_dyn.accuracy.costs.query_cost import QueryCost
 from robot_dyn.codegen import program_of
 from robot_dyn.codegen.parameters import parameters
-from robot_dyn.foundations import QueryError, json_text, plain
+from robot_dyn.foundations import QueryError, json_text
 from robot_dyn.report import Budget
 from robot_dyn.scene import starter
 from robot_dyn.simulation import StateEquation, machine_code
@@ -228,8 +230,38 @@ def test_json_and_rows_hold_the_alternatives() -> None:
     result = rd.accuracy.cost(setup(FRICTION, controller=CONTROLLERS["sampled"]), budget_s=0.5, repeats=2)
     read = json.loads(json_text(result))
     kept = result.alternatives
-    assert read["alternatives"] == [plain(pair) for pair in kept]
-    assert read["alternatives"][0]["first"]["instructions"] == kept[0].first.instructions
+    names = ("group", "what", "per", "instructions_ratio", "time_ratio", "time_ratio_spread", "time_between_s")
+    of_one = ("name", "instructions", "time_s", "repeats", "repeatable")
+    rows = list(result.rows)
+    assert len(read["alternatives"]) == len(rows) == len(kept) and any(pair.first.times for pair in kept)
+    for told, row, pair in zip(read["alternatives"], rows, kept, strict=True):
+        for name in names:
+            assert told[name] == row[name] == getattr(pair, name)
+        for of, version in (("first", pair.first), ("second", pair.second)):
+            for name in of_one:
+                known = getattr(version, name) if version.times or name != "time_s" else None
+                assert told[of][name] == row[f"{of}_{name}"] == known
     assert read["sentence"] == result.sentence and read["parts"] == result.parts
     assert kept[0].time_ratio is not None
-    assert [row["first_instructions"] for row in result.rows] == [each.first.instructions for each in kept]
+
+
+def test_a_time_that_was_not_measured_is_an_empty_cell(tmp_path) -> None:
+    result = rd.accuracy.cost(setup(FRICTION), **TINY)
+    with rd.accuracy.save_result(result, tmp_path / "cost.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert rows and all(row["first_time_s"] == row["second_time_s"] == "" for row in rows)
+
+
+def test_no_label_of_a_bar_is_over_the_names_of_the_rows() -> None:
+    """Labels are right of 0, and right of 1 where bars are of ratios, however far bars go to the left."""
+
+    def compared(group: str, what: str, first: int, second: int) -> ABComparison:
+        versions = (Version(str(n), n, times=(float(n),) * 3) for n in (first, second))
+        return ABComparison(group, what, "step", *versions)
+
+    pairs = (compared("parts", "wind", 40, 300), compared("parts", step_cost.EVERYTHING, 400, 300))
+    result = rd.accuracy.Cost("arm", (), (*pairs, compared("algorithms", "sum", 10, 90)), (), {}, 1.0, 1.0)
+    parts, ratios = draw(result).axes
+    for axes, least in ((parts, 0), (ratios, 1)):
+        assert min(bar.get_x() + min(bar.get_width(), 0) for bar in axes.patches) < least
+        assert axes.texts and all(text.get_position()[0] >= least for text in axes.texts)

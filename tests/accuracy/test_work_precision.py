@@ -134,6 +134,27 @@ def test_beyond_the_horizon_energy_and_the_way_back_judge() -> None:
     assert past_horizon(setup, 1.0, made, methods, Budget(1e-6)) == ()  # no run is short enough
 
 
+def test_machine_code_that_is_loaded_takes_no_time_of_a_run_beyond_the_horizon(monkeypatch) -> None:
+    """By a clock that stands still but for 1000 s of the first run of a method: a run may take 20 s."""
+    module, now, loaded = import_module(past_horizon.__module__), [0.0], set[str]()
+
+    def loading(run):
+        def first(setup: rd.Setup, **options):
+            now[0] += 1000.0 * (setup.integrator.name not in loaded)
+            loaded.add(setup.integrator.name)
+            return run(setup, **options)
+
+        return first
+
+    for name in ("warmed", "simulate"):
+        monkeypatch.setattr(module, name, loading(getattr(module, name)))
+    monkeypatch.setattr(module, "Budget", partial(Budget, clock=lambda: now[0]))
+    budget, point = Budget(1e3, clock=lambda: now[0]), Point(0.02, 1, 1, 1e-3, 0.0, True, times=(1e-6,))
+    ladder = ToleranceLadder("rk4", "interpreted", True, 4, "step", (point,), "", 0.0)
+    found = past_horizon(swing(), 0.1, [ladder], {"rk4": rd.integrate.method("rk4")}, budget)
+    assert [each.name for each in found] == ["rk4"] and budget.spent == 0
+
+
 def test_an_accuracy_of_the_setup_is_not_used() -> None:
     """It would choose the method, which differs from run to run here."""
     (only,) = rd.accuracy.work_precision(

@@ -202,6 +202,26 @@ def test_ten_seconds_of_ur5_stay_under_fifteen_megabytes() -> None:
     assert len(rd.replay(run).text.encode()) < 15e6
 
 
+def test_a_page_is_its_document(swing) -> None:
+    """Put together as the page's script does, to the last bit: of arrays the first bytes of all numbers come first."""
+    page = rd.replay(swing)
+    packed = re.search(r'id="data">"([^<]*)"<', page.text)
+    assert packed
+    content = gzip.decompress(base64.b64decode(packed[1]))
+    begin = 8 + int.from_bytes(content[:8], "little")
+
+    def numbers(found: dict[str, Any]) -> Any:
+        if "$array" not in found:
+            return found
+        kind = np.dtype(found["$array"].removesuffix("Array").lower())
+        stored = np.frombuffer(content, np.uint8, found["length"] * kind.itemsize, begin + found["offset"])
+        return stored.reshape(kind.itemsize, -1).T.copy().view(kind).ravel().tolist()
+
+    stated = json.dumps(json.loads(content[8:begin], object_hook=numbers))
+    is_same = stated == json.dumps({**page.document, "live": False}, default=lambda array: array.ravel().tolist())
+    assert is_same  # texts of megabytes, which are not to be told
+
+
 def test_outside_a_notebook_an_address_is_printed_and_nothing_stays_open(tmp_path) -> None:
     """A script ends by itself; the page at the address is there, whole, and IPython was not loaded."""
     program = (

@@ -153,6 +153,22 @@ def test_phase_is_velocity_over_position(cart) -> None:
         np.testing.assert_array_equal(lines(axes, "path")[0].get_xydata(), path)
 
 
+def test_a_long_phase_portrait_keeps_its_shape(run) -> None:
+    """25 turns of a circle, of 4000 samples each: no line between two that are drawn cuts a corner."""
+    phase = 2 * np.pi * 5 * np.linspace(0.0, 5.0, 100_001)[:, None] * np.ones(len(run.joint_names))
+    for axes in plot(stretched(run, 100_001, q=np.cos(phase), v=np.sin(phase)), "phase").axes:
+        path = lines(axes, "path")[0].get_xydata()
+        assert np.linalg.norm((path[1:] + path[:-1]) / 2, axis=1).min() > 1 - 1e-5  # half a step of 1/1000, squared
+
+
+def test_small_numbers_at_logarithmic_axes_are_powers_with_few_digits(run) -> None:
+    error = replace(run.error, error=np.logspace(-9, 0, len(run.error.t)))
+    (axes,) = plot(replace(run, error=error), "error_growth").axes
+    assert axes.get_ylim()[1] >= 1
+    label = axes.yaxis.get_major_formatter()
+    assert [label(x) for x in (1e-9, 1e-7, 1e-4, 1.0)] == ["1e−9", "1e−7", "0.0001", "1"]
+
+
 def test_error_growth_is_veiled_where_it_is_not_resolved(run) -> None:
     error = replace(run.error, until_s=0.1, note="not resolved")
     (axes,) = plot(replace(run, error=error), "error_growth").axes

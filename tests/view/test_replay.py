@@ -177,16 +177,6 @@ def test_a_ghost_is_a_second_arm_that_lets_light_through(browser, fall, tmp_path
         assert all("elbow_joint" in text and f"elbow_joint ({name})" in text for text in labels[:2])
 
 
-def test_ten_seconds_of_ur5_stay_under_fifteen_megabytes(tmp_path) -> None:
-    arm = rd.load("ur5")
-    plan = rd.control.via_points([0, 4, 7, 10], [UR5_Q, UR5_Q + 1, UR5_Q - 0.5, UR5_Q])
-    kp, kd = rd.control.gains_from(1.0, frequency=20.0)
-    drive = rd.control.ComputedTorque(arm, plan, kp, kd)
-    run = rd.simulate(arm, UR5_Q, duration_s=10.0, controller=drive, integrator="rk4", estimate_error=False)
-    assert len(run.t) == 10_001
-    assert rd.save_replay(run, tmp_path / "ten.html").stat().st_size < 15e6
-
-
 def test_names_of_a_file_are_text_and_no_code(browser) -> None:
     """Joint and robot names with HTML, slashes and quotes are shown, not run: a script would complain."""
     evil, text = "</script><img src=x onerror=alert(1)>", rd.load("planar_2r").description.text.decode()

@@ -80,6 +80,7 @@ class Cost(Result):
             row = {name: getattr(pair, name) for name in _OF_BOTH}
             for of, version in (("first", pair.first), ("second", pair.second)):
                 row |= {f"{of}_{name}": getattr(version, name) for name in _OF_ONE}
+                row |= {} if version.times else {f"{of}_time_s": None}
             yield row
 
     @reported

@@ -73,9 +73,10 @@ def _draw_parts(axes: Any, parts: list[tuple[str, int, str]], colours: Colours) 
     styled(axes, colours, "instructions", "A step of RK4, by part: with it less without it")
     names, counts, times = zip(*parts, strict=True)
     whole = sum(counts) or 1
-    bars = axes.barh(range(len(parts)), counts, 2 * _BAR, color=colours["lines"][0])
-    said = [f"{n} ({100 * n / whole:.1f} %){time}".replace("-", "−") for n, time in zip(counts, times, strict=True)]
-    axes.bar_label(bars, said, padding=3, fontsize=8, **ink(colours))
+    axes.barh(range(len(parts)), counts, 2 * _BAR, color=colours["lines"][0])
+    for place, (n, time) in enumerate(zip(counts, times, strict=True)):  # right of 0: the names are on the left
+        said = f" {n} ({100 * n / whole:.1f} %){time}".replace("-", "−")
+        axes.text(max(n, 0), place, said, va="center", fontsize=8, **ink(colours))
     _named(axes, names, colours)
     axes.set_xlim(min(0, *counts), 1.7 * max(counts) or 1)
 
@@ -92,8 +93,10 @@ def _draw_ratios(axes: Any, others: list[ABComparison], colours: Colours) -> Non
     for k, colour in enumerate(colours["lines"][:2]):
         hollow = [k and not (pair.first.repeatable and pair.second.repeatable) for pair in others]
         faces, places = ["none" if x else colour for x in hollow], np.arange(len(others)) + (k - 0.5) * _BAR
-        bars = axes.barh(places, ratios[:, k] - 1, _BAR, left=1, edgecolor=colour, color=faces)
-        axes.bar_label(bars, [f"{x:.2g}" for x in ratios[:, k]], padding=3, fontsize=8, **ink(colours))
+        axes.barh(places, ratios[:, k] - 1, _BAR, left=1, edgecolor=colour, color=faces)
+        for x, y in zip(ratios[:, k], places, strict=True):
+            if np.isfinite(x):
+                axes.text(max(x, 1), y, f" {x:.2g}", va="center", fontsize=8, **ink(colours))
     axes.axvline(1, color=colours["ink"], linewidth=0.9)
     _named(axes, [f"{pair.what}:\n{pair.first.name} / {pair.second.name}" for pair in others], colours)
     least, most = (np.nanmin(ratios, initial=1.0), np.nanmax(ratios, initial=2.0))

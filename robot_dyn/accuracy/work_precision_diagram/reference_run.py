@@ -274,9 +274,10 @@ def past_horizon(
         with suppress(OvertimeError, RobotDynError):
             setting = in_time[-1].setting
             finest = replace(setup, integrator=integrators[ladder.method], engine=ladder.engine)
-            found[ladder.method] = PastHorizon(
-                ladder.method, setting, *_there_and_back(at_setting(finest, setting), longest)
-            )
+            finest = at_setting(finest, setting)
+            with budget.apart():
+                warmed(finest)
+            found[ladder.method] = PastHorizon(ladder.method, setting, *_there_and_back(finest, longest))
     return tuple(found.values())
 
 

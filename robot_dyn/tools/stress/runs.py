@@ -112,9 +112,7 @@ def judged_runs(
             continue
         setup, what = scene
         run = work.do(f"run {k}, {what}", partial(judged, setup, what))
-        if run is not None and run.misleads:
-            run = work.do(f"shrinking of run {k}", partial(shrunk_run, run)) or run
-        yield run
+        yield shrunk_run(run, f"shrinking of run {k}", work) if run is not None and run.misleads else run
 
 
 def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
@@ -143,15 +141,14 @@ def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
     return JudgedRun(what, setup.duration_s, estimate, true, unsure, report or str(error), misleads, setup)
 
 
-def shrunk_run(run: JudgedRun, budget: Budget) -> JudgedRun:
-    """Return a run that misleads too, from the start of fewest digits that is found; the run itself if there is none.
+def shrunk_run(run: JudgedRun, name: str, work: Work) -> JudgedRun:
+    """Return a run that misleads too, from the start of fewest digits that is found before the time ends.
 
-    Raises:
-        OvertimeError: If the budget ends.
+    It is the run itself if there is none.
     """
     small = run
 
-    def fails(x: np.ndarray) -> bool:
+    def fails(budget: Budget, x: np.ndarray) -> bool:
         nonlocal small
         q0, v0 = np.split(x, 2)
         try:
@@ -161,5 +158,6 @@ def shrunk_run(run: JudgedRun, budget: Budget) -> JudgedRun:
         small = young if young.misleads else small
         return young.misleads
 
-    shrunk(np.concatenate([run.setup.q0, run.setup.v0]), fails, _MOST_TRIES)
+    start = np.concatenate([run.setup.q0, run.setup.v0])
+    work.do(name, lambda budget: shrunk(start, partial(fails, budget), _MOST_TRIES))
     return small

@@ -11,6 +11,7 @@ from robot_dyn import RobotDynError
 from robot_dyn.report import Budget, OvertimeError
 
 T = TypeVar("T")
+FAILURES = (RobotDynError, np.linalg.LinAlgError, FloatingPointError)
 _REASONS = {
     np.linalg.LinAlgError: "; M is near a singular one",
     FloatingPointError: "; its numbers are beyond those of a float64",
@@ -52,7 +53,7 @@ class Work:
                 return piece(self._budget.within(self._longest_s))
         except OvertimeError:
             self.skip(name, *needed_for)
-        except (RobotDynError, np.linalg.LinAlgError, FloatingPointError) as error:
+        except FAILURES as error:
             why = next((why for kind, why in _REASONS.items() if isinstance(error, kind)), "")
             self.left_out.append(f"{name}: {error}{why}")
             if needed_for:

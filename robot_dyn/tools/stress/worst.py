@@ -31,7 +31,7 @@ from robot_dyn.lagrange import unit_diagonal_conditions
 from robot_dyn.queries import FORWARD_DYNAMICS, INVERSE_DYNAMICS, M, N, Quantity
 from robot_dyn.report import Budget
 from robot_dyn.tools.stress.result import WorstCase
-from robot_dyn.tools.stress.work import Work
+from robot_dyn.tools.stress.work import FAILURES, Work
 
 FASTEST = "fastest motion"
 HELD = ("steps", "gain")  # limits that are looked for where the motion is fastest under a PD
@@ -104,7 +104,10 @@ def shrunk_state(
         return float(measure(dict(zip(names, x.reshape(len(names), 1, n), strict=True)))[0])
 
     def is_as_bad(x: np.ndarray) -> bool:
-        return bool(budget.left > 0 and (low <= x).all() and (x <= high).all() and at(x) >= least)
+        try:
+            return bool(budget.left > 0 and (low <= x).all() and (x <= high).all() and at(x) >= least)
+        except FAILURES:  # where an entry is 0, say
+            return False
 
     small = shrunk(np.concatenate([state[name] for name in names]), is_as_bad, tries)
     return dict(zip(names, small.reshape(len(names), n), strict=True)), at(small)

@@ -19,7 +19,7 @@ _WILD = 1e3  # times its usual size: what grew beyond it while a run diverged ne
 NEAR = 0.2  # of its effort limit: a torque that stays below is drawn without it
 _MOST_MARKS = 200  # in a cell
 _LARGEST = 8e307  # on an axis: Matplotlib takes the difference of its ends
-_PIXELS = 1000  # across a cell; of the samples that fall on one, the least and the largest are drawn
+_PIXELS = 1000  # across a cell
 THEMES: dict[str, dict[str, Any]] = {  # colours of Okabe and Ito, distinguishable for the colour-blind, by contrast
     "light": {"paper": "#ffffff", "ink": "#1a1a1a", "grid": "#dddddd", "veil": "#eeeeee"}
     | {"lines": ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9")},
@@ -169,13 +169,15 @@ class Cell(Axes):
         x, y = (np.where(np.abs(z) < _LARGEST, z, np.nan) for z in (curve.x, curve.y))
         y = np.where(y > 0, y, np.nan) if log else y
         if curve.dots or np.isfinite(y).sum() == 1:
-            shape = {"marker": "o", "markersize": 3, "linestyle": "", "rasterized": len(y) > 20_000}
+            shape = {"marker": "o", "markersize": 3, "linestyle": ""}
         else:
-            at = thinned(np.column_stack([x, y]), _PIXELS)
-            x, y, shape = x[at], y[at], {"linestyle": _DASHES[curve.style[1] % len(_DASHES)]}
+            at = _thinned(x, y)
+            x, y = x[at], y[at]
+            shape = {"linestyle": _DASHES[curve.style[1] % len(_DASHES)]}
         hue = style.colours["lines"][curve.style[0] % len(style.colours["lines"])]
         width = style.line if curve.is_scaled else style.line / 2
-        axes.plot(x, y, label=drawable(shortened(curve.label, 30)), color=hue, linewidth=width, **shape)
+        shape |= {"color": hue, "linewidth": width, "rasterized": len(y) > 20_000}
+        axes.plot(x, y, label=drawable(shortened(curve.label, 30)), **shape)
 
 
 def framed(axes: Any, theme: Mapping[str, Any], size: float) -> None:
@@ -224,9 +226,26 @@ def scale(
 
 def _tick(x: float, is_small: bool) -> str:
     """A number at an axis: 5e−4 where numbers are small, otherwise up to five digits."""
-    scientific = x and (is_small or abs(x) >= 1e5)
+    scientific = x and (is_small or not 1e-4 <= abs(x) < 1e5)
     text = np.format_float_scientific(x, 4, trim="-", exp_digits=1) if scientific else f"{x:.5g}"
     return text.replace("e+", "e").replace("-", "−")
+
+
+def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return which samples of a long curve to draw: the least and the largest of each pixel of a rising x.
+
+    Where x turns, as in a phase portrait, they are those that reach another pixel.
+    """
+    if len(y) <= 4 * _PIXELS or np.all(x[1:] >= x[:-1]):
+        return thinned(y[:, None], _PIXELS)
+    moved = np.zeros(len(y), dtype=bool)
+    for z in (x, y):
+        size = np.abs(z[np.isfinite(z) & (z != 0)])
+        if len(size):  # of a run that diverged, what came before is as large in the picture
+            pixel = min(size.max(), _WILD * np.quantile(size, 0.25, method="lower")) / _PIXELS
+            moved |= np.diff(np.round(z / pixel), prepend=np.nan) != 0
+    moved[[0, -1]] = True
+    return np.flatnonzero(moved)
 
 
 def shortened(name: str, most: int) -> str:

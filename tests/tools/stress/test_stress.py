@@ -48,6 +48,24 @@ def test_searched_states_are_no_better_than_random_ones_and_shrunk_ones_keep_nin
         assert each.minimal >= 0.9 * each.searched or each.searched < 0
 
 
+def test_a_state_that_cannot_be_judged_while_shrinking_does_not_lose_the_worst_one() -> None:
+    """A measure without a value where an entry is 0, the first that shrinking tries."""
+    errors = iter(
+        [np.linalg.LinAlgError("singular"), FloatingPointError("overflow"), *[rd.RobotDynError("none")] * 400]
+    )
+
+    def measure(batch: dict[str, np.ndarray]) -> np.ndarray:
+        if (batch["q"] == 0).any():
+            raise next(errors)
+        return np.abs(batch["q"]).sum(axis=1)
+
+    rng, work = np.random.default_rng(4), Work()
+    states = {"q": rng.uniform(-1, 1, (100, 3))}
+    found = work.do("worst x", partial(worst, WorstCase("x"), states, rng, ("q",), measure))
+    assert work.left_out == [] and found is not None
+    assert 0 not in found.state["q"] and found.minimal >= 0.9 * found.searched > 0
+
+
 def test_condition_of_a_double_pendulum_is_worst_where_it_is_straight() -> None:
     """M₁₁ is largest at q₂ = 0, and κ of M scaled to a unit diagonal with the correlation M₁₂/√(M₁₁ M₂₂)."""
     robot, rng = rd.load("planar_2r"), np.random.default_rng(2)
@@ -116,7 +134,7 @@ def test_an_estimate_that_is_too_small_misleads_and_shrinks_to_a_start_of_few_di
     found = runs.judged(setup, "swing", Budget())
     assert found.misleads and found.estimated < 0.3 * found.true
     assert runs.judged(replace(setup, integrator="order_8"), "swing", Budget()).misleads is False  # rounding
-    small = runs.shrunk_run(found, Budget())
+    small = runs.shrunk_run(found, "shrinking", Work())
     start = [*small.setup.q0.tolist(), *small.setup.v0.tolist()]
     assert small.misleads and sum(map(len, map(repr, start))) < len("0.7312-0.43210.51110.7222")
 
@@ -270,19 +288,20 @@ def test_a_run_ends_at_its_deadline_and_so_do_the_companions_of_its_error_estima
         assert (run is not None) == done and work.out_of_time == ([] if done else ["run"])
 
 
-def test_shrinking_that_has_no_time_keeps_the_failure(monkeypatch) -> None:
-    """It is told as it was found."""
+@pytest.mark.parametrize("judgements", [1, 3])
+def test_shrinking_that_has_no_time_keeps_the_smallest_failure_so_far(monkeypatch, judgements: int) -> None:
+    """It is the run as it was found if no other was judged."""
     robot, rng, told = rd.load("pendulum"), np.random.default_rng(1), list[JudgedRun]()
 
     def judged(setup: rd.Setup, what: str, budget: Budget) -> JudgedRun:
-        while told:
+        while len(told) == judgements:
             budget.check()
         told.append(JudgedRun(what, 0.1, 1e-9, 1.0, 0.0, "", True, setup))
-        return told[0]
+        return told[-1]
 
     monkeypatch.setattr(runs, "judged", judged)
     work = Work(Budget(10, clock=ticking()))
-    assert list(runs.judged_runs(robot, random_states(robot, 100, rng), 1, rng, work)) == told
+    assert list(runs.judged_runs(robot, random_states(robot, 100, rng), 1, rng, work)) == told[-1:]
     assert work.out_of_time == ["shrinking of run 1"]
 
 

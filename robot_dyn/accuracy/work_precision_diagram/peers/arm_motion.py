@@ -153,15 +153,17 @@ class ArmMotion:
 
 
 def desired_motion(of: PiecewisePolynomial) -> Callable[[float], np.ndarray]:
-    """q_d and v_d at a time, (2, n), in a fraction of the time of `of.at`, which checks t."""
-    from scipy.interpolate import PPoly
-
-    q = PPoly(np.moveaxis(of.coefficients, 1, 0)[::-1], of.breaks)
-    v = q.derivative()
+    """q_d and v_d at a time, (2, n), by powers of s = t − tᵢ: in less than half the time of `of.at`, which checks t."""
+    powers = np.arange(of.coefficients.shape[1])
+    lower = np.maximum(powers - 1, 0)
+    ends = of.breaks[1:-1]
 
     def at(t: float) -> np.ndarray:
         inside = min(max(t, of.start), of.end)
-        return np.array([q(inside), v(inside) * (inside == t)])
+        piece = int(np.searchsorted(ends, inside, side="right")) if len(ends) else 0
+        s = inside - of.breaks[piece]
+        rate = powers * s**lower if of.start <= t <= of.end else 0.0 * powers
+        return np.array([s**powers, rate]) @ of.coefficients[piece]
 
     return at
 
