@@ -238,8 +238,12 @@ def read(path: str | Path, most: int, error: type[RobotDynError], remedy: str) -
     return data
 
 
-def csv_rows(path: str | Path, most: int, error: type[RobotDynError], remedy: str) -> Iterator[tuple[str, list[str]]]:
+def csv_rows(
+    path: str | Path, most: int, error: type[RobotDynError], remedy: str, *, skip_blank: bool = False
+) -> Iterator[tuple[str, list[str]]]:
     """Yield the lines of a CSV file, each with its place in words, the first of which names the columns.
+
+    Empty lines are skipped; if `skip_blank`, also lines of spaces and commas alone.
 
     Raises:
         RobotDynError: Of type `error`, if it cannot be read, or a line has not one entry for each column.
@@ -250,6 +254,8 @@ def csv_rows(path: str | Path, most: int, error: type[RobotDynError], remedy: st
         heads = next(lines, [])
         yield str(path), heads
         for row in filter(None, lines):
+            if skip_blank and not any(map(str.strip, row)):
+                continue
             if len(row) != len(heads):
                 counts = f"{len(row)} entries for {len(heads)} columns"
                 raise error(f"{path}: line {lines.line_num} has {counts}; correct it")

@@ -66,9 +66,9 @@ def read_motors(path: str | Path) -> Motors:
     Raises:
         PlanError: If it cannot be read, a column or unit is unknown, or an entry is not a positive number.
     """
-    lines = csv_rows(path, _MOST_BYTES, PlanError, "give a CSV file with columns joint, peak [N m] …")
+    lines = csv_rows(path, _MOST_BYTES, PlanError, "give a CSV file with columns joint, peak [N m] …", skip_blank=True)
     heads = _heads(path, next(lines)[1])
-    rows = [_row(where, heads, line) for where, line in lines if any(map(str.strip, line))]
+    rows = [_row(where, heads, line) for where, line in lines]
     if not rows:
         raise PlanError(f"{path}: names no motor; write a line for each joint")
     names = [row["joint"] for row in rows]

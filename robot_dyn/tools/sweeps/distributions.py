@@ -168,7 +168,12 @@ def distribution(value: Any) -> Distribution:
 
 
 def from_dict(stored: Mapping[str, Any]) -> Distribution:
-    """The distribution of a dictionary that `to_dict` made; SweepError or KeyError if it has another form."""
+    """The distribution of a dictionary that `to_dict` made.
+
+    Raises:
+        SweepError: If it names no distribution, or lacks a parameter or has another one.
+        KeyError, TypeError or ValueError: If it is no dictionary, or has no name.
+    """
     given = dict(stored)
     name = given.pop("distribution")
     if str(name).startswith(_SCIPY):

@@ -14,7 +14,7 @@ from bisect import bisect
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import reduce
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -33,6 +33,7 @@ _REMEDIES: dict[type[ast.AST], str] = {
     ast.Compare: "0.1 < x < 0.2 is x > 0.1 & x < 0.2",
     ast.Call: "functions are not known: a figure may compute what is to be compared",
 }
+_COMPARES = "compare the number with a column, by <, <=, >, >=, == or !="
 _REMEDY = "a name of several words stands in quotes, and units are left out"
 _MOST = 1000  # characters
 _DEEPEST = 50
@@ -74,10 +75,17 @@ class Expression:
             words.append(_WORDS.get(value, value))
             self._places.append(place)
             self._columns.append(self._columns[-1] + len(words[-1]) + 1)
+        if not words or words[-1][0] not in "_)":  # it ends with an operator
+            raise self._wrong(self._columns[-1], "a name or a number is missing")
+        if depth > 0:
+            raise self._wrong(self._columns[-1], "a ) is missing")
         try:
             self._tree = ast.parse(" ".join(words), mode="eval").body
-        except (SyntaxError, RecursionError, MemoryError) as error:
-            raise self._wrong((getattr(error, "offset", None) or 1) - 1) from None
+            self._check(self._tree)
+        except SyntaxError as error:
+            raise self._wrong((error.offset or 1) - 1) from None
+        except (RecursionError, MemoryError):
+            raise SweepError(f"{shown(text)}: is nested too deeply") from None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -94,30 +102,44 @@ class Expression:
         except RecursionError:
             raise SweepError(f"{shown(self.text)}: is nested too deeply") from None
 
-    def _truth(self, tree: ast.AST, columns: Mapping[str, np.ndarray]) -> Truth:
+    def _check(self, tree: ast.AST) -> None:
+        """Raise SweepError unless a tree is an event."""
+        match tree:
+            case ast.BoolOp(values=values):
+                for value in values:
+                    self._check(value)
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                self._check(operand)
+            case ast.Compare(left=ast.Name(id=a), ops=[_], comparators=[ast.Name(id=b)]):
+                if not isinstance(self._operands[a], str) and not isinstance(self._operands[b], str):
+                    raise SweepError(f"{self.text}: compares two numbers; one of them must be the name of a column")
+            case ast.Name(id=name):
+                if not isinstance(self._operands[name], str):
+                    raise self._wrong(tree.col_offset, _COMPARES)
+            case _:
+                wrong = next((part for part in ast.walk(tree) if isinstance(part, ast.Call)), tree)
+                raise self._wrong(getattr(wrong, "col_offset", 0), _REMEDIES.get(type(wrong), _REMEDY))
+
+    def _truth(self, tree: Any, columns: Mapping[str, np.ndarray]) -> Truth:
         match tree:
             case ast.BoolOp(op=operator, values=values):
                 parts = [self._truth(value, columns) for value in values]
                 join = np.logical_or if isinstance(operator, ast.Or) else np.logical_and
                 return Truth(reduce(join, [x.certain for x in parts]), reduce(join, [x.possible for x in parts]))
-            case ast.UnaryOp(op=ast.Not(), operand=operand):
+            case ast.UnaryOp(operand=operand):
                 of = self._truth(operand, columns)
                 return Truth(~of.possible, ~of.certain)
             case ast.Compare(left=ast.Name(id=a), ops=[operator], comparators=[ast.Name(id=b)]):
                 return self._compared(operator, self._operands[a], self._operands[b], columns)
-            case ast.Name(id=name) if isinstance(column := self._operands[name], str):
-                x = columns[column]
-                if x.dtype != bool:
-                    raise SweepError(f"{column!r} is a number: compare it, as {column} > 0.1")
-                return Truth(x, x)
-        raise self._wrong(getattr(tree, "col_offset", 0), _REMEDIES.get(type(tree), _REMEDY))
+        column = str(self._operands[tree.id])
+        if (x := columns[column]).dtype != bool:
+            raise SweepError(f"{column!r} is a number: compare it, as {column} > 0.1")
+        return Truth(x, x)
 
     def _compared(
         self, operator: ast.cmpop, a: str | float, b: str | float, columns: Mapping[str, np.ndarray]
     ) -> Truth:
         left, right = (columns[x] if isinstance(x, str) else np.float64(x) for x in (a, b))
-        if not isinstance(a, str) and not isinstance(b, str):
-            raise SweepError(f"{self.text}: compares two numbers; one of them must be the name of a column")
         if bool in (left.dtype, right.dtype):
             raise SweepError("an outcome is true or false: it is not compared with a number")
         with np.errstate(invalid="ignore"):

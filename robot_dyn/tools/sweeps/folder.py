@@ -25,9 +25,10 @@ from typing import Any, final
 import numpy as np
 
 from robot_dyn.foundations import SceneError, SweepError, needs, read, reading, save, shown, why
+from robot_dyn.foundations.files import sync_folder
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
 from robot_dyn.tools.sweeps.rows import OUTCOMES, TEXTS, Rows, digest_of, schema, type_of
-from robot_dyn.tools.sweeps.sample_store import SampleStore
+from robot_dyn.tools.sweeps.sample_store import SampleStore, make_folder
 from robot_dyn.tools.sweeps.specification import FILE, Specification, processor, specification, stated_in, versions
 from robot_dyn.tools.sweeps.sweep import Sweep
 
@@ -119,16 +120,22 @@ class Folder:
         pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="sweeps")
         start, stop = self.of(chunk)
         footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": digest_of([rows])}
-        footer["samples"] = {} if self.samples is None else self.samples.write(chunk, samples)
-        stated = schema(self.names).with_metadata({_FOOTER: json.dumps(footer | self.about)})
-        table = pa.table(rows | {"run": np.arange(start, stop)}, stated)
-        save(
-            self.file(chunk),
-            lambda stream: parquet.write_table(
-                table, stream, compression="zstd", use_dictionary=list(TEXTS), write_page_checksum=True
-            ),
-            SweepError,
-        )
+        try:
+            footer["samples"] = {} if self.samples is None else self.samples.write(chunk, samples)
+            stated = schema(self.names).with_metadata({_FOOTER: json.dumps(footer | self.about)})
+            table = pa.table(rows | {"run": np.arange(start, stop)}, stated)
+            save(
+                self.file(chunk),
+                lambda stream: parquet.write_table(
+                    table, stream, compression="zstd", use_dictionary=list(TEXTS), write_page_checksum=True
+                ),
+                SweepError,
+            )
+        except SweepError as error:
+            raise SweepError(
+                f"chunk {chunk} (runs {start} to {stop - 1}): {error}; the chunks that are there are kept: run the"
+                " sweep again"
+            ) from None
 
     def read(self, chunk: int) -> Rows:
         """The rows of a chunk.
@@ -167,18 +174,17 @@ class Folder:
 
     def _read(self, chunk: int, names: list[str]) -> tuple[Rows, dict[str, Any]]:
         """Return columns of a chunk, and its footer."""
-        path = self.file(chunk)
+        path, parquet = self.file(chunk), needs("pyarrow.parquet", extra="sweeps")
         with reading(path, SweepError, _REMEDY) as stream:
             try:
-                return self._parsed(stream, chunk, names)
+                return self._parsed(parquet.ParquetFile(stream, page_checksum_verification=True), chunk, names)
             except _DamagedError as error:
                 raise SweepError(f"{path}: {error}; {_REMEDY}") from None
             except Exception as error:  # pyarrow promises no kinds
                 raise SweepError(f"{path}: is not a complete chunk ({type(error).__name__}); {_REMEDY}") from None
 
-    def _parsed(self, stream: Any, chunk: int, names: list[str]) -> tuple[Rows, dict[str, Any]]:
+    def _parsed(self, file: Any, chunk: int, names: list[str]) -> tuple[Rows, dict[str, Any]]:
         start, stop = self.of(chunk)
-        file = needs("pyarrow.parquet", extra="sweeps").ParquetFile(stream, page_checksum_verification=True)
         footer = json.loads(file.schema_arrow.metadata[_FOOTER])
         if footer["sweep"] != self.digest:
             raise _DamagedError("is of another sweep")
@@ -241,18 +247,11 @@ def begin(path: Path, stated: Specification, rows: np.ndarray) -> None:
     try:
         with suppress(FileExistsError):
             os.link(own, path / FILE)  # which refuses one that exists, as os.replace does not
+        sync_folder(path)
     except OSError as error:
         raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
     finally:
         own.unlink(missing_ok=True)
-
-
-def make_folder(path: Path) -> None:
-    """Make a folder, and those above it; SweepError if it cannot be made."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SweepError(f"{path}: the folder cannot be made ({why(error)}); give another path") from None
 
 
 def write_design(path: Path, rows: np.ndarray, digest: str) -> None:

@@ -41,15 +41,15 @@ NOTHING = Named()
 
 def named(scene: Any, figures: Any) -> Named:
     """Return the scene and figures that a reader of a folder names; errors as in `source_of` and `path_of`."""
-    functions = by_name("figures", {} if figures is None else figures)
+    functions = by_name("figures", {} if figures is None else figures, "settling")
     paths = tuple((name, path_of(function)) for name, function in functions.items())
     return Named(None if scene is None else source_of(scene), paths)
 
 
-def by_name(what: str, given: Any) -> dict[str, Any]:
+def by_name(what: str, given: Any, example: str) -> dict[str, Any]:
     """Distributions, figures or functions by name; SweepError if they are given otherwise."""
     if not isinstance(given, Mapping) or not all(isinstance(name, str) and name for name in given):
-        raise SweepError(f"{what}: give them by name, as {{'kp': …}}, got {shown(given)}")
+        raise SweepError(f"{what}: give them by name, as {{{example!r}: …}}, got {shown(given)}")
     return dict(given)
 
 

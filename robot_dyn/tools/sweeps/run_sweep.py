@@ -171,7 +171,7 @@ def _check_room(sweep: Sweep, path: Path) -> None:
 def pilot(sweep: Sweep, chunk: int | None = None) -> int:
     """The number of runs of a chunk, from the time of the pilot's runs unless it is given.
 
-    It is in whole tiles, and its samples take at most 64 MiB.
+    It is in whole tiles, and its samples take at most 64 MiB unless those of one tile take more.
 
     Raises:
         SweepError: If none of them finishes and some raise, themselves or figures of them; says why.
@@ -192,5 +192,5 @@ def pilot(sweep: Sweep, chunk: int | None = None) -> int:
     most = min(_MOST, max(LANES, -(-sweep.runs // _LEAST_CHUNKS)))
     if sweep.samples is not None:
         size = 8 * len(work.times()) * sweep.setup.plant.dynamics.n * len(sweep.samples.names)
-        most = min(most, _SAMPLE_BYTES // size)
+        most = min(most, _SAMPLE_BYTES // size // LANES * LANES)
     return LANES * max(1, round(min(runs, most) / LANES))

@@ -177,6 +177,14 @@ class SampleStore:
         )  # fmt: skip
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder, and those above it; SweepError if it cannot be made."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SweepError(f"{path}: the folder cannot be made ({why(error)}); give another path") from None
+
+
 def _write(path: Path, data: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     save(path, lambda stream: stream.write(data), SweepError)

@@ -61,12 +61,12 @@ class Sweep(Answer, Value):
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         set_(self, "scene", source_of(self.scene))
-        set_(self, "vary", {name: _varied(name, of) for name, of in by_name("vary", self.vary).items()})
+        set_(self, "vary", {name: _varied(name, of) for name, of in by_name("vary", self.vary, "kp").items()})
         if not self.vary:
             raise SweepError(
                 "vary: nothing varies; give distributions by name, such as {'kp': sw.uniform(low=1, high=2)}"
             )
-        figures = by_name("figures", self.figures)
+        figures = by_name("figures", self.figures, "settling")
         if taken := sorted(figures.keys() & {*RESERVED, *self.columns}):
             raise SweepError(f"figures: {taken[0]!r} is the name of another column of a sweep; take another one")
         set_(self, "figures", {name: figure(name, given) for name, given in figures.items()})
@@ -217,8 +217,8 @@ def from_scene(path: str | Path, **changes: Any) -> Sweep:
                 f"figures: {name}: {shorten(text)} runs code, and a scene is data; give it in Python or --figure"
             )
     stated = table | changes
-    for name in ("vary", "figures"):
-        stated[name] = {**table.get(name, {}), **by_name(name, changes.get(name, {}))}
+    for name, example in (("vary", "kp"), ("figures", "settling")):
+        stated[name] = {**table.get(name, {}), **by_name(name, changes.get(name, {}), example)}
     if "runs" not in stated:
         raise SweepError(f"{path}: how many runs? give runs=, or a table [sweep] with them")
     return Sweep(str(path), **stated)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from inspect import signature
 from typing import Any
 
-from robot_dyn.foundations import SweepError, nearest, shorten
+from robot_dyn.foundations import SweepError, nearest, shorten, shown
 
 _MOST = 10_000  # characters
 _EXAMPLES = {
@@ -56,5 +56,7 @@ def call_of(
     try:
         bound = signature(function).bind(*arguments, **by_name)
     except TypeError as error:
-        raise SweepError(f"{what}: {error}; it is {name}{signature(function)}".replace(": Any", "")) from None
+        given = ", ".join([*map(shown, arguments), *(f"{key}={shown(x)}" for key, x in by_name.items())])
+        takes = f"{name}{signature(function)}".replace(": Any", "")
+        raise SweepError(f"{shorten(f'{name}({given})')}: {error}; it is {takes}") from None
     return function(*bound.args, **bound.kwargs)

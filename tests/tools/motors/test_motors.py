@@ -33,6 +33,12 @@ def test_values_at_the_motor_and_at_the_joint_agree(tmp_path: Path) -> None:
     assert motors.armature == pytest.approx({"a": 1.5, "b": 1.5})
 
 
+@pytest.mark.parametrize("blank", ["", "   ", ",", ",,,", " , "])
+def test_lines_without_text_are_skipped_whatever_their_commas(tmp_path: Path, blank: str) -> None:
+    motors = rd.tools.motors.read_motors(_file(tmp_path, f"joint,peak [N m],at\na,1,\n{blank}\nb,2,\n{blank}\n"))
+    assert motors.peak == {"a": 1.0, "b": 2.0}
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -104,6 +104,7 @@ WRONG: dict[str, Callable[[], Any]] = {
     "lengths differ in scipy.stats.gamma": lambda: ds.distribution(stats.gamma([1.0, 2.0], scale=Q)),
     "no distribution 'unifrm'; nearest: uniform": lambda: ds.from_dict({"distribution": "unifrm"}),
     "missing a required .*argument: .high": lambda: ds.from_dict({"distribution": "uniform", "low": 1}),
+    r"^uniform\(lo=1, high=2\): missing a required": lambda: ds.distribution("uniform(lo=1, high=2)"),
     "has no distribution 'os' of one": lambda: ds.from_dict({"distribution": "scipy.stats.os"}),
     "does not take scipy.stats.gamma.foo=1": lambda: ds.from_dict({"distribution": "scipy.stats.gamma", "foo": 1}),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 
 import numpy as np
@@ -59,6 +60,23 @@ def test_kleene_logic(text: str, expected: str) -> None:
 def test_anything_else_is_refused(text: str) -> None:
     with pytest.raises(SweepError):
         Expression(text).of(COLUMNS)
+
+
+CALL, NUMBER = "functions are not known", "compare the number"
+
+
+@pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        ("⟨here⟩f(x) > 1", CALL), ("⟨here⟩f(x)", CALL), ("⟨here⟩5", NUMBER), ("diverged & ⟨here⟩3", NUMBER),
+        ("⟨here⟩x<1<2", "x > 0.1 & x < 0.2"), ("⟨here⟩()", ""), ("diverged | ⟨here⟩", "missing"),
+        ("x > 1 | (⟨here⟩", "missing"), ("⟨here⟩", "missing"), ("(diverged⟨here⟩", "missing"), ("1<2", "two numbers"),
+    ],
+)  # fmt: skip
+def test_what_is_no_event_is_refused_before_columns_are_known(text: str, remedy: str) -> None:
+    """Where it is wrong, with the remedy."""
+    with pytest.raises(SweepError, match=f"^{re.escape(text)}: .*{re.escape(remedy)}"):
+        Expression(text.replace("⟨here⟩", ""))
 
 
 def test_the_message_marks_the_place() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -11,13 +12,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from robot_dyn.foundations import SweepError
+from robot_dyn.foundations import MissingExtraError, SweepError
+from robot_dyn.simulation.rollouts.lock_step import LANES
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps import Work, begun, run_sweep
 from robot_dyn.tools.sweeps.folder import MOST_FILES, Folder, begin
 from robot_dyn.tools.sweeps.rows import NUMBERS, TEXTS
 from robot_dyn.tools.sweeps.specification import specification
-from tests.tools.sweeps.swept import digest, names_in, swept
+from tests.tools.sweeps.swept import VARY, digest, names_in, swept
 
 
 @pytest.fixture
@@ -36,12 +38,59 @@ def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypa
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    with monkeypatch.context() as patch, pytest.raises(SweepError, match=r"000003\.parquet.*No space left on device"):
+    said = r"^chunk 3 \(runs 60 to 79\): .*000003\.parquet.*\(No space left on device\).*make room.* are kept: run"
+    with monkeypatch.context() as patch, pytest.raises(SweepError, match=said):
         patch.setattr(os, "fsync", full)
         folder.write(3, work.rows(60, 80))
     assert folder.missing().tolist() == [1, 2, 3, 4]
     done = sw.run(sweep, tmp_path / "out")
     assert done.verify() == digest(sweep)
+
+
+def test_samples_whose_folder_cannot_be_made_are_refused_with_the_chunk(tmp_path: Path) -> None:
+    pytest.importorskip("zarr")
+    sweep = swept(tmp_path, 40, samples="q")
+    folder = begun(sweep, tmp_path / "out", chunk=20)
+    assert folder.samples is not None
+    folder.prepare()
+    (folder.samples.path / "q" / "c").write_text("")
+    with pytest.raises(SweepError, match=r"^chunk 1 \(runs 20 to 39\): "):
+        folder.write(1, *Work(sweep).made(20, 40, folder.samples.times()))
+    assert folder.missing().tolist() == [0, 1]
+
+
+def test_the_name_of_a_specification_is_on_the_disk_before_the_sweep_begins(tmp_path: Path, monkeypatch) -> None:
+    """The folder is synchronized after the name is there, so that a power loss leaves no rows without it."""
+    sweep, out, synced = swept(tmp_path, 50), tmp_path / "out", []
+    fsync = os.fsync
+
+    def noted(handle: int) -> None:
+        if out.is_dir() and os.path.samestat(os.fstat(handle), out.stat()):
+            synced.append((out / "sweep.json").exists())
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    begin(out, specification(sweep, 20), sweep.points.rows)
+    assert synced[-1]
+
+
+def test_a_chunk_is_not_called_damaged_where_pyarrow_is_missing(tmp_path: Path, monkeypatch) -> None:
+    done = sw.run(swept(tmp_path, 20), tmp_path / "out", chunk=20)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    for read in (lambda: done.folder.footer(0), lambda: done.folder.columns(["error"]), lambda: done.folder.read(0)):
+        with pytest.raises(MissingExtraError):
+            read()
+
+
+@pytest.mark.parametrize("tiles", [1.0, 1.7, 2.9])
+def test_samples_of_a_chunk_take_no_more_than_they_may(tmp_path: Path, monkeypatch, tiles: float) -> None:
+    """The pilot rounds to whole tiles; a chunk of more time and runs is bounded by its samples alone."""
+    sweep = swept(tmp_path, 2000, samples="q", vary={"q0": VARY["q0"]})
+    monkeypatch.setattr(run_sweep, "_CHUNK_S", 1e6)
+    size = 8 * 51 * 2  # times and joints
+    monkeypatch.setattr(run_sweep, "_SAMPLE_BYTES", int(tiles * LANES * size))
+    monkeypatch.setattr(run_sweep, "_LEAST_CHUNKS", 1)
+    assert run_sweep.pilot(sweep) == int(tiles) * LANES
 
 
 def test_what_killed_writers_left_is_removed_and_what_others_write_is_not(tmp_path: Path) -> None:

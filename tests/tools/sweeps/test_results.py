@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
 import robot_dyn as rd
 from robot_dyn.foundations import SweepError
@@ -100,6 +101,19 @@ def test_quantiles_count_failures_as_infinite(done: sw.SweepResult) -> None:
     assert median.estimate == counted[199] and median.failed == np.isnan(x).sum() > 0
     (last,) = done.quantiles("error", [0.999])
     assert last.estimate == np.inf
+
+
+@pytest.mark.parametrize("level", [0.9, 0.95])
+def test_a_probability_has_the_interval_of_clopper_and_pearson(done: sw.SweepResult, level: float) -> None:
+    failed = int((done.table("outcome")["outcome"] != "finished").sum())
+    expected = binomtest(failed, 400).proportion_ci(level, method="exact")
+    made = done.probability("failed", level)
+    assert (made.low, made.high) == pytest.approx((expected.low, expected.high), rel=1e-9)
+
+
+def test_functions_that_are_given_otherwise_than_by_name_are_refused_with_a_figure(done: sw.SweepResult) -> None:
+    with pytest.raises(SweepError, match=r"^figures: give them by name, as \{'settling': "):
+        sw.read(done.path, figures=["late"])  # pyright: ignore[reportArgumentType]
 
 
 def test_an_event_that_is_unknown_in_failed_runs_is_refused(done: sw.SweepResult) -> None:
