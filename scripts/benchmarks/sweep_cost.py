@@ -27,7 +27,6 @@ import numpy as np
 import psutil
 
 import robot_dyn as rd
-from benchmarks.planar_scene import planar_scene
 from robot_dyn.scene.starters import starter
 from robot_dyn.tools import sweeps as sw
 from robot_dyn.tools.sweeps.cluster import client_of
@@ -50,11 +49,28 @@ sw.run(done.sweep, {out!r}, threads=2)
 print(f"{{done.folder.count}} chunks: the work begins {{first[0]:.2f}} s after the import of the room;"
       f" with its last chunk {{time.perf_counter() - began:.2f}} s, CPU {{time.process_time() - cpu:.2f}} s")
 """
+SCENE = """
+robot = "planar_2r"
+duration_s = {duration_s}
+method = "rk4"
+step_s = 0.001
+record_period_s = 0.001
+
+[start]
+q = [0.4, 0.9]
+
+[[effect]]
+kind = "gravity"
+
+[[effect]]
+kind = "viscous_friction"
+damping_N_m_s_per_rad = 0.5
+"""
 
 
 def planar(folder: str, runs: int) -> sw.Sweep:
     """200 steps of two bars, with friction, starts and masses that vary."""
-    (Path(folder) / "scene.toml").write_text(planar_scene(duration_s=0.2))
+    (Path(folder) / "scene.toml").write_text(SCENE.format(duration_s=0.2))
     vary = {
         "viscous_friction.damping": sw.lognormal(median=0.5, sigma_of_log=0.2),
         "q0": sw.normal(mean=[0.4, 0.9], sd=0.05),

@@ -55,7 +55,7 @@ def campaigns() -> list[Campaign]:
         *(Campaign(f"fuzz, {name}", "tests.campaigns.fuzz", (name,), "--cases", 4000) for name in FUZZERS),
         Campaign("sweeps, flipped bits", sweeps, ("flips",), "--count", 400),
         Campaign("sweeps, rows by run(i)", sweeps, ("repeats",), "--count", 200),
-        Campaign("sweeps, killed", sweeps, ("kills",), "--count", 50),
+        Campaign("sweeps, killed", "tests.campaigns.sweep_kills", ("--workers", "20"), "--drivers", 50),
         Campaign("batches and single runs", "tests.campaigns.batches", (), "--scenes", 300),
         Campaign("pairs of runs", "tests.campaigns.run_pairs", (), "--pairs", 200),
         Campaign("estimates, thin layers", estimates, (), "--layers", 400),

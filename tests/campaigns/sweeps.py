@@ -2,28 +2,22 @@
 
 - flips: A bit of a chunk, or of a shard of samples, is flipped: the answer is of the whole folder, or one error.
 - repeats: A run by itself, `result.run(i)`, has the bits of its row.
-- kills: A sweep that is killed, by threads and by Dask, and resumed until done, has the digest of an unkilled one.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
-import signal
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 
 from robot_dyn import RobotDynError
 from robot_dyn.tools import sweeps as sw
-from tests.tools.sweeps.swept import SCENE, digest, scene, swept
+from tests.tools.sweeps.swept import SCENE, scene, swept
 
-ROOT = Path(__file__).parents[2]
 NOISE = '\n[[control.position]]\nkind = "noise"\ndeviation_rad = 0.01\n'
 STOPS = '[[effect]]\nkind = "joint_stops"\nstiffness_N_m_per_rad = 100.0\nlower_rad = -1.0\nupper_rad = 1.0\n\n'
 SCENES = {
@@ -33,8 +27,6 @@ SCENES = {
     "chosen steps": SCENE.replace('method = "rk4"\nstep_s = 0.001\n', ""),
 }
 ROWS_OF_A_SWEEP = 20
-KILLED_RUNS, KILLED_CHUNK = 4000, 10
-CLUSTERS = (None, "local:1x2")
 
 Read = Callable[[], dict[str, np.ndarray]]
 
@@ -99,55 +91,14 @@ def repeated(count: int, seed: int, folder: Path) -> Iterator[str]:
     print(f"{rows} rows repeated", flush=True)
 
 
-def fill(folder: str, cluster: str) -> None:
-    """Run the sweep that is killed, in a process of its own."""
-    place = Path(folder)
-    sw.run(swept(place.parent, KILLED_RUNS), place, chunk=KILLED_CHUNK, cluster=cluster or None)
-
-
-def killed(count: int, seed: int, folder: Path) -> Iterator[str]:
-    """Half of the kills by threads, half by Dask: driver and workers at once, at random times."""
-    whole, rng = digest(swept(folder, KILLED_RUNS)), np.random.default_rng([seed, 3])
-    for cluster, kills in zip(CLUSTERS, (count - count // 2, count // 2), strict=True):
-        duration, left, sweeps, cut = _filled(folder / f"whole {cluster}", cluster, 600.0)[0], kills, 0, 0
-        while left:
-            place, done = folder / f"{cluster} {sweeps}", False
-            while not done:
-                wait = rng.uniform(0.3, 1.0) * duration if left else 600.0
-                _, done = _filled(place, cluster, wait)
-                left -= not done
-                cut += bool(not done and place.is_dir() and any((place / "rows").glob("*.parquet")))
-            sweeps += 1
-            if (found := sw.read(place).verify()) != whole:
-                yield f"DIFFERS {place.name}: {found}, unkilled {whole}"
-        print(f"{cluster or 'threads'}: {kills} kills, {cut} with chunks in the folder; {sweeps} sweeps", flush=True)
-
-
-def _filled(folder: Path, cluster: str | None, wait_s: float) -> tuple[float, bool]:
-    """Fill a folder in a process that is killed after a time; what it took, and whether it ended."""
-    start, code = perf_counter(), f"from tests.campaigns.sweeps import fill; fill({str(folder)!r}, {cluster or ''!r})"
-    main = f"if __name__ == '__main__':\n    {code}"  # Dask's workers import the main module
-    with subprocess.Popen([sys.executable, "-c", main], cwd=ROOT, start_new_session=True) as child:
-        try:
-            child.wait(wait_s)
-        except subprocess.TimeoutExpired:
-            os.killpg(child.pid, signal.SIGKILL)
-            return perf_counter() - start, False
-    if child.returncode:
-        raise RuntimeError(f"filling {folder} ended with {child.returncode}")
-    return perf_counter() - start, True
-
-
-LAWS = {"flips": flipped, "repeats": repeated, "kills": killed}
+LAWS = {"flips": flipped, "repeats": repeated}
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("law", choices=LAWS)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument(
-        "--count", type=int, default=50, help="flips (of a chunk, and as many of a shard), rows or kills"
-    )
+    parser.add_argument("--count", type=int, default=50, help="flips of a chunk and as many of a shard, or rows")
     options = parser.parse_args()
     findings = 0
     with tempfile.TemporaryDirectory() as folder:

@@ -1,11 +1,11 @@
 """Kills of drivers, of workers and of both while sweeps run: what is lost, what is doubled, whether bits differ.
 
-    PYTHONPATH=scripts python -m benchmarks.sweep_kills --drivers 200 --workers 20
+    python -m tests.campaigns.sweep_kills --drivers 200 --workers 20 --seed 1
 
 Drivers are forked and run 1 to 3 threads; they are killed (SIGKILL) at a random moment, or end themselves at a random
 call to the system inside a write. Workers are processes of Dask, killed one or all at a time; then the driver is killed
 with them. Each is resumed, by another engine, until the sweep is complete. The digest of all rows must be that of a
-sweep without kills, in other chunks, and each chunk must have one file.
+sweep without kills, in other chunks, and each chunk must have one file. Exit code 1 if a sweep is wrong.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import multiprocessing
 import os
 import random
 import signal
+import sys
 import tempfile
 import time
 from contextlib import suppress
@@ -23,24 +24,13 @@ from typing import Any
 
 import psutil
 
-from benchmarks.planar_scene import planar_scene
 from robot_dyn.foundations import files
 from robot_dyn.tools import sweeps as sw
-from robot_dyn.tools.sweeps.run_sweep import begun
+from robot_dyn.tools.sweeps import begun
+from tests.tools.sweeps.swept import swept
 
 RUNS, CHUNK = 20_000, 256
 CALLS = "open", "fsync", "replace"
-
-
-def sweep(folder: str) -> sw.Sweep:
-    """The sweep that is killed; 0.6 % of its runs raise."""
-    vary = {
-        "viscous_friction.damping": sw.lognormal(median=0.5, sigma_of_log=0.3),
-        "q0": sw.normal(mean=[0.4, 0.9], sd=0.1),
-        "mass_scale": sw.normal(mean=1.0, sd=0.4),
-    }
-    figures = {"peak": sw.peak("v"), "end": sw.final("q", "joint_2")}
-    return sw.Sweep(f"{folder}/scene.toml", RUNS, vary, figures, seed=5)
 
 
 def fill(plan: sw.Sweep, out: str, calls: int, options: dict[str, Any]) -> None:
@@ -98,10 +88,10 @@ def check(plan: sw.Sweep, out: str, expected: str) -> str:
     result = sw.run(plan, out, threads=1)  # makes nothing
     names = sorted(path.name for path in (Path(out) / "rows").glob("[!.]*"))  # without those of writers just killed
     if names != [f"{k:06d}.parquet" for k in range(result.folder.count)]:
-        return f"WRONG: {len(names)} files, {result.folder.count} chunks"
+        return f"DIFFERS: {len(names)} files, {result.folder.count} chunks"
     if len(result.table("run")["run"]) != RUNS:
-        return "WRONG: rows are lost or doubled"
-    return "complete, same bits" if result.verify() == expected else "WRONG: other bits"
+        return "DIFFERS: rows are lost or doubled"
+    return "complete, same bits" if result.verify() == expected else "DIFFERS: other bits"
 
 
 def drivers(plan: sw.Sweep, out: str, counts: dict[str, int], most: int) -> None:
@@ -136,17 +126,17 @@ def workers(plan: sw.Sweep, out: str, counts: dict[str, int], most: int) -> None
     driver.join()
 
 
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--drivers", type=int, default=200)
     parser.add_argument("--workers", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     random.seed(given.seed)
+    wrong = 0
     counts = {"driver": 0, "inside a write": 0, "worker": 0, "all at once": 0}
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "scene.toml").write_text(planar_scene(duration_s=0.1))
-        plan = sweep(folder)
+        plan = swept(Path(folder), RUNS, seed=5)
         expected = sw.run(plan, f"{folder}/whole", chunk=1024).verify()
         print(f"without kills: {expected}", flush=True)
         for number in range(given.drivers + given.workers):
@@ -158,8 +148,12 @@ def main() -> None:
             if not left:
                 workers(plan, out, counts, given.workers)
             drivers(plan, out, counts, given.drivers)
-            print(f"sweep {number}: {counts}; {check(plan, out, expected)}", flush=True)
+            verdict = check(plan, out, expected)
+            wrong += verdict.startswith("DIFFERS")
+            print(verdict, f"sweep {number}", counts, sep="; ", flush=True)
+    print(f"{wrong} wrong sweeps; {counts}")
+    return int(bool(wrong))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
