@@ -89,7 +89,7 @@ def test_of_several_keys_without_effect_the_first_in_the_schema_is_told(tmp_path
     """Not one that changes with the hashes of a process."""
     (tmp_path / "scene.toml").write_text(f'{BASE}[control]\nkind = "pd"\nperiod_s = 0.01\nkp = 1\nkd = 1\n{UNUSED}')
     read = f"import robot_dyn as rd; rd.read_scene({str(tmp_path / 'scene.toml')!r})"
-    for seed in ("1", "2", "3"):
+    for seed in ("1", "6"):  # their orders differ
         assert b"control.integral_rate_per_s: " in spawn(code=read, PYTHONHASHSEED=seed).stderr
 
 
