@@ -57,6 +57,7 @@ from robot_dyn.foundations.files import file_path as file_path
 from robot_dyn.foundations.files import read as read
 from robot_dyn.foundations.files import reading as reading
 from robot_dyn.foundations.files import save as save
+from robot_dyn.foundations.files import sync_folder as sync_folder
 from robot_dyn.foundations.files import table_cell as table_cell
 from robot_dyn.foundations.files import target as target
 from robot_dyn.foundations.files import why as why

@@ -24,8 +24,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations import SceneError, SweepError, needs, read, reading, save, shown, why
-from robot_dyn.foundations.files import sync_folder
+from robot_dyn.foundations import SceneError, SweepError, needs, read, reading, save, shown, sync_folder, why
 from robot_dyn.tools.sweeps.imported import NOTHING, Named, check_places
 from robot_dyn.tools.sweeps.rows import OUTCOMES, TEXTS, Rows, digest_of, schema, type_of
 from robot_dyn.tools.sweeps.sample_store import SampleStore, make_folder
