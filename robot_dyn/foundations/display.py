@@ -118,7 +118,7 @@ def _axes(label: str, height: float, names: Iterable[str] = ()) -> Any:
 
     axes = Figure(figsize=(_WIDE, height), facecolor="none").add_subplot(facecolor="none")
     axes.set_xlabel(drawable(label), fontsize=8, color=INK, parse_math=False)
-    axes.tick_params(labelsize=8, length=0, colors=INK)
+    axes.tick_params(which="both", labelsize=8, length=0, colors=INK)
     axes.grid(color=GRID)
     axes.spines[:].set_visible(False)
     if names:

@@ -79,6 +79,7 @@ def test_runs_that_diverged_are_drawn_and_counted_in_each_part(some_lost) -> Non
         assert np.abs(axes.get_ylim()).max() < 10
     assert "3 of 40 diverged" in headings(figure)
     (axes,) = plot(some_lost, "outcomes").axes
+    assert all(tick == round(tick) for tick in axes.get_yticks())  # numbers of runs
     assert {
         label.get_text(): bar.get_height() for label, bar in zip(axes.get_xticklabels(), axes.patches, strict=True)
     } == {

@@ -36,6 +36,7 @@ from robot_dyn.tools.sweeps.rows import FINISHED, FIXED, NUMBERS, OUTCOMES
 from robot_dyn.tools.sweeps.sensitivity import Sensitivity, by_values, saltelli
 from robot_dyn.tools.sweeps.specification import specification
 from robot_dyn.tools.sweeps.statistics import Estimate
+from robot_dyn.tools.sweeps.statistics import text as number_text
 from robot_dyn.tools.sweeps.sweep import Sweep, heading
 from robot_dyn.tools.sweeps.work import Work
 
@@ -241,11 +242,12 @@ class SweepResult(Answer):
         label, x = heading(self.sweep, name), self._figure(name)
         given = "known" if (np.isnan(x) & ~self._failed).any() else None
         quantiles = self.quantiles(name, _PROBABILITIES, given=given)
-        rows = tuple((of.statistic, of.estimate, of.low, of.high) for of in quantiles)
+        rows = tuple((of.statistic, *map(number_text, (of.estimate, of.low, of.high))) for of in quantiles)
         first, finite = quantiles[0], x[np.isfinite(x)]
+        numbers = "estimate", f"{100 * first.level:g} % interval from", "to"
         worst = self.worst(name, min(_WORST, len(x)), given="known")
         blocks: list[Block] = [
-            Table(("", "estimate", f"{100 * first.level:g} % interval from", "to"), rows, digits=4),
+            Table(("", *numbers), rows, right=numbers),
             f"{first.n} runs, {first.failed} failed",
             Table(
                 ("worst runs that finished", label, "repeat it by"),

@@ -218,7 +218,8 @@ def scale(
         middle = low / 2 + high / 2
         half = max(high / 2 - low / 2, 5e-4 * abs(middle)) or 1.0  # noise on a constant stays noise
         bounds = middle - 1.08 * half, middle + 1.08 * half
-        axis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
+        counts = high - low >= 1 and bool(np.all(z == np.round(z)))
+        axis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10], integer=counts))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda x, _: _tick(x, max(map(abs, bounds)) < 0.01)))
     getattr(axes, f"set_{side}lim")(*np.clip(bounds, -_LARGEST, _LARGEST))
@@ -227,8 +228,10 @@ def scale(
 def _tick(x: float, is_small: bool) -> str:
     """A number at an axis: 5e−4 where numbers are small, otherwise up to five digits."""
     scientific = x and (is_small or not 1e-4 <= abs(x) < 1e5)
-    text = np.format_float_scientific(x, 4, trim="-", exp_digits=1) if scientific else f"{x:.5g}"
-    return text.replace("e+", "e").replace("-", "−")
+    if not scientific:
+        return f"{x:.5g}".replace("-", "−")
+    mantissa, exponent = f"{x:.4e}".split("e")
+    return f"{float(mantissa):g}e{int(exponent)}".replace("-", "−")
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -107,10 +107,14 @@ def _draw(part: Any, panel: Panel, style: Style, width: float, diverged: bool) -
 
 
 def _title(cell: Axes, letters: int) -> str:
-    """The title of a cell and its note, in lines of at most `letters` letters; a long name takes two."""
+    """The title of a cell and its note, in lines of at most `letters` letters; long names break after "_"."""
     parts = [text for text in (shortened(cell.title, 2 * letters), cell.note) if text]
     in_one = ", ".join(parts)
-    return in_one if len(in_one) <= letters else "\n".join(fill(text, letters) for text in parts)
+    return (
+        in_one
+        if len(in_one) <= letters
+        else "\n".join(fill(text.replace("_", "_ "), letters).replace("_ ", "_") for text in parts)
+    )
 
 
 def _legend(part: Any, entries: dict[str, Any], style: Style, width: float) -> None:
