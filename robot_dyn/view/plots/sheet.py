@@ -60,7 +60,7 @@ def draw(
 
     told = "\n".join(remarks)
     if len(told) > _MOST_REMARKS * width:
-        told = f"{told[: int(_MOST_REMARKS * width)]} … the summary has all remarks"
+        told = f"{told[: int(_MOST_REMARKS * width)].rpartition(' ')[0]} … the summary has all remarks"
     lines = sum(1 + _LETTER * style.text * len(line) // width for line in f"{opening}\n{told}".split("\n"))
     above = lines * _LINE * style.text if style.titled else 0.0
     heights = [panel.tall(panel.height) for panel in panels]
