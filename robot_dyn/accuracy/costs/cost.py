@@ -152,10 +152,10 @@ def cost(
                     pairs += make()
                 except (ImportError, RobotDynError) as error:
                     left_out.append(f"{name}: {error}")
+        alternatives, untimed = take_turns(pairs, budget, repeats)
     except KeyboardInterrupt:
         left_out.append(INTERRUPTED)
-        repeats = 0
-    alternatives, untimed = take_turns(pairs, budget, repeats)
+        alternatives, untimed = take_turns(pairs, budget, 0)
     name = getattr(setup.plant.dynamics, "name", type(setup.plant.dynamics).__name__)
     return Cost(
         name, acting(setup), alternatives, (*left_out, *untimed), processor_and_versions(), budget.seconds, budget.spent
