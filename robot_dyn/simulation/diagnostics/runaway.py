@@ -10,8 +10,8 @@ from math import log
 import numpy as np
 
 from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.values import cached
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.units import joint_types_of, unit
 from robot_dyn.simulation.dynamics.fastest_motion import fastest, jacobian
 from robot_dyn.simulation.dynamics.stability import below, excess_rate, longest_step
@@ -26,8 +26,9 @@ _TIMES = 100.0  # a velocity limit
 _LIMIT = 100.0  # [rad/s] or [m/s] of a joint whose file states none
 
 
-def speed_limits(dynamics: Dynamics) -> np.ndarray:
+def speed_limits(setup: Setup) -> np.ndarray:
     """Return the speed of each joint beyond which a run has left all speeds of the arm, (n,), in [rad/s] or [m/s]."""
+    dynamics = setup.plant.dynamics
     limits = dynamics.velocity_limit if isinstance(dynamics, Robot) else np.full(dynamics.n, np.inf)
     return _TIMES * np.where((limits > 0) & np.isfinite(limits), limits, _LIMIT)
 
@@ -39,12 +40,10 @@ def runaway(setup: Setup, speeds: np.ndarray) -> str:
         setup: What ran.
         speeds: Largest speed of each joint, (n,).
     """
-    dynamics = setup.plant.dynamics
-    limits = speed_limits(dynamics)
-    ratio = np.nan_to_num(speeds / limits, nan=np.inf)
-    joint = int(np.argmax(ratio))
-    if ratio[joint] <= 1:
+    limits = cached(setup, speed_limits)
+    if (speeds <= limits).all():
         return ""
+    dynamics, joint = setup.plant.dynamics, int(np.argmax(np.nan_to_num(speeds / limits, nan=np.inf)))
     reached = f"{speeds[joint]:.3g} {unit('v', joint_types_of(dynamics)[joint])}"
     return f"{dynamics.joint_names[joint]} reached {reached}, over {limits[joint]:.3g}: the motion of no arm"
 
