@@ -100,7 +100,7 @@ class _Ran(NamedTuple):
         record: Its record.
         ready: When it began, on the clock, put later by what it compiled.
         remarks: On a run before it.
-        runaway: Which joint left all speeds of an arm; empty if none did.
+        runaway: Which joint reached an implausible speed; empty if none did.
     """
 
     setup: Setup

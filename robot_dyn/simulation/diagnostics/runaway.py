@@ -1,6 +1,6 @@
-"""Runs that leave all speeds of an arm, past 100 times a velocity limit, and steps that are too long as the reason.
+"""Runs that reach an implausible speed, over 100 times a velocity limit, and steps that are too long as the cause.
 
-Such a motion is that of no arm: its error means nothing, and companion runs would take most of the time.
+No arm moves like that: the error means nothing, and companion runs would take most of the time.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _LIMIT = 100.0  # [rad/s] or [m/s] of a joint whose file states none
 
 
 def speed_limits(setup: Setup) -> np.ndarray:
-    """Return the speed of each joint beyond which a run has left all speeds of the arm, (n,), in [rad/s] or [m/s]."""
+    """Return the largest plausible speed of each joint, (n,), in [rad/s] or [m/s]."""
     dynamics = setup.plant.dynamics
     limits = dynamics.velocity_limit if isinstance(dynamics, Robot) else np.full(dynamics.n, np.inf)
     return _TIMES * np.where((limits > 0) & np.isfinite(limits), limits, _LIMIT)
@@ -45,7 +45,10 @@ def runaway(setup: Setup, speeds: np.ndarray) -> str:
         return ""
     dynamics, joint = setup.plant.dynamics, int(np.argmax(np.nan_to_num(speeds / limits, nan=np.inf)))
     reached = f"{speeds[joint]:.3g} {unit('v', joint_types_of(dynamics)[joint])}"
-    return f"{dynamics.joint_names[joint]} reached {reached}, over {limits[joint]:.3g}: the motion of no arm"
+    limit = limits[joint] / _TIMES
+    return (
+        f"{dynamics.joint_names[joint]} reached {reached}, over 100 times its limit ({limit:.3g}): check gains and step"
+    )
 
 
 def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
@@ -71,12 +74,12 @@ def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
 
 
 def judged(setup: Setup, record: Recording, why: str) -> Outcome:
-    """Return the outcome of a run by fixed steps that left all speeds: diverged where its energy came from nowhere.
+    """Return the outcome of an implausibly fast run by fixed steps: diverged if its ledger does not close.
 
     Args:
         setup: What ran.
         record: Its recording.
-        why: Which joint left all speeds, see `runaway`.
+        why: Which joint reached an implausible speed, see `runaway`.
     """
     outcome = record.outcome
     if outcome.ending is not Ending.FINISHED or setup.integrator.controls_error:
@@ -87,4 +90,4 @@ def judged(setup: Setup, record: Recording, why: str) -> Outcome:
         if ledger(setup.equation, record).closes:
             return outcome
     remedy = f"take a smaller step than {setup.taken_step_s:g} s, or an implicit method"
-    return Outcome(Ending.DIVERGED, outcome.t, f"{why}, and its energy came from nowhere: {remedy}")
+    return Outcome(Ending.DIVERGED, outcome.t, f"{why}, and the energy ledger does not close: {remedy}")

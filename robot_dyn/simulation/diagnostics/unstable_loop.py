@@ -37,7 +37,7 @@ def unstable(setup: Setup, t: np.ndarray, y: np.ndarray, runs_away: bool) -> Ite
         setup: What ran.
         t: Times of its samples, (m,), in [s].
         y: Its states there, (m, size).
-        runs_away: True if the run diverged or left all speeds of an arm. A continuous loop is examined only then:
+        runs_away: True if the run diverged or reached an implausible speed. A continuous loop is examined only then:
             deviations may grow for a while along a motion that is as it should be.
     """
     if setup.controller is None or not (setup.equation.sampled or runs_away):
