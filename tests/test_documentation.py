@@ -10,7 +10,7 @@ DOCS = ROOT / "docs"
 PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
 INDEX = DOCS / "developers" / "decisions" / "README.md"
 RECORDS = [path for path in PAGES if path.parent == INDEX.parent and path != INDEX]
-MOST_WORDS = 300
+MOST_WORDS = 250
 CODE = re.compile(r"^```.*?^```$|`[^`\n]*`", flags=re.MULTILINE | re.DOTALL)
 
 
@@ -36,10 +36,11 @@ def test_links_between_pages_resolve() -> None:
 
 
 def test_records_of_decisions_are_short() -> None:
-    assert len(RECORDS) > 30
+    assert RECORDS
     texts = {record.name: record.read_text(encoding="utf-8") for record in RECORDS}
     assert {name: len(text.split()) for name, text in texts.items() if len(text.split()) > MOST_WORDS} == {}
-    assert [name for name, text in texts.items() if "**Context.**" not in text or "**Decision.**" not in text] == []
+    parts = ("**Context.**", "**Decision.**", "**Consequences.**")
+    assert [name for name, text in texts.items() if not all(part in text for part in parts)] == []
 
 
 def test_the_index_lists_each_record_once_by_its_title() -> None:
