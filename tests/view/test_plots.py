@@ -96,6 +96,38 @@ def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
         plot(many(run, MOST_JOINTS + 1), "joints")
 
 
+@pytest.mark.parametrize("width", [80.0, 180.0])
+@pytest.mark.parametrize("name", ["overview", "phase", "energy"])
+def test_numbers_of_an_axis_do_not_overlap(run, name: str, width: float) -> None:
+    """Two numbers or more on each axis that has any; small values are written as 5e−4 and need more room."""
+    small = replace(run, q=run.q * 1e-3, v=run.v * 1e-3)
+    for figure in (plot(run, name, width_mm=width), plot(small, name, width_mm=width)):
+        figure.draw_without_rendering()
+        for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+            low, high = sorted(axis.get_view_interval())
+            shown = [
+                tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high and tick.label1.get_visible()
+            ]
+            boxes = [tick.label1.get_window_extent() for tick in shown]
+            assert not any(a.overlaps(b) for a, b in zip(boxes, boxes[1:], strict=False))
+            assert len(boxes) > 1 or not boxes
+
+
+def test_a_legend_names_curves_of_its_own_panel_only(run) -> None:
+    (part,) = plot(run, "energy").subfigs[0].subfigs
+    assert not part.legends
+    for axes in part.axes:
+        entries = [text.get_text() for text in axes.get_legend().texts] if axes.get_legend() else []
+        assert entries == ([line.get_label() for line in axes.lines] if len(axes.lines) > 1 else [])
+
+
+def test_names_of_y_axes_in_a_column_are_aligned(run) -> None:
+    figure = plot(run)
+    figure.draw_without_rendering()
+    for symbol in ("q", "v", "u"):
+        assert np.ptp([axes.yaxis.label.get_window_extent().x1 for axes in cells(figure, symbol)]) < 1
+
+
 def test_units_are_those_of_each_joint(run, cart) -> None:
     """The URDF in the run tells which joint slides; a run without one leaves it open."""
     figure = plot(cart, "joints", "torques", "phase")
