@@ -6,6 +6,7 @@ Sizes are those asked for, and text keeps its own.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from time import perf_counter
 
 import numpy as np
@@ -109,7 +110,7 @@ def test_numbers_of_an_axis_do_not_overlap(run, name: str, width: float) -> None
                 tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high and tick.label1.get_visible()
             ]
             boxes = [tick.label1.get_window_extent() for tick in shown]
-            assert not any(a.overlaps(b) for a, b in zip(boxes, boxes[1:], strict=False))
+            assert not any(a.overlaps(b) for a, b in pairwise(boxes))
             assert len(boxes) > 1 or not boxes
 
 
@@ -155,6 +156,28 @@ def test_limits_are_drawn_at_plus_and_minus_the_limit(run) -> None:
 def test_limits_are_the_urdfs_unless_given(run) -> None:
     drawn = [lines(axes, "_limit")[1].get_ydata()[0] for axes in cells(plot(run, "torques"), "u")]
     np.testing.assert_array_equal(drawn, rd.load("ur5").effort_limit)
+
+
+@pytest.mark.parametrize("by", ["plant", "controller", "both"])
+def test_the_effort_limit_that_acts_is_shown_rather_than_that_of_the_file(by: str) -> None:
+    """In figures, and in the curves and causes of the page; a joint without one keeps that of the file."""
+    arm, q = rd.load("ur5"), np.array([0.1, -1.2, 1.8, -2.2, -1.5, 0.3])
+    acting = np.array([15.0, np.inf, 10.0, np.inf, np.inf, np.inf])
+    kp, kd = rd.control.gains_from(np.diag(arm.M(q)), 20.0)
+    target = rd.control.hold(q + 0.1)
+    limited = rd.control.PID(
+        target, kp, kd, kp, effort_limit=acting if by == "controller" else np.minimum(acting, 12.0)
+    )
+    controller = rd.control.PD(target, kp, kd) if by == "plant" else limited
+    effects = [] if by == "controller" else [rd.effects.EffortLimit(acting)]
+    short = rd.simulate(rd.Plant(arm, effects), q0=q, duration_s=0.05, controller=controller)
+    smaller = np.minimum(acting, 12.0) if by == "both" else acting
+    expected = np.where(np.isfinite(smaller), smaller, arm.effort_limit)
+    drawn = [lines(axes, "_limit")[1].get_ydata()[0] for axes in cells(plot(short, "torques"), "u")]
+    np.testing.assert_array_equal(drawn, expected)
+    document = rd.replay(short).document
+    assert [joint["limit"] for joint in document["causes"]["joints"]] == list(expected)
+    assert {each["value"] for each in document["plots"][2]["limits"]} <= {*expected, *-expected}
 
 
 def test_a_far_limit_does_not_flatten_the_torque(run) -> None:
