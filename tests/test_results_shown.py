@@ -76,6 +76,30 @@ def test_a_table_in_a_narrow_terminal_is_split_and_no_cell_is_cut(width: int) ->
     assert (len(parts) == 1) is (max(map(len, whole.lines)) <= width)
 
 
+def test_the_columns_that_identify_a_row_stand_in_each_part_of_a_split_table() -> None:
+    """In (quantity, by) no row occurs twice; numbers identify nothing; equal rows have the first column."""
+    rows = tuple((quantity, by, 1.0, 2.0) for quantity in ("M", "C") for by in ("Pinocchio", "machine code"))
+    table = Table(("quantity", "by", "typical", "searched"), rows)
+    parts = list(table.within(32))
+    assert [part.heading for part in parts] == [("quantity", "by", "typical"), ("quantity", "by", "searched")]
+    assert all(len({row[:2] for row in part.rows}) == len(rows) for part in parts)
+    assert Table(("a", "b", "c"), (("x", 1.0, "y"), ("x", 2.0, "z"))).keys == 1
+    assert Table(("a", "b", "c"), (("x", "y", "z"), ("x", "y", "z"))).keys == 1
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 110])
+def test_a_table_of_long_texts_is_broken_between_words_only(width: int) -> None:
+    """Every word, headings included, fits the width of its column, and the columns fit the line."""
+    text = "the push grew 1.2e+04-fold (beyond limit of file, error told up to 0.129 s only)"
+    rows = (("step", "rosenbrock_5", 0.1, text, text), ("step", "time_stepping", 0.25, "", text))
+    table = Table(("of", "what", "value", "at 0.98 of value", "at 1.02 of value"), rows, wrap=True)
+    for part in table.within(width):
+        fitted = part.fitted(width)
+        assert sum(fitted) + 2 * (len(fitted) - 1) <= width
+        for letters, *column in zip(fitted, part.heading, *part.cells, strict=True):
+            assert all(len(word) <= letters for cell in column for word in cell.split())
+
+
 def test_a_checkup_has_a_row_for_each_finding() -> None:
     rows = [
         [cell.text_content() for cell in row.iter("td")]

@@ -24,7 +24,7 @@ import typer
 
 from robot_dyn.cli import arguments, completion
 from robot_dyn.cli.terminal import show
-from robot_dyn.foundations.errors import ModelWarning
+from robot_dyn.foundations.errors import ModelWarning, QueryError
 from robot_dyn.foundations.files import target
 
 if TYPE_CHECKING:
@@ -145,6 +145,8 @@ class Results:
         from robot_dyn.report.save import table_kind
         from robot_dyn.view.plots.plots import PICTURES
 
+        if self.dark and not self.output:
+            raise QueryError("--dark is of the figure; add --output PLOT.png, or leave it out")
         read, paths = [path for path in inputs if path and os.path.isfile(path)], []
         for path, kinds in ((self.output, PICTURES), (self.csv, table_kind(of))):
             if path:

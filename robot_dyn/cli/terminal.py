@@ -53,16 +53,19 @@ def say(*answers: Answer | Table | str) -> None:
 
 
 def _draw(table: Table) -> None:
-    """Print a table on a terminal: texts begin at the left and may be broken, numbers stand whole at the right."""
+    """Print a table on a terminal: texts begin at the left and are broken between words, numbers stand at the right."""
     from rich.console import Console
     from rich.table import Table as Grid
 
     console = Console(highlight=False, markup=False, emoji=False)
-    for part in table.within(console.width):  # a number that is cut off is another number
+    for number, part in enumerate(table.within(console.width)):  # a number that is cut off is another number
+        if number:
+            console.print()
         grid = Grid(box=None, pad_edge=False, header_style="bold")
-        for heading in part.heading:
+        for heading, wide in zip(part.heading, part.fitted(console.width), strict=True):
             word = heading in part.words
-            grid.add_column(heading, no_wrap=not word, overflow="fold", justify="left" if word else "right")
+            side = "left" if word else "right"
+            grid.add_column(heading, width=wide, no_wrap=not word, overflow="fold", justify=side)
         for row in part.cells:
             grid.add_row(*row)
         console.print(grid)

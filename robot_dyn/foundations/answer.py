@@ -21,7 +21,7 @@ class Table:
         rows: Cells, texts or numbers.
         digits: Of numbers.
         right: Headings of columns whose texts stand at the right, as numbers do.
-        wrap: Whether a narrow terminal breaks its texts rather than its rows.
+        wrap: Whether a narrow terminal breaks its texts between words before it splits the table.
     """
 
     heading: tuple[str, ...]
@@ -53,20 +53,54 @@ class Table:
         """Letters of the longest cell of each column, headings included."""
         return [max(map(len, column)) for column in zip(self.heading, *self.cells, strict=True)]
 
-    def within(self, width: int) -> Iterator[Table]:
-        """The table in parts of so many letters a line, as far as the first column, which each part has, leaves room.
+    @property
+    def least_widths(self) -> list[int]:
+        """Letters that each column needs: of its longest cell, or of its longest word where texts may be broken."""
+        columns = zip(self.heading, self.widths, zip(self.heading, *self.cells, strict=True), strict=True)
+        return [
+            max(len(word) for cell in column for word in cell.split() or [""])
+            if self.wrap and name in self.words
+            else widest
+            for name, widest, column in columns
+        ]
 
-        A table whose texts may be broken stays whole.
+    @property
+    def keys(self) -> int:
+        """Number of columns at the left that identify a row: those of texts until no two rows are equal, or 1."""
+        cells = self.cells
+        texts = [name in self.words for name in self.heading]
+        for k in range(1, len(texts)):
+            if not texts[k - 1]:
+                break
+            if len({tuple(row[:k]) for row in cells}) == len(cells):
+                return k
+        return 1
+
+    def within(self, width: int) -> Iterator[Table]:
+        """Yield the table in parts of at most `width` letters a line, each with the columns that identify a row.
+
+        A part with one further column may be wider.
         """
-        first, *others = self.widths
-        parts: list[list[int]] = [[]]
-        for k, each in enumerate(others, 1):
-            if parts[-1] and not self.wrap and first + sum(2 + self.widths[j] for j in parts[-1]) + 2 + each > width:
-                parts.append([])
+        least, keys = self.least_widths, list(range(self.keys))
+        parts = [[*keys]]
+        for k in range(len(keys), len(least)):
+            is_full = sum(least[j] + 2 for j in parts[-1]) + least[k] > width
+            if is_full and len(parts[-1]) > len(keys):
+                parts.append([*keys])
             parts[-1].append(k)
         for part in parts:
-            rows = tuple(tuple(row[k] for k in (0, *part)) for row in self.rows)
-            yield replace(self, heading=tuple(self.heading[k] for k in (0, *part)), rows=rows)
+            rows = tuple(tuple(row[k] for k in part) for row in self.rows)
+            yield replace(self, heading=tuple(self.heading[k] for k in part), rows=rows)
+
+    def fitted(self, width: int) -> list[int]:
+        """Return the width of each column in lines of `width` letters; columns of long texts share what is left."""
+        fitted, widths = self.least_widths, self.widths
+        spare = width - sum(fitted) - 2 * (len(fitted) - 1)
+        open_columns = sorted(range(len(fitted)), key=lambda k: widths[k] - fitted[k])
+        for place, k in enumerate(open_columns):
+            more = max(0, min(widths[k] - fitted[k], spare // (len(fitted) - place)))
+            fitted[k], spare = fitted[k] + more, spare - more
+        return fitted
 
     @property
     def lines(self) -> Iterator[str]:

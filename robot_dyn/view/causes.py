@@ -12,6 +12,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.causes import causes_of
 from robot_dyn.simulation.results.run_data import TrajectoryData
+from robot_dyn.view.series import effort_limits
 
 _MOST = 2000  # samples; no slider is wider in pixels of a screen
 _STEPS = 32767  # of 16 bits, for the largest torque of a joint
@@ -28,7 +29,8 @@ def causes(run: TrajectoryData, robot: Robot) -> dict[str, Any] | None:
     if not len(known):
         return None
     at = known[np.unique(np.linspace(0, len(known) - 1, min(len(known), _MOST)).round().astype(int))]
-    of_joints = zip(split.joints, split.types, robot.effort_limit, np.moveaxis(parts[:, at], 2, 0), strict=True)
+    limits = effort_limits(run, robot.effort_limit)
+    of_joints = zip(split.joints, split.types, limits, np.moveaxis(parts[:, at], 2, 0), strict=True)
     return {"t": split.t[at], "names": list(split.torques), "joints": [_joint(*each) for each in of_joints]}
 
 

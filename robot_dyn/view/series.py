@@ -8,6 +8,8 @@ A plot whose curves are all 0, or all absent, has no series and says why.
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -47,6 +49,8 @@ def plots(runs: list[TrajectoryData], stages: list[Stage], names: list[str]) -> 
     kind = types.pop() if len(types) == 1 else None
     marks, robot, first, found = ["", *(f" ({name})" for name in names[1:])], stages[0].robot, runs[0], []
 
+    efforts = effort_limits(first, robot.effort_limit)
+
     def curves(columns: Iterable[Columns], is_desired: bool = False) -> list[Curve]:
         return [
             Curve(name, run.t, values, mark, is_desired)
@@ -57,7 +61,7 @@ def plots(runs: list[TrajectoryData], stages: list[Stage], names: list[str]) -> 
     for title, symbol, reference, lower, upper in (
         ("joint positions q", "q", "desired", robot.lower, robot.upper),
         ("joint velocities v", "v", "desired_velocity", -robot.velocity_limit, robot.velocity_limit),
-        ("actuation u", "u", "", -robot.effort_limit, robot.effort_limit),
+        ("actuation u", "u", "", -efforts, efforts),
     ):
         actual = curves(_by_joint(run, getattr(run, symbol)) for run in runs)
         desired = curves((_desired(run, first, reference) for run in runs), True) if reference else []
@@ -72,6 +76,22 @@ def plots(runs: list[TrajectoryData], stages: list[Stage], names: list[str]) -> 
         if comparable(first, run):
             found.append(_difference(first, run, names[0], name, unit("q", kind)))
     return [*found, _plot("energy ledger", "J", curves(_energy(run) for run in runs))]
+
+
+def effort_limits(run: TrajectoryData, stated: np.ndarray) -> np.ndarray:
+    """Return the effort limit of each joint that acted in a run, and where none did that of the file, (n,).
+
+    Limits act by an `EffortLimit` of the plant and by that of a PID; the smaller one counts.
+
+    Args:
+        run: The run, whose settings hold the limits as texts, such as "15, inf N m".
+        stated: Limits of the file, (n,).
+    """
+    acting = np.full(len(stated), np.inf)
+    for name, text in json.loads(run.about.get("settings", "{}")).items():
+        if name.partition(" (")[0] in ("effort_limit.limit", "control.effort_limit") and "numbers" not in text:
+            acting = np.minimum(acting, [float(x) for x in re.findall(r"inf|\d[\d.e+-]*", text)])
+    return np.where(np.isfinite(acting), acting, stated)
 
 
 def _by_joint(run: TrajectoryData, x: np.ndarray) -> Columns:
@@ -139,7 +159,7 @@ def _plot(title: str, unit: str, curves: list[Curve]) -> dict[str, Any]:
 
 
 def _limits(names: Sequence[str], lower: np.ndarray, upper: np.ndarray, curves: list[Curve]) -> dict[str, Any]:
-    """Limits of the file: those that are drawn, since they are near the curve of their joint, and in words the others.
+    """Limits that are drawn, since they are near the curve of their joint, and in words the others.
 
     Near is within 1.5 times the largest value of its joint, or within a tenth of the height of all curves; and within
     half this height, so that no limit makes the curves much flatter.

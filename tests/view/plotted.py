@@ -43,7 +43,8 @@ def headings(figure) -> str:
 
 def legend(figure) -> list[str]:
     """The entries of the legends of a figure and of its parts."""
-    own = [text.get_text() for each in figure.legends for text in each.texts]
+    legends = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
+    own = [text.get_text() for each in legends for text in each.texts]
     return own + [text for part in figure.subfigs for text in legend(part)]
 
 

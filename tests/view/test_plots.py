@@ -6,6 +6,7 @@ Sizes are those asked for, and text keeps its own.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from time import perf_counter
 
 import numpy as np
@@ -96,6 +97,38 @@ def test_thirty_joints_keep_their_names_and_do_not_overlap(run) -> None:
         plot(many(run, MOST_JOINTS + 1), "joints")
 
 
+@pytest.mark.parametrize("width", [80.0, 180.0])
+@pytest.mark.parametrize("name", ["overview", "phase", "energy"])
+def test_numbers_of_an_axis_do_not_overlap(run, name: str, width: float) -> None:
+    """Two numbers or more on each axis that has any; small values are written as 5e−4 and need more room."""
+    small = replace(run, q=run.q * 1e-3, v=run.v * 1e-3)
+    for figure in (plot(run, name, width_mm=width), plot(small, name, width_mm=width)):
+        figure.draw_without_rendering()
+        for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+            low, high = sorted(axis.get_view_interval())
+            shown = [
+                tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high and tick.label1.get_visible()
+            ]
+            boxes = [tick.label1.get_window_extent() for tick in shown]
+            assert not any(a.overlaps(b) for a, b in pairwise(boxes))
+            assert len(boxes) > 1 or not boxes
+
+
+def test_a_legend_names_curves_of_its_own_panel_only(run) -> None:
+    (part,) = plot(run, "energy").subfigs[0].subfigs
+    assert not part.legends
+    for axes in part.axes:
+        entries = [text.get_text() for text in axes.get_legend().texts] if axes.get_legend() else []
+        assert entries == ([line.get_label() for line in axes.lines] if len(axes.lines) > 1 else [])
+
+
+def test_names_of_y_axes_in_a_column_are_aligned(run) -> None:
+    figure = plot(run)
+    figure.draw_without_rendering()
+    for symbol in ("q", "v", "u"):
+        assert np.ptp([axes.yaxis.label.get_window_extent().x1 for axes in cells(figure, symbol)]) < 1
+
+
 def test_units_are_those_of_each_joint(run, cart) -> None:
     """The URDF in the run tells which joint slides; a run without one leaves it open."""
     figure = plot(cart, "joints", "torques", "phase")
@@ -123,6 +156,28 @@ def test_limits_are_drawn_at_plus_and_minus_the_limit(run) -> None:
 def test_limits_are_the_urdfs_unless_given(run) -> None:
     drawn = [lines(axes, "_limit")[1].get_ydata()[0] for axes in cells(plot(run, "torques"), "u")]
     np.testing.assert_array_equal(drawn, rd.load("ur5").effort_limit)
+
+
+@pytest.mark.parametrize("by", ["plant", "controller", "both"])
+def test_the_effort_limit_that_acts_is_shown_rather_than_that_of_the_file(by: str) -> None:
+    """In figures, and in the curves and causes of the page; a joint without one keeps that of the file."""
+    arm, q = rd.load("ur5"), np.array([0.1, -1.2, 1.8, -2.2, -1.5, 0.3])
+    acting = np.array([15.0, np.inf, 10.0, np.inf, np.inf, np.inf])
+    kp, kd = rd.control.gains_from(np.diag(arm.M(q)), 20.0)
+    target = rd.control.hold(q + 0.1)
+    limited = rd.control.PID(
+        target, kp, kd, kp, effort_limit=acting if by == "controller" else np.minimum(acting, 12.0)
+    )
+    controller = rd.control.PD(target, kp, kd) if by == "plant" else limited
+    effects = [] if by == "controller" else [rd.effects.EffortLimit(acting)]
+    short = rd.simulate(rd.Plant(arm, effects), q0=q, duration_s=0.05, controller=controller)
+    smaller = np.minimum(acting, 12.0) if by == "both" else acting
+    expected = np.where(np.isfinite(smaller), smaller, arm.effort_limit)
+    drawn = [lines(axes, "_limit")[1].get_ydata()[0] for axes in cells(plot(short, "torques"), "u")]
+    np.testing.assert_array_equal(drawn, expected)
+    document = rd.replay(short).document
+    assert [joint["limit"] for joint in document["causes"]["joints"]] == list(expected)
+    assert {each["value"] for each in document["plots"][2]["limits"]} <= {*expected, *-expected}
 
 
 def test_a_far_limit_does_not_flatten_the_torque(run) -> None:

@@ -100,7 +100,7 @@ def replay(
     /,
     video: str | None = None,
     fps: int | None = None,
-    size: str = "1280x720",
+    size: str | None = None,
     dark: Dark = False,
     frame: str | None = None,
     view: PageOptions = SERVED,
@@ -114,12 +114,17 @@ def replay(
         runs (RUN.npz...): Run files; those after the first are drawn transparent.
         video (OUT.mp4): Write an .mp4 or .gif, drawn by an installed Chrome, Chromium or Edge.
         fps: Frames a second of the video: frame k shows t = k / fps; 60, or 25 of a .gif.
-        size (WIDTHxHEIGHT): Pixels of the video.
+        size (WIDTHxHEIGHT): Pixels of the video; 1280x720 by default.
         frame (LINK): Link whose path is drawn; the tip by default.
         package_dir: Folder in which ROS packages are searched; may be repeated.
     """
     file = view.file(runs)
-    film = None if video is None else _film(video, size, view, runs)
+    film = None if video is None else _film(video, size or "1280x720", view, runs)
+    if film is None and (dark or size is not None or fps is not None):
+        raise QueryError(
+            "--dark, --size and --fps are of a video; add --video OUT.mp4, or leave them out: a page is dark where the"
+            " browser is"
+        )
     page = rd.replay(*map(rd.load_run, runs), frame=frame, package_dirs=package_dir or (), **view.look)
     if film is None:
         view.give(page, file, "run")

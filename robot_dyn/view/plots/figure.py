@@ -92,12 +92,14 @@ class Axes:
         title: Text above them.
         x, y: Names of the axes, with their units.
         note: Text after the title.
+        own_legend: Whether its curves are named under its title, because no other cell has the same.
     """
 
     title: str
     x: str
     y: str
     note: str = field(default="", kw_only=True)
+    own_legend: bool = field(default=False, kw_only=True)
 
     def fill(self, axes: Any, style: Style, diverged: bool) -> None:
         """Draw on axes of Matplotlib; `diverged` says that values may have grown without bound."""
@@ -158,7 +160,7 @@ class Cell(Axes):
         scale(axes, "y", y, self.limit, diverged, log)
         if self.x == TIME:
             begin, end = first[[0, -1]]
-            scale(axes, "x", np.array([begin, end]))
+            scale(axes, "x", np.array([begin, end]), counts=False)
             axes.set_xlim(begin, end if end > begin else begin + 1)
         else:
             scale(axes, "x", np.concatenate([first, self.lost]), np.inf, diverged)
@@ -188,13 +190,30 @@ def framed(axes: Any, theme: Mapping[str, Any], size: float) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["bottom", "left"]].set_color(theme["ink"])
     axes.tick_params(which="both", colors=theme["ink"], labelsize=size)
+    axes.xaxis.get_offset_text().set(color=theme["ink"], size=size)
 
 
 def scale(
-    axes: Any, side: str, z: np.ndarray, limit: float = np.inf, diverged: bool = False, log: bool = False
+    axes: Any,
+    side: str,
+    z: np.ndarray,
+    limit: float = np.inf,
+    diverged: bool = False,
+    log: bool = False,
+    counts: bool = True,
 ) -> None:
-    """Bounds that show all that is finite; ± the limit too, unless the curve would be flat between such far lines."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
+    """Set bounds that show all finite values, and as many numbers as there is room for.
+
+    Args:
+        axes: Of Matplotlib.
+        side: "x" or "y".
+        z: Values.
+        limit: Shown at ±limit too, unless the curve would be flat between such far lines.
+        diverged: Whether values may have grown without bound.
+        log: Whether the scale is logarithmic.
+        counts: Whether values that are whole numbers get numbers at whole places only.
+    """
+    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator, ScalarFormatter
 
     axis = getattr(axes, f"{side}axis")
     z = z[(np.abs(z) < _LARGEST) & (z > 0 if log else True)]
@@ -206,7 +225,7 @@ def scale(
             10.0 ** max(np.floor(np.log10(np.quantile(z, 0.01, method="lower"))), -307),
             10.0 ** min(np.ceil(np.log10(high) + 0.01), 308),
         )
-        axis.set_major_locator(LogLocator(numticks=6))
+        axis.set_major_locator(LogLocator())
     elif diverged and size.max() > _WILD * (usual := np.quantile(size, 0.25, method="lower")):
         getattr(axes, f"set_{side}scale")("symlog", linthresh=usual)  # what led to the end is as legible as the end
         bounds = 2 * min(low, 0.0), 2 * max(high, 0.0)
@@ -218,10 +237,13 @@ def scale(
         middle = low / 2 + high / 2
         half = max(high / 2 - low / 2, 5e-4 * abs(middle)) or 1.0  # noise on a constant stays noise
         bounds = middle - 1.08 * half, middle + 1.08 * half
-        counts = high - low >= 1 and bool(np.all(z == np.round(z)))
-        axis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10], integer=counts))
+        whole = counts and high - low >= 1 and bool(np.all(z == np.round(z)))
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer=whole))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda x, _: _tick(x, max(map(abs, bounds)) < 0.01)))
+    if side == "x" and axis.get_scale() == "linear":  # numbers side by side have a factor in common, to be short
+        axis.set_major_formatter(ScalarFormatter(useOffset=False))
+        axes.ticklabel_format(axis="x", scilimits=(-2, 5))
     getattr(axes, f"set_{side}lim")(*np.clip(bounds, -_LARGEST, _LARGEST))
 
 

@@ -195,7 +195,7 @@ def _torque(view: View, i: int, held: tuple[Rest, ...] = ()) -> Cell:
     run, limit = view.run, float(view.efforts[i])
     every = run.u[:, i] if run.extremes is None else np.append(run.u[:, i], run.extremes[2, :, i])
     share = float(np.max(np.abs(every), where=np.isfinite(every), initial=0.0)) / limit
-    used = "under 1%" if 0 < share < 0.005 else f"{share:.0%}" if share < 10 else "over 1000%"
+    used = "<1%" if 0 < share < 0.005 else f"{share:.0%}" if share < 10 else ">1000%"
     note = f"{used} of the limit" if np.isfinite(limit) else ""
     curves = (Curve("u", run.t, run.u[:, i]),)
     return Cell(run.joint_names[i], TIME, f"u [{view.unit('u', i)}]", curves, limit=limit, note=note)
@@ -219,9 +219,9 @@ def _ledger(view: View) -> list[Cell]:
     )
     sole = f" by {next(iter(ledger.work))}" if len(works) == 1 else ""
     left = Curve("|residual|", t, np.abs(ledger.residual))
-    cells = [Cell("Energy since the start", TIME, "energy [J]", stores)]
+    cells = [Cell("Energy since the start", TIME, "energy [J]", stores, own_legend=True)]
     if any(np.nan_to_num(work.y).any() for work in works):
-        cells.append(Cell(f"Work since the start{sole}", TIME, "work [J]", works))
+        cells.append(Cell(f"Work since the start{sole}", TIME, "work [J]", works, own_legend=True))
     return [*cells, Cell("Residual |E − E(0) − Σ W|", TIME, "residual [J]", (left,), log=True)]
 
 

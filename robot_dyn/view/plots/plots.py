@@ -25,6 +25,7 @@ from robot_dyn.view.plots.batch import BATCH_PLOTS, BatchView
 from robot_dyn.view.plots.figure import PAPER, THEMES, Style
 from robot_dyn.view.plots.parts import PLOTS, PlotError, View
 from robot_dyn.view.plots.sheet import LEAST_MM, MOST_MM, WIDTH_MM, draw
+from robot_dyn.view.series import effort_limits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,7 +64,8 @@ def plot(
             histogram, scatter.
         only: As *names.
         joints: Names of the joints to show; all if not given.
-        limits: Effort limits, shape (n,), in [N m] or [N], inf for none; those of the run's URDF if not given.
+        limits: Effort limits, shape (n,), in [N m] or [N], inf for none; if not given, those
+            that acted in the run, and for joints without one those of its URDF.
         theme: For "light" or "dark" screens.
         style: "paper" has thin lines, no title, and colours and dashes that a grey print keeps apart.
         width_mm: Width, in [mm], from 80 to 1000.
@@ -194,7 +196,8 @@ def _view(run: TrajectoryData, shown: Collection[str], limits: np.ndarray | None
     stated, speeds = (
         np.array([np.inf if j is None else getattr(j, key) or np.inf for j in known]) for key in ("effort", "velocity")
     )
-    efforts = shaped("limits", stated if limits is None else limits, run.joint_names).astype(float)
+    limits = effort_limits(run, stated) if limits is None else limits
+    efforts = shaped("limits", limits, run.joint_names).astype(float)
     if efforts.ndim != 1:
         raise QueryError(f"limits must have shape ({len(known)},), got {efforts.shape}")
     types = tuple(j and j.kind for j in known)

@@ -11,7 +11,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, final
 
 from robot_dyn.foundations.display import drawable
-from robot_dyn.view.plots.figure import Axes, Style, framed, shortened
+from robot_dyn.view.plots.figure import TIME, Axes, Style, framed, shortened
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, FigureBase
@@ -20,6 +20,7 @@ WIDTH_MM, LEAST_MM, MOST_MM = 180.0, 80.0, 1000.0
 A4_MM, MM = 297.0, 1 / 25.4
 _HEADING, _BESIDE = 10.0, 14.0  # [mm]: about what a heading and a legend take, and what the y axis of a cell takes
 _LETTER, _LINE, _HANDLE = 0.19, 0.5, 1.5  # [mm], of 1 pt: width of a letter, a line, beside the text of a legend
+_RIGHT = 1.5  # [mm], free at the right for half of the last number of an x axis
 _LEAST_ROW = 20.0  # [mm], with its title and its numbers
 _MOST_REMARKS = 5  # letters of remarks above the panels, in a mm of the width; all are in the summary
 
@@ -27,7 +28,7 @@ _MOST_REMARKS = 5  # letters of remarks above the panels, in a mm of the width; 
 @final
 @dataclass(frozen=True)
 class Panel:
-    """Rows of cells under a heading, and below them the legend of those that have several curves.
+    """Rows of cells under a heading, and below them one legend of the curves that cells share.
 
     Attributes:
         heading: What the cells show.
@@ -66,6 +67,7 @@ def draw(
     heights = [panel.tall(panel.height) for panel in panels]
     tall = max(above + sum(panel.tall(_LEAST_ROW) for panel in panels), min(A4_MM, above + sum(heights)))
     figure = Figure((width * MM, tall * MM), 120, facecolor=style.colours["paper"], layout="constrained")
+    figure.get_layout_engine().set(rect=(0, 0, 1 - _RIGHT / width, 1))
     body = figure.add_subfigure(figure.add_gridspec()[0])
     if style.titled:
         headed(figure, opening, style.colours["ink"], fontsize=style.text)
@@ -97,13 +99,21 @@ def _draw(part: Any, panel: Panel, style: Style, width: float, diverged: bool) -
             cell.fill(axes, style, diverged)
             has_x = (k + 1) % panel.every == 0
             axes.tick_params(labelbottom=has_x, length=2, pad=2)
-            axes.set_xlabel(drawable(cell.x) if has_x else "", labelpad=1, fontsize=style.small, **style.ink)
+            side = "center" if cell.x == TIME else "left"  # at the right stands the factor of the numbers
+            axes.set_xlabel(drawable(cell.x) if has_x else "", labelpad=1, loc=side, fontsize=style.small, **style.ink)
             axes.set_ylabel(drawable(cell.y), fontsize=style.small, **style.ink)
-            axes.set_title(drawable(_title(cell, letters)), loc="left", pad=4, fontsize=style.text, **style.ink)
+            title = drawable(_title(cell, letters))
             handles, labels = axes.get_legend_handles_labels()
-            entries |= zip(labels, handles, strict=True) if len(labels) > 1 else ()
+            curves = dict(zip(labels, handles, strict=True)) if len(labels) > 1 else {}
+            if cell.own_legend and curves:
+                above = {"loc": "lower left", "bbox_to_anchor": (0, 1), "title": title, "alignment": "left"}
+                _legend(axes, curves, style, width / across - _BESIDE, borderaxespad=0, **above)
+            else:
+                axes.set_title(title, loc="left", pad=4, fontsize=style.text, **style.ink)
+                entries |= curves
     if entries:
-        _legend(part, entries, style, width)
+        _legend(part, entries, style, width, loc="outside lower left", borderaxespad=0.5)
+    part.align_ylabels()
 
 
 def _title(cell: Axes, letters: int) -> str:
@@ -117,13 +127,13 @@ def _title(cell: Axes, letters: int) -> str:
     )
 
 
-def _legend(part: Any, entries: dict[str, Any], style: Style, width: float) -> None:
-    """The legend of a panel below it, in as many columns as its width takes."""
+def _legend(where: Any, entries: dict[str, Any], style: Style, width: float, **placed: Any) -> None:
+    """Add a legend to axes or to a part of a figure, in as many columns as its width takes."""
     wide = (_LETTER * max(map(len, entries)) + _HANDLE) * style.small
-    legend = part.legend(
+    legend = where.legend(
         entries.values(), entries.keys(), ncols=min(max(1, int(width / wide)), len(entries)), frameon=False,
-        loc="outside lower left", fontsize=style.small, borderpad=0, borderaxespad=0.5, handlelength=2.2,
-        handletextpad=0.5, columnspacing=1.2, labelspacing=0.25,
+        fontsize=style.small, title_fontsize=style.text, borderpad=0, handlelength=2.2,
+        handletextpad=0.5, columnspacing=1.2, labelspacing=0.25, **placed,
     )  # fmt: skip
-    for label in legend.get_texts():
+    for label in [legend.get_title(), *legend.get_texts()]:
         label.set(**style.ink)

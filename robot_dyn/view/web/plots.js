@@ -102,7 +102,7 @@ function makePlot(plot, events, seek, zoomed) {
       { ...axis, label: plot.unit, labelSize: 18, size: 70, values: (u, ticks) => ticks.map(tick) }],
     series: [{ label: "t", value: (_, t) => (t == null ? "–" : t.toFixed(3) + " s") }, ...series],
   }, [plot.t, ...plot.series.map((each) => gaps(each.values))], box);
-  if (plot.beyond) box.append(Object.assign(document.createElement("p"), { className: "beyond", textContent: `limits of the file, not drawn: ${plot.beyond}` }));
+  if (plot.beyond) box.append(Object.assign(document.createElement("p"), { className: "beyond", textContent: `limits, not drawn: ${plot.beyond}` }));
   figure.over.append(...ticks, mark);
   figure.over.addEventListener("click", (event) => seek(figure.posToVal(event.offsetX, "x")));
   figure.root.querySelectorAll(".u-series + .u-series:not(.desired) > th").forEach(pressable);
