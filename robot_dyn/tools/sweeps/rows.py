@@ -51,7 +51,7 @@ FIXED = (
     Column("ended", float, "s", "time at which the run ended; nan if it was not made", np.nan, lambda made: made.ended),
     Column(
         "reason", object, "", "why the run failed, or which event ended it", "",
-        lambda made: np.array(made.advice, object),
+        lambda made: np.array([outcome.text for outcome in made.outcomes], object),
     ),
     Column(
         "remarks", object, "", "remarks on the run, by kind, quantity and joint", "",
