@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from site_parts import commands, gallery, hard_cases, rooms
+from site_parts import commands, gallery, hard_cases, reasons, rooms
 
 ROOT = Path(__file__).parents[2]
 
@@ -25,6 +25,7 @@ MAKERS: dict[str, Callable[[str], str]] = {
     "rooms": rooms.page,  # the public names of a room, from its stub and docstrings
     "commands": commands.page,  # the commands, from the command line itself
     "hard cases": hard_cases.page,  # counts from docs/data/hard_cases.json, laws from tests/campaigns/hard
+    "reasons": reasons.page,  # why a run ended, from the docstrings of Reason
     "gallery": gallery.page,  # the scripts of docs/gallery
     "root file": root_file,
 }

@@ -33,7 +33,10 @@ def run(trajectory: Trajectory) -> Document:
     return {
         "ending": outcome.ending,
         "t": outcome.t,
-        "advice": outcome.advice,
+        "reason": outcome.reason,
+        "joint": outcome.joint,
+        "facts": outcome.facts,
+        "text": outcome.text,
         "samples": len(trajectory.t),
         "acting": trajectory.acting,
         "joints": trajectory.joint_names,

@@ -23,6 +23,7 @@ from robot_dyn.simulation.results.samples import tracking_of as tracking_of
 from robot_dyn.simulation.rollouts.sweepable import parts_of_run as parts_of_run
 from robot_dyn.simulation.run.outcome import Ending as Ending
 from robot_dyn.simulation.run.outcome import Outcome as Outcome
+from robot_dyn.simulation.run.outcome import Reason as Reason
 from robot_dyn.simulation.setup.segment_table import segment_table as segment_table
 from robot_dyn.simulation.setup.settings import settings_of as settings_of
 from robot_dyn.simulation.setup.setup import MOST_BYTES as MOST_BYTES

@@ -31,7 +31,7 @@ from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estima
 from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.make_run import make_run
-from robot_dyn.simulation.run.outcome import Accumulation, Ending, Outcome, Stiff, TooLong
+from robot_dyn.simulation.run.outcome import Accumulation, Ending, Outcome, Reason, Stiff, TooLong
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options
 from robot_dyn.simulation.setup.setup import Setup, check_record
@@ -171,6 +171,5 @@ def _with_estimate(
     except KeyboardInterrupt:
         error = no_estimate("it was interrupted")
         if record.outcome.ending is Ending.FINISHED:
-            why = "interrupted after the run, in its error estimate"
-            record = replace(record, outcome=Outcome(Ending.STOPPED, record.outcome.t, why))
+            record = replace(record, outcome=Outcome(Reason.INTERRUPTED_IN_ESTIMATE, record.outcome.t))
     return record, error, spent, companions

@@ -197,7 +197,7 @@ class _Document:
 
 def _outcome(shown: Shown) -> str:
     end = shown.run.outcome
-    return f"{shown.prefix}{end.ending} at t = {end.t:g} s" + (f": {end.advice}" if end.advice else "")
+    return f"{shown.prefix}{end.ending} at t = {end.t:g} s" + (f": {end.text}" if end.text else "")
 
 
 def _title(shown: list[Shown]) -> str:

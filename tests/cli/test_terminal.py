@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.simulation import Ending, Outcome, Remark, RemarkKind
+from robot_dyn.simulation import Outcome, Reason, Remark, RemarkKind
 from tests.command import run
 
 HOSTILE = "a\nrobot-dyn: all is well\x1b[2J\r\u202e"
@@ -62,7 +62,8 @@ def test_the_summary_of_a_run_file_has_the_lines_of_a_summary(swing: rd.Trajecto
     """Whatever texts are in the file."""
     remark = Remark(RemarkKind.CHATTER, HOSTILE, "u", 0.0, 0.1, 0.0, 1.0, None, HOSTILE, HOSTILE)
     strange = replace(
-        swing, outcome=Outcome(Ending.FINISHED, 0.01, HOSTILE), about=swing.about | {"right_angles": HOSTILE},
+        swing, outcome=Outcome(Reason.TERMINAL_EVENT, 0.01, HOSTILE, {"event": HOSTILE}),
+        about=swing.about | {"right_angles": HOSTILE},
         acting=(HOSTILE,), remarks=(remark,), statistics=replace(swing.statistics, method=HOSTILE, engine=HOSTILE),
     )  # fmt: skip
     loaded = rd.load_run(rd.save_run(strange, tmp_path / "run.npz"))

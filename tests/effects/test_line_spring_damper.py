@@ -111,4 +111,4 @@ def test_where_the_points_meet_there_is_no_direction() -> None:
             engine=engine, estimate_error=False,
         )  # fmt: skip
         assert run.outcome.ending is Ending.DIVERGED
-        assert "has no direction" in run.outcome.advice
+        assert "has no direction" in run.outcome.text

@@ -158,7 +158,7 @@ def test_a_run_that_diverges_ends_alike(name: str) -> None:
     ours, theirs = both(estimate_error=False, **DIVERGING[name])
     assert ours.outcome.ending == theirs.outcome.ending == "diverged"
     assert ours.outcome.t == pytest.approx(theirs.outcome.t, abs=0.011)
-    assert ours.outcome.advice.split(";")[-1].split("at t")[0] == theirs.outcome.advice.split(";")[-1].split("at t")[0]
+    assert ours.outcome.text.split(";")[-1].split("at t")[0] == theirs.outcome.text.split(";")[-1].split("at t")[0]
     assert np.isfinite(ours.q).all() and abs(len(ours.t) - len(theirs.t)) <= 11
 
 

@@ -101,7 +101,7 @@ def test_a_terminal_event_ends_the_run_there(engine: str) -> None:
     run = rd.simulate(plant, [0.3, 0.4], duration_s=60.0, engine=engine, events=[slow], record_period_s=0.1)
     assert run.outcome.ending == "finished"
     assert run.outcome.t == run.t[-1] == run.events[-1].t < 60
-    assert "at rest" in run.outcome.advice
+    assert "at rest" in run.outcome.text
     assert np.hypot(*run.v[-1]) == pytest.approx(1e-3, rel=1e-9)
     assert np.isfinite(run.a[-1]).all()
 

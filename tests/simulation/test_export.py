@@ -14,7 +14,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn import export
-from robot_dyn.simulation import Ending, Outcome, RunFileError
+from robot_dyn.simulation import Outcome, Reason, RunFileError
 from robot_dyn.simulation.export import tables
 
 NAMES = ('a, "b"', "c\nd/ü [rad]")
@@ -35,7 +35,7 @@ def hostile(tame) -> rd.Trajectory:
     rng, shape = np.random.default_rng(3), tame.q.shape
     q, v, u = (np.where(rng.random(shape) < 0.3, rng.choice(NUMBERS, shape), rng.normal(size=shape)) for _ in range(3))
     power = {"control": u[:, 0], 'a "b", c\n/d': v[:, 0], "a b c d": q[:, 0]}
-    end = Outcome(Ending.DIVERGED, float(tame.t[-1]), "for a test")
+    end = Outcome(Reason.STATE_OVERFLOWS, float(tame.t[-1]))
     return replace(tame, joint_names=NAMES, q=q, v=v, u=u, power=power, outcome=end)
 
 

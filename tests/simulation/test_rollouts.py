@@ -192,13 +192,13 @@ def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str, effects:
         later = runs.t > runs.ended[i] + 1e-9
         assert later.any() and np.isnan(runs.q[i, later]).all() and np.isnan(runs.u[i, later]).all()
         assert np.isnan(runs.kinetic[i, later]).all() and np.isfinite(runs[i].q).all()
-        assert runs.ended[i] < 0.2 and "take a smaller step" in outcome.advice
+        assert runs.ended[i] < 0.2 and "take a smaller step" in outcome.text
         if len(effects) == 2:  # nothing cuts their steps
-            assert "take a smaller step than 0.002 s" in outcome.advice
+            assert "take a smaller step than 0.002 s" in outcome.text
             fastest = ARM.joint_names[np.argmax(np.abs(runs[i].v[-1]))]
-            assert f"the fastest joint is '{fastest}'" in outcome.advice
+            assert f"the fastest joint is '{fastest}'" in outcome.text
     assert "2 diverged" in runs.summary and f"run 3 diverged at t = {runs.ended[3]:g} s; " in runs.summary
-    assert not runs.outcome(0).advice
+    assert not runs.outcome(0).text
 
 
 @pytest.mark.parametrize("engine", ["interpreted", "compiled"])
@@ -439,12 +439,12 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
         for i in range(3):
             alone = rd.simulate(runs.setup, q0=q0[i], v0=[0.0, 0.0])
             assert runs.outcome(i).ending == alone.outcome.ending == "finished" and back.outcome(i) == runs.outcome(i)
-            assert runs.outcome(i).advice == alone.outcome.advice
+            assert runs.outcome(i).text == alone.outcome.text
             assert runs.ended[i] == pytest.approx(alone.outcome.t, abs=1e-12)
             before = runs.t < runs.ended[i] if runs.ended[i] < 0.3 else runs.t <= 0.3
             np.testing.assert_allclose(runs.q[i, before], alone.q[: before.sum()], rtol=0, atol=1e-11)
             assert np.isnan(runs.q[i, ~before]).all()
-        assert "'down'" in runs.outcome(0).advice and not runs.outcome(2).advice
+        assert "'down'" in runs.outcome(0).text and not runs.outcome(2).text
         assert "; 0 diverged, 0 stopped, 2 ended by an event" in runs.summary
 
 

@@ -16,7 +16,7 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.scene import starter
-from robot_dyn.simulation import Ending, Outcome, RunFileError
+from robot_dyn.simulation import Outcome, Reason, RunFileError
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +129,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("about", lambda _: None, "no text 'about'"),
         ("about", lambda text: np.array("[" * 100_000), "'about' is not JSON"),
         ("about", lambda text: np.array([str(text)]), "no text 'about'"),
-        ("about", lambda text: said(text, format=3), "it has format 3, this version reads 7; .*robot-dyn"),
+        ("about", lambda text: said(text, format=3), "it has format 3, this version reads 8; .*robot-dyn"),
         ("about", lambda text: said(text, format="3"), "it has format '3'"),
         ("about", lambda text: said(text, format={"a": 3}), "it has format {'a': 3}"),
         ("about", lambda text: said(text, novelty=3), "'novelty': .*3"),
@@ -141,7 +141,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("about", lambda text: said(text, v="q"), "'v': its array is missing"),
         ("about", lambda text: said(text, deviation="u", u=None), "'u': its array is missing"),
         ("about", lambda text: said(text, power={}), "member 'power/.*' is not known to this version"),
-        ("about", lambda text: said(text, outcome__ending="done"), "'outcome/ending': .*finished.*'done'"),
+        ("about", lambda text: said(text, outcome__reason="done"), "'outcome/reason': .*interrupted.*'done'"),
         ("about", lambda text: said(text, outcome__t=float("nan")), "'outcome/t' holds nan, not a time"),
         ("about", lambda text: said(text, outcome=None), "'outcome': .*None"),
         ("about", lambda text: said(text, statistics__steps=1.5), "'statistics/steps': .*1.5"),
@@ -156,7 +156,7 @@ def test_members_that_do_not_fit_together_are_refused_by_name(run, tmp_path, nam
 
 def test_a_run_that_diverged_keeps_its_nans(run, tmp_path) -> None:
     """What a diverged run ends with may be anything; so a run that NumPy wrote again by itself still loads."""
-    end = replace(run, outcome=Outcome(Ending.DIVERGED, 0.2, "smaller step"), q=np.where(run.q > 0, np.nan, run.q))
+    end = replace(run, outcome=Outcome(Reason.STATE_OVERFLOWS, 0.2), q=np.where(run.q > 0, np.nan, run.q))
     path = rd.save_run(end, tmp_path / "run.npz")
     np.testing.assert_array_equal(rd.load_run(path).q, end.q)
     with np.load(path) as file:

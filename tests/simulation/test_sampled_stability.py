@@ -116,8 +116,8 @@ def test_a_run_that_its_loop_ends_says_so_and_not_to_take_a_smaller_step(options
     runs = rd.rollouts(joint, [[0.1], [0.2]], duration_s=5.0, controller=law, **options)
     for outcome in (run.outcome, runs.outcome(0), runs.outcome(1)):
         assert outcome.ending == "diverged"
-        assert outcome.advice.startswith("control loop unstable, deviations grow: pivot by ")
-        assert "step" not in outcome.advice
+        assert outcome.text.startswith("control loop unstable, deviations grow: pivot by ")
+        assert "step" not in outcome.text
     assert run.summary.count("control loop unstable") == 1
 
 
@@ -133,7 +133,7 @@ def test_a_run_that_its_step_ends_under_a_stable_loop_says_so() -> None:
     assert run.outcome.ending == "diverged"
     (remark,) = (each for each in run.remarks if each.kind is RemarkKind.TOO_LONG)
     assert remark.limit == pytest.approx(2.785293563405282e-5, rel=1e-3)
-    assert run.outcome.advice.startswith("step too long to be stable")
+    assert run.outcome.text.startswith("step too long to be stable")
     assert RemarkKind.UNSTABLE not in {each.kind for each in run.remarks}
 
 

@@ -62,7 +62,7 @@ def test_states_of_a_sampled_pid_advance_once_a_tick(method, step: float) -> Non
     """z⁺ = z + period · ż at the tick, z = 0 at the first: τ at each tick is that of the recursion, to rounding."""
     law = rd.control.PID(GOAL, [80.0, 20.0], [900.0, 400.0], [9.0, 2.0], effort_limit=[25.0, 8.0], period_s=0.012)
     run = rd.simulate(PLANT, **START, duration_s=0.24, controller=law, **stepped(method, step))
-    assert run.outcome.ending == "finished", run.outcome.advice
+    assert run.outcome.ending == "finished", run.outcome.text
     ticks = np.searchsorted(run.t, 0.012 * np.arange(21) - 1e-12)
     z = np.zeros(2)
     for i in ticks:

@@ -59,7 +59,7 @@ def check_kept(run: rd.Trajectory, until: float, early: float = 2e-3) -> None:
 
 def test_a_finished_run_says_so() -> None:
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.05)
-    assert (run.outcome.ending, run.outcome.t, run.outcome.advice) == ("finished", 0.05, "")
+    assert (run.outcome.ending, run.outcome.t, run.outcome.text) == ("finished", 0.05, "")
     check_kept(run, 0.05)
 
 
@@ -81,11 +81,11 @@ def test_stiff_gains_at_too_large_a_step_diverge_and_the_run_says_what_to_do(met
     )  # fmt: skip
     assert run.outcome.ending == "diverged"
     assert 0 <= run.outcome.t < 10.0
-    assert any(joint in run.outcome.advice for joint in UR5.joint_names)
+    assert any(joint in run.outcome.text for joint in UR5.joint_names)
     loop = law.period_s and run.outcome.t > law.period_s  # which no step makes stable
     kinds = {remark.kind for remark in run.remarks}
     assert RemarkKind.UNSTABLE in kinds if loop else law.period_s or RemarkKind.TOO_LONG in kinds
-    assert ("control loop unstable" if loop else "step") in run.outcome.advice
+    assert ("control loop unstable" if loop else "step") in run.outcome.text
     assert run.t[-1] <= run.outcome.t + 0.01
     assert np.isfinite(run.q).all()
     assert np.isfinite(run.v).all()
@@ -118,12 +118,12 @@ def test_a_controller_that_fails_or_is_interrupted_ends_the_run_where_it_does(me
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, controller=law, integrator=method)
     check_kept(run, 0.05 + period, slack(method, period))
     if isinstance(ending, KeyboardInterrupt):
-        assert run.outcome.ending == "stopped" and run.outcome.advice and run.error is None
+        assert run.outcome.ending == "stopped" and run.outcome.text and run.error is None
     else:
         assert run.outcome.ending == "diverged"
         assert run.outcome.t == pytest.approx(0.05 + period, abs=slack(method, period))
     if isinstance(ending, rd.RobotDynError):
-        assert "stretched out" in run.outcome.advice
+        assert "stretched out" in run.outcome.text
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -242,7 +242,7 @@ def test_a_look_at_the_energy_that_fails_ends_the_run(engine: str) -> None:
     run = rd.simulate(rd.Plant(DOUBLE, [WithoutEnergy()]), **START, duration_s=0.2, engine=engine, integrator="rk4")
     assert run.outcome.ending == "diverged"
     assert 0.05 < run.outcome.t < 0.05 + 64e-3
-    assert "the potential has no value" in run.outcome.advice
+    assert "the potential has no value" in run.outcome.text
 
 
 @pytest.mark.parametrize("method", ["rk4", "DOP853"])
@@ -264,7 +264,7 @@ def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(met
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, integrator=method, engine="interpreted")
     assert len(ran) == 2
     assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.2)
-    assert "in its error estimate" in run.outcome.advice
+    assert "in its error estimate" in run.outcome.text
     assert run.t[-1] == 0.2
     assert run.error is not None and "interrupted" in str(run.error)
 

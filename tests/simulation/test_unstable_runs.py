@@ -41,7 +41,7 @@ def test_gains_that_excite_an_elastic_gear_are_named_with_their_growth(joint: rd
     run = rd.simulate(plant, [0.01], duration_s=60.0, controller=law)
     remark = remark_of(run, RemarkKind.UNSTABLE)
     assert run.outcome.ending == "diverged"
-    assert run.outcome.advice.startswith("control loop unstable")
+    assert run.outcome.text.startswith("control loop unstable")
     assert remark.value == pytest.approx(growth(1.0), rel=1e-4)  # derivatives by differences
     assert (remark.joint, remark.limit) == ("pivot", 0.0) and "kp = 500 N m/rad, kd = 20 N m s/rad" in remark.text
     assert run.error is not None and run.error.largest == inf and run.statistics.companion_runs == 0
@@ -76,7 +76,7 @@ def test_an_arm_with_gears_and_high_gains_is_reported_as_unstable_not_as_stiff(n
     law = rd.control.FeedForward(arm, rd.control.quintic(q0, q0 + 0.4, 1.0), 2e4, 800.0)
     run = rd.simulate(rd.Plant(arm, [gears]), q0, duration_s=2.0, controller=law)
     assert run.outcome.ending == "diverged"
-    assert run.outcome.advice.startswith("control loop unstable")
+    assert run.outcome.text.startswith("control loop unstable")
     assert remark_of(run, RemarkKind.UNSTABLE).joint in arm.joint_names
     assert run.error is not None and run.error.largest == inf and run.statistics.companion_runs == 0
 
@@ -128,4 +128,4 @@ def test_a_run_that_a_stop_throws_out_of_its_steps_has_not_finished() -> None:
         integrator="rk4", step_s=2e-3,
     )  # fmt: skip
     assert not run.ledger.closes
-    assert run.outcome.ending == "diverged" and "joint_2" in run.outcome.advice
+    assert run.outcome.ending == "diverged" and "joint_2" in run.outcome.text

@@ -18,7 +18,7 @@ from matplotlib.text import Text
 import robot_dyn as rd
 from robot_dyn import plot, save_plot
 from robot_dyn.foundations import QueryError
-from robot_dyn.simulation import Ending, Ledger, Outcome
+from robot_dyn.simulation import Ledger, Outcome, Reason
 from robot_dyn.view import PLOTS, PlotError
 from robot_dyn.view.plots.plots import MOST_JOINTS
 from tests.long import long
@@ -294,14 +294,14 @@ def test_a_diverged_run_shows_how_it_began_and_how_it_ended(cart, tmp_path) -> N
     growth = np.exp(np.linspace(0, 460, 200))[:, None] * [0.1, -0.1]
     growth[-3:] = [[np.nan], [np.inf], [np.nan]]
     energy = Ledger(growth[:, 0], growth[:, 1], {"control": growth[:, 0]})
-    end = Outcome(Ending.DIVERGED, 5.0, "take a smaller step")
+    end = Outcome(Reason.STATE_OVERFLOWS, 5.0)
     fast = {"q": growth, "v": growth, "u": growth, "ledger": energy, "outcome": end}
     run = stretched(cart, 200, **fast, deviation=growth, desired=growth)
     save_plot(run, tmp_path / "diverged.png", dpi=40)
     figure = plot(run)
     assert all(np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all() for axes in figure.axes)
     assert {axes.get_yscale() for axes in cells(figure, "q")} == {"symlog"}
-    assert "take a smaller step" in headings(figure)
+    assert end.text in headings(figure)
     nothing = np.full((200, 2), np.nan)
     save_plot(stretched(run, 200, q=nothing, v=nothing, u=nothing), tmp_path / "nan.png", dpi=40)
 
@@ -436,6 +436,8 @@ def test_vector_files_have_the_width(run, tmp_path, suffix: str, page: bytes) ->
 
 def test_many_remarks_leave_room_for_the_curves(run) -> None:
     """The last line says where the others are."""
-    long = replace(run, outcome=replace(run.outcome, advice="take a smaller step, " * 90))
+    long = replace(
+        run, outcome=Outcome(Reason.CANNOT_EVALUATE, run.outcome.t, facts={"error": "take a smaller step, " * 90})
+    )
     figure = plot(long)
     assert figure.get_size_inches()[1] * MM <= 297 and "the summary has all remarks" in headings(figure)

@@ -139,7 +139,7 @@ def one_run(name: str, setup: Setup, translate: Callable[..., MachineCode] = mac
         if record.outcome.ending is Ending.STOPPED:
             raise KeyboardInterrupt
         if record.outcome.ending is not Ending.FINISHED:
-            raise RobotDynError(f"a run of {short.duration_s:g} s from the start ends early: {record.outcome.advice}")
+            raise RobotDynError(f"a run of {short.duration_s:g} s from the start ends early: {record.outcome.text}")
         return spent / short.steps
 
     return Version(name, instructions(made), run)

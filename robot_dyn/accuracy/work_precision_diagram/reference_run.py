@@ -295,5 +295,5 @@ def _run(setup: Setup, longest: float) -> Trajectory:
     if run.outcome.ending is Ending.STOPPED:
         raise KeyboardInterrupt
     if run.outcome.ending is not Ending.FINISHED:
-        raise RobotDynError(run.outcome.advice)
+        raise RobotDynError(run.outcome.text)
     return run

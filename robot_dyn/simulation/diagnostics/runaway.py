@@ -17,7 +17,7 @@ from robot_dyn.simulation.dynamics.fastest_motion import fastest, jacobian
 from robot_dyn.simulation.dynamics.stability import below, excess_rate, longest_step
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind, remark_lines
 from robot_dyn.simulation.results.samples import ledger
-from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.run.outcome import Ending, Outcome, Reason
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -85,9 +85,8 @@ def judged(setup: Setup, record: Recording, why: str) -> Outcome:
     if outcome.ending is not Ending.FINISHED or setup.integrator.controls_error:
         return outcome
     if remarks := step_too_long(setup, outcome.t):
-        return Outcome(Ending.DIVERGED, outcome.t, remark_lines(remarks)[0])
+        return Outcome(Reason.STEP_TOO_LONG, outcome.t, remarks[0].joint, {"cause": remark_lines(remarks)[0]})
     with np.errstate(all="ignore"):
         if ledger(setup.equation, record).closes:
             return outcome
-    remedy = f"take a smaller step than {setup.taken_step_s:g} s, or an implicit method"
-    return Outcome(Ending.DIVERGED, outcome.t, f"{why}, and the energy ledger does not close: {remedy}")
+    return Outcome(Reason.IMPLAUSIBLE_SPEED, outcome.t, facts={"cause": why, "step_s": setup.taken_step_s})

@@ -23,7 +23,7 @@ from robot_dyn.simulation.diagnostics.runaway import EXPLAINS
 from robot_dyn.simulation.dynamics.sampled_loop import SampledLoop, linearised, remedy
 from robot_dyn.simulation.dynamics.stability import after, below, periods, shown
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind, remark_lines
-from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.run.outcome import Ending, Outcome, Reason
 from robot_dyn.simulation.setup.setup import Setup
 
 _GAINS = ("kp", "ki", "kd")
@@ -150,15 +150,20 @@ def _gains(setup: Setup, joint: int) -> str:
 
 
 def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outcome:
-    """Return the outcome of a run; if it diverged and a remark on its step or loop explains it, with that as advice."""
+    """Return the outcome of a run; if a remark on its step or loop explains its divergence, that is its reason."""
     if outcome.ending is not Ending.DIVERGED:
         return outcome
     for remark in remarks:
         if remark.kind is RemarkKind.TOO_LONG:
-            return replace(outcome, advice=remark_lines([remark])[0])
+            return _because(Reason.STEP_TOO_LONG, outcome.t, remark)
         if remark.kind is RemarkKind.UNSTABLE and setup.controller is not None:
             period = setup.controller.period_s
             grown = periods(outcome.t, period) * log(remark.value) if period else outcome.t * remark.value
             if grown > log(EXPLAINS):
-                return replace(outcome, advice=remark_lines([remark])[0])
+                return _because(Reason.CONTROL_LOOP_UNSTABLE, outcome.t, remark)
     return outcome
+
+
+def _because(reason: Reason, t: float, remark: Remark) -> Outcome:
+    """Return the outcome of a run that a remark explains."""
+    return Outcome(reason, t, remark.joint, {"cause": remark_lines([remark])[0]})

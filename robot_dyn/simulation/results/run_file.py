@@ -17,8 +17,8 @@ from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import LONGEST_S
 
-FORMAT = 7
-ROLLOUTS_FORMAT = "rollouts 5"
+FORMAT = 8
+ROLLOUTS_FORMAT = "rollouts 6"
 RUN = FileKind("a run file", ".npz", b"PK\x03\x04")
 
 

@@ -24,7 +24,7 @@ def summary(run: TrajectoryData) -> str:
     part = f"{ledger.closure:.1e} of the energy exchanged" if ledger.exchanges else "no energy exchanged"
     residual = f"residual {largest(np.abs(ledger.residual)):.2e} J, {part}"
     lines = [
-        opening + _after(run.outcome.advice),
+        opening + _after(run.outcome.text),
         *([] if run.acting is None else [f"effects: {', '.join(run.acting) or 'none'}"]),
         *([f"right angles, in machine code: {run.about['right_angles']}"] if "right_angles" in run.about else []),
         f"energy ledger: {residual}" + _after(run.leak) if ledger.known else "energy ledger: was not recorded",
@@ -34,7 +34,7 @@ def summary(run: TrajectoryData) -> str:
     lines += [] if run.accuracy is None else [f"accuracy: {run.accuracy}"]
     lines += ["between samples: not observed"] if run.extremes is None else []
     lines += [f"events: {_events_text(run.events)}"] if run.events else []
-    lines += [line for line in lines_of(run.remarks) if line != run.outcome.advice]
+    lines += [line for line in lines_of(run.remarks) if line != run.outcome.text]
     if run.tracking_error is not None:
         lines.append(f"{of_tracking(run, run.desired is None)}: {run.tracking_error:.3e} rms")
     step = f"step {s.step_s:.4g} s, " if s.step_s else ""

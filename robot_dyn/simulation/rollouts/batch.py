@@ -17,7 +17,7 @@ from robot_dyn.simulation.observation.observation import Observation, Observed
 from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.rollouts.sweepable import parts_of_run
 from robot_dyn.simulation.rollouts.thresholds import Thresholds, thresholds
-from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.simulation.setup.setup import Setup
 
 
@@ -124,7 +124,8 @@ class Record:
         setup: Setup whose equations ran.
         t: Times of the samples, (m,), in [s].
         columns: Recorded quantities, (B, m, size) by name; nan after the end of a run.
-        ended, diverged, stopped, advice, steps, evaluations: See `Rollouts`.
+        outcomes: How each run ended, B of them.
+        steps, evaluations: See `Rollouts`.
         statistics: Statistics of the batch.
         observed: Observations of all runs.
     """
@@ -132,10 +133,7 @@ class Record:
     setup: Setup
     t: np.ndarray
     columns: dict[str, np.ndarray]
-    ended: np.ndarray
-    diverged: np.ndarray
-    stopped: np.ndarray
-    advice: list[str]
+    outcomes: list[Outcome]
     steps: np.ndarray
     evaluations: np.ndarray
     statistics: Statistics
@@ -152,6 +150,4 @@ class Record:
         """End a run after some of its samples."""
         for x in self.columns.values():
             x[run, rows:] = np.nan
-        self.ended[run] = outcome.t
-        self.diverged[run], self.stopped[run] = (outcome.ending is x for x in (Ending.DIVERGED, Ending.STOPPED))
-        self.advice[run] = "" if outcome.ending is Ending.STOPPED else outcome.advice
+        self.outcomes[run] = outcome

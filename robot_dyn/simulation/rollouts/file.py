@@ -44,15 +44,15 @@ def _check(runs: Rollouts, found: Found) -> None:
         raise StoreError(f"arrays are of {found.lengths['n']} joints, 'joint_names' of {len(runs.joint_names)}")
     if not are_times(runs.t) or not len(runs.t):
         raise StoreError("the times of member 't' are not finite, or do not grow")
-    if not all(map(are_times, runs.ended[:, None])) or (runs.diverged & runs.stopped).any():
-        raise StoreError("members 'ended', 'diverged' and 'stopped' are not those of runs")
+    if not all(map(are_times, runs.ended[:, None])):
+        raise StoreError("the times in 'outcomes' are not those of runs")
     numbered = (number for each in (() if runs.saved is None else runs.saved.remarks) for number in each.runs)
     if len(runs.observed.levels) != runs.observed.limits.shape[1]:
         raise StoreError("'observed/levels' are not those of member 'observed/limits'")
     if not all(0 <= number < len(runs) for number in (*numbered, 0 if runs.saved is None else runs.saved.worst)):
         raise StoreError(f"'saved' is about a run that is not one of the {len(runs)}")
-    if len(runs.advice) != len(runs):
-        raise StoreError(f"'advice' is of {len(runs.advice)} runs, not of {len(runs)}")
+    if len(runs.outcomes) != len(runs.q0):
+        raise StoreError(f"'outcomes' is of {len(runs.outcomes)} runs, not of {len(runs.q0)}")
     if runs.work is not None and set(runs.work) != set(runs.sources):
         raise StoreError("members 'work/…' and 'sources' have different names")
     whole = ~(runs.diverged | runs.stopped)[:, None] & (

@@ -29,19 +29,18 @@ from robot_dyn.simulation.rollouts.one_by_one import singles
 from robot_dyn.simulation.rollouts.pool import in_threads
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
 from robot_dyn.simulation.run.fixed_step import samples_at_most
-from robot_dyn.simulation.run.outcome import Ending, Outcome
+from robot_dyn.simulation.run.outcome import Outcome, Reason
 from robot_dyn.simulation.run.recording import records_of
-from robot_dyn.simulation.run.watch import LARGEST, diverged_advice
+from robot_dyn.simulation.run.watch import LARGEST, step_and_period
 from robot_dyn.simulation.setup.schedule import ON_STEP
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 
 LANES = 64  # runs in a tile: with 8, 16 or 32 a step of RK4 took 1.5, 1.1 and 1.05 times as long
 _REASONS = {
-    Why.GOES_ON: "",
-    Why.OVERFLOWED: "a number overflowed",
-    Why.GAINED: "energy grows without a source",
-    Why.NOT_FOUND: "the stages of a step are not found",
+    Why.OVERFLOWED: Reason.STATE_OVERFLOWS,
+    Why.GAINED: Reason.ENERGY_WITHOUT_SOURCE,
+    Why.NOT_FOUND: Reason.STAGES_NOT_FOUND,
 }
 _INSTANTS = 200  # at least, or every step, at which an actuation that changes between ticks is observed
 
@@ -99,7 +98,7 @@ class Tiles:
 
         in_threads(self._tile, len(self.t), threads, self.stop, lambda: report(self._reached()))
         result = self._record(self._repeated(threads, report), began)
-        if on_progress is not None and not result.stopped.any():
+        if on_progress is not None and all(x.reason is not Reason.INTERRUPTED for x in result.outcomes):
             report(end)
         return result
 
@@ -162,10 +161,12 @@ class Tiles:
         """Return the record of lock step, with repeated runs in place of those that passed a threshold."""
         B, setup, t = len(self.batch), self.setup, max(self.t, key=len)
         why, ended = self.why[:B], self.ended[:B].copy()
-        advice = [""] * B
+        outcomes = [Outcome(Reason.END, setup.duration_s)] * B
+        for run in np.flatnonzero(np.repeat(self.unfinished, LANES)[:B]).tolist():
+            outcomes[run] = Outcome(Reason.INTERRUPTED, float(ended[run]))
         for run in np.flatnonzero(why).tolist():
             fastest = self.code.compiled_form.fastest_joint(self.last[:, run])
-            advice[run] = diverged_advice(_REASONS[Why(why[run])], fastest, setup)
+            outcomes[run] = Outcome(_REASONS[Why(why[run])], float(ended[run]), fastest, step_and_period(setup))
         columns, sizes = dict[str, np.ndarray](), self.batch.sizes
         for array, names in ((self.out_y, self.states), (self.out_extras, self.batch.extras)):
             by_run = np.moveaxis(array[: len(t), :, :B], -1, 0)
@@ -178,8 +179,7 @@ class Tiles:
         alone = {run: single.observation for run, single in repeated.items() if single is not None}
         instants = self.steps // self.apart if self.apart > 1 else 0
         result = Record(
-            _compiled(setup), t, columns, ended, why > 0, np.repeat(self.unfinished, LANES)[:B] & (why == 0), advice,
-            self._steps(ended), np.repeat(self.evaluations, LANES)[:B],
+            _compiled(setup), t, columns, outcomes, self._steps(ended), np.repeat(self.evaluations, LANES)[:B],
             Statistics(setup.integrator.name, step, self.steps, most, perf_counter() - began, engine=label),
             observed(self.observations, self.levels, alone, instants)[:B],
         )  # fmt: skip
@@ -188,7 +188,7 @@ class Tiles:
                 result.write(run, single)
             else:
                 rows = int(np.searchsorted(t, self.until[run], side="right"))
-                result.cut(run, rows, Outcome(Ending.STOPPED, min(self.until[run], ended[run])))
+                result.cut(run, rows, Outcome(Reason.INTERRUPTED, float(min(self.until[run], ended[run]))))
         return result
 
     def _steps(self, ended: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.rollouts.batch import Batch, Record, Single
 from robot_dyn.simulation.rollouts.pool import in_threads
 from robot_dyn.simulation.run.make_run import make_run
-from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.simulation.run.outcome import Ending, Outcome, Reason
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -88,8 +88,7 @@ def one_by_one(batch: Batch, threads: int, on_progress: Callable[[float], object
     step = 0.0 if setup.integrator.controls_error else setup.duration_s / setup.steps
     steps, evaluations = (max((getattr(x, of) for x in made.values()), default=0) for of in ("steps", "evaluations"))
     result = Record(
-        setup, t, recorded, np.zeros(B), np.zeros(B, bool), np.ones(B, bool), [""] * B, np.zeros(B, np.int64),
-        np.zeros(B, np.int64),
+        setup, t, recorded, [Outcome(Reason.INTERRUPTED, 0.0)] * B, np.zeros(B, np.int64), np.zeros(B, np.int64),
         Statistics(setup.integrator.name, step, steps, evaluations, perf_counter() - began, engine=label),
         observed([starts], levels, {i: record.observation for i, record in made.items()}),
     )  # fmt: skip

@@ -18,6 +18,7 @@ from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_square, tracking_of
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
+from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.simulation.setup.setup import Setup
 
 OF_REFERENCES = RemarkKind.JUMPS, RemarkKind.HELD
@@ -181,18 +182,18 @@ def tracking_errors(runs: RolloutsData) -> np.ndarray | None:
     return np.array([root_mean_square(x[of]) if of.any() else np.nan for x, of in zip(deviation, known, strict=True)])
 
 
-def causes(runs: RolloutsData) -> tuple[str, ...]:
-    """The advice of each run; of the first that diverged with its loop as the cause, where that explains it.
+def causes(runs: RolloutsData) -> tuple[Outcome, ...]:
+    """Return the outcome of each run; of the first that diverged with its loop as the reason, if it explains it.
 
     Loops are linearised about the starts, which differ from run to run, as their parameters may.
     """
-    advice, diverged = list(runs.advice), np.flatnonzero(runs.diverged)
+    outcomes, diverged = list(runs.outcomes), np.flatnonzero(runs.diverged)
     controller = None if runs.setup is None else runs.setup.controller
     if controller is None or not len(diverged):
-        return runs.advice
+        return runs.outcomes
     earliest = diverged[np.argsort(runs.ended[diverged], kind="stable")]
     for run in list(dict.fromkeys([int(diverged[0]), *earliest.tolist()]))[:_JUDGED]:
         setup = runs.setup_of(run)
         remarks = unstable(setup, np.zeros(1), setup.equation.start(setup.q0, setup.v0)[None], True)
-        advice[run] = explained(runs.outcome(run), setup, remarks).advice
-    return tuple(advice)
+        outcomes[run] = explained(runs.outcome(run), setup, remarks)
+    return tuple(outcomes)

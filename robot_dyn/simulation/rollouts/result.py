@@ -23,6 +23,7 @@ from robot_dyn.simulation.rollouts.overview import of_some, overview
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
 from robot_dyn.simulation.rollouts.run import trajectory
 from robot_dyn.simulation.rollouts.table import columns, samples
+from robot_dyn.simulation.run.outcome import Reason
 
 _SHARED = ("joint_names", "t", "statistics", "sources", "about", "setup", "uncut", "saved", "numbers")  # by all runs
 _MOST_DRAWN = 2000  # runs whose quantiles a notebook shows
@@ -43,10 +44,7 @@ class Rollouts(RolloutsData):
         u: Actuation within its bounds, (B, m, n), in [N m] or [N].
         kinetic, potential: Energies, (B, m), in [J].
         work: Work done up to each sample by the control and by each other effect, by name, (B, m), in [J].
-        ended: Time at which each run ended, (B,), in [s].
-        diverged: Whether each run ended by diverging, (B,).
-        stopped: Whether each run was interrupted, (B,).
-        advice: Why a run diverged and what to do, or which event ended it, as in `simulate`; empty otherwise.
+        outcomes: How each run ended, B of them, as in `simulate`: reason, time, and the numbers that explain it.
         steps: Number of steps of each run, (B,).
         evaluations: Evaluations of the equation of motion by the group of 64 runs that includes each run, (B,).
         statistics: Statistics of the longest run; the time is that of all runs.
@@ -171,7 +169,7 @@ class Rollouts(RolloutsData):
             lines.append(f"cuts=False: no step ends at {levels}, and a run that passes one is not that of simulate")
         if self.diverged.any():
             run = int(self.diverged.argmax())
-            lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.advice[run]}")
+            lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.outcomes[run].text}")
         counted = len(self) > 1
         remarks = [each if counted else replace(each, runs=()) for each in self.remarks]
         lines += lines_of(remarks)
@@ -187,6 +185,6 @@ class Rollouts(RolloutsData):
     def _early(self) -> str:
         """How many runs ended early, and why."""
         at = f" by an interrupt, the first at t = {self.ended[self.stopped].min():g} s" if self.stopped.any() else ""
-        by_event = int((np.array([text != "" for text in self.advice]) & ~self.diverged).sum())
+        by_event = sum(outcome.reason is Reason.TERMINAL_EVENT for outcome in self.outcomes)
         early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped{at}"
         return early + (f", {by_event} ended by an event" if by_event else "")

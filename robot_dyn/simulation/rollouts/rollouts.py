@@ -120,7 +120,7 @@ def rollouts(
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
     batch = batch_of(setup, q0, v0, params or {}, record, numbers)
     runs = run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), most_bytes, on_progress)
-    return replace(runs, advice=causes(replace(runs, setup=setup)))
+    return replace(runs, outcomes=causes(replace(runs, setup=setup)))
 
 
 def batch_of(
@@ -195,7 +195,7 @@ def run_batch(
         u=columns.get("u"), kinetic=None if energy is None else energy[..., 0],
         potential=None if energy is None else energy[..., 1],
         work=None if work is None else dict(zip(sources, np.moveaxis(work, -1, 0), strict=True)),
-        ended=record.ended, diverged=record.diverged, stopped=record.stopped, advice=tuple(record.advice),
+        outcomes=tuple(record.outcomes),
         steps=record.steps, evaluations=record.evaluations, statistics=record.statistics, sources=sources,
         about=about | setup.about, params=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
         observed=record.observed, numbers=batch.numbers, uncut=() if cuts or passed is None else passed.names,

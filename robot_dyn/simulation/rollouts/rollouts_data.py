@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, final
 
 import numpy as np
@@ -48,10 +49,7 @@ class RolloutsData(RunData):
     kinetic: Annotated[np.ndarray, SAMPLED["kinetic"].of_runs] | None
     potential: Annotated[np.ndarray, SAMPLED["potential"].of_runs] | None
     work: dict[str, Annotated[np.ndarray, SAMPLED["work"].of_runs]] | None
-    ended: Annotated[np.ndarray, Layout(("B",))]
-    diverged: Annotated[np.ndarray, Layout(("B",), "bool")]
-    stopped: Annotated[np.ndarray, Layout(("B",), "bool")]
-    advice: tuple[str, ...]
+    outcomes: tuple[Outcome, ...]
     steps: Annotated[np.ndarray, Layout(("B",), "int64")]
     evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
     sources: tuple[str, ...]
@@ -65,15 +63,29 @@ class RolloutsData(RunData):
     numbers: Annotated[np.ndarray | None, NOT_STORED] = None
 
     def __len__(self) -> int:
-        return len(self.ended)
+        return len(self.outcomes)
+
+    @cached_property
+    def ended(self) -> np.ndarray:
+        """Time at which each run ended, (B,), in [s]."""
+        return np.array([outcome.t for outcome in self.outcomes])
+
+    @cached_property
+    def diverged(self) -> np.ndarray:
+        """Whether each run ended by diverging, (B,)."""
+        return self._ended_by(Ending.DIVERGED)
+
+    @cached_property
+    def stopped(self) -> np.ndarray:
+        """Whether each run was interrupted, (B,)."""
+        return self._ended_by(Ending.STOPPED)
+
+    def _ended_by(self, ending: Ending) -> np.ndarray:
+        return np.array([outcome.ending is ending for outcome in self.outcomes])
 
     def outcome(self, run: int) -> Outcome:
         """Return how a run ended; raises QueryError if no run has that number."""
-        run = integer("run", run, least=-len(self), most=len(self) - 1)
-        if self.stopped[run]:
-            return Outcome(Ending.STOPPED, float(self.ended[run]), "interrupted; all samples up to here are kept")
-        ending = Ending.DIVERGED if self.diverged[run] else Ending.FINISHED
-        return Outcome(ending, float(self.ended[run]), self.advice[run])
+        return self.outcomes[integer("run", run, least=-len(self), most=len(self) - 1)]
 
     def setup_of(self, run: int) -> Setup:
         """Return the setup of a single run: `rd.simulate(runs.setup_of(17))` repeats the run with an error estimate.

@@ -21,7 +21,7 @@ from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.observation.observation import NOTHING
 from robot_dyn.simulation.observation.observer import Observer
-from robot_dyn.simulation.run.outcome import Ending, GivesUp, Outcome, Stiff
+from robot_dyn.simulation.run.outcome import GivesUp, Outcome, Reason, Stiff
 from robot_dyn.simulation.run.recording import Path, Recording, Records, records_of
 from robot_dyn.simulation.run.watch import DivergedError, Watch
 from robot_dyn.simulation.setup.segment_table import SegmentTable
@@ -99,9 +99,9 @@ class Driver(ABC):
             with np.errstate(all="ignore"):  # what overflows ends the run
                 ended = self._loop()
         except DivergedError as end:
-            ended = Outcome(Ending.DIVERGED, end.t, str(end))
+            ended = end.outcome
         except KeyboardInterrupt:
-            ended = Outcome(Ending.STOPPED, self.time, "interrupted; all samples up to here are kept")
+            ended = Outcome(Reason.INTERRUPTED, self.time)
         return self._recording(ended) if isinstance(ended, Outcome) else ended
 
     def record(self) -> Recording:
@@ -153,7 +153,7 @@ class Driver(ABC):
                 budget = int(np.clip(budget * _PAUSE_S / max(spent, 1e-9), self.first // 10, 100 * budget))
         if self.on_progress is not None and self.time > reported:
             self.on_progress(self.time)
-        return Outcome(Ending.FINISHED, self.setup.duration_s)
+        return Outcome(Reason.END, self.setup.duration_s)
 
     def _go(self, budget: int) -> Ended | Stiff:
         """So many steps, with a rest whenever there is no room for what is observed and recorded."""

@@ -30,7 +30,7 @@ from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.run.event_loop import Times, event_loop
-from robot_dyn.simulation.run.outcome import Ending, GivesUp, Outcome, Stiff, TooLong
+from robot_dyn.simulation.run.outcome import GivesUp, Outcome, Reason, Stiff, TooLong
 from robot_dyn.simulation.run.recording import MOST_SHARED, Path, sample
 from robot_dyn.simulation.run.stiffness import FIRST_LOOK, changes_over
 from robot_dyn.simulation.run.switched_run import SwitchedRun
@@ -41,7 +41,6 @@ from robot_dyn.simulation.setup.setup import Setup
 from robot_dyn.simulation.setup.setup import samples as most_samples
 
 _SAMPLES = 1000  # of a run without a record period
-_GROWS = "y grows without bound, or tolerances are too tight"
 _COMPARED = 1000  # times at which a run is compared with runs of other tolerances
 _BRIEF = 1e-9  # of a run: events of one threshold in that part of it chatter
 _ACCUMULATED = 1000  # changes of the mode, in that part of the run: no motion that ends them is left between
@@ -148,7 +147,7 @@ class EventRun(SwitchedRun):
                 raise
             if not self.setup.integrator.controls_error:
                 self._review_step()
-            raise DivergedError(self.time, f"{error}, at t = {self.time}") from None
+            raise DivergedError(Outcome(Reason.CANNOT_EVALUATE, self.time, facts={"error": str(error)})) from None
         finally:
             self._take_log()
 
@@ -160,7 +159,7 @@ class EventRun(SwitchedRun):
         right_side = system(functions, equation, p, self.runs.run_parameters[: self.rules.held])
         h = float(self.control[At.TAKEN])
         one_step(self.setup.integrator, right_side, t, y, h, self.watch)
-        raise self.watch.diverged(t, y, "a number overflowed")
+        raise self.watch.diverged(Reason.STATE_OVERFLOWS, t, y)
 
     def _judge(self, ended: Ended) -> Outcome | GivesUp | None:
         if self.now[Now.EVALUATIONS] > self.most:
@@ -168,15 +167,15 @@ class EventRun(SwitchedRun):
         t, y = self.time, self.y
         if not np.isfinite(t):  # of an event that was looked for in states that overflow
             t = float(self.records.t[: int(self.now[Now.ROW])].max(initial=0.0))
-            raise DivergedError(t, f"the state overflows in a step after t = {t:.9g}: {_GROWS}")
+            raise DivergedError(Outcome(Reason.STATE_OVERFLOWS, t, facts={"largest": inf}))
         if t > self.past_horizon + self.setup.duration_s / _COMPARED:
-            return Outcome(Ending.FINISHED, self.past_horizon)
+            return Outcome(Reason.END, self.past_horizon)
         self.watch.pace(t, y, int(self.now[Now.STEPS]))
-        where = f"at t = {t}, max |y| = {np.abs(y).max():.3g}: {_GROWS}"
+        largest: dict[str, float | str] = {"largest": float(np.abs(y).max())}
         if ended is Ended.EVENT:
             if (name := self._event(t, y)) is not None:
                 self._sample_end(t)
-                return Outcome(Ending.FINISHED, t, f"ended by the event {name!r}")
+                return Outcome(Reason.TERMINAL_EVENT, t, facts={"event": name})
         elif ended in (Ended.CHANGED, Ended.ACCUMULATED, Ended.UNSETTLED):
             return self._end_mode(ended, t, y)
         elif ended is Ended.PAYLOAD:
@@ -188,13 +187,13 @@ class EventRun(SwitchedRun):
         elif ended is Ended.TOO_SMALL and not self.setup.integrator.controls_error:
             self._review_step()
         elif self.met is not None and ended in (Ended.TOO_SMALL, Ended.NOT_FINITE):
-            raise DivergedError(t, f"{self.met}, at t = {t}")
+            raise DivergedError(Outcome(Reason.CANNOT_EVALUATE, t, facts={"error": str(self.met)}))
         elif ended is Ended.TOO_SMALL:
-            raise DivergedError(t, f"the step became smaller than the spacing of floats {where}")
+            raise DivergedError(Outcome(Reason.STEP_BELOW_FLOAT_SPACING, t, facts=largest))
         elif ended is Ended.NOT_FINITE:
-            raise DivergedError(t, f"the rate is not finite {where}")
+            raise DivergedError(Outcome(Reason.RATE_NOT_FINITE, t, facts=largest))
         elif ended is Ended.FAST:
-            raise DivergedError(t, "a joint moves faster than 1e+06 rad/s: the control is unstable")
+            raise DivergedError(Outcome(Reason.IMPLAUSIBLE_SPEED, t, facts={"limit": 1e6}))
         return None
 
     def _sample_end(self, t: float) -> None:

@@ -22,7 +22,7 @@ from robot_dyn.simulation.engine.interpreted import interpreted, sample, system
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.run.driver import Driver
-from robot_dyn.simulation.run.outcome import Outcome
+from robot_dyn.simulation.run.outcome import Outcome, Reason
 from robot_dyn.simulation.run.recording import MOST_SHARED, Path, Recording
 from robot_dyn.simulation.run.time_loop import WATCHED, acts, time_loop
 from robot_dyn.simulation.run.watch import LARGEST, Watch, one_step, overflowed
@@ -124,7 +124,7 @@ class FixedStep(Driver):
         arguments = functions, coefficients, t, h, runs.y, p, runs.run_parameters, runs.after, work, runs.lost
         self.watch.answer(t, self.y, lambda: step(*arguments))
         if runs.lost[0] or overflowed(runs.after):
-            raise self.watch.diverged(t, self.y, "a number overflowed")
+            raise self.watch.diverged(Reason.STATE_OVERFLOWS, t, self.y)
         return runs.after[:, 0].copy()
 
     def _keys(self, places: np.ndarray) -> np.ndarray:

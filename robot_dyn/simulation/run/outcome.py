@@ -1,30 +1,199 @@
-"""How a run ended: its outcome, or why it gives up for another run to replace it."""
+"""Outcomes of runs: reason, time and the numbers that explain it; and the one place that words them.
+
+To answer "why did this run end?": find the reason below, then search for `Reason.<NAME>` to see where it is raised.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
+from string import Formatter
 from typing import final
 
 from robot_dyn.simulation.observation.remarks import Remark
 
+Facts = Mapping[str, float | str]
+"""Numbers and names by name: the fields of a sentence."""
+
 
 class Ending(StrEnum):
-    """How a run ended."""
+    """A run ends in one of three ways."""
 
     FINISHED = "finished"
     DIVERGED = "diverged"
     STOPPED = "stopped"
 
 
+class Reason(StrEnum):
+    """A run ends for one of these reasons."""
+
+    END = "end"
+    """The run reached its duration."""
+
+    TERMINAL_EVENT = "terminal_event"
+    """A user-defined event with `terminal=True` occurred. The last sample is the state at the event.
+
+    If the run should continue past it, pass `terminal=False`.
+    """
+
+    CONTROL_LOOP_UNSTABLE = "control_loop_unstable"
+    """The gains or the control period make deviations grow. A linearisation about a state of the run shows it.
+
+    Take lower gains or a shorter control period, as the message proposes; a smaller step does not help.
+    """
+
+    STEP_TOO_LONG = "step_too_long"
+    """The fixed step exceeds the stability limit of the method at the start of the run.
+
+    Take the step that the message names, or an implicit method.
+    """
+
+    IMPLAUSIBLE_SPEED = "implausible_speed"
+    """A joint moved faster than 100 times its velocity limit (100 rad/s if the file states none), or 1e6 rad/s.
+
+    A run by fixed steps ends here only if its energy ledger does not close. Check gains, period and step.
+    """
+
+    ENERGY_WITHOUT_SOURCE = "energy_without_source"
+    """The energy grew by 1000 times more than the work of all effects and of the control explains.
+
+    The step is too long, or an effect computes a wrong torque. Halve the step and compare.
+    """
+
+    STATE_OVERFLOWS = "state_overflows"
+    """A number of the state became infinite, nan or larger than 1e100.
+
+    The step is too long, the loop is unstable, or the inertia of a joint is close to zero.
+    """
+
+    RATE_NOT_FINITE = "rate_not_finite"
+    """The equation of motion returned nan or infinity, and shorter steps did not help.
+
+    The state grows without bound, or a tolerance is too tight.
+    """
+
+    STEP_BELOW_FLOAT_SPACING = "step_below_float_spacing"
+    """Error control reduced the step until t + h = t.
+
+    The state grows without bound, or a tolerance is too tight.
+    """
+
+    STALLED = "stalled"
+    """Error control takes steps so short that the rest of the run would need more than 1e7 of them: it is stiff.
+
+    Take Rosenbrock, softer effects or a larger tolerance.
+    """
+
+    STAGES_NOT_FOUND = "stages_not_found"
+    """An implicit method could not solve the equations of a step.
+
+    Take a smaller step, or a method for stiff systems.
+    """
+
+    EVENTS_ACCUMULATE = "events_accumulate"
+    """Impacts or changes between sliding and sticking follow each other in ever shorter times.
+
+    Take `integrator="time_stepping"` with a step, or soft stops and regularised friction.
+    """
+
+    TORQUE_NOT_FINITE = "torque_not_finite"
+    """The controller returned nan or infinity.
+
+    Check its gains and its reference, and that the state has not grown without bound before.
+    """
+
+    CANNOT_EVALUATE = "cannot_evaluate"
+    """A part of the equation of motion has no value at the state reached, such as a spring whose ends coincide.
+
+    The message names the part. Keep the motion away from that state, or change the part.
+    """
+
+    INTERRUPTED = "interrupted"
+    """Ctrl-C stopped the run. All samples up to there are kept."""
+
+    INTERRUPTED_IN_ESTIMATE = "interrupted_in_estimate"
+    """Ctrl-C stopped the companion runs of the error estimate. The run itself is complete."""
+
+
+_FINISHED = Reason.END, Reason.TERMINAL_EVENT
+_STOPPED = Reason.INTERRUPTED, Reason.INTERRUPTED_IN_ESTIMATE
+
+
 @final
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended: `ending` at time `t` in [s], and `advice` for a reader."""
+    """The end of a run.
 
-    ending: Ending
+    Attributes:
+        reason: The reason by name.
+        t: Time of the end, in [s].
+        joint: Name of the joint it concerns: the fastest, or the one that takes part most; empty if none.
+        facts: Numbers and names that explain it, by name; see `outcome.py` for those of each reason.
+    """
+
+    reason: Reason
     t: float
-    advice: str = ""
+    joint: str = ""
+    facts: dict[str, float | str] = field(default_factory=dict, hash=False)
+
+    @property
+    def ending(self) -> Ending:
+        """Finished, diverged or stopped, as the reason implies."""
+        if self.reason in _FINISHED:
+            return Ending.FINISHED
+        return Ending.STOPPED if self.reason in _STOPPED else Ending.DIVERGED
+
+    @property
+    def text(self) -> str:
+        """The reason in a sentence, with a remedy; empty if the run reached its duration."""
+        return sentence(_SENTENCES[self.reason], {"joint": self.joint, "t": self.t, **self.facts})
+
+
+_FASTEST = "; the fastest joint is {joint!r}: take a smaller step than {step_s:g} s, or an implicit method"
+_PERIOD = "; or, if the sampled loop is unstable, a shorter period than {period_s:g} s"
+_BENDS = " ({effect} of joint {effect_joint!r} bends within {width:.1e} {unit})"
+_GROWS = " at t = {t:.9g}, max |y| = {largest:.3g}: y grows without bound, or tolerances are too tight"
+_SENTENCES: Mapping[Reason, tuple[str, ...]] = {
+    Reason.END: (),
+    Reason.TERMINAL_EVENT: ("ended by the event {event!r}",),
+    Reason.CONTROL_LOOP_UNSTABLE: ("{cause}",),
+    Reason.STEP_TOO_LONG: ("{cause}",),
+    Reason.IMPLAUSIBLE_SPEED: (
+        "{cause}, and the energy ledger does not close: take a smaller step than {step_s:g} s, or an implicit method",
+        "a joint moves faster than {limit:g} rad/s: the control is unstable",
+    ),
+    Reason.ENERGY_WITHOUT_SOURCE: ("energy grows without a source", _FASTEST, _PERIOD),
+    Reason.STATE_OVERFLOWS: ("a number overflowed", _GROWS, _FASTEST, _PERIOD),
+    Reason.RATE_NOT_FINITE: ("the rate is not finite", _GROWS),
+    Reason.STEP_BELOW_FLOAT_SPACING: ("the step became smaller than the spacing of floats", _GROWS),
+    Reason.STALLED: (
+        "stalled: the last {steps} steps advanced {advanced_s:.1e} s, {remaining:.0e} more would be needed: the system "
+        "is stiff",
+        "; {motion}",
+        ": take {remedy}",
+        _BENDS,
+    ),
+    Reason.STAGES_NOT_FOUND: ("the stages of a step are not found", ": {error}", _FASTEST, _PERIOD, _BENDS),
+    Reason.EVENTS_ACCUMULATE: (
+        "events accumulate at t = {t:.9g}: {changes} changes of mode in {span_s:.1e} s, the last of joint {joint!r}; "
+        "take {remedy}",
+    ),
+    Reason.TORQUE_NOT_FINITE: ("the controller asks for a torque that is not finite", _FASTEST, _PERIOD),
+    Reason.CANNOT_EVALUATE: ("{error}, at t = {t:.9g}", _FASTEST, _PERIOD),
+    Reason.INTERRUPTED: ("interrupted; all samples up to here are kept",),
+    Reason.INTERRUPTED_IN_ESTIMATE: ("interrupted after the run, in its error estimate",),
+}
+
+
+def sentence(parts: tuple[str, ...], facts: Facts) -> str:
+    """Return the parts of a sentence with their facts filled in, without the parts whose facts are missing."""
+    return "".join(part.format_map(facts) for part in parts if _fields(part) <= facts.keys())
+
+
+def _fields(part: str) -> set[str]:
+    """Return the names of the facts in a part."""
+    return {name for _, name, _, _ in Formatter().parse(part) if name}
 
 
 @final

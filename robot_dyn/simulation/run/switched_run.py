@@ -24,7 +24,7 @@ from robot_dyn.simulation.events.sides import Sides, keep_numbers, sides_of
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.run.driver import Driver
-from robot_dyn.simulation.run.outcome import Accumulation
+from robot_dyn.simulation.run.outcome import Accumulation, Outcome, Reason
 from robot_dyn.simulation.run.watch import DivergedError
 from robot_dyn.simulation.setup.setup import STEP_S
 
@@ -174,7 +174,8 @@ class SwitchedRun(Driver):
         alone = motion.payloads or motion.drives  # which time stepping does not take
         if alone or not self.chooses:
             remedy = "soft stops and regularised friction" if alone else "integrator='time_stepping' and a step_s"
-            raise DivergedError(t, f"events accumulate at t = {t:.9g}: {what}; take {remedy}")
+            facts = {"changes": len(holding.changes), "span_s": span, "remedy": remedy}
+            raise DivergedError(Outcome(Reason.EVENTS_ACCUMULATE, t, joint, facts))
         speed = float(np.abs(y[self.rules.n : 2 * self.rules.n]).max())
         text = f"{what}, at t = {t:.6g} s"
         remedy = f"made by time stepping with steps of {STEP_S} s, without an estimate of its error"

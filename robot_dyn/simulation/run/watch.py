@@ -1,4 +1,4 @@
-"""Monitor a run: detect divergence and stalled steps, and compose the advice for the user."""
+"""Monitor a run: detect divergence and stalled steps."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import PortableError, RobotDynError, is_mistake
 from robot_dyn.foundations.values import cached
 from robot_dyn.integrate.integrator import IntegrationError, Integrator, System
-from robot_dyn.simulation.dynamics.fastest_motion import fastest
+from robot_dyn.simulation.dynamics.fastest_motion import Fastest, fastest
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.payload_events import PayloadEvents
+from robot_dyn.simulation.run.outcome import Outcome, Reason
 from robot_dyn.simulation.setup.setup import Setup
 
 LARGEST = 1e100  # limit on Σ |y|; products of larger numbers overflow
@@ -25,18 +26,18 @@ T = TypeVar("T")
 
 
 class DivergedError(PortableError):
-    """Internal: the run cannot continue past `t`; the message is advice to the user."""
+    """Internal: the run cannot continue; `outcome` states when and why."""
 
-    def __init__(self, t: float, advice: str) -> None:
-        super().__init__(advice)
-        self.t = t
+    def __init__(self, outcome: Outcome) -> None:
+        super().__init__(outcome.text)
+        self.outcome = outcome
 
 
 def one_step(method: Integrator, system: System, t: float, y: Array, h: float, watch: Watch) -> Array:
     """Return the state after a step; raises DivergedError if the step fails or a number overflows."""
     after = watch.answer(t, y, lambda: method.step(system, t, y, h))
     if overflowed(after):
-        raise watch.diverged(t, y, "a number overflowed")
+        raise watch.diverged(Reason.STATE_OVERFLOWS, t, y)
     return after
 
 
@@ -67,24 +68,25 @@ class Watch:
         """Run one controller tick; raises DivergedError if the tick fails or the torque is not finite."""
         y, held = self.answer(t, y, lambda: self.equation.tick(t, y))
         if held is not None and not np.isfinite(held).all():
-            raise self.diverged(t, y, "the controller asks for a torque that is not finite")
+            raise self.diverged(Reason.TORQUE_NOT_FINITE, t, y)
         return y, held
 
     def look(self, t: float, y: Array) -> None:
         """Raise DivergedError if energy grows without a source."""
         if self.answer(t, y, lambda: self.gains(t, y)):
-            raise self.diverged(t, y, "energy grows without a source")
+            raise self.diverged(Reason.ENERGY_WITHOUT_SOURCE, t, y)
 
     def answer(self, t: float, y: Array, ask: Callable[[], T]) -> T:
         """Return the result of `ask`; raises DivergedError if the equations cannot be evaluated."""
         try:
             return ask()
         except IntegrationError as error:  # the message already suggests a remedy
-            raise DivergedError(t, str(error) + self._steepest()) from None
+            facts: dict[str, float | str] = {"error": str(error), **self._steepest()}
+            raise DivergedError(Outcome(Reason.STAGES_NOT_FOUND, t, facts=facts)) from None
         except RobotDynError as error:
             if is_mistake(error):
                 raise
-            raise self.diverged(t, y, str(error)) from None
+            raise self.diverged(Reason.CANNOT_EVALUATE, t, y, error=str(error)) from None
 
     def pace(self, t: float, y: Array, steps: int) -> None:
         """Raise DivergedError if the steps of an adaptive method are too short for the run to finish."""
@@ -94,33 +96,34 @@ class Watch:
         made, self.paced, self.looked = t - self.paced, t, steps
         ahead = (self.setup.duration_s - t) / max(made, 1e-300) * since
         if ahead > _MOST_AHEAD:
-            why = self._fastest(t, y, made / since)
             implicit = "" if self.setup.integrator.name == "Rosenbrock" else "Rosenbrock, "
-            raise DivergedError(
-                t, f"the last {since} steps led {made:.1e} s on, at which pace {ahead:.0e} more are left: the system "
-                f"is stiff; {why}take {implicit}softer effects or a larger tolerance{self._steepest()}"
-            )  # fmt: skip
+            facts: dict[str, float | str] = {"steps": since, "advanced_s": made, "remaining": ahead}
+            facts["remedy"] = f"{implicit}softer effects or a larger tolerance"
+            motion = self._fastest(t, y, made / since)
+            facts |= {"motion": str(motion)} if motion else {}
+            joint = motion.joint if motion else ""
+            raise DivergedError(Outcome(Reason.STALLED, t, joint, facts | self._steepest()))
 
-    def _fastest(self, t: float, y: Array, h: float) -> str:
-        """Describe the fastest motion, if it is found at this state and fast enough for stability to limit h."""
+    def _fastest(self, t: float, y: Array, h: float) -> Fastest | None:
+        """Return the fastest motion if it is found at this state and fast enough for stability to limit h."""
         held = np.zeros(self.equation.plant.dynamics.n) if self.equation.sampled else None
         try:
             motion = fastest(self.equation, t, y, held)
         except (RobotDynError, np.linalg.LinAlgError):
-            return ""
-        return f"{motion}: " if abs(motion.eigenvalue) * h > 1 else ""
+            return None
+        return motion if abs(motion.eigenvalue) * h > 1 else None
 
-    def _steepest(self) -> str:
-        """Describe the effect that bends over the smallest range of q or v, if that range is small."""
-        names, found = self.equation.plant.dynamics.joint_names, (_STEEP, "")
+    def _steepest(self) -> dict[str, float | str]:
+        """Return the effect that bends over the smallest range of q or v, with its joint, if that range is small."""
+        names, width, steepest = self.equation.plant.dynamics.joint_names, _STEEP, dict[str, float | str]()
         for effect in self.equation.plant.effects:
-            for width, unit in zip(effect.widths, ("rad or m", "rad/s or m/s"), strict=True):
-                at = np.broadcast_to(width, (len(names),))
-                i = int(np.argmin(at))
-                found = min(
-                    found, (float(at[i]), f"{effect.name} of joint {names[i]!r} bends within {at[i]:.1e} {unit}")
-                )
-        return found[1] and f" ({found[1]})"
+            for widths, unit in zip(effect.widths, ("rad or m", "rad/s or m/s"), strict=True):
+                by_joint = np.broadcast_to(widths, (len(names),))
+                i = int(np.argmin(by_joint))
+                if by_joint[i] < width:
+                    width = float(by_joint[i])
+                    steepest = {"effect": effect.name, "effect_joint": names[i], "width": width, "unit": unit}
+        return steepest
 
     def gains(self, t: float, y: Array) -> bool:
         """Whether the ledger's residual shows energy growth without a source."""
@@ -128,14 +131,13 @@ class Watch:
         K, V = self.equation.energies(np.array([t]), q[None], v[None])
         return bool((K + V)[0] - self.energy - W.sum() > 1e3 * (self.scale + np.abs(W).sum()))
 
-    def diverged(self, t: float, y: Array, why: str) -> DivergedError:
-        """Return the error for a run that diverged at time t and state y; it names the fastest joint and a remedy."""
-        return DivergedError(t, diverged_advice(why, self.equation.fastest_joint(y), self.setup))
+    def diverged(self, reason: Reason, t: float, y: Array, **facts: str) -> DivergedError:
+        """Return the error for a run that diverged at time t and state y, with its fastest joint."""
+        joint = self.equation.fastest_joint(y)
+        return DivergedError(Outcome(reason, t, joint, facts | step_and_period(self.setup)))
 
 
-def diverged_advice(why: str, joint: str, setup: Setup) -> str:
-    """Describe why a run diverged, which joint moved fastest, and what to do, unless the loop explains it."""
-    advice = f"take a smaller step than {setup.taken_step_s:g} s, or an implicit method"
-    if setup.controller is not None and setup.controller.period_s:
-        advice += f"; or, if the sampled loop is unstable, a shorter period than {setup.controller.period_s:g} s"
-    return f"{why}; the fastest joint is {joint!r}: {advice}"
+def step_and_period(setup: Setup) -> dict[str, float | str]:
+    """Return the step and, of a sampled loop, the control period: the facts about a run that diverged."""
+    period_s = 0.0 if setup.controller is None else setup.controller.period_s
+    return {"step_s": setup.taken_step_s} | ({"period_s": period_s} if period_s else {})

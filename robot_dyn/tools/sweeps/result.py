@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -44,7 +43,6 @@ _SHOWN = 5  # reasons
 _WORST = 10  # runs in a report
 _PROBABILITIES = (0.05, 0.5, 0.95, 0.99)
 _GIVEN = "finished", "known"
-_NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
 
 @final
@@ -225,7 +223,7 @@ class SweepResult(Answer):
         blocks, drawing = [*self.probability("failed").blocks()], ""
         if failed.any():
             some = np.flatnonzero(failed)[:_WORST].tolist()
-            rows = ((i, str(table["outcome"][i]), str(table["reason"][i]), f"{self._repeat}({i})") for i in some)
+            rows = ((i, str(table["outcome"][i]), str(table["why"][i]), f"{self._repeat}({i})") for i in some)
             blocks.append(Table(("first runs that failed", "outcome", "reason", "repeat it by"), tuple(rows)))
         if failed.any() and len(varied) > 1:
             first, second = (varied[k] for k in strongest(failed, np.column_stack([table[name] for name in varied])))
@@ -326,11 +324,8 @@ class SweepResult(Answer):
         return dict(count.most_common())
 
     def reasons(self) -> dict[str, int]:
-        """Number of runs by reason of failure, the most frequent first; texts that differ in numbers alone are one."""
-        first, count = dict[str, str](), Counter[str]()
-        for text in self.folder.columns(("reason",))["reason"][self._failed].tolist():
-            count[first.setdefault(_NUMBER.sub("…", text), text)] += 1
-        return dict(count.most_common())
+        """Number of failed runs by reason, the most frequent first."""
+        return dict(Counter(self.folder.columns(("reason",))["reason"][self._failed].tolist()).most_common())
 
     @property
     def title(self) -> str:
@@ -344,8 +339,9 @@ class SweepResult(Answer):
         yield ", ".join(f"{count} {name}" for name, count in (self.outcomes or {}).items())
         if len(processors := self.processors) > 1:
             yield f"rows of several processors, whose last bits may differ: {', '.join(processors)}"
-        for text, count in list(self.reasons().items())[:_SHOWN]:
-            yield f"{count} times: {text}"
+        reasons, why = self.folder.columns(("reason", "why")).values()
+        for reason, count in list(self.reasons().items())[:_SHOWN]:
+            yield f"{count} times {reason}, first: {why[self._failed & (reasons == reason)][0]}"
         for text, count in (self.remarks or {}).items():
             yield f"remark on {count} of {self.sweep.runs} runs: {text}"
         yield "rd.simulate(done.setup_of(i)) makes run i by itself, with the error of its method and its energy ledger"

@@ -50,8 +50,12 @@ FIXED = (
     ),
     Column("ended", float, "s", "time at which the run ended; nan if it was not made", np.nan, lambda made: made.ended),
     Column(
-        "reason", object, "", "why the run failed, or which event ended it", "",
-        lambda made: np.array(made.advice, object),
+        "reason", object, "", "reason of the end, a member of robot_dyn.simulation.Reason; or raised", RAISED,
+        lambda made: np.array([outcome.reason.value for outcome in made.outcomes], object),
+    ),
+    Column(
+        "why", object, "", "the reason in a sentence, with the numbers of the run", "",
+        lambda made: np.array([outcome.text for outcome in made.outcomes], object),
     ),
     Column(
         "remarks", object, "", "remarks on the run, by kind, quantity and joint", "",

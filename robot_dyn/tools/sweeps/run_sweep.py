@@ -182,7 +182,7 @@ def pilot(sweep: Sweep, chunk: int | None = None) -> int:
     if raised.any() and not (rows["outcome"] == FINISHED).any():
         raise SweepError(
             f"none of the {count} runs of the pilot finishes, and {raised.sum()} raise; the first:"
-            f" {rows['reason'][raised][0]}"
+            f" {rows['why'][raised][0]}"
         )
     if chunk is not None:
         return chunk

@@ -84,7 +84,7 @@ class Work:
             rows = empty(last - first, dict(zip(self.sweep.columns, columns, strict=True)), self.sweep.figures)
             for runs, result in self._results(np.arange(first, last), values, look):
                 if isinstance(result, str):
-                    rows["outcome"][runs - first], rows["reason"][runs - first] = RAISED, result
+                    rows["why"][runs - first] = result
                     continue
                 self._write(rows, runs - first, result)
                 if kept is not None and t is not None:
@@ -137,7 +137,8 @@ class Work:
                     try:
                         rows[name][place] = figure.of(runs.only(i))[0]
                     except Exception as error:
-                        rows["outcome"][place], rows["reason"][place] = RAISED, f"figure {name}: {because(error)}"
+                        rows["outcome"][place] = rows["reason"][place] = RAISED
+                        rows["why"][place] = f"figure {name}: {because(error)}"
 
     def _results(
         self, runs: np.ndarray, values: dict[str, np.ndarray], look: Look | None = None

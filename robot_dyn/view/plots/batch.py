@@ -18,7 +18,7 @@ from robot_dyn.queries.units import unit
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import tracking_of
 from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
-from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.simulation.run.outcome import Ending, Reason
 from robot_dyn.view.plots.figure import LOST, TIME, Axes, Cell, Curve, Style
 from robot_dyn.view.plots.parts import PlotError
 from robot_dyn.view.plots.sheet import Panel, in_rows
@@ -114,7 +114,7 @@ def tracking(view: BatchView) -> list[Panel]:
 def outcomes(view: BatchView) -> list[Panel]:
     """How many runs finished, ended by an event, diverged, or were stopped."""
     runs = view.runs
-    by_event = np.array([text != "" for text in runs.advice]) & ~runs.diverged & ~runs.stopped
+    by_event = np.array([outcome.reason is Reason.TERMINAL_EVENT for outcome in runs.outcomes])
     kinds = {"ended by an event": by_event, "diverged": runs.diverged, "stopped": runs.stopped}
     kinds = {"finished": ~np.any(list(kinds.values()), axis=0)} | kinds
     counts = {name: int(some.sum()) for name, some in kinds.items() if some.any()}

@@ -102,7 +102,7 @@ def plot(
         panels = [panel for name in parts or ("overview",) for panel in PLOTS[name](view)]
         end = run.outcome
         title = f"{run.about.get('robot', 'run')}: {end.ending} at t = {end.t:g} s, {run.statistics.method}"
-        remarks = [text for text in (end.advice, *remark_lines(run.remarks)) if text]
+        remarks = [text for text in (end.text, *remark_lines(run.remarks)) if text]
         return draw(panels, title, remarks, look, width, end.ending is Ending.DIVERGED)
 
 

@@ -47,7 +47,7 @@ SMOOTH = (2, 3)  # places of regularised friction and of stops as springs among 
 
 def words(run: rd.Trajectory) -> str:
     """What the library says against a run."""
-    return "; ".join(each for each in (run.outcome.advice, run.error.note, run.leak) if each)
+    return "; ".join(each for each in (run.outcome.text, run.error.note, run.leak) if each)
 
 
 def of_estimates(case: str, found: list[Judgement]) -> Iterator[Row]:

@@ -47,7 +47,7 @@ def ours(robot: rd.Robot, q0: Any, duration: float, effects: list[Any], **option
     """The end of a run of this library."""
     run = rd.simulate(rd.Plant(robot, effects), q0, duration_s=duration, **options)
     end = run.outcome
-    said = f"error of q: {run.error}" if end.ending == "finished" else f"{end.ending}: {end.advice}"
+    said = f"error of q: {run.error}" if end.ending == "finished" else f"{end.ending}: {end.text}"
     return End(run.q[-1], run.v[-1], said, run.error.largest if end.ending == "finished" else np.nan)
 
 

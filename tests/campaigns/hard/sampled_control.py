@@ -65,7 +65,7 @@ def run_at(arm: rd.Robot, q: np.ndarray, law: rd.control.Controller, period: flo
 def words(run: rd.Trajectory) -> str:
     """What the summary says of a loop that is unstable."""
     of = [each for each in run.remarks if each.kind in (RemarkKind.UNSTABLE, RemarkKind.CHATTER)]
-    return "; ".join([run.outcome.advice] * bool(run.outcome.advice) + remark_lines(of))
+    return "; ".join([run.outcome.text] * bool(run.outcome.text) + remark_lines(of))
 
 
 def limit_of(name: str, kind: str, seed: int) -> Iterator[Row]:

@@ -154,7 +154,7 @@ def _path(name: str, path: Path, seed: int) -> Iterator[Row]:
     run = rd.simulate(robot, start, controller=law, **options)
     away = rd.simulate(robot, other, controller=control(robot, path, beside, other), **options)
     told = [each for each in run.remarks if each.kind is RemarkKind.DAMPED]
-    said = "; ".join([run.outcome.advice] * bool(run.outcome.advice) + remark_lines(told))
+    said = "; ".join([run.outcome.text] * bool(run.outcome.text) + remark_lines(told))
     for symbol, row in (("v", 1), ("τ", 2)):
         largest = [float(np.abs(each.extremes[row]).max()) for each in (run, away)]
         yield Row(name, f"|{symbol}| over that of the path {AWAY} m away", largest[0] / largest[1], MOST, said)

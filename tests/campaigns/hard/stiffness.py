@@ -53,7 +53,7 @@ def _asked(case: str, motion: Motion, setup: rd.Setup) -> Row:
         run = rd.simulate(setup, accuracy=ASKED)
     except RobotDynError as refusal:
         return Row(case, what, float("nan"), TIMES, str(refusal))
-    return Row(case, what, true_error(run, motion) / ASKED, TIMES, run.outcome.advice)
+    return Row(case, what, true_error(run, motion) / ASKED, TIMES, run.outcome.text)
 
 
 def _controlled(case: str, motion: Motion, setup: rd.Setup) -> Row:
@@ -68,7 +68,7 @@ def _fixed(case: str, name: str, motion: Motion, setup: rd.Setup) -> Row:
     run = rd.simulate(setup)
     what = f"{name} of {setup.nominal_step_s:g} s: true error over estimate"
     if run.outcome.ending != "finished":
-        return Row(case, what, float("nan"), 1 / LEAST, run.outcome.advice)
+        return Row(case, what, float("nan"), 1 / LEAST, run.outcome.text)
     if not run.error.until_s > 0:
         return Row(case, what, float("nan"), 1 / LEAST, str(run.error))
     found = max(true_error(run, motion), ROUNDING) / max(run.error.at(run.error.until_s), ROUNDING)

@@ -76,7 +76,7 @@ def swing(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
     setup = rd.Setup(rd.Plant(robot), rng.uniform(-0.5, 0.5, robot.n), np.zeros(robot.n), duration_s=SWING_S)
     run = rd.simulate(setup)
     if run.outcome.ending != "finished":
-        yield Row(name, "swing: true error / estimate", np.nan, 1 / LEAST, run.outcome.advice or run.outcome.ending)
+        yield Row(name, "swing: true error / estimate", np.nan, 1 / LEAST, run.outcome.text or run.outcome.ending)
         return
     if robot.couplings.trivial:
         true = np.vstack([setup.q0, truth(setup, run.t[1:])])
@@ -106,7 +106,7 @@ def held(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:
     weight = np.abs(robot.N(q))
     effects = [rd.effects.DryFriction(1.01 * weight + 1e-3 * weight.max() + 1e-9)]
     run = rd.simulate(rd.Plant(robot, effects), q, duration_s=HELD_S)
-    yield Row(name, "held by friction: moved", float(np.abs(run.q - q).max()), 0.0, run.outcome.advice)
+    yield Row(name, "held by friction: moved", float(np.abs(run.q - q).max()), 0.0, run.outcome.text)
 
 
 def sampled(name: str, robot: rd.Robot, seed: int) -> Iterator[Row]:

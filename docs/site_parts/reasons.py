@@ -1,0 +1,78 @@
+"""The page of reasons: the docstring of each member of `Reason`, and an example of its message."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from inspect import getsource
+from textwrap import dedent
+
+from robot_dyn.simulation import Outcome, Reason
+
+_STEP = {"step_s": 0.002, "period_s": 0.01}
+_LARGEST = {"largest": 3.2e101}
+EXAMPLES = {
+    Reason.TERMINAL_EVENT: {"event": "the tip touches the table"},
+    Reason.CONTROL_LOOP_UNSTABLE: {
+        "cause": "control loop unstable, deviations grow: elbow_joint by 1.31 in each period of 0.01 s about the state "
+        "at 0 s, by 5.2e+11 over the run; the loop is stable up to 0.0062 s: take period_s=0.005, or lower gains"
+    },
+    Reason.STEP_TOO_LONG: {
+        "cause": "step too long to be stable: 0.01 s, rk4 is stable up to 0.004 s; the fastest motion changes with 710 "
+        "per second, of joint 'elbow_joint', by 'joint_stops'; take step_s=0.002, or an implicit method"
+    },
+    Reason.IMPLAUSIBLE_SPEED: {
+        "cause": "elbow_joint reached 640 rad/s, over 100 times its limit (3.15): check gains and step", **_STEP
+    },
+    Reason.ENERGY_WITHOUT_SOURCE: _STEP,
+    Reason.STATE_OVERFLOWS: _STEP,
+    Reason.RATE_NOT_FINITE: _LARGEST,
+    Reason.STEP_BELOW_FLOAT_SPACING: _LARGEST,
+    Reason.STALLED: {
+        "steps": 2600, "advanced_s": 3e-4, "remaining": 1e7,
+        "remedy": "Rosenbrock, softer effects or a larger tolerance",
+    },
+    Reason.STAGES_NOT_FOUND: {
+        "error": "gauss: the stages of the step 0.01 at t = 0.13 do not converge in 50 iterations: take a smaller "
+        "step, or a method for stiff systems"
+    },
+    Reason.EVENTS_ACCUMULATE: {
+        "changes": 1000, "span_s": 2.1e-10, "remedy": "integrator='time_stepping' and a step_s"
+    },
+    Reason.TORQUE_NOT_FINITE: _STEP,
+    Reason.CANNOT_EVALUATE: {
+        "error": "line_spring_damper: its ends are at the same place, where it has no direction", **_STEP
+    },
+}  # fmt: skip
+"""Facts of an example, by reason."""
+
+
+def page(_: str) -> str:
+    """What happened, what to do and an example message, for each reason."""
+    return "\n".join(_page())
+
+
+def docstrings() -> dict[Reason, str]:
+    """Return the docstring of each member: the string after its assignment."""
+    (tree,) = ast.parse(dedent(getsource(Reason))).body
+    assert isinstance(tree, ast.ClassDef)
+    found = {}
+    for name, text in zip(tree.body, tree.body[1:], strict=False):
+        if isinstance(name, ast.Assign) and isinstance(text, ast.Expr):
+            found[Reason[ast.unparse(name.targets[0])]] = dedent("    " + ast.literal_eval(text.value)).strip()
+    return found
+
+
+def _page() -> Iterator[str]:
+    texts = docstrings()
+    for reason in Reason:
+        example = Outcome(reason, 0.137, "elbow_joint", dict(EXAMPLES.get(reason, {})))
+        yield f"## {reason}"
+        yield ""
+        yield f"`Reason.{reason.name}`, {example.ending}"
+        yield ""
+        yield texts[reason]
+        yield ""
+        if example.text:
+            yield f"> {example.text}"
+            yield ""
