@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -113,23 +114,34 @@ def test_numbers_of_any_form_give_the_same_answer(form: str, place: int) -> None
         np.testing.assert_allclose(getattr(PLANT, name)(0.25, *given), timed, rtol=1e-12)
 
 
+WRONG: list[Any] = [np.ones(1), np.ones(3), np.array(1.0), [1.0, "x"], None, np.array([1.0, np.nan])]
+WRONG += [np.full(2, np.inf), np.full((3, 2), np.nan), *(np.ones(2, kind) for kind in ("M8[s]", complex, object))]
+
+
 @pytest.mark.parametrize("place", [0, 1, 2])
-@pytest.mark.parametrize(
-    "wrong", [np.ones(1), np.ones(3), np.array(1.0), np.ones(2, "M8[s]"), np.ones(2, complex), np.ones(2, object)]
-)
-def test_arrays_that_fit_no_joints_are_refused(wrong: np.ndarray, place: int) -> None:
-    given = state(False)
+@pytest.mark.parametrize("wrong", WRONG)
+def test_what_is_no_state_is_refused_in_the_words_of_the_robot(wrong: Any, place: int) -> None:
+    given: list[Any] = state(False)
     given[place] = wrong
-    with pytest.raises(QueryError):
-        FAST.forward_dynamics(*given)
-    with pytest.raises(QueryError):
-        PLANT.forward_dynamics(0.25, *given)
+    refusals = []
+    for ask in (ARM.forward_dynamics, FAST.forward_dynamics, partial(PLANT.forward_dynamics, 0.25)):
+        with pytest.raises(QueryError) as refused:
+            ask(*given)
+        refusals.append(str(refused.value))
+    assert refusals[0] == refusals[1]
 
 
-def test_a_plant_that_was_used_can_be_pickled() -> None:
-    right = PLANT.forward_dynamics(0.3, *state(False))
-    again = pickle.loads(pickle.dumps(PLANT))
-    np.testing.assert_array_equal(again.forward_dynamics(0.3, *state(False)), right)
+def test_batches_that_do_not_match_are_refused() -> None:
+    with pytest.raises(QueryError, match="batch axes do not match"):
+        FAST.inverse_dynamics(np.ones((2, 2)), np.ones((3, 2)), np.ones(2))
+
+
+@pytest.mark.parametrize(("engine", "time"), [(FAST, ()), (PLANT, (0.3,))], ids=["robot", "plant"])
+def test_what_was_used_can_be_pickled(engine: Any, time: tuple[float, ...]) -> None:
+    """As its robot or plant and its options; the kernels are made again."""
+    right = engine.forward_dynamics(*time, *state(False))
+    again = pickle.loads(pickle.dumps(engine))
+    np.testing.assert_array_equal(again.forward_dynamics(*time, *state(False)), right)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from robot_dyn.codegen import primitives as loops
 from robot_dyn.foundations import MachineCodeError
 from robot_dyn.integrate import primitives
 from robot_dyn.integrate.primitives import GOING
+from tests.codegen.cells import cell
 
 SPECIAL = np.array([0.0, -0.0, np.nan, np.inf, -np.inf, 5e-324, -2e-310, 1e308, -1e-308, 1.0, -1.0])
 RUNS = pytest.mark.parametrize("W", [1, 3, 64], ids=["one run", "3 runs", "64 runs"])
@@ -24,10 +27,18 @@ def numbers(rng: np.random.Generator, *shape: int, special: float = 0.25) -> np.
     return np.where(rng.random(shape) < special, rng.choice(SPECIAL, shape), x)
 
 
+@cache
+def machine_code(primitive: Callable[..., Any]) -> Any:
+    """A primitive, called by a function of the subset: a call from outside gives numbers alone."""
+    names, result = ", ".join(signature(primitive).parameters), signature(primitive).return_annotation
+    caller = f"def f({names}):\n    {'return ' * (result != 'None')}call({names})\n"
+    return MachineFunction(cell(caller, call=primitive).f, INSTEAD, lambda: None, "").calls()
+
+
 def three_ways(function: Callable[..., Any], plain: Callable[..., Any] | None, *given: Any) -> None:
     """By NumPy, by machine code and by the loops as Python runs them: results and arrays."""
     results = []
-    ways = [function, MachineFunction(function, INSTEAD, lambda: None, "").calls(), *([plain] if plain else [])]
+    ways = [function, machine_code(function), *([plain] if plain else [])]
     for way in ways:
         own = [x.copy() if isinstance(x, np.ndarray) else x for x in given]
         with np.errstate(all="ignore"):
@@ -42,54 +53,7 @@ def three_ways(function: Callable[..., Any], plain: Callable[..., Any] | None, *
             np.testing.assert_array_equal(np.signbit(x[here]), np.signbit(y[here]))
 
 
-# A function of the subset for each, since a call from outside gives numbers alone
-
-
-def combined(x, y, h, w, K, count):
-    primitives.combination(x, y, h, w, K, count)
-
-
-def copied(x, y):
-    primitives.copy(x, y)
-
-
-def summed(x, out):
-    primitives.sizes(x, out)
-
-
-def subtracted(x, y):
-    primitives.subtract(x, y)
-
-
-def enclosed(low, high, x, least, most):
-    return primitives.enclose(low, high, x, least, most)
-
-
-def limited(x, limit):
-    return primitives.below(x, limit)
-
-
-def normed(x, y, after, rtol, atol):
-    return primitives.norm(x, y, after, rtol, atol)
-
-
-def within(y, F, theta, out):
-    primitives.between(y, F, theta, out)
-
-
-def settled(Z, new, y, least, stale, state, epsilon):
-    return primitives.settle(Z, new, y, least, stale, state, epsilon)
-
-
-def factored(A, J, scale, rows, lost):
-    primitives.factor(A, J, scale, rows, lost)
-
-
-def solved(A, rows, x):
-    primitives.solve(A, rows, x)
-
-
-def multiplied(x, h, out):
+def multiplied(x, h, out) -> None:
     np.multiply(x, h, out)
 
 
@@ -102,9 +66,9 @@ def test_combinations(m: int, W: int) -> None:
     some, none = [0.5, 0.0, -1.0, 0.0, 3.0], [0.0] * 5
     weights = rng.normal(size=5).tolist(), some, none, none, [0, 0, 1.0, 0, 0], [0.0, -0.0, np.nan, 1, 1]
     for h, w in zip((1e-3, -2.0, -1.0, np.inf, 0.25, 1.0), map(np.array, weights), strict=True):
-        three_ways(combined, loops.combination, x, y, h, w, K, 5)
-        three_ways(combined, loops.combination, x, y, h, w, K, 3)
-    three_ways(combined, loops.combination, x, y, 0.5, np.ones(5), K, 0)
+        three_ways(primitives.combination, loops.combination, x, y, h, w, K, 5)
+        three_ways(primitives.combination, loops.combination, x, y, h, w, K, 3)
+    three_ways(primitives.combination, loops.combination, x, y, 0.5, np.ones(5), K, 0)
 
 
 @RUNS
@@ -113,15 +77,15 @@ def test_entries(W: int) -> None:
     rng = np.random.default_rng(W)
     for m in (1, 7, 12):
         x, y = numbers(rng, m, W), numbers(rng, m, W)
-        three_ways(copied, None, x, y)
-        three_ways(copied, None, x[:, 0].copy(), y[:, 0])
-        three_ways(subtracted, None, x, y)
+        three_ways(primitives.copy, None, x, y)
+        three_ways(primitives.copy, None, x[:, 0].copy(), y[:, 0])
+        three_ways(primitives.subtract, None, x, y)
         three_ways(multiplied, None, x, -0.3, y)
-        three_ways(summed, loops.sizes, numbers(rng, m, W, special=0.02), np.full(W, np.nan))
+        three_ways(primitives.sizes, loops.sizes, numbers(rng, m, W, special=0.02), np.full(W, np.nan))
     for _ in range(9):  # of like sizes, where the order is seen
-        three_ways(summed, loops.sizes, rng.normal(size=(40, W)), np.zeros(W))
+        three_ways(primitives.sizes, loops.sizes, rng.normal(size=(40, W)), np.zeros(W))
         if W == 1:
-            three_ways(normed, loops.norm, *rng.normal(size=(3, 40, 1)), 1e-6, 1e-9)
+            three_ways(primitives.norm, loops.norm, *rng.normal(size=(3, 40, 1)), 1e-6, 1e-9)
 
 
 @RUNS
@@ -132,12 +96,12 @@ def test_bounds(W: int) -> None:
         low, high, x = (np.where(each == 0.0, 1.0, each) for each in numbers(rng, 3, length))
         low, high = np.nan_to_num(low, nan=np.inf), np.nan_to_num(high, nan=-np.inf)
         for limits in ((-np.inf, np.inf), (np.fmin.reduce(x), np.fmax.reduce(x)), (-1e9, 1e9)):
-            three_ways(enclosed, None, low, high, x, *limits)
+            three_ways(primitives.enclose, None, low, high, x, *limits)
         for at in rng.integers(0, length, 3):  # one entry outside, by one unit in the last place
             inside = rng.uniform(-1.0, 1.0, length)
             for limits in ((np.nextafter(-2.0, -3.0), 1.0), (-1.0, np.nextafter(2.0, 1.0))):
                 inside[at] = -2.0 if limits[1] == 1.0 else 2.0
-                three_ways(enclosed, None, low, high, inside, *limits)
+                three_ways(primitives.enclose, None, low, high, inside, *limits)
 
 
 @RUNS
@@ -145,15 +109,15 @@ def test_limits(W: int) -> None:
     """All entries are less; one that is not, or is nan, or is the limit, is found at each place. Of integers, too."""
     for length in (W, 2 * W + 5):
         x, whole = np.random.default_rng(W).uniform(-1.0, 1.0, length), np.zeros(length, np.int64)
-        three_ways(limited, None, x, 1.0)
-        three_ways(limited, None, whole, 1)
+        three_ways(primitives.below, None, x, 1.0)
+        three_ways(primitives.below, None, whole, 1)
         assert primitives.below(x, 1.0) and primitives.below(whole, 1)
         for at in {0, W // 2, W - 1, length - 1}:
             for value in (1.0, np.nan, np.inf):
                 other = np.where(np.arange(length) == at, value, x)
                 assert not primitives.below(other, 1.0)
-                three_ways(limited, None, other, 1.0)
-            three_ways(limited, None, (np.arange(length) == at).astype(np.int64), 1)
+                three_ways(primitives.below, None, other, 1.0)
+            three_ways(primitives.below, None, (np.arange(length) == at).astype(np.int64), 1)
 
 
 def test_norms() -> None:
@@ -161,7 +125,7 @@ def test_norms() -> None:
     rng = np.random.default_rng(5)
     for special in (0.0, 0.0, 0.05, 0.3):
         given = [numbers(rng, 9, 1, special=special) for _ in range(3)]
-        three_ways(normed, loops.norm, *given, 1e-6, 1e-9)
+        three_ways(primitives.norm, loops.norm, *given, 1e-6, 1e-9)
 
 
 @RUNS
@@ -170,7 +134,7 @@ def test_polynomials(W: int) -> None:
     for d in (3, 4, 7):
         y, F = numbers(rng, 6, W), numbers(rng, d, 6, W)
         for theta in (0.0, 0.3, 1.0, -0.0):
-            three_ways(within, loops.between, y, F, theta, np.zeros((6, W)))
+            three_ways(primitives.between, loops.between, y, F, theta, np.zeros((6, W)))
 
 
 @RUNS
@@ -182,8 +146,8 @@ def test_iterations(W: int) -> None:
         new = Z + rng.normal(size=Z.shape) * 10.0 ** rng.integers(-20, 2, Z.shape)
         least, stale = np.abs(numbers(rng, 5, W, special=0.1)), rng.integers(0, 4, W)
         state = rng.choice([GOING, GOING, 0, 2], W)
-        three_ways(settled, loops.settle, Z, new, y, least, stale, state, 2.0**-52)
-        three_ways(settled, loops.settle, Z, Z.copy(), y, least, stale, state, 2.0**-52)
+        three_ways(primitives.settle, loops.settle, Z, new, y, least, stale, state, 2.0**-52)
+        three_ways(primitives.settle, loops.settle, Z, Z.copy(), y, least, stale, state, 2.0**-52)
 
 
 @RUNS
@@ -197,27 +161,27 @@ def test_elimination(m: int, W: int) -> None:
         J[0, :, 0] = 0.0
         J[0, 0, 0] = 0.5  # 1 − 2 · 0.5 = 0
         A, rows, lost = np.zeros((m, m, W)), np.zeros((m, W), np.int64), np.zeros(W, np.int64)
-        three_ways(factored, loops.factor, A, J, 2.0, rows, lost)
+        three_ways(primitives.factor, loops.factor, A, J, 2.0, rows, lost)
         with np.errstate(all="ignore"):
             primitives.factor(A, J, 2.0, rows, lost)
-        three_ways(solved, loops.solve, A, rows, numbers(rng, m, W, special=special))
+        three_ways(primitives.solve, loops.solve, A, rows, numbers(rng, m, W, special=special))
 
 
-@pytest.mark.parametrize(
-    ("function", "given", "message"),
-    [
-        (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(2), np.ones((4, 3, 1)), 4), "of a combination"),
-        (combined, (np.ones((3, 1)), np.ones((3, 1)), 1.0, np.ones(4), np.ones((4, 2, 1)), 4), "of a combination"),
-        (subtracted, (np.ones((3, 1)), np.ones((2, 1))), "have different sizes"),
-        (enclosed, (np.ones(4), np.ones(4), np.ones(3), 0.0, 2.0), "have different sizes"),
-        (enclosed, (np.ones(3), np.ones(4), np.ones(3), 0.0, 2.0), "have different sizes"),
-        (normed, (np.ones((3, 1)), np.ones((2, 1)), np.ones((3, 1)), 1.0, 1.0), "arrays of a norm"),
-        (solved, (np.ones((3, 3, 1)), np.full((3, 1), 7), np.ones((3, 1))), "a row to exchange is out of range"),
-        (factored, (np.ones((3, 3, 1)), np.ones((2, 3, 1)), 1.0, np.zeros((3, 1), np.int64), np.zeros(1, np.int64)),
-         "arrays of an elimination"),
-    ],
-)  # fmt: skip
-def test_arrays_of_other_sizes_end_the_call(function: Any, given: Any, message: str) -> None:
+LOST = np.zeros(1, np.int64)
+WRONG = [  # arrays of ones by their shapes
+    (primitives.combination, ((3, 1), (3, 1), 1.0, (2,), (4, 3, 1), 4), "of a combination"),
+    (primitives.combination, ((3, 1), (3, 1), 1.0, (4,), (4, 2, 1), 4), "of a combination"),
+    (primitives.subtract, ((3, 1), (2, 1)), "have different sizes"),
+    (primitives.enclose, ((4,), (4,), (3,), 0.0, 2.0), "have different sizes"),
+    (primitives.enclose, ((3,), (4,), (3,), 0.0, 2.0), "have different sizes"),
+    (primitives.norm, ((3, 1), (2, 1), (3, 1), 1.0, 1.0), "arrays of a norm"),
+    (primitives.solve, ((3, 3, 1), np.full((3, 1), 7), (3, 1)), "a row to exchange is out of range"),
+    (primitives.factor, ((3, 3, 1), (2, 3, 1), 1.0, np.zeros((3, 1), np.int64), LOST), "arrays of an elimination"),
+]
+
+
+@pytest.mark.parametrize(("primitive", "given", "message"), WRONG)
+def test_arrays_of_other_sizes_end_the_call(primitive: Any, given: Any, message: str) -> None:
     """Within a primitive nothing is checked: it looks at the sizes first."""
     with pytest.raises(MachineCodeError, match=message):
-        MachineFunction(function, INSTEAD, lambda: None, "").calls()(*given)
+        machine_code(primitive)(*(np.ones(x) if isinstance(x, tuple) else x for x in given))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.hostile.kinds import ARM, MASS, Kind, altered, arm, beside, inside, text
+from tests.hostile.kinds import ARM, MASS, Make, altered, arm, beside, inside, text
 
 
 def doctype(declaration: str, robot: str = ARM) -> str:
@@ -19,45 +19,33 @@ def encoded(encoding: str) -> str:
     return f'<?xml version="1.0" encoding="{encoding}"?>'
 
 
-NO_DOCTYPE = ("<!DOCTYPE", "remove the declaration")
-TOO_MUCH = ("line 1", "entity", "exceeds the limits of the parser", "remove it")
-UNDECLARED = ("which is not declared", "write its text instead")
-KINDS = [
-    Kind("a document type that declares nothing", text(doctype("")), NO_DOCTYPE),
-    Kind("a document type in UTF-16", text(encoded("UTF-16") + doctype("[]"), "utf-16"), NO_DOCTYPE),
-    Kind("a document type in UTF-7",
-         text((encoded("UTF-7") + doctype('[<!ENTITY m "1.5">]').replace("<", "+ADw-")).encode()), NO_DOCTYPE),
-    Kind("a document type of another file", beside(lambda secret: doctype(f'SYSTEM "{secret.as_uri()}"')),
-         NO_DOCTYPE),
-    Kind("a default attribute by document type",
-         text(doctype('[<!ATTLIST mass value CDATA "1.5">]', arm((MASS, "<mass/>")))), NO_DOCTYPE),
-    Kind("an entity in a number", text(doctype('[<!ENTITY m "1.5">]', arm((MASS, '<mass value="&m;"/>')))),
-         NO_DOCTYPE),
-    Kind("an entity without declaration after a comment and in UTF-16",
-         text(encoded("UTF-16") + arm((MASS, '<!-- &mdash; --><mass value="&heavy;"/>')), "utf-16"),
-         ("line 6", "&heavy;", *UNDECLARED)),
-    Kind("an entity without declaration", altered(MASS, '<mass value="&heavy;"/>'),
-         ("line 6", "&heavy;", *UNDECLARED)),
-    Kind("entities that grow in a text", text(doctype(laughs(), "<robot name='a'>&e9;</robot>")), TOO_MUCH),
-    Kind("entities that grow in an attribute", text(doctype(laughs(), "<robot name='&e9;'/>")), TOO_MUCH),
-    Kind(
-        "an entity of another file",
-        beside(
-            lambda secret: doctype(f'[<!ENTITY x SYSTEM "{secret.as_uri()}">]', inside("<link name='l'>&x;</link>"))
-        ),
-        NO_DOCTYPE,
+KINDS: dict[str, Make] = {
+    "a document type that declares nothing": text(doctype("")),
+    "a document type in UTF-16": text(encoded("UTF-16") + doctype("[]"), "utf-16"),
+    "a document type in UTF-7": text(
+        (encoded("UTF-7") + doctype('[<!ENTITY m "1.5">]').replace("<", "+ADw-")).encode()
     ),
-    Kind("parameter entities of another file",
-         beside(lambda secret: doctype(f'[<!ENTITY % x SYSTEM "{secret.as_uri()}"> %x;]')), NO_DOCTYPE),
-    Kind("a parameter entity that holds itself", text(doctype('[<!ENTITY % x "&#37;x;"> %x;]')),
-         ("line 1", "entity reference loop", "correct the file")),
-    Kind(
-        "an inclusion of another file",
-        beside(
-            lambda secret: inside(
-                f'<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="{secret.as_uri()}" parse="text"/>'
-            )
-        ),
-        upper=(1, 2),
+    "a document type of another file": beside(lambda secret: doctype(f'SYSTEM "{secret.as_uri()}"')),
+    "a default attribute by document type": text(
+        doctype('[<!ATTLIST mass value CDATA "1.5">]', arm((MASS, "<mass/>")))
     ),
-]  # fmt: skip
+    "an entity in a number": text(doctype('[<!ENTITY m "1.5">]', arm((MASS, '<mass value="&m;"/>')))),
+    "an entity without declaration after a comment and in UTF-16": text(
+        encoded("UTF-16") + arm((MASS, '<!-- &mdash; --><mass value="&heavy;"/>')), "utf-16"
+    ),
+    "an entity without declaration": altered(MASS, '<mass value="&heavy;"/>'),
+    "entities that grow in a text": text(doctype(laughs(), "<robot name='a'>&e9;</robot>")),
+    "entities that grow in an attribute": text(doctype(laughs(), "<robot name='&e9;'/>")),
+    "an entity of another file": beside(
+        lambda secret: doctype(f'[<!ENTITY x SYSTEM "{secret.as_uri()}">]', inside("<link name='l'>&x;</link>"))
+    ),
+    "parameter entities of another file": beside(
+        lambda secret: doctype(f'[<!ENTITY % x SYSTEM "{secret.as_uri()}"> %x;]')
+    ),
+    "a parameter entity that holds itself": text(doctype('[<!ENTITY % x "&#37;x;"> %x;]')),
+    "an inclusion of another file": beside(
+        lambda secret: inside(
+            f'<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="{secret.as_uri()}" parse="text"/>'
+        )
+    ),
+}

@@ -1,34 +1,12 @@
-"""The record of one kind of hostile file, and the builders that write such files."""
+"""Builders of hostile files: each writes one at a path and returns the path to load."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 Make = Callable[[Path], Path]
 SECRET = "the content of another file"
-
-
-@dataclass(frozen=True)
-class Kind:
-    """One kind of file.
-
-    Attributes:
-        id: What is wrong with it.
-        make: Writes it at a path of the test's own and returns the path to load.
-        refused: Fragments of the refusal; empty if it loads.
-        warned: Fragments of its one ModelWarning; empty if it loads in silence.
-        stuck: Fragments of the error of forward dynamics; empty if that answers.
-        upper: Upper limits of the loaded joints, where they are the point.
-    """
-
-    id: str
-    make: Make
-    refused: tuple[str, ...] = ()
-    warned: tuple[str, ...] = ()
-    stuck: tuple[str, ...] = ()
-    upper: tuple[float, ...] | None = None
 
 
 ARM = """<robot name="arm">
