@@ -47,18 +47,3 @@ def test_the_index_lists_each_record_once_by_its_title() -> None:
     listed = re.findall(r"^- \[(.*)\]\((.*)\)$", INDEX.read_text(encoding="utf-8"), flags=re.MULTILINE)
     titles = [(record.read_text(encoding="utf-8").partition("\n")[0], record.name) for record in RECORDS]
     assert sorted((f"# {title}", name) for title, name in listed) == sorted(titles)
-
-
-def test_files_that_are_named_exist() -> None:
-    """`lagrange/tree.py` is a file of the package, or of the repository."""
-    pages = [DOCS / "developers" / "architecture.md", *RECORDS]
-    names = [
-        (page, each)
-        for page in pages
-        for each in re.findall(r"`((?:\w+/)+(?:\w+\.\w+)?|\w+\.py)`", page.read_text("utf-8"))
-    ]
-    assert len(names) > 10
-    missing = [
-        (page, name) for page, name in names if not any((root / name).exists() for root in (ROOT, ROOT / "robot_dyn"))
-    ]
-    assert [f"{name} of {page.name}" for page, name in missing] == []

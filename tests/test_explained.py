@@ -9,7 +9,6 @@ from importlib import import_module
 from types import FunctionType
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
@@ -102,26 +101,6 @@ def test_total_energy_changes_by_the_power_of_the_torque(engine) -> None:
     after, before = (arm.total_energy(q + s * v + s**2 / 2 * a, v + s * a) for s in (h, -h))
     assert (after - before) / (2 * h) == pytest.approx(v @ tau, abs=1e-6)
     assert arm.total_energy(np.tile(q, (3, 1)), v).shape == (3,)
-
-
-PINOCCHIO = {"local": pin.LOCAL, "world": pin.WORLD, "local_world_aligned": pin.LOCAL_WORLD_ALIGNED}
-
-
-@pytest.mark.parametrize("name", PINOCCHIO)
-@pytest.mark.parametrize("engine", [lambda robot: robot, rd.Lagrangian, rd.Compiled], ids=["Robot", "own", "compiled"])
-def test_axes_are_those_of_pinocchio_by_their_names(engine, name: str) -> None:
-    """J and its rate agree with Pinocchio's own, 1e-12 of entries near 1."""
-    robot = rd.load("skew_tree")
-    q, v = np.random.default_rng(4).normal(size=(2, robot.n))
-    model, data, frame = robot.model, robot.model.createData(), robot.frame_names[-1]
-    index = model.getFrameId(frame, pin.BODY)
-    pin.computeJointJacobiansTimeVariation(model, data, q, v)
-    pin.updateFramePlacements(model, data)
-    J = pin.getFrameJacobian(model, data, index, PINOCCHIO[name])
-    rate = pin.getFrameJacobianTimeVariation(model, data, index, PINOCCHIO[name])
-    for axes in (name, PINOCCHIO[name]):
-        np.testing.assert_allclose(engine(robot).jacobian(q, frame, expressed_in=axes), J, atol=1e-12)
-        np.testing.assert_allclose(engine(robot).jacobian_rate(q, v, frame, expressed_in=axes), rate, atol=1e-12)
 
 
 @pytest.mark.parametrize("engine", [lambda robot: robot, rd.Lagrangian, rd.Compiled], ids=["Robot", "own", "compiled"])

@@ -31,10 +31,12 @@ CELLS = {
     " methods=['rk4', 'DOP853'], peers=False, budget_s=0.3, repeats=1)",
     "stress": "rd.tools.stress.stress(arm, samples=100, runs=0, budget_s=1.0)",
     "budget": "rd.tools.motors.budget(rd.control.quintic(q, q + 1, 1.0), arm, effort=50.0, velocity=9.0)",
+    "info": "rd.info(rd.load('panda'))",
+    "why": "rd.why(rd.Plant(arm, [rd.effects.DryFriction(0.7)]), q, q, q, 'joint_2')",
     "linearise": "rd.linearise(arm, q)",
     "task_dynamics": "rd.control.task_dynamics(arm, q, np.ones(2), 'tip', rows=(0, 2))",
 }
-ALWAYS_DRAWN = {"compare", "advise", "prove", "certify", "cost", "work_precision", "budget"}  # with a figure
+ALWAYS_DRAWN = {"compare", "advise", "prove", "certify", "cost", "work_precision", "budget", "why"}  # with a figure
 NAMES = [pytest.param(name, id=name) for name in CELLS]
 
 

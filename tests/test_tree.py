@@ -30,12 +30,16 @@ def test_each_top_room_has_a_readme() -> None:
     assert [room.name for room in top if not (room / "README.md").exists()] == []
 
 
-def test_files_that_readmes_name_exist() -> None:
-    """A name such as `plant.py` or `geometry/` is of the room."""
-    for page in PACKAGE.rglob("README.md"):
-        names = re.findall(r"`([\w/]+\.py|\w+/)`", page.read_text(encoding="utf-8"))
+def test_files_that_pages_of_developers_name_exist() -> None:
+    """A name such as `plant.py`, `lagrange/tree.py` or `geometry/` is of the room, the package or the repository."""
+    developers = ROOT / "docs" / "developers"
+    count = 0
+    for page in [*PACKAGE.rglob("README.md"), developers / "architecture.md", *(developers / "decisions").glob("*.md")]:
+        names = re.findall(r"`((?:\w+/)+(?:\w+\.\w+)?|\w+\.py)`", page.read_text(encoding="utf-8"))
         missing = [name for name in names if not any((at / name).exists() for at in (page.parent, PACKAGE, ROOT))]
-        assert names and not missing, page
+        assert not missing and (names or PACKAGE not in page.parents), page
+        count += len(names)
+    assert count > 50
 
 
 def test_tests_stand_in_the_rooms_of_what_they_test() -> None:

@@ -116,15 +116,6 @@ def test_reader_that_leaves_is_no_error(args: list[str]):
     assert all(line.startswith(b"robot-dyn: warning: ") for line in done.stderr.splitlines())
 
 
-@pytest.mark.skipif(os.name != "posix", reason="a shell of POSIX")
-def test_head_takes_the_first_line():
-    command = f'set -o pipefail; "{sys.executable}" -c "{MAIN}" query tiago_dual | head -1'
-    done = subprocess.run(["bash", "-c", command], capture_output=True, encoding="utf-8", timeout=30)
-    assert done.stdout.startswith("q ") and done.stdout.count("\n") == 1
-    assert [line[:20] for line in done.stderr.splitlines()] == ["robot-dyn: warning: "]  # of the robot: its base
-    assert done.returncode in (0, 1, 141)
-
-
 @pytest.mark.skipif(os.name != "posix", reason="/dev/full and descriptors of POSIX")
 @pytest.mark.parametrize("redirection", ["> /dev/full", ">&-"])
 @pytest.mark.parametrize(
@@ -196,15 +187,3 @@ def test_the_shell_completes_robots_scenes_and_joints(line: str, completed: list
 def test_version_and_public_names():
     assert said("--version") == f"robot-dyn {rd.__version__}\n" == f"robot-dyn {version('robot-dyn')}\n"
     assert set(dir(rd)) == {*rd.__all__, "__version__"}
-
-
-def test_import_is_light():
-    loaded = set(spawn(code=f"import robot_dyn\n{LOADED}").stdout.decode().split())
-    assert "robot_dyn" in loaded and not loaded & (HEAVY | {"rich", "typer"})
-
-
-@pytest.mark.parametrize("args", [["query", "--help"], ["list"]])
-def test_help_and_list_are_light(args: list[str]):
-    code = f"import sys\ntry:\n    from robot_dyn.cli import main; main()\nexcept SystemExit:\n    pass\n{LOADED}"
-    loaded = set(spawn(*args, code=code).stdout.decode().splitlines()[-1].split())
-    assert "robot_dyn" in loaded and not loaded & HEAVY

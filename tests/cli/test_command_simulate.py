@@ -65,12 +65,6 @@ def test_document_has_the_keys_that_are_promised(scene) -> None:
     assert document("simulate", scene).keys() == promised("simulate").keys()
 
 
-def test_explain_shows_the_equation(scene) -> None:
-    done = run("explain", scene)
-    assert done.returncode == 0
-    assert "N = ∂V/∂q − τ_viscous_friction" in done.stdout
-
-
 def test_scene_prints_starters() -> None:
     listed = [line.split(maxsplit=1) for line in run("scene").stdout.splitlines()[1:]]
     assert [name for name, _ in listed] == list(starter_names())

@@ -82,9 +82,7 @@ def test_bars_are_as_long_as_the_causes() -> None:
     plant = plants()["ur5 with payload"]
     q, v, a = np.random.default_rng(6).uniform(-1.5, 1.5, (3, 6))
     cause = rd.why(plant, q, v, a, "elbow_joint")
-    text = cause._repr_html_()
-    assert "<script" not in text and len(text) < 20_000  # a third is the table
-    page = html.fragment_fromstring(text)
+    page = html.fragment_fromstring(cause._repr_html_())
     columns = ([getattr(share, name) for share in cause.shares] for name in ("inertia", "coriolis", "gravity"))
     columns = [np.array(x) for x in (*columns, [*cause.effects.values()])]
     expected = np.concatenate([part for x in columns for part in (x[x > 0], x[x < 0])])

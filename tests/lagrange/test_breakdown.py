@@ -88,11 +88,3 @@ def test_the_armature_is_a_part_of_M_alone() -> None:
     assert armature.source == "(armature)"
     assert np.array_equal(armature.M, 0.1 * np.eye(robot.n))
     assert not armature.C.any() and not armature.N.any()
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_their_torques_add_up_to_inverse_dynamics(name: str) -> None:
-    """Σ (M a + C v + N) is Pinocchio's; some roundings of the largest term."""
-    robot, (q, v, a) = parts_of(name)
-    terms = [term for part in breakdown(rd.Lagrangian(robot), q, v) for term in (part.M @ a, part.C @ v, part.N)]
-    assert np.all(np.abs(sum(terms) - robot.inverse_dynamics(q, v, a)) <= 1e-14 * np.max(sum(map(np.abs, terms))))

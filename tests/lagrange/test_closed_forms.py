@@ -70,11 +70,12 @@ def test_planar_2r_arm_has_its_closed_form(m, r, l1, I, q, v) -> None:  # noqa: 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_pendulum_has_its_closed_form(engine) -> None:
-    """Uniform rod about its end: M = m l²/3, N = m g (l/2) sin q; the file prints 18 digits."""
+    """Uniform rod about its end: M = m l²/3, V = −m g (l/2) cos q, N = ∂V/∂q; the file prints 18 digits."""
     dynamics, q, g = engine(rd.load("pendulum")), [0.7], rd.STANDARD_GRAVITY[2]
     np.testing.assert_allclose(dynamics.M(q), [[1 / 3]], rtol=1e-15)
     np.testing.assert_allclose(dynamics.N(q), [-g * 0.5 * np.sin(0.7)], rtol=1e-15)
     np.testing.assert_allclose(dynamics.C(q, [2.0]), [[0.0]], atol=1e-16)
+    np.testing.assert_allclose(dynamics.potential_energy(q), g * 0.5 * np.cos(0.7), rtol=1e-15)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

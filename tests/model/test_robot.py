@@ -42,23 +42,31 @@ def test_uncoupled_robot_says_what_pinocchio_says():
         assert_allclose(robot.potential_energy(q), pin.computePotentialEnergy(model, data, q), rtol=1e-15)
 
 
-def test_frames_are_those_of_pinocchio():
-    """Turned to the base's axes by the robot itself, and so to 1e-15 of the largest entry."""
-    robot = rd.load("ur5")
+AXES = {"world_aligned": pin.LOCAL_WORLD_ALIGNED, "body": pin.LOCAL, "world": pin.WORLD}
+AXES |= {"local_world_aligned": pin.LOCAL_WORLD_ALIGNED, "local": pin.LOCAL} | {axes: axes for axes in AXES.values()}
+
+
+ENGINES = [("ur5", rd.load("ur5"), 1e-15)]
+ENGINES += [("skew_tree", make(rd.load("skew_tree")), 1e-12) for make in (rd.Robot.with_, rd.Lagrangian, rd.Compiled)]
+
+
+@pytest.mark.parametrize(("arm", "asked", "rounding"), ENGINES, ids=lambda x: type(x).__name__)
+def test_frames_are_those_of_pinocchio(arm: str, asked, rounding: float):
+    """Axes by names of this library and of Pinocchio; turned to the base's axes by the robot itself: 1e-15 of J."""
+    robot = rd.load(arm)
     model, data = robot.model, robot.model.createData()
     q, v, _ = general(robot, 1)
     turn = np.abs(v).sum()
-    references = {"world_aligned": pin.LOCAL_WORLD_ALIGNED, "body": pin.LOCAL, "world": pin.WORLD}
     for name in robot.frame_names:
         frame = model.getFrameId(name, pin.FrameType.BODY)
         pin.framesForwardKinematics(model, data, q)
         assert_array_equal(robot.placement(q, name), data.oMf[frame].homogeneous)
-        for axes, reference in references.items():
+        for axes, reference in AXES.items():
             J = pin.computeFrameJacobian(model, data, q, frame, reference)
-            assert_allclose(robot.jacobian(q, name, expressed_in=axes), J, rtol=0, atol=1e-15)
+            assert_allclose(asked.jacobian(q, name, expressed_in=axes), J, rtol=0, atol=rounding)
             pin.computeJointJacobiansTimeVariation(model, data, q, v)
             dJ = pin.getFrameJacobianTimeVariation(model, data, frame, reference)
-            assert_allclose(robot.jacobian_rate(q, v, name, expressed_in=axes), dJ, rtol=0, atol=1e-15 * turn)
+            assert_allclose(asked.jacobian_rate(q, v, name, expressed_in=axes), dJ, rtol=0, atol=rounding * turn)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -71,15 +79,6 @@ def test_equation_of_motion(name: str):
     assert_allclose(robot.forward_dynamics(q, v, tau), a, rtol=1e-9)
     assert_allclose(robot.kinetic_energy(q, v), v @ robot.M(q) @ v / 2, rtol=1e-15)
     assert_array_equal(robot.M(q), robot.M(q).T)
-
-
-def test_pendulum_of_one_rod():
-    """I = m l²/3 about the pivot, V = −m g (l/2) cos q, τ = m g (l/2) sin q [any textbook]."""
-    robot, g = rd.load("pendulum"), 9.80665
-    q = np.array([0.7])
-    assert_allclose(robot.M(q), [[1 / 3]], rtol=1e-15)
-    assert_allclose(robot.N(q), [g / 2 * np.sin(0.7)], rtol=1e-15)
-    assert_allclose(robot.potential_energy(q), -g / 2 * np.cos(0.7), rtol=1e-15)
 
 
 # --- what its file states
