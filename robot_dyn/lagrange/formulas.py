@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array, apply, transpose
+from robot_dyn.foundations.arithmetic import Array, Scalar, apply, transpose
 from robot_dyn.foundations.spatial import (
     adjoint,
     adjoint_inverse,
@@ -58,7 +58,7 @@ def _kinetic_energy(at: Configuration, v: Array) -> Array:
     return (v * apply(_M(at), v)).sum(axis=-1) / 2
 
 
-def _potential_energy(at: Configuration) -> Array:
+def _potential_energy(at: Configuration) -> Scalar:
     V, g = 0, at.linkage.gravity
     for inertia, (R, p) in zip(at.linkage.inertias, at.in_base.values(), strict=True):
         V = V - (inertia[0, 0] * p + R @ first_moment(inertia)) @ g
@@ -110,7 +110,7 @@ def _change(at: Configuration, link: str, axes: Axes) -> Array:
     return block_diagonal(R) if axes is Axes.WORLD_ALIGNED else np.eye(6, dtype=R.dtype)
 
 
-FORMULAS: dict[str, Callable[..., Array]] = {
+FORMULAS: dict[str, Callable[..., Scalar]] = {
     "M": _M,
     "C": _C,
     "N": _N,

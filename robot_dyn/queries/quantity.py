@@ -11,13 +11,13 @@ from inspect import cleandoc, signature
 from math import inf
 from typing import Any, TypeVar, final
 
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Scalar
 from robot_dyn.queries.units import of_joint
 
 DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hides
 MOST_DIGITS = 20  # of an answer that are counted
 
-State = Mapping[str, Array]
+State = Mapping[str, Scalar]
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 _PARAMETERS = {
