@@ -21,7 +21,7 @@ TABLE = [kind for topic in TOPICS for kind in topic.KINDS]
 LONGEST_MESSAGE = 1500  # characters besides the path: what still fits a terminal
 REMEDY = re.compile(
     r"\b(give|needs|write|correct|remove|rename|keep|add|make|join|expand|exchange|check|split"
-    r"|known|nearest|looked for|only)\b"
+    r"|known|nearest|only)\b"
 )
 
 

@@ -69,5 +69,5 @@ KINDS = [
     Kind("numbers in odd but sound spelling", altered(MASS, '<mass value=" +01.50E+0 "/>'), upper=(1, 2)),
     Kind("an axis over several lines", altered(AXIS, '<axis xyz="\n0\t0\n1 "/>'), upper=(1, 2)),
     Kind("every number the largest", text(LARGEST),
-         warned=("origin lies 1.73205e+12 m away, beyond 10000 m, which costs digits", "correct it"), upper=(1, 2)),
+         warned=("origin is 1.73205e+12 m away, over 10000 m, which loses digits", "correct it"), upper=(1, 2)),
 ]  # fmt: skip

@@ -25,18 +25,18 @@ KINDS = [
     Kind("a mesh that is missing and shapes without meaning", altered('<link name="base"/>', MESH), upper=(1, 2)),
     Kind("elements of another simulator", text(inside(NOT_OWN)), upper=(1, 2)),
     Kind("a link without inertial at the tip", text(inside('<link name="tip"/>' + joint("wrist", "fore", "tip"))),
-         warned=("ModelWarning: arm: link 'tip'", "no mass", "give it an <inertial>"), stuck=STUCK),
+         warned=("ModelWarning: arm: link 'tip'", "no mass", "add an <inertial>"), stuck=STUCK),
     Kind("a point mass on the axis at the tip",
          text(inside(f'<link name="tip">{POINT}</link>' + joint("wrist", "fore", "tip"))),
-         warned=("joint 'wrist'", "no inertia about its axis", "give its link moments of inertia"), stuck=STUCK),
+         warned=("joint 'wrist'", "no inertia about its axis", "add moments of inertia to its link"), stuck=STUCK),
     Kind("a massless link in the midst", altered(ARM[ARM.index("    <inertial>") : ARM.index("  </link>")], ""),
-         warned=("ModelWarning: arm: link 'upper'", "no mass", "give it an <inertial>")),
+         warned=("ModelWarning: arm: link 'upper'", "no mass", "add an <inertial>")),
     Kind(
         "no masses at all",
         text(
             re.sub(r"<inertial>.*?</inertial>", "", ARM.replace(ELBOW, ELBOW.replace("revolute", "fixed")), flags=re.S)
         ),
-        warned=("ModelWarning: arm: link 'upper'", "no mass", "give it an <inertial>"),
+        warned=("ModelWarning: arm: link 'upper'", "no mass", "add an <inertial>"),
         stuck=("SingularError", "joint 'shoulder' carries no inertia"),
     ),
     Kind("an indefinite inertia", altered(MOMENTS, MOMENTS.replace('izz="0.01"', 'izz="-0.01"')),

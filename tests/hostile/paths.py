@@ -52,7 +52,7 @@ def at(path: str) -> Make:
     return lambda _: Path(path)
 
 
-NO_FILE, NOT_REGULAR = ("no file", "looked for"), ("not a regular file", "give the path of a URDF file")
+NO_FILE, NOT_REGULAR = ("no file", "check the path"), ("not a regular file", "give the path of a URDF file")
 KINDS = [
     Kind("a missing file", missing, NO_FILE),
     Kind("a folder", folder, ("is a folder", "give the path of a URDF file")),

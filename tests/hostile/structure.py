@@ -10,7 +10,7 @@ KINDS = [
     Kind("no robot name", altered('<robot name="arm">', "<robot>"), ("<robot> in line 1", *NO_NAME)),
     Kind("a blank robot name", altered('"arm"', '" "'), ("<robot> in line 1", *NO_NAME)),
     Kind("a link without name", text(inside("<link/>")), ("<link> in line 28", *NO_NAME)),
-    Kind("no links", text('<robot name="arm"/>'), ("robot", "no <link>", "add one link at least")),
+    Kind("no links", text('<robot name="arm"/>'), ("robot", "no <link>", "add at least one link")),
     Kind("a link alone", text(f'<robot name="brick"><link name="brick">{BODY}</link></robot>'), NO_MOTION),
     Kind("a link defined twice", text(inside('<link name="fore"/>')), ("link 'fore'", "defined twice", "rename")),
     Kind(
@@ -71,7 +71,7 @@ KINDS = [
     for word, kind, said in (
         ("no type", "", ("has no type", "write one of")),
         ("unknown type", ' type="hinge"', ("unknown type 'hinge'", "write one of")),
-        ("type floating", ' type="floating"', ("is floating", "only joints of one degree of freedom")),
-        ("type planar", ' type="planar"', ("is planar", "only joints of one degree of freedom")),
+        ("type floating", ' type="floating"', ("is floating", "only joints with one degree of freedom")),
+        ("type planar", ' type="planar"', ("is planar", "only joints with one degree of freedom")),
     )
 ]

@@ -22,7 +22,7 @@ KINDS = [
     Kind("a Latin-1 file that calls itself UTF-8", text(inside("<!-- é -->"), "latin-1"), (*NOT_XML, "encoding")),
     Kind("an encoding nobody knows", text('<?xml version="1.0" encoding="klingon"?>' + ARM), (*NOT_XML, "klingon")),
     Kind("an encoding that is another one", text(XML_16 + ARM), NOT_XML),
-    Kind("another format", text('<sdf version="1.7"><model name="arm"/></sdf>'), ("SDF, not URDF", "export a URDF")),
+    Kind("another format", text('<sdf version="1.7"><model name="arm"/></sdf>'), ("SDF, not URDF", "give a URDF")),
     Kind("a robot of another namespace", text('<x:robot xmlns:x="urn:x" name="a"/>'), ("urn:x", "give a URDF")),
     Kind("macros with an expression",
          text(inside('<xacro:arm xmlns:xacro="http://www.ros.org/wiki/xacro" side="${side}"/>')),
