@@ -13,7 +13,7 @@ import numpy as np
 
 from robot_dyn.control.orientation import orientation_error
 from robot_dyn.control.reference import PiecewisePolynomial, Reference, hermite, number, numbers, quintic
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.coefficients import coefficient
 from robot_dyn.foundations.errors import ControlError, shown
 from robot_dyn.foundations.spatial import rotation as rotation_about
@@ -56,7 +56,7 @@ class CartesianReference(Reference):
         """Times in [s] at which position or angle pass to another polynomial."""
         return self.position.knots if self.angle is None else np.union1d(self.position.knots, self.angle.knots)
 
-    def at(self, t: Array) -> tuple[Array, Array | None, Array, Array]:
+    def at(self, t: Scalar) -> tuple[Array, Array | None, Array, Array]:
         """Position, orientation, twist and its rate at t.
 
         Args:

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, NamedTuple, final
 import numpy as np
 
 from robot_dyn.control.reference import Reference
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.coefficients import check_coefficients, declared, with_values
 from robot_dyn.foundations.errors import ControlError, shown
 from robot_dyn.foundations.threshold import Threshold
@@ -114,7 +114,7 @@ class Controller(Value, ABC):
         return None
 
     @property
-    def saturation(self) -> Array:
+    def saturation(self) -> Scalar:
         """Greatest torque that it commands, a scalar or (n,), in [N m] or [N]; inf where nothing limits it."""
         return np.inf
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from robot_dyn.foundations import validate
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.errors import ControlError, QueryError, shown
 from robot_dyn.foundations.validate import choice, duration, times
 from robot_dyn.foundations.values import Value
@@ -93,7 +93,7 @@ class PiecewisePolynomial(Reference):
         """Time of the last break, in [s]."""
         return float(self.breaks[-1])
 
-    def at(self, t: Array) -> tuple[Array, Array, Array]:
+    def at(self, t: Scalar) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration at t, by Horner's rule.
 
         At a break the piece to its right counts; at the last one, the piece to its left. The search for the piece is

@@ -1,4 +1,6 @@
-"""The catalog: a name, a path or a package:// address → a URDF file.
+"""The catalog: maps a name, a path or a package:// address to a URDF file.
+
+The names are those of the files in `urdf/` and of every URDF of the installed example-robot-data.
 
 Names are those of the files of `urdf/` and of every URDF of the installed example-robot-data.
 """
@@ -13,7 +15,7 @@ from pathlib import Path
 from robot_dyn.description.packages import environment_folders, package_folders
 from robot_dyn.foundations.errors import CatalogError, nearest, shorten, shown
 
-# Files whose stem is shared, or not descriptive.
+# Files whose stem is not unique or not descriptive.
 _RENAMED = {
     "anymal_b_simple_description/robots/anymal.urdf": "anymal_b",
     "anymal_b_simple_description/robots/anymal-kinova.urdf": "anymal_b_kinova",
@@ -25,20 +27,20 @@ _RENAMED = {
 
 
 def list_robots() -> tuple[str, ...]:
-    """Names that `load` takes, sorted."""
+    """Return the names that `load` accepts, sorted."""
     return tuple(sorted(_files()))
 
 
 def files() -> frozenset[Path]:
-    """The URDF files of these robots."""
+    """Return the URDF files of all robots in the catalog."""
     return frozenset(_files().values())
 
 
 def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> Path:
-    """The URDF file of a name, a path or a package:// address.
+    """Return the URDF file for a name, a path or a package:// address.
 
     Raises:
-        CatalogError: If the robot is not found; names the nearest robots or the places tried.
+        CatalogError: If there is no such robot; the message lists similar names or the searched folders.
     """
     start = name_or_path.decode(errors="replace") if isinstance(name_or_path, bytes) else name_or_path
     if isinstance(start, str) and start.lstrip("\ufeff \t\r\n").startswith("<") and not _is_path(start):
@@ -55,15 +57,15 @@ def find(name_or_path: str | Path, package_dirs: Iterable[str | Path] = ()) -> P
         if path.exists():
             return path
         if path.suffix or len(path.parts) > 1:
-            raise CatalogError(f"no file {shorten(text, 200)}; looked for {shorten(path.absolute(), 300)}")
-    except (OSError, RuntimeError, ValueError) as error:  # too long, not to be searched, no such user, a NUL
+            raise CatalogError(f"no file {shorten(text, 200)}; check the path {shorten(path.absolute(), 300)}")
+    except (OSError, RuntimeError, ValueError) as error:  # too long, not readable, no such user, or a NUL
         why = getattr(error, "strerror", error)
         raise CatalogError(f"no file {shorten(text)!r}: {why}; give the path of a URDF file") from None
     raise CatalogError(f"no robot {shorten(text)!r}; {nearest(text, list_robots())}; or give the path of a URDF file")
 
 
 def _is_path(text: str) -> bool:
-    """Return True for an existing path, and for a text without > that ends as a file name does."""
+    """Return True for an existing path, and for text without ">" that ends in a file suffix."""
     try:
         return Path(text).exists() or (">" not in text and bool(Path(text).suffix))
     except (OSError, ValueError):  # too long for a path, or a NUL
@@ -71,10 +73,10 @@ def _is_path(text: str) -> bool:
 
 
 def abbreviated(path: str | Path) -> str:
-    """A path as answers print it.
+    """Return a path in the form that messages print.
 
-    Files of example-robot-data stand without the folder of their installation, those below the working directory
-    relative to it.
+    A file of example-robot-data is shown without its installation folder, a file below the working directory relative
+    to it.
     """
     text = Path(path).as_posix()
     _, package, inside = text.partition("/example-robot-data/robots/")
@@ -87,44 +89,45 @@ def abbreviated(path: str | Path) -> str:
 
 
 def resolve(address: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:
-    """The file of a package://package/path address that stands in `urdf`.
+    """Return the file that a package://package/path address in `urdf` refers to.
 
     Raises:
-        CatalogError: If no package of that name holds it, see `packages`; lists the places tried.
+        CatalogError: If no package of that name contains it, see `packages`; the message lists the searched folders.
     """
-    name, _, inside = address.removeprefix("package://").lstrip("/").partition("/")  # a third slash is common
+    name, _, inside = address.removeprefix("package://").lstrip("/").partition("/")  # many files write a third slash
     package_dirs = tuple(package_dirs)
-    for folder in package_folders(name, urdf, package_dirs) if name and inside else ():
-        if (folder / inside).is_file():
-            return folder / inside
+    for candidate in package_folders(name, urdf, package_dirs) if name and inside else ():
+        if (candidate / inside).is_file():
+            return candidate / inside
     raise CatalogError(f"no file for {shorten(address, 200)}; {_remedy(name, urdf, package_dirs)}")
 
 
 def package(name: str, urdf: Path, package_dirs: Iterable[str | Path] = ()) -> Path:
-    """The folder of a package that `urdf` names.
+    """Return the folder of a package that `urdf` refers to.
 
     Raises:
-        CatalogError: If the file is not found; lists the places tried.
+        CatalogError: If there is no such folder; the message lists the searched folders.
     """
     package_dirs = tuple(package_dirs)
-    for folder in package_folders(name, urdf, package_dirs):
-        if folder.is_dir():
-            return folder
+    for candidate in package_folders(name, urdf, package_dirs):
+        if candidate.is_dir():
+            return candidate
     raise CatalogError(f"no package {name!r}; {_remedy(name, urdf, package_dirs)}")
 
 
 def _remedy(name: str, urdf: Path, package_dirs: Iterable[str | Path]) -> str:
-    named = (Path(folder).expanduser() for folder in package_dirs)
-    tried = dict.fromkeys(map(str, (*named, *urdf.absolute().parents, *environment_folders())))
+    """Return the searched folders and how to add another, for an error message."""
+    added = (Path(folder).expanduser() for folder in package_dirs)
+    tried = dict.fromkeys(map(str, (*added, *urdf.absolute().parents, *environment_folders())))
     return (
-        f"tried in {', '.join(tried)}; name the folder that holds {name or 'the package'!r} in package_dirs"
+        f"searched {', '.join(tried)}; add the folder that contains {name or 'the package'!r} to package_dirs"
         " or ROS_PACKAGE_PATH"
     )
 
 
 @cache
 def _files() -> dict[str, Path]:
-    """File by name."""
+    """Return the URDF file of each robot by name."""
     bundled = {path.stem: path for path in sorted(_own_folder().glob("*.urdf"))}
     files = dict(_example_robot_data())
     clash = bundled.keys() & files.keys()
@@ -133,7 +136,7 @@ def _files() -> dict[str, Path]:
 
 
 def _own_folder() -> Path:
-    """`urdf/`: inside the installed package, or beside it in a checkout."""
+    """Return `urdf/`, which is part of an installed package and next to the package in a checkout."""
     package = Path(__file__).parents[1]
     inside = package / "urdf"
     return inside if inside.is_dir() else package.parent / "urdf"

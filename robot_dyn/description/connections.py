@@ -1,4 +1,4 @@
-"""How links and joints connect: one tree from one root, and mimics that end at a joint that moves."""
+"""How links and joints connect: one tree with one root; every chain of mimic joints ends at a moving joint."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.foundations.errors import nearest, shorten
 
-LARGEST = 1e12  # of a length, a mass, a moment, a ratio: beyond it the equations of motion overflow
+LARGEST = 1e12  # limit of lengths, masses, moments and ratios, beyond which the equations of motion overflow
 
 Refuse = Callable[[str, str], NoReturn]  # where and why
 
 
 def one_tree(links: list[str], robot: etree._Element, refuse: Refuse) -> None:
-    """One root, one parent each, no cycle."""
+    """Refuse a robot without exactly one root, with two parents of a link, or with a cycle."""
     parent_of: dict[str, str] = {}
     for joint in robot.iterfind("joint"):
         parent, child = joint.find("parent").get("link"), joint.find("child").get("link")
@@ -39,7 +39,7 @@ def one_tree(links: list[str], robot: etree._Element, refuse: Refuse) -> None:
 
 
 def mimics(robot: etree._Element, refuse: Refuse) -> None:
-    """Every mimic follows a joint that moves, none follows itself, and no chain of them grows without bound."""
+    """Refuse a mimic joint whose source is undefined, fixed or its own follower, and chains that grow without bound."""
     kinds = {joint.get("name"): joint.get("type") for joint in robot.iterfind("joint")}
     couplings = {joint.get("name"): joint.find("mimic") for joint in robot.iterfind("joint[mimic]")}
     for follower, coupling in couplings.items():
@@ -64,6 +64,6 @@ def mimics(robot: etree._Element, refuse: Refuse) -> None:
 
 
 def _loop(names: list[str]) -> str:
-    """Names along a loop, the first again at the end; long ones cut in between."""
+    """Return the names along a loop, closed by the first one; a long loop is abbreviated."""
     shown = names if len(names) <= 8 else [*names[:6], "…", names[-1]]
     return " → ".join(shorten(name) for name in shown)

@@ -14,13 +14,13 @@ from robot_dyn.foundations.errors import OverflowedError
 from robot_dyn.foundations.validate import LEAST_EXACT, is_moderate
 from robot_dyn.foundations.values import Value
 
-_EXACT = LEAST_EXACT / np.finfo(np.float64).eps  # positions below this are known to LEAST_EXACT
+_EXACT = LEAST_EXACT / np.finfo(np.float64).eps  # float64 positions below this are exact to LEAST_EXACT
 
 
 @final
 @dataclass(frozen=True)
 class Mimic:
-    """The coupling of a joint to another: q = multiplier · q_source + offset, in literals."""
+    """A joint coupled to another: q = multiplier · q_source + offset, as literals."""
 
     source: str
     multiplier: Any
@@ -28,7 +28,7 @@ class Mimic:
 
 
 def resolve(name: str, mimics: Mapping[str, Mimic], arithmetic: Arithmetic) -> tuple[str, Any, Any]:
-    """The independent joint that `name` follows through a chain of mimics, with the composed multiplier and offset."""
+    """Return the independent joint that `name` follows, with the composed multiplier and offset of the chain."""
     ratio, offset = arithmetic.number("1"), arithmetic.number("0")
     while name in mimics:
         coupling = mimics[name]
@@ -41,10 +41,10 @@ def resolve(name: str, mimics: Mapping[str, Mimic], arithmetic: Arithmetic) -> t
 @final
 @dataclass(frozen=True, eq=False)
 class Couplings(Value):
-    """The map q_full = S q + s₀ from n independent coordinates to all N joints that move.
+    """The map q_full = S q + s₀ from n independent coordinates to all N moving joints.
 
     Attributes:
-        S: Shape (N, n); one entry a row.
+        S: Shape (N, n), with one nonzero entry in each row.
         s0: Shape (N,).
     """
 
@@ -57,18 +57,18 @@ class Couplings(Value):
 
     @cached_property
     def trivial(self) -> bool:
-        """Whether q_full = q."""
+        """True if q_full = q."""
         N, n = self.S.shape
         return n == N and bool(np.all(np.eye(n, dtype=int) == self.S)) and bool(np.all(self.s0 == 0))
 
     @cached_property
     def _source(self) -> Array:
-        """The coordinate that each joint follows, (N,)."""
+        """Index of the coordinate that each joint follows, (N,)."""
         return np.argmax(self.S != 0, axis=1)
 
     @cached_property
     def _ratio(self) -> Array | None:
-        """The entry of each row of S, (N,); None if all are 1."""
+        """Nonzero entry of each row of S, (N,); None if all are 1."""
         ratio = self.S[np.arange(len(self.S)), self._source]
         return None if np.all(ratio == 1) else ratio
 
@@ -77,10 +77,10 @@ class Couplings(Value):
         return not np.all(self.s0 == 0)
 
     def position(self, q: Array) -> Array:
-        """q_full = S q + s₀.
+        """Return q_full = S q + s₀.
 
         Raises:
-            OverflowedError: If q is so large that rounding hides where the joints that follow are.
+            OverflowedError: If q is so large that rounding errors of the coupled positions are not negligible.
         """
         if self.trivial:
             return q
@@ -89,58 +89,59 @@ class Couplings(Value):
             full = full + self.s0
         if self._rounded.size and full.dtype.kind == "f" and self._hidden(full):
             raise OverflowedError(
-                "q is so large that rounding hides where the joints that follow others are, to"
+                "q is so large that the positions of mimic joints are not exact to"
                 f" {LEAST_EXACT:g} rad or m; take a smaller q, or rd.Lagrangian(robot, rd.accuracy.Ball(bits))"
             )
         return full
 
     @cached_property
     def _rounded(self) -> Array:
-        """The joints that have a position which rounding changes: those that do not just repeat another one's."""
+        """Indices of the joints whose computed position is rounded, because they do not just copy a coordinate."""
         return np.flatnonzero(np.any((self.S != 0) & (np.abs(self.S) != 1), axis=1) | (self.s0 != 0))
 
     def _hidden(self, full: Array) -> bool:
+        """Return True if rounding of a coupled joint's position exceeds LEAST_EXACT."""
         if full.ndim == 1 and full.dtype == np.float64 and is_moderate(full, _EXACT):
             return False
         position = full[..., self._rounded]
         return bool(np.finfo(position.dtype).eps * np.abs(position).max(initial=0.0) > LEAST_EXACT)
 
     def velocity(self, v: Array) -> Array:
-        """v_full = S v, and accelerations alike: S is constant."""
+        """Return v_full = S v; accelerations transform in the same way, because S is constant."""
         if self.trivial:
             return v
         full = v.take(self._source, axis=-1)
         return full if self._ratio is None else self._ratio * full
 
     def torque(self, tau: Array) -> Array:
-        """τ = Sᵀ τ_full, by virtual work."""
+        """Return τ = Sᵀ τ_full, by virtual work."""
         return tau if self.trivial else tau.dot(self.S)
 
     def rows(self, A: Array) -> Array:
-        """Sᵀ A, torques that are linear in the columns of A (..., N, m)."""
+        """Return Sᵀ A for torques A (..., N, m) that are linear in m parameters."""
         return A if self.trivial else self.S.T @ A
 
     def matrix(self, A: Array) -> Array:
-        """Sᵀ A S, for quadratic forms."""
+        """Return Sᵀ A S for a quadratic form A."""
         if self.trivial:
             return A
-        S = self.S  # of one state `dot` takes half the time of `@`
+        S = self.S  # for one state `dot` takes half the time of `@`
         return S.T.dot(A).dot(S) if A.ndim == 2 else S.T @ A @ S
 
     def cube(self, A: Array) -> Array:
-        """A with S applied to each of its last three axes, for ∂M/∂q."""
+        """Apply S to each of the last three axes of A, as ∂M/∂q needs."""
         for axis in () if self.trivial else (-3, -2, -1):
             A = np.moveaxis(np.moveaxis(A, axis, -1) @ self.S, -1, axis)
         return A
 
     def columns(self, J: Array) -> Array:
-        """J S, for Jacobians."""
+        """Return J S for a Jacobian J."""
         if self.trivial:
             return J
         return J.dot(self.S) if J.ndim <= 2 else J @ self.S
 
     def reduced(self, values: Any, axes: tuple[int | str, ...]) -> Any:
-        """A quantity of all joints as one of the coordinates; "n" marks the axes of joints in its shape."""
+        """Reduce a quantity of all joints to independent coordinates; "n" in `axes` marks joint axes of its shape."""
         if self.trivial or "n" not in axes:
             return values
         if axes == ("n", "n"):

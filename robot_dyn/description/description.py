@@ -1,8 +1,8 @@
-"""The hardened read of a URDF file: bytes in, checked bytes out, or a refusal.
+"""Reading of untrusted URDF files: bytes in, checked bytes out, or a refusal.
 
-Both implementations see only the canonical bytes written here, in which each element occurs
-once, every number is a finite decimal literal, and links and joints form one tree; what dynamics does
-not need (meshes, materials, simulator extensions) is left out.
+Both implementations of the dynamics see only the canonical bytes written here. In them each element occurs once, every
+number is a finite decimal literal, and links and joints form one tree. Meshes, materials and simulator extensions are
+left out, because dynamics does not need them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from robot_dyn.foundations.files import read_start
 from robot_dyn.foundations.validate import instance
 
 MAX_BYTES = 16 * 2**20  # the largest robot of example-robot-data has 0.2 MiB
-_MARK = "\ufeff".encode()  # outweighs the encoding that a text declares, which is that of its file
+_MARK = "\ufeff".encode()  # overrides the encoding declared in a str, which was that of its file
 
 
 @final
@@ -33,10 +33,10 @@ class Description:
 
     Attributes:
         name: The robot's name in the file.
-        source: Where it was read from, as shown in messages.
+        source: Origin of the text, as shown in messages.
         text: The bytes of the file, in UTF-8.
         xml: The checked bytes: a minimal URDF with the same literals.
-        findings: What was assumed where the file departs from the format.
+        findings: Assumptions made where the file departs from the format.
     """
 
     name: str
@@ -47,23 +47,23 @@ class Description:
 
     @property
     def element(self) -> etree._Element:
-        """The checked bytes as a fresh XML element."""
+        """Return the checked bytes as a fresh XML element."""
         return parse(self.xml, self.source)[0]
 
     @cached_property
     def estimated(self) -> dict[str, str]:
-        """What the inertials that nobody measured were made from, by link: the mark that `load` and `check` write."""
+        """Basis of each estimated inertial by link, from the mark that `load` and `check_urdf` write."""
         marked = ((link.get("name"), link.find("inertial[@estimated]")) for link in self.element.iterfind("link"))
         return {name: inertial.get("estimated") for name, inertial in marked if inertial is not None}
 
     @cached_property
     def joint_kinds(self) -> dict[str, str]:
-        """Type by joint: "revolute", "continuous", "prismatic" or "fixed"."""
+        """Type of each joint: "revolute", "continuous", "prismatic" or "fixed"."""
         return {joint.get("name"): joint.get("type") for joint in self.element.iterfind("joint")}
 
     @cached_property
     def joint_frames(self) -> dict[str, str]:
-        """The child link, whose frame is that of the joint, by joint; without joints that share a link's name."""
+        """Child link of each joint, whose frame is the joint's; without joints that share the name of a link."""
         file = self.element
         links = {link.get("name") for link in file.iterfind("link")}
         children = {joint.get("name"): joint.find("child").get("link") for joint in file.iterfind("joint")}
@@ -83,44 +83,46 @@ def read(path: str | Path) -> Description:
 
 
 def refuse_xacro(path: Path) -> None:
-    """Refuse a file that is named as one of xacro: without its macros it may describe another robot."""
+    """Raise DescriptionError for a file with a xacro suffix: unexpanded, it may describe another robot."""
     if path.suffix.lower() == ".xacro":
         raise DescriptionError(f"{path}: is a xacro file; {urdf.EXPAND}")
 
 
 def content(path: Path) -> bytes:
-    """The bytes of a file, one more than `MAX_BYTES` at most.
+    """Return the bytes of a file, up to `MAX_BYTES` + 1.
 
     Raises:
-        DescriptionError: If it is not a regular file, or cannot be read.
+        DescriptionError: If it is not a regular file or cannot be read.
     """
     return read_start(path, MAX_BYTES + 1, DescriptionError, "give the path of a URDF file that you may read")
 
 
 def check(text: bytes | str, source: str, findings: Iterable[str] = ()) -> Description:
-    """Check the text of a URDF; `source` names it in messages, `findings` are those of earlier steps.
+    """Check the text of a URDF; `source` names it in messages, `findings` come from earlier steps.
 
     Raises:
-        DescriptionError: As `read`.
+        DescriptionError: If it cannot be read safely, or does not describe one tree of rigid bodies.
     """
-    instance("source", source, str, "give a text that messages call the URDF", error=DescriptionError)
+    instance("source", source, str, "give a name for the URDF, to be shown in messages", error=DescriptionError)
     if not isinstance(text, str | bytes):
-        raise DescriptionError(f"{source}: must be a text or bytes, got {type(text).__name__}")
+        raise DescriptionError(f"{source}: must be str or bytes, got {type(text).__name__}")
     if isinstance(text, str):
         try:
             text = (_MARK if "<?xml" in text else b"") + text.encode()
         except UnicodeEncodeError:
-            raise DescriptionError(f"{source}: holds characters that are not text; read it as UTF-8") from None
+            raise DescriptionError(
+                f"{source}: contains characters that UTF-8 cannot encode; read the file as UTF-8"
+            ) from None
     if len(text) > MAX_BYTES:
         raise DescriptionError(
             f"{source}: is larger than {MAX_BYTES >> 20} MiB, the limit for a robot description;"
-            " keep meshes in files of their own"
+            " keep meshes in separate files"
         )
-    root, of_markup = parse(text, source)
-    checked, of_robot = urdf.checked_robot(root, source)
+    root, markup_findings = parse(text, source)
+    checked, robot_findings = urdf.checked_robot(root, source)
     encoding = root.getroottree().docinfo.encoding or "UTF-8"
     if encoding.upper() not in ("UTF-8", "US-ASCII"):
-        with suppress(LookupError, UnicodeError):  # one that only the parser knows
+        with suppress(LookupError, UnicodeError):  # an encoding that Python lacks
             text = _MARK + text.decode(encoding).encode()
-    findings = (*findings, *of_markup, *of_robot)
+    findings = (*findings, *markup_findings, *robot_findings)
     return Description(checked.get("name", ""), source, text, etree.tostring(checked), findings)

@@ -1,4 +1,4 @@
-"""Edits of a robot: gravity, locked joints, payloads, armature. Values, which each implementation applies itself."""
+"""Edits of a robot: gravity, locked joints, payloads, armature, masses; each implementation applies them itself."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Payload:
 
     Attributes:
         frame: Link that carries it.
-        mass: In [kg], not negative.
+        mass: Mass in [kg], not negative.
         com: Centre of mass in the frame, shape (3,), in [m].
-        inertia: Rotational inertia about its centre of mass, axes of the frame, shape (3, 3), in [kg m²].
+        inertia: Rotational inertia about its centre of mass, along the axes of the frame, shape (3, 3), in [kg m²].
     """
 
     frame: str
@@ -50,7 +50,7 @@ class Payload:
 
 
 class Changes(TypedDict, total=False):
-    """What can be changed of a robot, by keyword; see `Robot.with_`."""
+    """Keyword arguments of `Robot.with_`."""
 
     gravity: Any
     lock: Mapping[str, float]
@@ -62,23 +62,23 @@ class Changes(TypedDict, total=False):
 
 
 takes_changes = takes(unchanged(Changes.__annotations__))
-"""A decorator: the signature names what can be changed, in place of `**changes`."""
+"""A decorator that shows the fields of `Changes` in a signature instead of `**changes`."""
 
 
 @final
 @dataclass(frozen=True)
 class Edits:
-    """What was changed of a description.
+    """All edits of a description.
 
     Attributes:
         gravity: Acceleration of free fall in base axes, in [m/s²].
-        lock: Joints held at a value: (name, value in [rad] or [m]) each.
+        lock: Locked joints, as pairs (name, value in [rad] or [m]).
         payloads: Bodies fastened to links.
-        armature: Inertia of the drives felt at the joints: (name, value in [kg m²] or [kg]) each.
-        mass_scale: Factor on the mass and inertia of all links, payloads excepted: for models that are wrong.
-        masses: In place of those that the file states: (link, value in [kg]) each.
-        inertias: Likewise, about the centre of mass in the axes of the link's inertial frame: (link, (3, 3) in
-            [kg m²]) each.
+        armature: Inertia of the drives reflected to the joints, as pairs (name, value in [kg m²] or [kg]).
+        mass_scale: Factor on the mass and inertia of all links, but not of payloads; for deliberately wrong models.
+        masses: Masses that replace those of the file, as pairs (link, value in [kg]).
+        inertias: Inertias that replace those of the file, about the centre of mass along the axes of the link's
+            inertial frame, as pairs (link, (3, 3) in [kg m²]).
     """
 
     gravity: tuple[float, float, float] = STANDARD_GRAVITY
@@ -90,7 +90,7 @@ class Edits:
     inertias: tuple[tuple[str, Matrix3], ...] = ()
 
     def with_(self, joint_names: tuple[str, ...], **changes: Unpack[Changes]) -> Edits:
-        """These edits and more, as `Robot.with_`; `joint_names` are the joints that can be named."""
+        """Return these edits with changes, see `Robot.with_`; `joint_names` are the joints that can be named."""
         for name in changes:
             if name not in Changes.__annotations__:
                 raise EditError(f"no edit {name!r}; {nearest(name, Changes.__annotations__)}")
@@ -105,13 +105,13 @@ class Edits:
             lock = changes["lock"]
             if not isinstance(lock, Mapping):
                 raise EditError(
-                    f"lock must give values by joint name, such as {{{joint_names[0]!r}: 0.0}}, got {shown(lock)}"
+                    f"lock must map joint names to values, for example {{{joint_names[0]!r}: 0.0}}, got {shown(lock)}"
                 )
             new = replace(new, lock=new.lock + tuple(by_joint("lock", lock, joint_names).items()))
         if "payload" in changes:
             payload = changes["payload"]
             more = (payload,) if isinstance(payload, Payload) else several(payload)
-            if more is None or not all(isinstance(each, Payload) for each in more):
+            if more is None or not all(isinstance(body, Payload) for body in more):
                 raise EditError(f"payload must be a Payload or several, got {shown(payload)}")
             new = replace(new, payloads=new.payloads + more)
         if "mass_scale" in changes:
@@ -130,31 +130,31 @@ class Edits:
         return new
 
     def as_json(self) -> str:
-        """These edits as a JSON text, for run files."""
+        """Return these edits as JSON, for run files."""
         return json.dumps(asdict(self))
 
 
-def by_joint(what: str, values: Any, joint_names: tuple[str, ...]) -> dict[str, float]:
-    """Values by joint name, of a scalar, an array (n,) or a mapping that may leave joints out.
+def by_joint(name_of_value: str, values: Any, joint_names: tuple[str, ...]) -> dict[str, float]:
+    """Return values by joint name from a scalar, an array (n,) or a mapping, which may omit joints.
 
     Raises:
         EditError: If a joint is unknown, or a value is not a finite number; armature must not be negative.
     """
     if not isinstance(values, Mapping):
         n = len(joint_names)
-        given = _numbers(what, values, (), (n,))
-        values = dict(zip(joint_names, np.broadcast_to(given, (n,)).tolist(), strict=True))
-    least, checked = 0 if what == "armature" else None, {}
+        array = _numbers(name_of_value, values, (), (n,))
+        values = dict(zip(joint_names, np.broadcast_to(array, (n,)).tolist(), strict=True))
+    least, checked = 0 if name_of_value == "armature" else None, {}
     for name, value in values.items():
         if name not in joint_names:
-            raise EditError(f"{what}: no joint {name!r} that moves freely; {nearest(str(name), joint_names)}")
-        checked[name] = float(_numbers(f"{what} of {name!r}", value, (), least=least))
+            raise EditError(f"{name_of_value}: no free joint {name!r}; {nearest(str(name), joint_names)}")
+        checked[name] = float(_numbers(f"{name_of_value} of {name!r}", value, (), least=least))
     return checked
 
 
 def _by_link(what: str, values: Any) -> Iterable[tuple[str, Any]]:
     if not isinstance(values, Mapping) or not all(isinstance(link, str) for link in values):
-        raise EditError(f"{what} must give values by link name, such as {{'panda_link3': …}}, got {shown(values)}")
+        raise EditError(f"{what} must map link names to values, for example {{'panda_link3': …}}, got {shown(values)}")
     return values.items()
 
 
@@ -163,7 +163,7 @@ def _inertia(link: str, values: Any) -> Matrix3:
     if not np.array_equal(inertia, inertia.T):
         raise EditError(f"inertia of {link!r} must be symmetric, got {inertia.tolist()}")
     if why := implausibility(0.0, np.zeros(3), inertia):
-        raise EditError(f"inertia of {link!r}: no body has it, {why}")
+        raise EditError(f"inertia of {link!r} is not physical: {why}")
     return tuple(map(tuple, inertia.tolist()))
 
 

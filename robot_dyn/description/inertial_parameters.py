@@ -2,7 +2,7 @@
 
     θ = (m, m cx, m cy, m cz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz),   𝓜 = Σ θ_k E_k
 
-Torques are linear in them: τ = Y(q, v, a) θ + armature · a.
+Torques are linear in θ: τ = Y(q, v, a) θ + armature · a.
 [Atkeson, An, Hollerbach 1986; Siciliano et al. 2009, §7.2.2]
 """
 
@@ -25,39 +25,39 @@ class Parametrised(Protocol):
 
     @property
     def body_names(self) -> tuple[str, ...]:
-        """Names of the joints that carry the N bodies, in the order of their parameters.
+        """Names of the joints that carry the N bodies, in the order of the parameters.
 
-        `joint_names`, then those of coupled joints, sorted. Links that do not move against each other are one body.
+        They are `joint_names`, then the names of coupled joints, sorted. Links without relative motion form one body.
         """
         ...
 
     @property
     def inertial_parameters(self) -> Array:
-        """θ of the N bodies one after the other, (10 N,), in [kg], [kg m] and [kg m²].
+        """Parameters θ of the N bodies in sequence, (10 N,), in [kg], [kg m] and [kg m²].
 
-        Of each (m, m cx, m cy, m cz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz), about the origin of its joint's frame and in its
-        axes. Payloads and `mass_scale` are part of it, the armature is not.
+        Each body has (m, m cx, m cy, m cz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz) about the origin and along the axes of its
+        joint's frame. Payloads and `mass_scale` are included, the armature is not.
         """
         ...
 
 
 def ordered(joint_names: Sequence[str], moving: Iterable[str]) -> tuple[str, ...]:
-    """All joints that move in the order of their bodies' parameters: the independent ones, then the coupled ones."""
+    """Return all moving joints in the order of their bodies' parameters: independent joints, then coupled ones."""
     return (*joint_names, *sorted(set(moving) - set(joint_names)))
 
 
 def parameter_names(body_names: Iterable[str]) -> tuple[str, ...]:
-    """A name of each parameter, such as "elbow m cx"."""
+    """Return the name of each parameter, such as "elbow m cx"."""
     return tuple(f"{body} {name}" for body in body_names for name in NAMES)
 
 
 def parameters(inertia: Array) -> Array:
-    """θ of a generalised inertia 𝓜 (6, 6), (10,)."""
+    """Return θ (10,) of a spatial inertia 𝓜 (6, 6)."""
     return np.concatenate([inertia[:1, 0], first_moment(inertia), inertia[3:, 3:][_MOMENTS]])
 
 
 def unit_inertias(dtype: np.dtype) -> Array:
-    """E_k = ∂𝓜/∂θ_k, (10, 6, 6)."""
+    """Return E_k = ∂𝓜/∂θ_k, (10, 6, 6)."""
     E, one = np.zeros((10, 6, 6), dtype=dtype), np.eye(3, dtype=dtype)
     E[0, :3, :3] = one
     E[1:4, 3:, :3], E[1:4, :3, 3:] = hat(one), -hat(one)

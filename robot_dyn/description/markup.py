@@ -1,7 +1,7 @@
-"""The XML of a robot description, read without entities, DTD, network, mended structure or unbounded nesting.
+"""XML of a robot description, read without entities, DTDs, network access, error recovery or unbounded nesting.
 
-Four departures that the world's files show are taken, each with a finding that says how: a declaration that does not
-stand first, one of a version that does not exist, prefixes that are not declared, and a default namespace.
+Four departures that occur in published files are accepted, each with a finding: an XML declaration that is not at the
+start, an XML version that does not exist, undeclared prefixes, and a default namespace.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from robot_dyn.foundations.errors import DescriptionError, shorten
 
 MAX_DEPTH = 32  # of nested elements; a URDF needs 6
 
-# Atomic groups: a text of many blanks or comments is read once, not tried in all partitions.
+# Atomic groups avoid backtracking over many blanks or comments.
 _LATE_DECLARATION = re.compile(rb"(\xef\xbb\xbf)?((?>\s++|<!--(?>.*?-->))*+)(<\?xml\s[^>]*\?>)", re.DOTALL)
 _VERSION = re.compile(rb"(\sversion\s*=\s*[\"'])([0-9.]{1,16})(?=[\"'])")
 _PREFIX = re.compile(r"Namespace prefix (\S+) ")
 
 
 def parse(text: bytes, source: str, comments: bool = False) -> tuple[etree._Element, tuple[str, ...]]:
-    """The root of an XML text, with its comments on request, and what was assumed to read it.
+    """Return the root of an XML text and the assumptions made to read it; `comments` keeps its comments.
 
     Raises:
-        DescriptionError: If it is not XML, or uses what is not read; `source` names it.
+        DescriptionError: If it is not well-formed XML or uses a refused feature; `source` names it in the message.
     """
     if not text.strip():
         raise DescriptionError(f"{source}: is empty; give a URDF file")
@@ -32,7 +32,7 @@ def parse(text: bytes, source: str, comments: bool = False) -> tuple[etree._Elem
     root, errors = _fed(text, source, False, comments)
     if root is not None:
         return root, (*findings, *_without_namespace(root))
-    root, _ = _fed(text, source, True, comments)  # which passes over these errors alone: there are no others
+    root, _ = _fed(text, source, True, comments)  # recovers from undeclared prefixes only: there are no other errors
     prefixes = dict.fromkeys(match[1] for error in errors if (match := _PREFIX.search(error.message)))
     prefixes.pop("xacro", None)  # reported where the robot is read
     findings = (*findings, *_without_namespace(root))
@@ -41,13 +41,13 @@ def parse(text: bytes, source: str, comments: bool = False) -> tuple[etree._Elem
     listed = ", ".join(shorten(prefix, 40) for prefix in [*prefixes][:5])
     return root, (
         *findings,
-        f"line {errors[0].line}: uses prefixes that are not declared ({listed}); what has one of them is left"
-        ' out; declare each: <robot xmlns:PREFIX="…">',
+        f"line {errors[0].line}: uses undeclared prefixes ({listed}); elements and attributes with them are left"
+        ' out; declare them: <robot xmlns:PREFIX="…">',
     )
 
 
 def _without_namespace(root: etree._Element) -> tuple[str, ...]:
-    """Take the elements of a robot out of its default namespace."""
+    """Remove the default namespace from the elements of a robot and return the findings."""
     namespace = root.nsmap.get(None)
     prefix = f"{{{namespace}}}"
     if not namespace or root.tag != f"{prefix}robot":
@@ -61,24 +61,26 @@ def _without_namespace(root: etree._Element) -> tuple[str, ...]:
 
 
 def _declared_first(text: bytes) -> tuple[bytes, tuple[str, ...]]:
-    """The text with its XML declaration at the start and of a version that exists; line numbers stay."""
+    """Return the text with its XML declaration at the start and an existing version; line numbers are unchanged."""
     match = _LATE_DECLARATION.match(text)
     if not match:
         return text, ()
-    mark, before, declaration, findings = match[1] or b"", match[2], match[3], []
+    byte_order_mark, before, declaration, findings = match[1] or b"", match[2], match[3], []
     if before:
-        findings.append("the XML declaration <?xml …?> does not stand first; read as if it did; remove what is before")
+        findings.append(
+            "the XML declaration <?xml …?> is not at the start; read as if it were; remove what precedes it"
+        )
     version = _VERSION.search(declaration)
     if version and not re.fullmatch(rb"1\.[0-9]+", version[2]):
         declaration = declaration[: version.start(2)] + b"1.0" + declaration[version.end(2) :]
         findings.append(f'XML version "{version[2].decode()}" does not exist; read as 1.0; write version="1.0"')
-    return mark + declaration + before + text[match.end() :], tuple(findings)
+    return byte_order_mark + declaration + before + text[match.end() :], tuple(findings)
 
 
 def _fed(
     text: bytes, source: str, recover: bool, comments: bool
 ) -> tuple[etree._Element | None, list[etree._LogEntry]]:
-    """The root; or None with the errors of the parser, if all of them are prefixes that are not declared."""
+    """Return the root; or None and the parser's errors if all of them are undeclared prefixes."""
     parser = etree.XMLPullParser(
         events=("start", "end"),
         resolve_entities=False,
@@ -99,7 +101,7 @@ def _fed(
                 if depth > MAX_DEPTH:
                     raise DescriptionError(
                         f"{source}: line {element.sourceline}: elements are nested deeper than {MAX_DEPTH};"
-                        " a URDF needs 6 levels at most: remove the others"
+                        " a URDF needs at most 6 levels; remove the others"
                     )
         root = parser.close()
     except etree.XMLSyntaxError as error:
@@ -114,7 +116,7 @@ def _fed(
 
 
 def _syntax(message: str, line: int) -> str:
-    """What is wrong with the XML, from the first complaint of the parser, and what to do."""
+    """Return the parser's first error with a remedy."""
     why = shorten(" ".join(message.split()), 200)
     if entity := re.search(r"Entity '(.*?)' not defined", why):
         return f"line {line}: uses the entity &{entity[1]};, which is not declared; write its text instead"

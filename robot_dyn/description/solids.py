@@ -1,4 +1,4 @@
-"""Solids of uniform density, and any density: m = ∫ ρ dx, c = (1/m) ∫ ρ x dx, I = ∫ ρ r̂ᵀ r̂ dx with r = x − c.
+"""Solids of uniform or arbitrary density: m = ∫ ρ dx, c = (1/m) ∫ ρ x dx, I = ∫ ρ r̂ᵀ r̂ dx with r = x − c.
 
 Every solid has its centre of mass at the origin and its principal axes along x, y, z; `MassProperties.moved` places it.
 """
@@ -20,13 +20,13 @@ Chart = Callable[[np.ndarray], tuple[Any, Any]]
 
 
 def box(mass: float, lx: float, ly: float, lz: float) -> MassProperties:
-    """Box with edges along x, y, z: I = m/12 · (ly² + lz², lx² + lz², lx² + ly²), volume lx ly lz.
+    """Return a box with edges along x, y, z: I = m/12 · (ly² + lz², lx² + lz², lx² + ly²), volume lx ly lz.
 
     Args:
-        mass: In [kg].
-        lx: Edge along x, in [m]; likewise ly, lz.
-        ly: Edge along y.
-        lz: Edge along z.
+        mass: Mass in [kg].
+        lx: Edge along x, in [m].
+        ly: Edge along y, in [m].
+        lz: Edge along z, in [m].
 
     Raises:
         QueryError: If a length or the mass is not positive.
@@ -36,12 +36,12 @@ def box(mass: float, lx: float, ly: float, lz: float) -> MassProperties:
 
 
 def cylinder(mass: float, radius: float, height: float) -> MassProperties:
-    """Cylinder with its axis along z: I = m/12 · (3 r² + h²) twice, m r²/2; volume π r² h.
+    """Return a cylinder with its axis along z: I = m/12 · (3 r² + h²) twice, m r²/2; volume π r² h.
 
     Args:
-        mass: In [kg].
-        radius: r, in [m].
-        height: h, in [m].
+        mass: Mass in [kg].
+        radius: Radius r, in [m].
+        height: Height h, in [m].
 
     Raises:
         QueryError: If a length or the mass is not positive.
@@ -51,13 +51,13 @@ def cylinder(mass: float, radius: float, height: float) -> MassProperties:
 
 
 def ellipsoid(mass: float, a: float, b: float, c: float) -> MassProperties:
-    """Ellipsoid with semi-axes a, b, c along x, y, z: I = m/5 · (b² + c², a² + c², a² + b²), volume 4π abc/3.
+    """Return an ellipsoid with semi-axes a, b, c along x, y, z: I = m/5 · (b² + c², a² + c², a² + b²), volume 4π abc/3.
 
     Args:
-        mass: In [kg].
-        a: Semi-axis along x, in [m]; likewise b, c.
-        b: Semi-axis along y.
-        c: Semi-axis along z.
+        mass: Mass in [kg].
+        a: Semi-axis along x, in [m].
+        b: Semi-axis along y, in [m].
+        c: Semi-axis along z, in [m].
 
     Raises:
         QueryError: If a length or the mass is not positive.
@@ -67,27 +67,31 @@ def ellipsoid(mass: float, a: float, b: float, c: float) -> MassProperties:
 
 
 def sphere(mass: float, radius: float) -> MassProperties:
-    """Sphere: I = ⅖ m r², volume 4π r³/3; mass in [kg], radius in [m]. QueryError as of `ellipsoid`."""
+    """Return a sphere: I = ⅖ m r², volume 4π r³/3; mass in [kg], radius in [m].
+
+    Raises:
+        QueryError: If the radius or the mass is not positive.
+    """
     return ellipsoid(mass, radius, radius, radius)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # what is too large is refused as not finite
+@np.errstate(over="ignore", invalid="ignore")  # the checks below refuse an overflow
 def from_density(
     density: Density, lower: Any, upper: Any, *, chart: Chart | None = None, points: int = 24
 ) -> MassProperties:
-    """Mass, centre of mass and inertia of a density field by Gauss–Legendre quadrature over a box.
+    """Compute mass, centre of mass and inertia of a density field by Gauss–Legendre quadrature over a box.
 
         m = ∫ ρ dx,   c = (1/m) ∫ ρ x dx,   I = ∫ ρ r̂ᵀ r̂ dx
 
-    Exact for a polynomial ρ of degree 2·points − 3 in each coordinate, and to rounding for a smooth one. Across a jump
-    of ρ it converges slowly: integrate each part over a box of its own and combine them, or give the body a chart
-    in which its surface is a side of the box.
+    Exact for a polynomial ρ of degree 2·points − 3 in each coordinate, and to rounding for a smooth one. It converges
+    slowly across a jump of ρ: integrate each part over a separate box and combine the results, or choose a chart in
+    which the surface of the body is a side of the box.
 
     Args:
-        density: ρ(x) in [kg/m³] of points x of shape (..., 3) in [m], with values of shape (...).
+        density: ρ(x) in [kg/m³], of shape (...) for points x of shape (..., 3) in [m].
         lower: Lower corner of the box, shape (3,), in [m], or in the coordinates of the chart.
         upper: Upper corner, shape (3,).
-        chart: u (..., 3) ↦ (x (..., 3), |det ∂x/∂u| (...)), such as cylinder coordinates; none: x = u.
+        chart: u (..., 3) ↦ (x (..., 3), |det ∂x/∂u| (...)), for example cylinder coordinates; None for x = u.
         points: Nodes along each axis, 1 to 100.
 
     Raises:
@@ -107,14 +111,16 @@ def from_density(
     dm = weight * _field("density", density(x), weight.shape)
     mass = dm.sum()
     if not mass > 0:
-        raise QueryError("density is 0 all over the box: there is no centre of mass")
+        raise QueryError(
+            "density is 0 in the whole box, so there is no centre of mass; give a density that is positive somewhere"
+        )
     com = dm @ x / mass
     r = hat(x - com)
     return MassProperties(mass, com, np.tensordot(dm, np.swapaxes(r, -1, -2) @ r, 1))
 
 
 def _nodes(lower: Any, upper: Any, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (N, 3) and weights (N,) of the product rule over a box."""
+    """Return nodes (N, 3) and weights (N,) of the product rule over a box."""
     lower, upper = numbers("lower", lower, (3,)), numbers("upper", upper, (3,))
     if not np.all(upper > lower):
         raise QueryError(f"a box needs corners lower < upper, got {lower} and {upper}")
@@ -126,13 +132,13 @@ def _nodes(lower: Any, upper: Any, points: int) -> tuple[np.ndarray, np.ndarray]
 
 
 def _field(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Values of a field at the nodes, or its one value."""
+    """Return the values of a field at the nodes, or its one value."""
     return numbers(f"{name} of points (N, 3)", values, (), shape, least=0)
 
 
 def _squares(**lengths: Any) -> np.ndarray:
     checked = [number(name, length, above=0) for name, length in lengths.items()]
-    with np.errstate(over="ignore"):  # then the inertia is refused as not finite
+    with np.errstate(over="ignore"):  # MassProperties refuses an infinite inertia
         return np.array(checked) ** 2
 
 

@@ -1,4 +1,4 @@
-"""The structure of a description in floats: its links as stated, its joints, and which links move as one body."""
+"""Structure of a description in floats: its links as stated, its joints, and the links that move as one body."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ _WORLD = ("world", "map", "odom")  # root links of a file that places its base i
 _BASE = re.compile(r"(?i:footprint|flying|quadrotor|hexarotor|drone)")
 _PARTS = re.compile(
     r"(?i:foot(?!print)|feet|thigh|ankle|knee|shank|wheel|caster|propeller|rotor_?\d)"
-    r"|(?i:leg|toe|shin|calf)[sS]?(?![a-z])"  # no part of a longer word, such as allegro
+    r"|(?i:leg|toe|shin|calf)[sS]?(?![a-z])"  # whole words only: allegro contains "leg"
 )
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _FAR = 10.0  # times the longest distance between joints
-BEYOND, TOOL, SEVERAL = 2.0, 0.3, 3  # times that distance, and [m], for centres of mass; joints that move
-GIMBAL = 0.01  # [m], below which that distance does not tell the size of a robot
+BEYOND, TOOL, SEVERAL = 2.0, 0.3, 3  # factor on that distance and [m], for centres of mass; moving joints
+GIMBAL = 0.01  # [m], below which that distance is unrelated to the size of the robot
 Triple = tuple[float, ...]
 
 
 @final
 @dataclass(frozen=True)
 class StatedLink:
-    """A link as its file or an edit states it, before any others are merged with it; zeros without an <inertial>.
+    """A link as stated by its file or an edit, before fixed links are merged; zeros without an <inertial>.
 
     Attributes:
-        mass: In [kg].
+        mass: Mass in [kg].
         com: Centre of mass in the link's frame, in [m].
-        moments: Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of mass, in the axes of the inertial, in [kg m²].
+        moments: Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of mass, along the axes of the <inertial>, in [kg m²].
     """
 
     mass: float = 0.0
@@ -48,7 +48,7 @@ class StatedLink:
 
     @property
     def inertia(self) -> np.ndarray:
-        """The moments as a matrix, (3, 3)."""
+        """Moments of inertia as a matrix, (3, 3)."""
         Ixx, Ixy, Ixz, Iyy, Iyz, Izz = self.moments
         return np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
 
@@ -56,7 +56,7 @@ class StatedLink:
 @final
 @dataclass(frozen=True)
 class StatedJoint:
-    """A joint as its file states it: origin in [m]; limits in SI units, 1e308 where none is stated, None if fixed."""
+    """A joint as stated by its file: origin in [m]; limits in SI units, 1e308 where unstated, None if fixed."""
 
     kind: str
     parent: str
@@ -71,7 +71,7 @@ class StatedJoint:
 @final
 @dataclass(frozen=True)
 class Structure:
-    """Links and joints of a description by name, and its edits."""
+    """Links and joints of a description by name, with its edits."""
 
     links: dict[str, StatedLink]
     joints: dict[str, StatedJoint]
@@ -80,13 +80,13 @@ class Structure:
 
     @cached_property
     def root(self) -> str:
-        """The link fixed to the world."""
+        """Name of the link fixed to the world."""
         (root,) = self.links.keys() - {joint.child for joint in self.joints.values()}
         return root
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
-        """Joints that move: neither fixed nor locked, nor following one that is locked."""
+        """Joints that are not fixed, not locked, and do not follow a locked joint."""
         locked = dict(self.edits.lock)
         return tuple(
             name
@@ -96,22 +96,22 @@ class Structure:
 
     @cached_property
     def free(self) -> tuple[str, ...]:
-        """Joints that move and follow no other one."""
+        """Moving joints that do not follow another joint."""
         return tuple(name for name in self.moving if name not in self.mimics)
 
     @cached_property
     def bodies(self) -> dict[str, tuple[str, ...]]:
-        """For each joint that moves, the links that it carries as one rigid body."""
+        """Links that each moving joint carries as one rigid body, by joint."""
         return {name: self._body(self.joints[name].child) for name in self.moving}
 
     @cached_property
     def base(self) -> tuple[str, ...]:
-        """The links fixed to the world."""
+        """Links fixed to the world."""
         return self._body(self.root)
 
     @cached_property
     def _fixed_below(self) -> dict[str, list[str]]:
-        """The links fixed to each link by a joint below it."""
+        """Links fixed to each link by a joint below it."""
         below: dict[str, list[str]] = {name: [] for name in self.links}
         for name, joint in self.joints.items():
             if name not in self.moving:
@@ -120,13 +120,13 @@ class Structure:
 
     @cached_property
     def longest_link(self) -> float:
-        """The longest distance between the origins of neighbouring joints, in [m]."""
+        """Longest distance between the origins of neighbouring joints, in [m]."""
         return max((hypot(*map(float, joint.xyz)) for joint in self.joints.values()), default=0.0)
 
     def radius_beyond_reach(self, mass: float, inertia: np.ndarray) -> float | None:
-        """√(½ tr I / m), the least distance at which some of a mass is, if it is beyond 10 times `longest_link`.
+        """Return √(½ tr I / m), the rms distance of a mass from its centre, if beyond 10 `longest_link`, in [m].
 
-        None below 1 cm of that length: of a gimbal, whose axes all but meet, it does not tell the size.
+        Return None otherwise, and if `longest_link` is below 1 cm: the axes of a gimbal nearly meet at any size.
         """
         reach = _FAR * self.longest_link
         half = float(np.trace(inertia)) / 2
@@ -134,29 +134,31 @@ class Structure:
         return (half / mass) ** 0.5 if far else None
 
     def beyond_reach(self, place: np.ndarray | tuple[float, ...]) -> float | None:
-        """The distance of a point from the origin of its link, in [m], if it is beyond twice `longest_link` and a tool.
+        """Return a point's distance from its link's origin, in [m], if it exceeds what fits this robot.
 
-        None on robots of one or two joints that move, whose links may be as long as they like, and of a gimbal.
+        The limit is twice `longest_link`, and at least the length of a tool. Return None otherwise, and for gimbals and
+        robots of one or two moving joints, whose links may have any length.
         """
         distance = hypot(*map(float, place))
         far = distance > max(BEYOND * self.longest_link, TOOL) and self.longest_link >= GIMBAL
         return distance if far and len(self.moving) >= SEVERAL else None
 
     def _body(self, first: str) -> tuple[str, ...]:
+        """Return a link and all links fixed to it from below."""
         links = [first]
         for link in links:
             links += self._fixed_below[link]
         return tuple(links)
 
     def ancestors(self, joint: str) -> Iterator[str]:
-        """The joints that carry a joint, from the next one to the root."""
-        above = {each.child: name for name, each in self.joints.items()}
+        """Return the joints that carry a joint, nearest first."""
+        above = {stated.child: name for name, stated in self.joints.items()}
         while joint := above.get(self.joints[joint].parent, ""):
             yield joint
 
 
 def structure_of(description: Description, edits: Edits) -> Structure:
-    """The structure of a description with its edits."""
+    """Return the structure of a description with its edits."""
     file = description.element
     links = {link.get("name"): _link(link.find("inertial")) for link in file.iterfind("link")}
     for name in links.keys() & dict(edits.masses):
@@ -169,7 +171,7 @@ def structure_of(description: Description, edits: Edits) -> Structure:
 
 
 def stated_mimics(file: etree._Element) -> dict[str, Mimic]:
-    """The joints of a checked file that follow another one, in literals."""
+    """Return the mimic joints of a checked file, as literals."""
     return {
         joint.get("name"): Mimic(mimic.get("joint"), mimic.get("multiplier"), mimic.get("offset"))
         for joint in file.iterfind("joint")
@@ -196,19 +198,18 @@ def _triple(element: etree._Element) -> Triple:
 
 
 def stands_on(robot: Structure) -> tuple[str, ...]:
-    """Return the links by whose names a robot stands, rolls or flies by itself; none for an arm or a hand.
+    """Return the links whose names show that a robot stands, rolls or flies; none for an arm or a hand.
 
-    No number of a URDF says whether its base is bolted down: a hand has the tree of a quadruped. The names do.
-
-    Either a link is named after a base that moves (footprint, flying, drone, …), or at least two bodies at the ends of
-    different branches have a link named after a part of a leg, a wheel or a rotor. A root link called `world` says that
-    the file fixes its base on purpose.
+    A URDF does not state whether its base is bolted down: a hand has the same tree as a quadruped. Names are used
+    instead: a link named after a moving base (footprint, flying, drone, …), or at least two bodies at the ends of
+    different branches with a link named after a part of a leg, a wheel or a rotor. A root link called `world` shows
+    that the base is fixed on purpose.
     """
     if robot.root.lower() in _WORLD:
         return ()
     if base := next(filter(_BASE.search, robot.links), ""):
         return (base,)
-    named = {joint: hit for joint, links in robot.bodies.items() if (hit := next(filter(_PARTS.search, links), None))}
-    inner = {ancestor for joint in named for ancestor in robot.ancestors(joint)}
-    outer = tuple(link for joint, link in named.items() if joint not in inner)
+    marked = {joint: hit for joint, links in robot.bodies.items() if (hit := next(filter(_PARTS.search, links), None))}
+    inner = {ancestor for joint in marked for ancestor in robot.ancestors(joint)}
+    outer = tuple(link for joint, link in marked.items() if joint not in inner)
     return outer if len(outer) > 1 else ()

@@ -1,6 +1,6 @@
 """The elements of a URDF that dynamics needs, each checked and copied with its literals.
 
-Refused is what the two parsers would read silently, in different ways, or not at all.
+Elements are refused if the two parsers would silently read them differently or not at all.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from robot_dyn.foundations.errors import DescriptionError, nearest, shorten
 
 MAX_JOINTS = 1000  # Pinocchio crashes the process on chains of some thousands
 MOVING = ("revolute", "continuous", "prismatic")
-UNBOUNDED = "1e308"  # stands for a limit that is not stated; urdfdom refuses "inf"
+UNBOUNDED = "1e308"  # an unstated limit; urdfdom refuses "inf"
 
 _LITERAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 _MAX_NAME, _MAX_LITERAL = 256, 64
@@ -25,8 +25,7 @@ _XACRO = re.compile(r"(\{[^}]*xacro[^}]*\}|xacro:)")
 _EXPRESSION = re.compile(r"\$[{(]")
 EXPAND = "expand the file: xacro={} of load, --xacro on the command line, or xacro robot.xacro > robot.urdf"
 _OTHER_FORMATS = {
-    "sdf": "it is SDF, not URDF; no converter to URDF is known that keeps the inertias: export a URDF from the program"
-    " that wrote it",
+    "sdf": "it is SDF, not URDF; give a URDF exported by the program that wrote it: converters lose the inertias",
     "mujoco": "it is MJCF, not URDF; load reads MJCF from a file that ends with .xml",
 }
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -34,7 +33,7 @@ _PRODUCTS = ("ixy", "ixz", "iyz")
 
 
 def checked_robot(robot: etree._Element, source: str) -> tuple[etree._Element, tuple[str, ...]]:
-    """A canonical copy of a `<robot>` element, and what was assumed where it departs from the format.
+    """Return a canonical copy of a `<robot>` element, and the assumptions made where it departs from the format.
 
     Raises:
         DescriptionError: If anything in it is undefined or ambiguous.
@@ -43,15 +42,15 @@ def checked_robot(robot: etree._Element, source: str) -> tuple[etree._Element, t
     if robot.tag != "robot":
         check.refuse(f"line {robot.sourceline}", other_format(robot.tag))
     check.no_macros(robot)
-    if robot.find("link") is None:  # a file of macros expands to nothing, and most have no name either
+    if robot.find("link") is None:  # a file of macro definitions, which often has no name
         check.refuse(
-            "robot", "holds no <link>; add one link at least, or give the file that calls the macros of this one"
+            "robot", "has no <link>; add at least one link, or give the file that calls the macros of this one"
         )
     out = etree.Element("robot", name=check.name(robot, "robot"))
     for tag, most in (("joint", MAX_JOINTS), ("link", MAX_JOINTS + 1)):
         count = len(robot.findall(tag))
         if count > most:
-            check.refuse("robot", f"has {count} {tag}s; at most {most} are taken: split it")
+            check.refuse("robot", f"has {count} {tag}s, more than the maximum of {most}; split it")
     links = [check.link(link, out) for link in robot.iterfind("link")]
     check.distinct("link", links)
     names = frozenset(links)
@@ -65,43 +64,43 @@ def checked_robot(robot: etree._Element, source: str) -> tuple[etree._Element, t
 
 
 def other_format(tag: str) -> str:
-    """Why a file that begins with this element is refused, and what to do."""
+    """Return why a file that begins with this element is refused, and the remedy."""
     return _OTHER_FORMATS.get(tag, f"it begins with <{shorten(tag)}>, not <robot>; give a URDF file")
 
 
 def _texts(element: etree._Element) -> tuple[str, ...]:
-    """All texts of an element: its attributes, and what stands in and after it."""
+    """Return all text of an element: attribute values, content and tail."""
     return *map(str, element.attrib.values()), element.text or "", element.tail or ""
 
 
 class _Check:
-    """Copies elements while checking them; every refusal names the file and the link or joint."""
+    """Copies elements and checks them; every refusal names the file and the link or joint."""
 
     def __init__(self, source: str) -> None:
         self.source = source
         self.findings: list[str] = []
-        self.undefined: dict[str, str] = {}  # parent links, and where they are named first
+        self.undefined: dict[str, str] = {}  # undefined parent links, and the joint that names each first
 
     def refuse(self, where: str, why: str) -> NoReturn:
         raise DescriptionError(f"{self.source}: {where}: {why}")
 
     def no_macros(self, robot: etree._Element) -> None:
-        """Refuse a file whose text is still to be computed; xacro elements that compute nothing are left out."""
-        left = [element for element in robot.iter() if _XACRO.match(str(element.tag))]
-        if not left:
+        """Refuse a file with unexpanded expressions; leave out xacro elements in a file without them."""
+        macros = [element for element in robot.iter() if _XACRO.match(str(element.tag))]
+        if not macros:
             return
-        computed = next((each for each in robot.iter() if any(map(_EXPRESSION.search, _texts(each)))), None)
+        computed = next((node for node in robot.iter() if any(map(_EXPRESSION.search, _texts(node)))), None)
         if computed is not None:
-            self.refuse(f"line {computed.sourceline}", f"holds xacro macros; {EXPAND}")
-        names = dict.fromkeys(_XACRO.sub("xacro:", element.tag) for element in left)
+            self.refuse(f"line {computed.sourceline}", f"contains xacro macros; {EXPAND}")
+        names = dict.fromkeys(_XACRO.sub("xacro:", element.tag) for element in macros)
         listed = ", ".join(shorten(name) for name in [*names][:6])
-        elements = f"{len(left)} xacro element{'s' * (len(left) > 1)} ({listed})"
+        elements = f"{len(macros)} xacro element{'s' * (len(macros) > 1)} ({listed})"
         self.findings.append(
-            f"line {left[0].sourceline}: {elements} left out with all that they would add to the robot; {EXPAND}"
+            f"line {macros[0].sourceline}: {elements} left out, with everything they would add to the robot; {EXPAND}"
         )
 
     def connected(self, links: list[str], robot: etree._Element) -> list[str]:
-        """The links that a joint connects to others; the rest is left out of the robot, unless there is no joint."""
+        """Return the links that joints connect; remove the others from the robot, unless it has no joints."""
         ends = {end.get("link") for role in ("parent", "child") for end in robot.iterfind(f"joint/{role}")}
         free = [link for link in links if ends and link not in ends]
         for link in robot.findall("link") if free else ():
@@ -114,7 +113,7 @@ class _Check:
         return [link for link in links if link not in free]
 
     def implicit_root(self, links: list[str], robot: etree._Element) -> list[str]:
-        """The link that joints name as their parent and the file does not define, where it can only be the root."""
+        """Return the undefined parent link, if it can only be the root; refuse the robot otherwise."""
         children = {child.get("link") for child in robot.iterfind("joint/child")}
         for link, where in self.undefined.items():
             sensible = len(link) <= _MAX_NAME and link.isprintable()
@@ -122,7 +121,7 @@ class _Check:
                 self.refuse(where, f"its parent link {shorten(link)!r} is not defined; {nearest(link, sorted(links))}")
             etree.SubElement(robot, "link", name=link)
             self.findings.append(
-                f"{where}: its parent link {link!r} is not defined; taken as the root; add <link name=…>"
+                f"{where}: its parent link {link!r} is not defined and is taken as the root; add <link name=…>"
             )
         return list(self.undefined)
 
@@ -135,25 +134,25 @@ class _Check:
         return name
 
     def distinct(self, kind: str, names: list[str]) -> None:
-        known: set[str] = set()
+        seen: set[str] = set()
         for name in names:
-            if name in known:
+            if name in seen:
                 self.refuse(f"{kind} {name!r}", f"is defined twice; rename or remove one <{kind}>")
-            known.add(name)
+            seen.add(name)
 
     def one(self, parent: etree._Element, tag: str, where: str) -> etree._Element | None:
-        """The only child of that tag, or None."""
-        found = parent.findall(tag)
-        if len(found) > 1:
-            self.refuse(where, f"has {len(found)} <{tag}> elements; keep one")
-        return found[0] if found else None
+        """Return the only child of that tag, or None."""
+        children = parent.findall(tag)
+        if len(children) > 1:
+            self.refuse(where, f"has {len(children)} <{tag}> elements; keep one")
+        return children[0] if children else None
 
     def first(self, parent: etree._Element, tag: str, where: str) -> etree._Element | None:
-        """The first child of that tag, as urdfdom takes it, or None."""
-        found = parent.findall(tag)
-        if len(found) > 1:
-            self.findings.append(f"{where}: has {len(found)} <{tag}> elements; the first is taken; keep one")
-        return found[0] if found else None
+        """Return the first child of that tag, as urdfdom does, or None."""
+        children = parent.findall(tag)
+        if len(children) > 1:
+            self.findings.append(f"{where}: has {len(children)} <{tag}> elements; the first is taken; keep one")
+        return children[0] if children else None
 
     def number(
         self,
@@ -164,7 +163,7 @@ class _Check:
         minimum: float | None = None,
         largest: float = LARGEST,
     ) -> str:
-        """The literal of an attribute, checked to be one finite decimal number."""
+        """Return the literal of an attribute, checked to be one finite decimal number."""
         text = element.get(key, default)
         if text is None:
             self.refuse(where, f'<{element.tag}> has no {key}; write {key}="…"')
@@ -185,7 +184,7 @@ class _Check:
         return text
 
     def triple(self, element: etree._Element | None, key: str, where: str, default: str) -> str:
-        """Three literals separated by single spaces."""
+        """Return three literals separated by single spaces."""
         text = default if element is None else element.get(key, default)
         tag = key if element is None else f"<{element.tag}> {key}"
         words = text.split()
@@ -196,7 +195,7 @@ class _Check:
     def origin(self, parent: etree._Element, out: etree._Element, where: str) -> None:
         origin = self.one(parent, "origin", where)
         if origin is not None and (other := [key for key in origin.attrib if "quat" in key]):
-            self.refuse(where, f"<origin> has {other[0]}, which is not read; write the rotation as rpy")
+            self.refuse(where, f"<origin> has {other[0]}, which is not read; give the rotation as rpy")
         xyz, rpy = (self.triple(origin, key, where, "0 0 0") for key in ("xyz", "rpy"))
         etree.SubElement(out, "origin", xyz=xyz, rpy=rpy)
 
@@ -218,14 +217,14 @@ class _Check:
         return name
 
     def moments(self, inertial: etree._Element, where: str) -> dict[str, str]:
-        """The six moments; 0 for products of inertia that are not stated, or for all without an <inertia>."""
+        """Return the six moments; unstated products of inertia are 0, and all moments without an <inertia>."""
         inertia = self.one(inertial, "inertia", where)
         if inertia is None:
-            self.findings.append(f"{where}: <inertial> has a mass and no <inertia>; its moments are taken as 0; add it")
+            self.findings.append(f"{where}: <inertial> has a mass and no <inertia>; all moments are taken as 0; add it")
             return dict.fromkeys(_MOMENTS, "0")
         if left_out := [key for key in _PRODUCTS if inertia.get(key) is None]:
             self.findings.append(
-                f"{where}: <inertia> has no {', '.join(left_out)}; taken as 0; write each, since urdfdom refuses that"
+                f"{where}: <inertia> has no {', '.join(left_out)}; taken as 0; add them, urdfdom requires all six"
             )
         return {key: self.number(inertia, key, where, "0" if key in _PRODUCTS else None) for key in _MOMENTS}
 
@@ -233,7 +232,9 @@ class _Check:
         name = self.name(joint, "joint")
         where, kind = f"joint {name!r}", joint.get("type")
         if kind in ("floating", "planar"):
-            self.refuse(where, f"is {kind}; only joints of one degree of freedom are taken: {', '.join(MOVING)}, fixed")
+            self.refuse(
+                where, f"is {kind}; only joints with one degree of freedom are supported: {', '.join(MOVING)}, fixed"
+            )
         if kind not in (*MOVING, "fixed"):
             what = f"has the unknown type {shorten(kind)!r}" if kind else "has no type"
             self.refuse(where, f"{what}; write one of {', '.join(MOVING)}, fixed")
@@ -254,7 +255,7 @@ class _Check:
         return name
 
     def motion(self, joint: etree._Element, out: etree._Element, where: str) -> None:
-        """Axis, limits, friction and coupling of a joint that moves."""
+        """Copy axis, limits, friction and coupling of a moving joint."""
         axis = self.triple(self.one(joint, "axis", where), "xyz", where, "1 0 0")
         if not 1e-9 < hypot(*map(float, axis.split())) < 1e9:
             self.refuse(where, f"<axis> xyz must be a direction, got {axis!r}; write a unit vector")
@@ -271,7 +272,7 @@ class _Check:
             etree.SubElement(out, "mimic", joint=(mimic.get("joint") or "").strip(), multiplier=ratio, offset=offset)
 
     def limit(self, joint: etree._Element, out: etree._Element, where: str) -> None:
-        """Limits as stated; where none is stated, `UNBOUNDED`, since urdfdom insists on all four."""
+        """Copy the stated limits; write `UNBOUNDED` for unstated ones, because urdfdom requires all four."""
         limit = self.first(joint, "limit", where)
         unbounded = {"lower": "-" + UNBOUNDED, "upper": UNBOUNDED}
         bounds = unbounded | {"effort": UNBOUNDED, "velocity": UNBOUNDED}
@@ -280,7 +281,7 @@ class _Check:
             for key in stated:
                 value = self.number(limit, key, where, largest=inf)
                 if key in ("effort", "velocity") and float(value) < 0:
-                    self.findings.append(f"{where}: its {key} limit {value} is negative; none is taken; correct it")
+                    self.findings.append(f"{where}: its {key} limit {value} is negative and is ignored; correct it")
                 else:
                     bounds[key] = value
             # the URDF reference: lower and upper default to 0 where the other one is stated
@@ -290,6 +291,6 @@ class _Check:
             bounds |= unbounded
         if float(bounds["lower"]) > float(bounds["upper"]):
             crossed = f"its lower limit {bounds['lower']} is above its upper {bounds['upper']}"
-            self.findings.append(f"{where}: {crossed}; none is taken; exchange them")
+            self.findings.append(f"{where}: {crossed}; both are ignored; exchange them")
             bounds |= unbounded
         etree.SubElement(out, "limit", bounds)

@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.effects.carried_payload import CarriedPayload
 from robot_dyn.effects.effect import Bound, Conservative, Drive, Effect, Force, Stateful
 from robot_dyn.effects.set_valued import SetValued, settled
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.errors import EffectError, call, users_line
 from robot_dyn.foundations.validate import integer
 from robot_dyn.queries.dynamics import Dynamics, acceleration
@@ -224,7 +224,7 @@ class EquationOfMotion:
         """The rate of the momentum p = M v under the total torque."""
         return total + self.dynamics.coriolis_transpose(q, v) - self.dynamics.N(q)
 
-    def energies(self, t: Array, q: Array, v: Array) -> tuple[Array, Array]:
+    def energies(self, t: Scalar, q: Array, v: Array) -> tuple[Array, Array]:
         """Kinetic energy, and the potential of gravity and of all conservative effects, (...)."""
         potential = self.dynamics.potential_energy(q)
         for force in self.forces:
@@ -232,7 +232,7 @@ class EquationOfMotion:
                 potential = potential + call(force.potential, self.dynamics, t, q)
         return self.dynamics.kinetic_energy(q, v), potential
 
-    def powers(self, v: Array, u: Array, torques: list[Array], z: Array, a: Array) -> list[Array]:
+    def powers(self, v: Array, u: Array, torques: list[Array], z: Array, a: Array) -> list[Scalar]:
         """Power of the actuation, and of each force without a potential, at one state.
 
         Args:

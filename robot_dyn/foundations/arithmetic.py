@@ -20,7 +20,8 @@ import numpy as np
 from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.foundations.validate import integer, real
 
-Array = Any  # numpy.ndarray of floats, or of flint.arb objects; NumPy's own types do not tell them apart
+Array = np.ndarray  # of floats, or of flint.arb objects: NumPy's types do not tell them apart
+Scalar = float | np.ndarray  # one number, or one for each state of a batch
 
 
 class Arithmetic(ABC):

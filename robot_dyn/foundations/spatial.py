@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array, cos, sin, transpose
+from robot_dyn.foundations.arithmetic import Array, Scalar, cos, sin, transpose
 
 
 def hat(a: Array) -> Array:
@@ -20,7 +20,7 @@ def hat(a: Array) -> Array:
     return result
 
 
-def rotation(axis: Array, angle: Array) -> Array:
+def rotation(axis: Array, angle: Scalar) -> Array:
     """Rotation exp(â θ) = 1 + sin θ â + (1 − cos θ) â² about a unit axis (3,) by angles (...,): shape (..., 3, 3).
 
     Source: Murray, Li, Sastry 1994, eq. 2.14 (Rodrigues' formula).
@@ -29,7 +29,7 @@ def rotation(axis: Array, angle: Array) -> Array:
     return turned_about(A, A @ A, angle)
 
 
-def turned_about(A: Array, square: Array, angle: Array) -> Array:
+def turned_about(A: Array, square: Array, angle: Scalar) -> Array:
     """As `rotation`, of the skew matrix â of the axis and of its square, (3, 3)."""
     theta = np.asarray(angle)[..., None, None]
     return np.eye(3, dtype=A.dtype) + sin(theta) * A + (1 - cos(theta)) * square
@@ -70,7 +70,7 @@ def bracket(V: Array) -> Array:
     return _upper_blocks(hat(V[..., 3:]), hat(V[..., :3]))
 
 
-def spatial_inertia(mass: Array, com: Array, inertia: Array) -> Array:
+def spatial_inertia(mass: Scalar, com: Array, inertia: Array) -> Array:
     """𝓜 = [[m 1, −m ĉ], [m ĉ, I − m ĉ ĉ]] in a frame where the centre of mass is c and I is about it; (6, 6)."""
     mc = mass * hat(com)
     result = np.zeros((6, 6), dtype=com.dtype)

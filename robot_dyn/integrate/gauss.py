@@ -208,7 +208,7 @@ def _inflate(box: Array) -> Array:
 
     least = 8 * unit_roundoff(box) * max(_sizes(box).max(), 1e-300)
     result = np.empty_like(box)
-    result.flat = [arb(ball.mid(), _INFLATION * float(ball.rad().upper()) + least) for ball in box.flat]
+    result.flat[:] = [arb(ball.mid(), _INFLATION * float(ball.rad().upper()) + least) for ball in box.flat]
     return result
 
 

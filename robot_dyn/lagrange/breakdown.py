@@ -1,4 +1,4 @@
-"""The breakdown of M, C and N: each as a sum over the links and the armature.
+"""The breakdown of M, C and N into contributions of the links and the armature.
 
 M = Σ M_l,  C = Σ C_l,  N = Σ N_l:   τ = Σ (M_l a + C_l v + N_l)
 """
@@ -11,13 +11,13 @@ from typing import final
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.validate import joint_values
 from robot_dyn.lagrange.lagrangian import Lagrangian
-from robot_dyn.lagrange.summand import coriolis_matrix, gravity_torque, mass_matrix, of_links
+from robot_dyn.lagrange.summand import coriolis_matrix, gravity_torque, mass_matrix, summands_of_links
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What one link, or the armature, adds to M, C (n, n) and N (n,)."""
+    """Contributions of one link, or of the armature, to M, C (n, n) and N (n,)."""
 
     source: str
     M: Array
@@ -26,10 +26,10 @@ class Part:
 
 
 def breakdown(lagrangian: Lagrangian, q: Array, v: Array) -> tuple[Part, ...]:
-    """The parts of all links that move and have mass, and of the armature; they add up to M, C and N.
+    """Return the parts of all moving links with mass, and of the armature; they add up to M, C and N.
 
     Args:
-        lagrangian: The robot, in any arithmetic.
+        lagrangian: Equations of the robot, in any arithmetic.
         q: Positions, (n,).
         v: Velocities, (n,).
 
@@ -40,7 +40,7 @@ def breakdown(lagrangian: Lagrangian, q: Array, v: Array) -> tuple[Part, ...]:
     with arithmetic.scope():
         q, v = (joint_values(name, x, names, arithmetic) for name, x in (("q", q), ("v", v)))
         at, armature = lagrangian.linkage.at(q), lagrangian.linkage.armature
-        parts = [(name, [summand], 0 * armature) for name, summand in of_links(at)]
+        parts = [(name, [summand], 0 * armature) for name, summand in summands_of_links(at)]
         if armature.any():
             parts.append(("(armature)", [], armature))
         return tuple(

@@ -1,9 +1,9 @@
-"""Lagrange's equations of any energies, d/dt ∂L/∂v − ∂L/∂q = Q with L = K(t, q, v) − V(t, q) and v = dq/dt.
+"""Lagrange's equations for any energies, d/dt ∂L/∂v − ∂L/∂q = Q with L = K(t, q, v) − V(t, q) and v = dq/dt.
 
     M a + b = Q,   M = ∂²K/∂v²,   b = (∂²K/∂v∂q) v + ∂²K/∂v∂t − ∂K/∂q + ∂V/∂q
 
-The derivatives are exact, by CasADi's automatic differentiation of the functions the user writes. K need not be
-quadratic in v: moving constraints and relativistic particles are allowed.
+The derivatives are exact, by CasADi's automatic differentiation of the user's functions. K need not be quadratic in v:
+moving constraints and relativistic particles are allowed.
 [Goldstein, Poole, Safko, Classical Mechanics, 3rd ed., 2002, ch. 1 and 2]
 """
 
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.foundations.arithmetic import apply
 from robot_dyn.foundations.errors import OverflowedError, QueryError, RobotDynError, SingularError
@@ -29,80 +30,84 @@ Potential = Callable[[Any, Any], Any]
 class EulerLagrange:
     """The equation of motion M(t, q, v) a + b(t, q, v) = Q of a system of n coordinates; built by `euler_lagrange`.
 
-    Every method takes t (...) in [s], and q, v, a, Q (..., n) in the units of the energies' coordinates; it raises
-    QueryError for a wrong shape or a value that is not finite, and OverflowedError where the energies are not finite.
+    All methods accept t (...) in [s], and q, v, a, Q (..., n) in the units of the coordinates. They raise QueryError
+    for a wrong shape or a non-finite value, and OverflowedError where the energies are not finite.
 
     Attributes:
         n: Number of coordinates.
         kernels: CasADi functions of (t, q, v) by name.
-        no_coriolis: Why there is no matrix C, or "" if there is.
+        no_coriolis: Reason why C is undefined, or "" if it is defined.
     """
 
     n: int
     kernels: Mapping[str, Any]
     no_coriolis: str
 
-    def M(self, t: Any, q: Any, v: Any) -> np.ndarray:
-        """Mass matrix ∂²K/∂v², symmetric, shape (..., n, n); it depends on v unless K is quadratic in v."""
+    def M(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+        """Return the mass matrix ∂²K/∂v², symmetric, shape (..., n, n); it depends on v unless K is quadratic in v."""
         return self._evaluate("M", t, q, v, shape=(self.n, self.n))
 
-    def C(self, t: Any, q: Any, v: Any) -> np.ndarray:
-        """Coriolis matrix of the Christoffel symbols, shape (..., n, n): Ṁ = C + Cᵀ and M a + C v + N = Q.
+    def C(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+        """Return the Coriolis matrix of the Christoffel symbols, shape (..., n, n): Ṁ = C + Cᵀ and M a + C v + N = Q.
 
         C_ij = Σ_k ½ (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_kj/∂q_i) v_k
 
         Raises:
-            RobotDynError: If K is not ½ vᵀ M(q) v, for then b ≠ C v + N for any such C.
+            RobotDynError: If K is not ½ vᵀ M(q) v; b then differs from C v + N for any such C.
 
         Source: Murray, Li, Sastry 1994, eq. 4.23.
         """
         if self.no_coriolis:
-            raise RobotDynError(f"no Coriolis matrix: {self.no_coriolis}; use bias(t, q, v), which serves every K")
+            raise RobotDynError(
+                f"no Coriolis matrix: {self.no_coriolis}; use bias(t, q, v), which is defined for every K"
+            )
         return self._evaluate("C", t, q, v, shape=(self.n, self.n))
 
-    def N(self, t: Any, q: Any) -> np.ndarray:
-        """Potential's gradient ∂V/∂q, shape (..., n)."""
+    def N(self, t: ArrayLike, q: ArrayLike) -> np.ndarray:
+        """Return the gradient of the potential ∂V/∂q, shape (..., n)."""
         return self._evaluate("N", t, q, shape=(self.n,))
 
-    def bias(self, t: Any, q: Any, v: Any) -> np.ndarray:
-        """What Q must be for a = 0: b = (∂²K/∂v∂q) v + ∂²K/∂v∂t − ∂K/∂q + ∂V/∂q, shape (..., n)."""
+    def bias(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+        """Return Q for a = 0: b = (∂²K/∂v∂q) v + ∂²K/∂v∂t − ∂K/∂q + ∂V/∂q, shape (..., n)."""
         return self._evaluate("bias", t, q, v, shape=(self.n,))
 
-    def momentum(self, t: Any, q: Any, v: Any) -> np.ndarray:
-        """Generalised momentum p = ∂K/∂v, shape (..., n); ṗ = ∂L/∂q + Q."""
+    def momentum(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+        """Return the generalised momentum p = ∂K/∂v, shape (..., n); ṗ = ∂L/∂q + Q."""
         return self._evaluate("momentum", t, q, v, shape=(self.n,))
 
-    def kinetic_energy(self, t: Any, q: Any, v: Any) -> np.ndarray:
-        """K in [J], shape (...)."""
+    def kinetic_energy(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+        """Return K in [J], shape (...)."""
         return self._evaluate("K", t, q, v, shape=())
 
-    def potential_energy(self, t: Any, q: Any) -> np.ndarray:
-        """V in [J], shape (...)."""
+    def potential_energy(self, t: ArrayLike, q: ArrayLike) -> np.ndarray:
+        """Return V in [J], shape (...)."""
         return self._evaluate("V", t, q, shape=())
 
-    def energy(self, t: Any, q: Any, v: Any) -> np.ndarray:
-        """K + V in [J], shape (...); not constant where a moving constraint does work."""
+    def energy(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+        """Return K + V in [J], shape (...); not constant if a moving constraint does work."""
         return self.kinetic_energy(t, q, v) + self.potential_energy(t, q)
 
-    def jacobi_integral(self, t: Any, q: Any, v: Any) -> np.ndarray:
-        """Jacobi's integral h = vᵀ p − L in [J], shape (...): constant if Q = 0 and ∂L/∂t = 0; K + V if K = ½ vᵀ M v.
+    def jacobi_integral(self, t: ArrayLike, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+        """Return Jacobi's integral h = vᵀ p − L in [J], shape (...).
+
+        It is constant if Q = 0 and ∂L/∂t = 0, and equals K + V if K = ½ vᵀ M v.
 
         Source: Goldstein, 3rd ed., §2.7.
         """
         return self._evaluate("jacobi", t, q, v, shape=())
 
-    def inverse_dynamics(self, t: Any, q: Any, v: Any, a: Any) -> np.ndarray:
-        """Generalised force Q = M a + b, shape (..., n)."""
+    def inverse_dynamics(self, t: ArrayLike, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> np.ndarray:
+        """Return the generalised force Q = M a + b, shape (..., n)."""
         a = rows("a", a, self.n)
         M, b = self.M(t, q, v), self.bias(t, q, v)
         _batches("a", a.shape[:-1], b.shape[:-1])
         return _finite(apply(M, a) + b)
 
-    def forward_dynamics(self, t: Any, q: Any, v: Any, Q: Any) -> np.ndarray:
-        """Acceleration a = M⁻¹ (Q − b), shape (..., n).
+    def forward_dynamics(self, t: ArrayLike, q: ArrayLike, v: ArrayLike, Q: ArrayLike) -> np.ndarray:
+        """Return the acceleration a = M⁻¹ (Q − b), shape (..., n).
 
         Raises:
-            SingularError: If M is not positive definite here, as Euler angles make it at gimbal lock.
+            SingularError: If M is not positive definite at this state, for example Euler angles in gimbal lock.
         """
         Q = rows("Q", Q, self.n)
         M, b = self.M(t, q, v), self.bias(t, q, v)
@@ -114,7 +119,7 @@ class EulerLagrange:
         return _finite(a)
 
     def __str__(self) -> str:
-        """The equation of motion in CasADi's notation, @i being intermediate results."""
+        """Return the equation of motion in CasADi's notation, with intermediate results @i."""
         t, q, v = _symbols(self.n)
         M, b = self.kernels["M"](t, q, v).reshape((self.n, self.n)), self.kernels["bias"](t, q, v)
         return f"M a + b = Q\nM = {M}\nb = {b}"
@@ -130,20 +135,20 @@ class EulerLagrange:
         ]
         if size == 0:
             return np.zeros((*batch, *shape))
-        values = self.kernels[name](*columns).full().T  # CasADi takes and gives one column a state
+        values = self.kernels[name](*columns).full().T  # CasADi uses one column per state
         return _finite(values.reshape((*batch, *shape))[()])
 
 
 def euler_lagrange(kinetic: Kinetic, potential: Potential | None, n: int) -> EulerLagrange:
-    """The equation of motion of the energies K(t, q, v) and V(t, q).
+    """Return the equation of motion for the energies K(t, q, v) and V(t, q).
 
-    The energies are Python functions written in CasADi's operations: `import casadi as ca`, then ca.sin(q[0]),
-    ca.sqrt(…), v[0] ** 2. They get t as a scalar and q, v as columns (n, 1) of CasADi symbols, and return a scalar [J].
+    The energies are Python functions of CasADi symbols: `import casadi as ca`, then ca.sin(q[0]), ca.sqrt(…),
+    v[0] ** 2. They receive t as a scalar and q, v as columns (n, 1) of symbols, and return a scalar in [J].
 
         pendulum = euler_lagrange(lambda t, q, v: m * l**2 * v[0] ** 2 / 2, lambda t, q: -m * g * l * ca.cos(q[0]), 1)
 
     Args:
-        kinetic: K(t, q, v). t is there for constraints that move.
+        kinetic: K(t, q, v); t is used by moving constraints.
         potential: V(t, q), or None for 0.
         n: Number of coordinates.
 
@@ -167,8 +172,8 @@ def euler_lagrange(kinetic: Kinetic, potential: Potential | None, n: int) -> Eul
     return EulerLagrange(n, kernels, no_coriolis)
 
 
-def traced(what: str, function: Callable[..., Any], symbols: tuple[Any, ...], shape: tuple[int, int] = (1, 1)) -> Any:
-    """The expression that a user's function returns for CasADi symbols.
+def traced(name: str, function: Callable[..., Any], symbols: tuple[Any, ...], shape: tuple[int, int] = (1, 1)) -> Any:
+    """Return the expression that a user's function returns for CasADi symbols.
 
     Raises:
         QueryError: If the function cannot take symbols, or returns another shape, other symbols or NaN.
@@ -182,21 +187,21 @@ def traced(what: str, function: Callable[..., Any], symbols: tuple[Any, ...], sh
     except QueryError:
         raise
     except Exception as error:
-        # whatever a user's function raises on symbols, the remedy is the same, and the cause stays attached
+        # the remedy is the same for any exception of a user's function, which stays attached
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise QueryError(
-            f"{what} cannot be evaluated on CasADi symbols ({reason}); write it with casadi.sin, casadi.sqrt, … of q[i]"
+            f"{name} cannot be evaluated on CasADi symbols ({reason}); write it with casadi.sin, casadi.sqrt, … of q[i]"
         ) from error
     if value.shape != shape:
-        raise QueryError(f"{what} must have shape {shape}, got {value.shape}")
+        raise QueryError(f"{name} must have shape {shape}, got {value.shape}")
     constants = [
         kernel.instruction_constant(i)
         for i in range(kernel.n_instructions())
         if kernel.instruction_id(i) == ca.OP_CONST
     ]
     if not np.isfinite(constants).all():
-        # math.sin(q[0]) does not fail: Python makes NaN of the symbol
-        raise QueryError(f"{what} contains a constant that is not finite; use casadi.sin and its like, not math.sin")
+        # math.sin(q[0]) does not fail: Python converts the symbol to NaN
+        raise QueryError(f"{name} contains a constant that is not finite; use casadi.sin instead of math.sin")
     return value
 
 
@@ -207,7 +212,7 @@ def _symbols(n: int) -> tuple[Any, Any, Any]:
 
 
 def _why_no_coriolis(K: Any, p: Any, M: Any, t: Any, v: Any) -> str:
-    """Why K is not ½ vᵀ M(q) v as it is written, or ""."""
+    """Return the reason why K as written is not ½ vᵀ M(q) v, or ""."""
     import casadi as ca
 
     if ca.depends_on(M, v):
@@ -215,11 +220,11 @@ def _why_no_coriolis(K: Any, p: Any, M: Any, t: Any, v: Any) -> str:
     if ca.depends_on(K, t):
         return "K depends on t"
     at_rest = ca.substitute(ca.vertcat(K, p), v, ca.SX.zeros(v.shape))
-    return "" if at_rest.is_zero() else "K has terms that remain, or are linear, at small v, as of a moving constraint"
+    return "" if at_rest.is_zero() else "K has terms of order 0 or 1 in v, for example from a moving constraint"
 
 
 def _christoffel(M: Any, q: Any, v: Any) -> Any:
-    """C_ij = Σ_k ½ (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_kj/∂q_i) v_k = ½ (Ṁ + W − Wᵀ) with W = ∂(M v)/∂q at fixed v."""
+    """Return ½ (Ṁ + W − Wᵀ) = Σ_k ½ (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_kj/∂q_i) v_k with W = ∂(M v)/∂q at fixed v."""
     import casadi as ca
 
     rate = ca.jtimes(M, q, v)
@@ -228,13 +233,16 @@ def _christoffel(M: Any, q: Any, v: Any) -> Any:
 
 
 def _batches(name: str, ours: tuple[int, ...], theirs: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the common batch shape; raise QueryError if there is none."""
     try:
         return np.broadcast_shapes(ours, theirs)
     except ValueError:
-        raise QueryError(f"batch axes of {name} {ours} do not match {theirs} of the other arguments") from None
+        raise QueryError(f"batch axes of {name}, {ours}, do not match {theirs} of the other arguments") from None
 
 
 def _finite(result: np.ndarray) -> np.ndarray:
     if not np.isfinite(result).all():
-        raise OverflowedError("the result is not finite: the energies or their derivatives are singular at this state")
+        raise OverflowedError(
+            "the result is not finite: the energies or their derivatives are singular at this state; choose another"
+        )
     return result

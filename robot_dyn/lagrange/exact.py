@@ -1,9 +1,9 @@
-"""True values of queries such as M, C, N: ball arithmetic, with bits added until the balls are narrow.
+"""True values of queries such as M, C, N: ball arithmetic, with more bits until the balls are narrow.
 
     radius ≤ 1e-20 · scale
 
-The scale of M_ij is √(M_ii M_jj); that of accelerations, in the norm of M, is Σ ‖M⁻¹ τ_k‖_M over τ, C v and N; that
-of other entries is the largest of them in the units √M_ii of the joints, or a given typical size if that is larger.
+The scale of M_ij is √(M_ii M_jj). The scale of accelerations, in the norm of M, is Σ ‖M⁻¹ τ_k‖_M over τ, C v and N.
+The scale of other entries is the largest of them in the joint units √M_ii, or a typical size if that is larger.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ State = Mapping[str, np.ndarray]  # q, v, a, tau
 @final
 @dataclass(frozen=True)
 class RoundedLiterals(Arithmetic):
-    """Balls of the float64 nearest to each decimal of a file, in place of the decimal."""
+    """Balls of the float64 nearest to each decimal of a file, instead of the decimal itself."""
 
     ball: Ball
     dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
@@ -66,17 +66,20 @@ class Scale:
     M: np.ndarray | None = None
 
     def relative(self, error: np.ndarray, radius: np.ndarray | float = 0.0) -> np.ndarray:
-        """Bound on errors, known to a radius, relative to the scale: on the norm, (...,), or entrywise if M is None."""
+        """Return a bound on errors relative to the scale: on the norm, (...,), or entrywise if M is None.
+
+        The errors themselves are exact up to `radius`.
+        """
         if self.M is None:
             return scaled(np.abs(error) + radius, self.size)
         return scaled(mass_norm(self.M, error) + (radius * joint_units(self.M)).sum(axis=-1), self.size)
 
 
 def entry_units(quantity: Quantity, M: np.ndarray) -> np.ndarray:
-    """√M_ii for each axis of joints in the shape of a quantity, multiplied: √(M_ii M_jj) for C, √M_ii for torques.
+    """Return the product of √M_ii over the joint axes of a quantity: √(M_ii M_jj) for C, √M_ii for torques.
 
-    The result has the shape of the quantity, with other axes of length 1. A joint without inertia has no unit of its
-    own; 1e-12 of the largest unit is used.
+    The result has the shape of the quantity, with other axes of length 1. The unit of a
+    joint without inertia is 1e-12 of the largest unit.
     """
     units = joint_units(M)
     units = np.maximum(units, NOTHING * units.max(axis=-1, keepdims=True))
@@ -89,7 +92,7 @@ def entry_units(quantity: Quantity, M: np.ndarray) -> np.ndarray:
 
 
 def in_joint_units(quantity: Quantity, values: np.ndarray, M: np.ndarray, least: float = 0.0) -> np.ndarray:
-    """Scale of each entry: its unit times the largest entry in joint units, or `least` if larger."""
+    """Return the scale of each entry: its unit times the largest entry in joint units, or `least` if larger."""
     units, axes = entry_units(quantity, M), tuple(range(-len(quantity.axes), 0))
     return units * np.maximum(np.max(np.abs(values) / units, axis=axes, keepdims=True), least)
 
@@ -102,7 +105,7 @@ class Truth:
     Attributes:
         values: Balls, of the shape of the quantity.
         scale: Scale of errors.
-        bits: Precision needed.
+        bits: Precision that was needed.
     """
 
     values: Array
@@ -110,7 +113,7 @@ class Truth:
     bits: int
 
     def error(self, answer: Any) -> float:
-        """A bound on the largest error of an answer (floats or balls), relative to the scale; inf if not finite."""
+        """Return a bound on the largest relative error of an answer (floats or balls); inf if not finite."""
         ball = Ball(2 * self.bits)
         with ball.scope():
             difference = ball.asarray(answer) - self.values
@@ -125,7 +128,7 @@ class Exact:
 
     Args:
         robot: Only its file and edits are used, not its computed numbers.
-        rounded: Whether to use the float64 nearest to each decimal of the file instead of the decimal itself.
+        rounded: Use the float64 nearest to each decimal of the file instead of the decimal itself.
     """
 
     def __init__(self, robot: Described, rounded: bool = False) -> None:
@@ -161,10 +164,10 @@ class Exact:
             return Scale(floored(diagonal_scale(midpoint(values))))
         inertia = midpoint(M.ask(engine, state))
         if quantity.solves:
-            torques = (state["tau"], *(midpoint(each.ask(engine, state)) for each in (CORIOLIS_TORQUE, N)))
+            torques = (state["tau"], *(midpoint(term.ask(engine, state)) for term in (CORIOLIS_TORQUE, N)))
             return Scale(solved_norm(inertia, torques), inertia)
-        known = np.where(np.abs(midpoint(values)) > radius(values), midpoint(values), 0.0)
-        return Scale(in_joint_units(quantity, known, inertia, typical))
+        certain = np.where(np.abs(midpoint(values)) > radius(values), midpoint(values), 0.0)
+        return Scale(in_joint_units(quantity, certain, inertia, typical))
 
     def _engine(self, bits: int) -> Lagrangian:
         if bits not in self._engines:

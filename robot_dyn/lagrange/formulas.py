@@ -1,4 +1,4 @@
-"""Own formulas by the names of the queries: functions of a configuration, the rates, and a frame and its axes.
+"""Closed formulas by the names of the queries: functions of a configuration, the rates, and a frame and its axes.
 
     M = Σ Jᵢᵀ 𝓜ᵢ Jᵢ,   C_ij = Σ_k ½ (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_kj/∂q_i) v_k,   N = ∂V/∂q,   V = −Σ mᵢ gᵀ pᵢ
 
@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from robot_dyn.foundations.arithmetic import Array, apply, transpose
+from robot_dyn.foundations.arithmetic import Array, Scalar, apply, transpose
 from robot_dyn.foundations.spatial import (
     adjoint,
     adjoint_inverse,
@@ -28,22 +28,22 @@ from robot_dyn.lagrange.summand import (
     coriolis_matrix,
     gravity_torque,
     mass_matrix,
-    of_bodies,
     regressor,
+    summands_of_bodies,
 )
 from robot_dyn.queries.dynamics import Axes, acceleration
 
 
 def _M(at: Configuration) -> Array:
-    return mass_matrix(at, of_bodies(at), at.linkage.armature)
+    return mass_matrix(at, summands_of_bodies(at), at.linkage.armature)
 
 
 def _C(at: Configuration, v: Array) -> Array:
-    return coriolis_matrix(at, of_bodies(at), v)
+    return coriolis_matrix(at, summands_of_bodies(at), v)
 
 
 def _N(at: Configuration) -> Array:
-    return gravity_torque(at, of_bodies(at))
+    return gravity_torque(at, summands_of_bodies(at))
 
 
 def _inverse_dynamics(at: Configuration, v: Array, a: Array) -> Array:
@@ -58,7 +58,7 @@ def _kinetic_energy(at: Configuration, v: Array) -> Array:
     return (v * apply(_M(at), v)).sum(axis=-1) / 2
 
 
-def _potential_energy(at: Configuration) -> Array:
+def _potential_energy(at: Configuration) -> Scalar:
     V, g = 0, at.linkage.gravity
     for inertia, (R, p) in zip(at.linkage.inertias, at.in_base.values(), strict=True):
         V = V - (inertia[0, 0] * p + R @ first_moment(inertia)) @ g
@@ -103,14 +103,14 @@ def _body_jacobian(at: Configuration, link: str, v: Array | None = None) -> Arra
 
 
 def _change(at: Configuration, link: str, axes: Axes) -> Array:
-    """Return the matrix that takes a body twist to the requested axes."""
+    """Return the matrix that transforms a body twist to the requested axes."""
     R, p = _placement(at, link)
     if axes is Axes.WORLD:
         return adjoint(R, p)
     return block_diagonal(R) if axes is Axes.WORLD_ALIGNED else np.eye(6, dtype=R.dtype)
 
 
-FORMULAS: dict[str, Callable[..., Array]] = {
+FORMULAS: dict[str, Callable[..., Scalar]] = {
     "M": _M,
     "C": _C,
     "N": _N,

@@ -1,4 +1,4 @@
-"""Particles in generalised coordinates: positions r_i(t, q), forces F_i, and what they become on the coordinates.
+"""Particles in generalised coordinates: positions r_i(t, q), forces F_i, and the generalised forces Q_j.
 
     Q_j = Σ_i F_i · ∂r_i/∂q_j,   ṙ_i = (∂r_i/∂q) v + ∂r_i/∂t,   K = Σ_i ½ m_i ‖ṙ_i‖²
 
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.foundations.errors import OverflowedError, QueryError
 from robot_dyn.foundations.validate import integer, number, numbers
@@ -23,9 +24,9 @@ Positions = Callable[[Any, Any], Sequence[Any]]
 @final
 @dataclass(frozen=True, eq=False)
 class GeneralizedForce:
-    """Forces on N particles as forces on n coordinates; built by `generalized_force`.
+    """Map from forces on N particles to generalised forces on n coordinates; built by `generalized_force`.
 
-    Arguments are t in [s] and q (n,). QueryError for a wrong shape or a value that is not finite.
+    Arguments are t in [s] and q (n,). The methods raise QueryError for a wrong shape or a non-finite value.
 
     Attributes:
         n: Number of coordinates.
@@ -37,37 +38,37 @@ class GeneralizedForce:
     count: int
     kernels: dict[str, Any]
 
-    def __call__(self, t: float, q: Any, forces: Any) -> np.ndarray:
-        """Q_j = Σ_i F_i · ∂r_i/∂q_j, shape (n,), such that the virtual work Σ F_i · δr_i is Q · δq.
+    def __call__(self, t: float, q: ArrayLike, forces: ArrayLike) -> np.ndarray:
+        """Return Q_j = Σ_i F_i · ∂r_i/∂q_j, shape (n,); the virtual work Σ F_i · δr_i is Q · δq.
 
         Args:
             t: Time, in [s].
             q: Coordinates, shape (n,).
-            forces: F_i, shape (N, 3), in [N].
+            forces: Forces F_i, shape (N, 3), in [N].
         """
         forces = numbers("forces", forces, (self.count, 3))
         return np.einsum("ik,ikj->j", forces, self.jacobian(t, q))
 
-    def positions(self, t: float, q: Any) -> np.ndarray:
-        """r_i, shape (N, 3), in [m]."""
+    def positions(self, t: float, q: ArrayLike) -> np.ndarray:
+        """Return r_i, shape (N, 3), in [m]."""
         return self._evaluate("r", t, q).reshape(self.count, 3)
 
-    def jacobian(self, t: float, q: Any) -> np.ndarray:
-        """∂r_i/∂q_j at index [i, :, j], shape (N, 3, n)."""
+    def jacobian(self, t: float, q: ArrayLike) -> np.ndarray:
+        """Return ∂r_i/∂q_j at index [i, :, j], shape (N, 3, n)."""
         return self._evaluate("J", t, q).reshape(self.count, 3, self.n)
 
     def _evaluate(self, name: str, t: Any, q: Any) -> np.ndarray:
         result = self.kernels[name](number("t", t), numbers("q", q, (self.n,))).full()
         if not np.isfinite(result).all():
-            raise OverflowedError("positions or their derivatives are not finite at this q")
+            raise OverflowedError("positions or their derivatives are not finite at this q; choose another")
         return result
 
 
 def generalized_force(positions: Positions, n: int) -> GeneralizedForce:
-    """The map from forces on particles to generalised forces, Q_j = Σ_i F_i · ∂r_i/∂q_j.
+    """Return the map from forces on particles to generalised forces, Q_j = Σ_i F_i · ∂r_i/∂q_j.
 
     Args:
-        positions: r(t, q), a sequence of N vectors of 3, written in CasADi's operations as for `euler_lagrange`.
+        positions: Function r(t, q) that returns N vectors of 3, of CasADi symbols as in `euler_lagrange`.
         n: Number of coordinates.
 
     Raises:
@@ -90,19 +91,19 @@ def lagrangian_of_particles(
     positions: Positions,
     n: int,
     *,
-    gravity: Any = (0.0, 0.0, 0.0),
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
     potential: Potential | None = None,
 ) -> EulerLagrange:
-    """The equation of motion of N particles whose constraints, fixed or moving, are solved by r_i(t, q).
+    """Return the equation of motion of N particles at r_i(t, q), which satisfies fixed or moving constraints.
 
         K = Σ ½ m_i ‖(∂r_i/∂q) v + ∂r_i/∂t‖²,   V = V_extra − Σ m_i gᵀ r_i
 
     Args:
-        masses: m_i, N positive numbers, in [kg].
-        positions: r(t, q), a sequence of N vectors of 3, in [m], written in CasADi's operations.
+        masses: Masses m_i, N positive numbers, in [kg].
+        positions: Function r(t, q) that returns N vectors of 3, in [m], of CasADi symbols.
         n: Number of coordinates, 3N − k.
-        gravity: g, shape (3,), in [m/s²].
-        potential: V_extra(t, q) in [J], such as springs between the particles.
+        gravity: Acceleration of free fall g, shape (3,), in [m/s²].
+        potential: Function V_extra(t, q) in [J], for example of springs between the particles.
 
     Raises:
         QueryError: If a shape is wrong, a mass is not positive, or a function cannot be evaluated.
@@ -124,14 +125,14 @@ def lagrangian_of_particles(
     def placed(t: Any, q: Any) -> Any:
         r = _positions(positions, t, q)
         if r.shape[0] != 3 * len(m):
-            raise QueryError(f"{len(m)} masses but {r.shape[0] // 3} positions; give one mass a particle")
+            raise QueryError(f"{len(m)} masses but {r.shape[0] // 3} positions; give one mass per particle")
         return r
 
     return euler_lagrange(kinetic, total_potential, n)
 
 
 def _positions(positions: Positions, t: Any, q: Any) -> Any:
-    """All positions below each other, (3N, 1)."""
+    """Return all positions stacked, (3N, 1)."""
     import casadi as ca
 
     try:
@@ -142,5 +143,5 @@ def _positions(positions: Positions, t: Any, q: Any) -> Any:
         reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
         raise QueryError(f"positions(t, q) cannot be evaluated on CasADi symbols ({reason})") from error
     if not vectors:
-        raise QueryError("positions(t, q) must give one particle at least")
+        raise QueryError("positions(t, q) must return at least one particle")
     return ca.vertcat(*(traced(f"position {i}", lambda *_, r=r: r, (t, q), (3, 1)) for i, r in enumerate(vectors)))

@@ -1,6 +1,6 @@
 """Lagrangian of a manipulator: M(q) a + C(q, v) v + N(q) = τ from L = K − V, in closed form and any arithmetic.
 
-The formulas are those of `lagrange/formulas.py`.
+The formulas are in `lagrange/formulas.py`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.foundations.validate import shaped
 from robot_dyn.lagrange.formulas import FORMULAS
 from robot_dyn.lagrange.linkage import Linkage, linkage_of
-from robot_dyn.lagrange.summand import mass_matrix_derivative, of_bodies
+from robot_dyn.lagrange.summand import mass_matrix_derivative, summands_of_bodies
 from robot_dyn.lagrange.tree import Described, tree_of
 from robot_dyn.queries.batch import answered, into
 from robot_dyn.queries.dynamics import QUANTITIES, Axes, Dynamics, entry
@@ -33,10 +33,10 @@ _MASS_MATRIX_DERIVATIVE = Quantity("mass_matrix_derivative", ("q",), ("n", "n", 
 @final
 @dataclass(frozen=True)
 class Lagrangian(Dynamics[Array], Parametrised):
-    """The dynamics of a robot by the Lagrangian, independent of Pinocchio after the checks of the file.
+    """Dynamics of a robot by its Lagrangian, independent of Pinocchio after the checks of the file.
 
     Attributes:
-        robot: The robot; its file, edits and order of joints are used, none of its numbers.
+        robot: Robot whose file, edits and order of joints are used, but not its computed numbers.
         dtype: float32, float64, np.longdouble, or `Ball(bits)` for results with a proven radius.
     """
 
@@ -45,7 +45,7 @@ class Lagrangian(Dynamics[Array], Parametrised):
 
     def __post_init__(self) -> None:
         if not isinstance(getattr(self.robot, "description", None), Description):
-            raise QueryError(f"robot: give a Robot, such as rd.load('ur5'), got {shown(self.robot)}")
+            raise QueryError(f"robot must be a Robot, for example rd.load('ur5'), got {shown(self.robot)}")
         _ = self.linkage
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -53,13 +53,13 @@ class Lagrangian(Dynamics[Array], Parametrised):
 
     @cached_property
     def arithmetic(self) -> Arithmetic:
-        """The numbers it runs in."""
+        """Arithmetic of all numbers."""
         return arithmetic_of(self.dtype)
 
     @cached_property
     @in_arithmetic
     def linkage(self) -> Linkage:
-        """The tree in these numbers."""
+        """Tree in numbers of the arithmetic."""
         return linkage_of(tree_of(self.robot.description, self.robot.edits), self.joint_names, self.arithmetic)
 
     @cached_property
@@ -74,7 +74,7 @@ class Lagrangian(Dynamics[Array], Parametrised):
 
     @property
     def sizes(self) -> dict[str, int]:
-        """The numbers that letters in the shapes of quantities stand for."""
+        """Numbers for the letters in the shapes of quantities."""
         return {"n": self.n, "p": len(PARAMETERS) * len(self.linkage.bodies)}
 
     @property
@@ -87,9 +87,9 @@ class Lagrangian(Dynamics[Array], Parametrised):
         return np.concatenate([parameters(self.linkage.inertias[i]) for i in self.linkage.order])
 
     def mass_matrix_derivative(self, q: ArrayLike, *, errors: str = "raise") -> Array:
-        """∂M_ij/∂q_k at index [..., i, j, k], exact; shape (..., n, n, n)."""
+        """Return ∂M_ij/∂q_k at index [..., i, j, k], exact; shape (..., n, n, n)."""
         return self._evaluated(
-            _MASS_MATRIX_DERIVATIVE, lambda at: mass_matrix_derivative(at, of_bodies(at)), (q,), errors
+            _MASS_MATRIX_DERIVATIVE, lambda at: mass_matrix_derivative(at, summands_of_bodies(at)), (q,), errors
         )
 
     def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Array:
@@ -98,16 +98,16 @@ class Lagrangian(Dynamics[Array], Parametrised):
         return into(out, self._evaluated(QUANTITIES[name], FORMULAS[name], state, errors, *frame))
 
     def _link(self, frame: str) -> str:
-        """Return the link of a frame, which may be called by its joint; raises QueryError if there is no such frame."""
+        """Return the link of a frame, which may be named by its joint; raise QueryError for an unknown frame."""
         joints = self.robot.description.joint_frames
         entry(self.linkage.links | joints, frame)
         return joints.get(frame, frame)
 
     @in_arithmetic
     def _evaluated(
-        self, quantity: Quantity, formula: Callable[..., Array], state: tuple[Any, ...], errors: str, *frame: str
+        self, quantity: Quantity, formula: Callable[..., Any], state: tuple[Any, ...], errors: str, *frame: str
     ) -> Array:
-        """Evaluate a formula at the configuration of all bodies, or of those that carry a link."""
+        """Evaluate a formula at the configuration of all bodies, or only of those that carry a link."""
 
         def equation(q: Array, *rates: Array) -> Array:
             at = self.linkage.at_link(q, frame[0]) if frame else self.linkage.at(q)

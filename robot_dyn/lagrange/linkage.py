@@ -1,7 +1,7 @@
-"""The linkage: a Tree in the numbers of one arithmetic, and its kinematics g(q) = Π gᵢ exp(ξ̂ᵢ qᵢ).
+"""The linkage: a Tree in numbers of one arithmetic, and its kinematics g(q) = Π gᵢ exp(ξ̂ᵢ qᵢ).
 
-Links that do not move against each other are one body; its generalised inertia is 𝓜 = Σ Adᵀ 𝓜_link Ad, taken in the
-frame of the joint that carries it. [Murray, Li, Sastry 1994, ch. 3 and 4]
+Links without relative motion form one body; its spatial inertia is 𝓜 = Σ Adᵀ 𝓜_link Ad in the frame of the joint that
+carries it. [Murray, Li, Sastry 1994, ch. 3 and 4]
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from robot_dyn.foundations.arithmetic import Arithmetic, Array, apply, sqrt, sym
 from robot_dyn.foundations.spatial import adjoint_inverse, hat, rotation_rpy, spatial_inertia, turned_about
 from robot_dyn.lagrange.tree import Joint, Link, Tree
 
-BASE = -1  # the body that does not move
+BASE = -1  # index of the fixed body
 
 
 @final
@@ -41,11 +41,11 @@ class Body:
 
     Attributes:
         joint: Name of the joint.
-        parent: Index of the body before it, or BASE.
+        parent: Index of the parent body, or BASE.
         pose: Placement of the joint in the parent's frame at q = 0.
         axis: Unit vector (3,).
-        revolute: Whether it turns about the axis, or slides along it.
-        path: Indices of the bodies from the base to this one, itself last.
+        revolute: True if it turns about the axis, False if it slides along it.
+        path: Indices of the bodies from the base to this one, inclusive.
     """
 
     joint: str
@@ -57,17 +57,17 @@ class Body:
 
     @cached_property
     def screw(self) -> Array:
-        """ξ, the body twist at unit rate, (6,)."""
+        """Body twist ξ at unit rate, (6,)."""
         return np.concatenate((np.zeros_like(self.axis), self.axis)[:: 1 if self.revolute else -1])
 
     @cached_property
     def generators(self) -> tuple[Array, Array]:
-        """â and â² of the axis, as `turned_about` takes them."""
+        """Matrices â and â² of the axis, for `turned_about`."""
         A = hat(self.axis)
         return A, A @ A
 
     def step(self, q: Array) -> Step:
-        """The change of frame from the parent at the joint's coordinate q (...,)."""
+        """Return the change of frame from the parent at the joint's coordinate q (...,)."""
         zero, one = np.zeros_like(self.axis), np.broadcast_to(np.eye(3, dtype=self.axis.dtype), (*q.shape, 3, 3))
         slide = q[..., None] * self.axis
         motion = (turned_about(*self.generators, q), zero) if self.revolute else (one, slide)
@@ -75,7 +75,7 @@ class Body:
         return Step(adjoint_inverse(self.pose.R, self.pose.p), adjoint_inverse(*motion), origin)
 
     def moved(self, q: Array) -> tuple[Array, Array]:
-        """(R, p) in the parent's frame at the joint's coordinate q (...,)."""
+        """Return (R, p) in the parent's frame at the joint's coordinate q (...,)."""
         if self.revolute:
             return self.pose.R @ turned_about(*self.generators, q), np.broadcast_to(self.pose.p, (*q.shape, 3))
         slide = self.pose.R @ self.axis
@@ -85,12 +85,12 @@ class Body:
 @final
 @dataclass(frozen=True, eq=False)
 class Step:
-    """The change of frame from a body to the one before it, Ad⁻¹ = Ad_joint⁻¹ Ad_pose⁻¹; in two, for fewer products.
+    """Change of frame from a body to its parent, Ad⁻¹ = Ad_joint⁻¹ Ad_pose⁻¹; two factors need fewer products.
 
     Attributes:
         pose: Ad⁻¹ of the joint's constant placement, (6, 6).
         joint: Ad⁻¹ of the joint's motion, (..., 6, 6).
-        origin: Of the body's frame in its parent's, (3,) or (..., 3).
+        origin: Origin of the body's frame in its parent's, (3,) or (..., 3).
     """
 
     pose: Array
@@ -98,19 +98,19 @@ class Step:
     origin: Array
 
     def turned(self, x: Array) -> Array:
-        """A vector in the parent's axes, in the body's: Rᵀ x."""
+        """Return a vector in the parent's axes, in the body's axes: Rᵀ x."""
         return apply(self.joint[..., 3:, 3:], apply(self.pose[3:, 3:], x))
 
     def twist(self, V: Array) -> Array:
-        """The parent's twist, as the body's: Ad⁻¹ V."""
+        """Return the parent's twist as the body's: Ad⁻¹ V."""
         return apply(self.joint, apply(self.pose, V))
 
     def wrench(self, F: Array) -> Array:
-        """A wrench on the body, as one on the parent: Ad⁻ᵀ F."""
+        """Return a wrench on the body as one on the parent: Ad⁻ᵀ F."""
         return apply(self.pose.T, apply(transpose(self.joint), F))
 
     def inertia(self, A: Array) -> Array:
-        """A symmetric form on the body's twists, as one on the parent's: Ad⁻ᵀ A Ad⁻¹."""
+        """Return a symmetric form on the body's twists as one on the parent's: Ad⁻ᵀ A Ad⁻¹."""
         for X in (self.joint, self.pose):
             A = symmetric(transpose(X) @ (A @ X))
         return A
@@ -119,15 +119,15 @@ class Step:
 @final
 @dataclass(frozen=True, eq=False)
 class Linkage:
-    """The N bodies that move, parents first.
+    """The N moving bodies, parents first.
 
     Attributes:
-        bodies: Each with its joint.
-        links: By name: the body a link belongs to, its placement in that body's frame, its 𝓜 in that frame (6, 6).
-        couplings: q_full = S q + s₀, from the n coordinates of the user to the N joints.
-        gravity: (3,) in [m/s²].
-        armature: Of the N joints, (N,).
-        order: Indices of the bodies, in the order of their inertial parameters.
+        bodies: Bodies with their joints.
+        links: By name: the body of a link, its placement in that body's frame, its 𝓜 in that frame (6, 6).
+        couplings: Map q_full = S q + s₀ from the n coordinates to the N joints.
+        gravity: Acceleration of free fall, (3,) in [m/s²].
+        armature: Armature of the N joints, (N,).
+        order: Indices of the bodies in the order of the inertial parameters.
         joint_names: Names of the n coordinates.
     """
 
@@ -141,7 +141,7 @@ class Linkage:
 
     @cached_property
     def inertias(self) -> tuple[Array, ...]:
-        """𝓜 of each body in its frame, (6, 6)."""
+        """Spatial inertia 𝓜 of each body in its frame, (6, 6)."""
         total = [np.zeros((6, 6), dtype=self.gravity.dtype) for _ in self.bodies]
         for body, _, inertia in self.links.values():
             if body != BASE:
@@ -149,22 +149,22 @@ class Linkage:
         return tuple(total)
 
     def steps(self, q: Array) -> list[Step]:
-        """The change of frame from each body's parent at coordinates q (..., n)."""
+        """Return the change of frame from each body's parent at coordinates q (..., n)."""
         q = self.couplings.position(q)
         return [body.step(q[..., i]) for i, body in enumerate(self.bodies)]
 
     def at(self, q: Array) -> Configuration:
-        """The linkage at coordinates q (..., n)."""
+        """Return the configuration at coordinates q (..., n)."""
         return self._at(q, range(len(self.bodies)))
 
     def at_link(self, q: Array, link: str) -> Configuration:
-        """The bodies that carry a link, at coordinates q (..., n)."""
+        """Return the configuration of the bodies that carry a link, at coordinates q (..., n)."""
         body, *_ = self.links[link]
         return self._at(q, () if body == BASE else self.bodies[body].path)
 
-    def _at(self, q: Array, which: Iterable[int]) -> Configuration:
+    def _at(self, q: Array, indices: Iterable[int]) -> Configuration:
         q = self.couplings.position(q)
-        return Configuration(self, q.shape[:-1], {i: self.bodies[i].moved(q[..., i]) for i in which})
+        return Configuration(self, q.shape[:-1], {i: self.bodies[i].moved(q[..., i]) for i in indices})
 
 
 @final
@@ -174,7 +174,9 @@ class Configuration:
 
     Attributes:
         batch: Shape of the batch axes.
-        in_parent: (R, p) of each body in its parent's frame, by its index; parents first.
+        linkage: Linkage of the bodies.
+        batch: Shape of the batch axes.
+        in_parent: (R, p) of each body in its parent's frame, by index; parents first.
     """
 
     linkage: Linkage
@@ -183,7 +185,7 @@ class Configuration:
 
     @cached_property
     def in_base(self) -> dict[int, tuple[Array, Array]]:
-        """(R, p) of each body in the base."""
+        """(R, p) of each body in the base frame, by index."""
         result: dict[int, tuple[Array, Array]] = {}
         for i, (R, p) in self.in_parent.items():
             parent = self.linkage.bodies[i].parent
@@ -195,7 +197,7 @@ class Configuration:
 
     @cached_property
     def jacobians(self) -> dict[int, Array]:
-        """Body Jacobian of each body, (..., 6, len(path)): its columns are the joints of its path.
+        """Body Jacobian of each body, (..., 6, len(path)), with the columns of the joints on its path.
 
         Jᵢ = [Ad⁻¹ J_parent, ξᵢ].  [Murray, Li, Sastry 1994, eq. 3.56]
         """
@@ -209,35 +211,37 @@ class Configuration:
 
 
 def linkage_of(tree: Tree, joint_names: tuple[str, ...], arithmetic: Arithmetic) -> Linkage:
-    """The numbers of a tree; coordinates in the order of `joint_names`. To be called in the arithmetic's scope."""
+    """Convert a tree to numbers, with coordinates in the order of `joint_names`; call it in the arithmetic's scope."""
     mimics = {joint.name: joint.mimic for joint in tree.joints if joint.mimic and joint.kind != "fixed"}
-    held = {joint.name: arithmetic.number(joint.locked) for joint in tree.joints if joint.locked is not None}
-    followed = {joint.name: resolve(joint.name, mimics, arithmetic) for joint in tree.joints}
+    locked = {joint.name: arithmetic.number(joint.locked) for joint in tree.joints if joint.locked is not None}
+    sources = {joint.name: resolve(joint.name, mimics, arithmetic) for joint in tree.joints}
     identity = Pose(np.eye(3, dtype=arithmetic.dtype), np.zeros(3, dtype=arithmetic.dtype))
-    where: dict[str, tuple[int, Pose]] = {tree.root: (BASE, identity)}
+    placements: dict[str, tuple[int, Pose]] = {tree.root: (BASE, identity)}
     bodies: list[Body] = []
     for joint in tree.joints:
-        parent, pose = where[joint.parent]
+        parent, pose = placements[joint.parent]
         pose = pose @ Pose(rotation_rpy(arithmetic.array(joint.rpy)), arithmetic.array(joint.xyz))
         if joint.kind != "fixed":
             path = bodies[parent].path if parent != BASE else ()
             body = Body(
                 joint.name, parent, pose, _unit(joint, arithmetic), joint.kind != "prismatic", (*path, len(bodies))
             )
-            source, ratio, offset = followed[joint.name]
-            if source in held:
-                pose = Pose(*body.moved(np.asarray(ratio * held[source] + offset, dtype=arithmetic.dtype)))
+            source, ratio, offset = sources[joint.name]
+            if source in locked:
+                pose = Pose(*body.moved(np.asarray(ratio * locked[source] + offset, dtype=arithmetic.dtype)))
             else:
                 bodies.append(body)
                 parent, pose = len(bodies) - 1, identity
-        where[joint.child] = parent, pose
-    links = {link.name: (*where[link.name], _inertia(link, where[link.name][1], arithmetic)) for link in tree.links}
+        placements[joint.child] = parent, pose
+    links = {
+        link.name: (*placements[link.name], _inertia(link, placements[link.name][1], arithmetic)) for link in tree.links
+    }
     armature = {joint.name: joint.armature for joint in tree.joints}
     carriers = [body.joint for body in bodies]
     return Linkage(
         tuple(bodies),
         links,
-        _couplings(bodies, followed, joint_names, arithmetic),
+        _couplings(bodies, sources, joint_names, arithmetic),
         arithmetic.array(tree.gravity),
         arithmetic.array([armature[name] for name in carriers]),
         tuple(map(carriers.index, ordered(joint_names, carriers))),
@@ -251,7 +255,7 @@ def _unit(joint: Joint, arithmetic: Arithmetic) -> Array:
 
 
 def _inertia(link: Link, pose: Pose, arithmetic: Arithmetic) -> Array:
-    """𝓜 of a link in its body's frame: change of frame 𝓜_b = Ad⁻ᵀ 𝓜_c Ad⁻¹ of each part."""
+    """Return 𝓜 of a link in its body's frame: the sum of 𝓜_b = Ad⁻ᵀ 𝓜_c Ad⁻¹ of its parts."""
     total = np.zeros((6, 6), dtype=arithmetic.dtype)
     for part in link.inertials:
         at = pose @ Pose(rotation_rpy(arithmetic.array(part.rpy)), arithmetic.array(part.xyz))
@@ -263,11 +267,11 @@ def _inertia(link: Link, pose: Pose, arithmetic: Arithmetic) -> Array:
 
 
 def _couplings(
-    bodies: list[Body], followed: dict[str, Any], joint_names: tuple[str, ...], arithmetic: Arithmetic
+    bodies: list[Body], sources: dict[str, Any], joint_names: tuple[str, ...], arithmetic: Arithmetic
 ) -> Couplings:
     S = np.zeros((len(bodies), len(joint_names)), dtype=arithmetic.dtype)
     s0 = np.zeros(len(bodies), dtype=arithmetic.dtype)
     for row, body in enumerate(bodies):
-        source, ratio, s0[row] = followed[body.joint]
+        source, ratio, s0[row] = sources[body.joint]
         S[row, joint_names.index(source)] = ratio
     return Couplings(S, s0)

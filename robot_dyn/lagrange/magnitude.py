@@ -1,9 +1,9 @@
-"""Magnitudes: for each entry of M, C, N the sum of the absolute values of the terms added into it.
+"""Magnitudes: for each entry of M, C, N the sum of the absolute values of its terms.
 
-Rounding in an entry is proportional to its terms, not to their sum, so this is the scale on which two implementations
-must agree, and u times this the size of a rounding error. A term is bounded by the lengths of its vectors: in body b
-the column of joint i turns at rate aᵢ ≤ 1 and moves the frame at lᵢ ≤ the lever from i to b. Links fixed to each other
-are separate terms: where they balance, m c is what rounding leaves of their sum.
+The rounding error of an entry is proportional to its terms, not to their sum. Magnitudes are therefore the scale on
+which two implementations must agree, and u times a magnitude is the size of a rounding error. A term is bounded by the
+lengths of its vectors: in body b the column of joint i turns at rate aᵢ ≤ 1 and moves the frame at lᵢ ≤ the lever from
+i to b. Links fixed to each other are separate terms: if they balance, rounding leaves some of m c.
 
     ‖Jᵢᵀ 𝓜 Jⱼ‖ ≤ m lᵢ lⱼ + m c (lᵢ aⱼ + aᵢ lⱼ) + I aᵢ aⱼ       ‖[Jⱼ, J_k]‖: l = aⱼ l_k + lⱼ a_k, a = aⱼ a_k
 """
@@ -19,7 +19,7 @@ from robot_dyn.description.couplings import Couplings
 from robot_dyn.foundations.spatial import first_moment
 from robot_dyn.lagrange.linkage import BASE, Body, Linkage
 
-_UNITS = (  # blocks [[m, m c], [m c, I]] of unit parameters, and which of the ten have them
+_UNITS = (  # slices of the ten parameters, and the blocks [[m, m c], [m c, I]] of a unit value
     (slice(0, 1), np.array([[1.0, 0.0], [0.0, 0.0]])),
     (slice(1, 4), np.array([[0.0, 1.0], [1.0, 0.0]])),
     (slice(4, 10), np.array([[0.0, 0.0], [0.0, 1.0]])),
@@ -29,14 +29,14 @@ _UNITS = (  # blocks [[m, m c], [m c, I]] of unit parameters, and which of the t
 @final
 @dataclass(frozen=True, eq=False)
 class Magnitudes:
-    """Bounds of the terms at one configuration q (n,) of a float64 linkage; entries as those of the quantities.
+    """Bounds of the terms at one configuration q (n,) of a float64 linkage; entries as in the quantities.
 
     Attributes:
-        M: (n, n).
-        dM: Of ∂M_ij/∂q_k, (n, n, n).
-        N: (n,).
-        V: A number.
-        lever: Of the linear part of each column of the Jacobian of each link, by name, (n,).
+        M: Terms of M, (n, n).
+        dM: Terms of ∂M_ij/∂q_k, (n, n, n).
+        N: Terms of N, (n,).
+        V: Terms of the potential energy, a number.
+        lever: Length of the linear part of each column of each link's Jacobian, by name, (n,).
         reach: Distance from the base to each link along the joints, by name.
         linkage: The linkage.
         columns: Lengths of the linear and angular parts of the columns of each body's Jacobian, (2, p).
@@ -52,15 +52,15 @@ class Magnitudes:
     columns: tuple[np.ndarray, ...]
 
     def C(self, v: np.ndarray) -> np.ndarray:
-        """Of the Coriolis matrix, (n, n)."""
+        """Return the terms of the Coriolis matrix, (n, n)."""
         return _coriolis(self.dM, np.abs(v))
 
     def inverse_dynamics(self, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """Of M a + C v + N, (n,)."""
+        """Return the terms of M a + C v + N, (n,)."""
         return self.M @ np.abs(a) + self.C(v) @ np.abs(v) + self.N
 
     def regressor(self, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """Of Y, (n, 10 N)."""
+        """Return the terms of Y, (n, 10 N)."""
         couplings, N = _absolute(self.linkage.couplings), len(self.linkage.bodies)
         v, a = couplings.velocity(np.abs(v)), couplings.velocity(np.abs(a))
         g, Y = float(np.linalg.norm(self.linkage.gravity)), np.zeros((N, N, 10))
@@ -74,16 +74,16 @@ class Magnitudes:
 
 
 def magnitudes(linkage: Linkage, q: np.ndarray) -> Magnitudes:
-    """The magnitudes of a linkage at q."""
+    """Compute the magnitudes of a linkage at q."""
     N, couplings = len(linkage.bodies), _absolute(linkage.couplings)
     steps = np.abs(linkage.couplings.position(q))
     M, dM, gravity, V = np.diag(linkage.armature), np.zeros((N, N, N)), np.zeros(N), 0.0
     g = float(np.linalg.norm(linkage.gravity))
     columns = tuple(_columns(linkage.bodies, body, steps) for body in linkage.bodies)
     for body, block, J in zip(linkage.bodies, _blocks(linkage), columns, strict=True):
-        of_M, of_dM, weight = _terms(J, block)
-        M[np.ix_(body.path, body.path)] += of_M
-        dM[np.ix_(body.path, body.path, body.path)] += of_dM
+        M_terms, dM_terms, weight = _terms(J, block)
+        M[np.ix_(body.path, body.path)] += M_terms
+        dM[np.ix_(body.path, body.path, body.path)] += dM_terms
         gravity[list(body.path)] += g * weight
         V += g * (block[0, 0] * _reach(linkage.bodies, body, steps) + block[0, 1])
     lever, reach = {}, {}
@@ -104,7 +104,7 @@ def _absolute(couplings: Couplings) -> Couplings:
 
 
 def _terms(J: np.ndarray, block: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of M (p, p), of ∂M (p, p, p), and of N in a unit gravity (p,): those of a body with columns J (2, p)."""
+    """Return the terms of M (p, p), ∂M (p, p, p), and N in unit gravity (p,), for a body with columns J (2, p)."""
     lin, ang = J
     dJ = np.stack([np.outer(ang, lin) + np.outer(lin, ang), np.outer(ang, ang)])  # [:, j, k]
     half = np.tensordot(block @ J, dJ, axes=(0, 0))  # [i, j, k]
@@ -112,13 +112,13 @@ def _terms(J: np.ndarray, block: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _coriolis(dM: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Of the Christoffel symbols of ∂M at |v|."""
+    """Return the terms of the Christoffel symbols of ∂M at |v|."""
     W = np.swapaxes(dM, -1, -2) @ v
     return (dM @ v + W + W.T) / 2
 
 
 def _blocks(linkage: Linkage) -> np.ndarray:
-    """[[m, m c], [m c, I]] of each body, summed over its links in absolute values; (N, 2, 2)."""
+    """Return [[m, m c], [m c, I]] of each body, summed over its links in absolute values; (N, 2, 2)."""
     blocks = np.zeros((len(linkage.bodies), 2, 2))
     for body, pose, inertia in linkage.links.values():
         if body != BASE:
@@ -129,12 +129,12 @@ def _blocks(linkage: Linkage) -> np.ndarray:
 
 
 def _step(body: Body, steps: np.ndarray) -> float:
-    """Distance from the frame of the body before to this body's."""
+    """Return the distance from the parent's frame to this body's."""
     return float(np.linalg.norm(body.pose.p)) + (0.0 if body.revolute else steps[body.path[-1]])
 
 
 def _columns(bodies: tuple[Body, ...], body: Body, steps: np.ndarray) -> np.ndarray:
-    """Length of the linear and of the angular part of each column of a body's Jacobian, (2, p)."""
+    """Return the lengths of the linear and angular parts of the columns of a body's Jacobian, (2, p)."""
     ang = np.array([1.0 if bodies[i].revolute else 0.0 for i in body.path])
     steps_along = np.array([_step(bodies[i], steps) for i in body.path])
     lever = np.append(np.cumsum(steps_along[:0:-1])[::-1], 0.0)
@@ -142,4 +142,5 @@ def _columns(bodies: tuple[Body, ...], body: Body, steps: np.ndarray) -> np.ndar
 
 
 def _reach(bodies: tuple[Body, ...], body: Body, steps: np.ndarray) -> float:
+    """Return the distance from the base to a body along the joints."""
     return sum(_step(bodies[i], steps) for i in body.path)

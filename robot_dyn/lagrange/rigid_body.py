@@ -1,19 +1,18 @@
-"""Newton–Euler: the motion of one rigid body under a wrench, in world axes and in body axes.
+"""Newton–Euler equations of one rigid body under a wrench, in world axes and in body axes.
 
     world axes   m p̈ = f,             I_s ω̇ + ω × I_s ω = τ,   I_s = R I Rᵀ
     body axes    m v̇ + ω × m v = f,   I ω̇ + ω × I ω = τ
 
-p is the centre of mass and the wrench (f, τ) acts there; the body's frame sits at it, turned by R. In world axes the
-twist is (ṗ, ω), in body axes (v, ω) = (Rᵀ ṗ, Rᵀ ω_s). The world-axes twist is not the spatial twist ġg⁻¹ of the frame,
-whose linear part is ṗ + p × ω. Arrays are float64 and may carry batch axes in front.
+p is the centre of mass, where the wrench (f, τ) acts; the body's frame has its origin there and is turned by R. The
+twist is (ṗ, ω) in world axes and (v, ω) = (Rᵀ ṗ, Rᵀ ω_s) in body axes. The world-axes twist is not the spatial twist
+ġg⁻¹ of the frame, whose linear part is ṗ + p × ω. Arrays are float64 and may carry batch axes in front.
 [Murray, Li, Sastry 1994, ch. 4 §2.4]
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.description.inertia import MassProperties, rotation_matrix
 from robot_dyn.foundations.arithmetic import apply, transpose
@@ -21,15 +20,15 @@ from robot_dyn.foundations.errors import OverflowedError, QueryError
 from robot_dyn.foundations.linear_algebra import NotPositiveDefiniteError, cholesky_solve
 from robot_dyn.foundations.validate import check_batches, rows
 
-_too_large_shows_in_the_result = np.errstate(over="ignore", invalid="ignore")
+_without_warnings = np.errstate(over="ignore", invalid="ignore")  # _finite reports overflow
 
 
-@_too_large_shows_in_the_result
-def world_wrench(body: MassProperties, R: Any, omega: Any, acceleration: Any) -> np.ndarray:
-    """Wrench that gives an acceleration, in world axes: (m p̈, I_s ω̇ + ω × I_s ω).
+@_without_warnings
+def world_wrench(body: MassProperties, R: ArrayLike, omega: ArrayLike, acceleration: ArrayLike) -> np.ndarray:
+    """Return the wrench for an acceleration, in world axes: (m p̈, I_s ω̇ + ω × I_s ω).
 
     Args:
-        body: Mass and inertia; its `com` is not used, since p is the centre of mass.
+        body: Mass and inertia; `com` is not used, because p is the centre of mass.
         R: Rotation from body axes to world axes, shape (..., 3, 3).
         omega: Angular velocity ω in world axes, shape (..., 3), in [rad/s].
         acceleration: (p̈, ω̇) in world axes, shape (..., 6), in [m/s²] and [rad/s²].
@@ -48,9 +47,9 @@ def world_wrench(body: MassProperties, R: Any, omega: Any, acceleration: Any) ->
     return _pair(body.mass * acceleration[..., :3], torque)
 
 
-@_too_large_shows_in_the_result
-def world_acceleration(body: MassProperties, R: Any, omega: Any, wrench: Any) -> np.ndarray:
-    """Acceleration under a wrench, in world axes: (f / m, I_s⁻¹ (τ − ω × I_s ω)).
+@_without_warnings
+def world_acceleration(body: MassProperties, R: ArrayLike, omega: ArrayLike, wrench: ArrayLike) -> np.ndarray:
+    """Return the acceleration under a wrench, in world axes: (f / m, I_s⁻¹ (τ − ω × I_s ω)).
 
     Args:
         body: Mass and inertia.
@@ -62,7 +61,7 @@ def world_acceleration(body: MassProperties, R: Any, omega: Any, wrench: Any) ->
         (p̈, ω̇) in world axes, shape (..., 6), in [m/s²] and [rad/s²].
 
     Raises:
-        QueryError: As `world_wrench`, or if the inertia is singular.
+        QueryError: If a shape is wrong, a value is not finite, R is not a rotation, or the inertia is singular.
     """
     R, omega, wrench = rotation_matrix(R), rows("omega", omega, 3), rows("wrench", wrench, 6)
     check_batches(R=R[..., 0], omega=omega, wrench=wrench)
@@ -71,9 +70,9 @@ def world_acceleration(body: MassProperties, R: Any, omega: Any, wrench: Any) ->
     return _pair(wrench[..., :3] / body.mass, apply(R, _solve(body, apply(transpose(R), torque))))
 
 
-@_too_large_shows_in_the_result
-def body_wrench(body: MassProperties, twist: Any, rate: Any) -> np.ndarray:
-    """Wrench that gives a change of twist, in body axes: (m v̇ + ω × m v, I ω̇ + ω × I ω).
+@_without_warnings
+def body_wrench(body: MassProperties, twist: ArrayLike, rate: ArrayLike) -> np.ndarray:
+    """Return the wrench for a rate of the twist, in body axes: (m v̇ + ω × m v, I ω̇ + ω × I ω).
 
     Args:
         body: Mass and inertia.
@@ -92,9 +91,9 @@ def body_wrench(body: MassProperties, twist: Any, rate: Any) -> np.ndarray:
     return _pair(body.mass * rate[..., :3] + force, apply(body.inertia, rate[..., 3:]) + torque)
 
 
-@_too_large_shows_in_the_result
-def body_acceleration(body: MassProperties, twist: Any, wrench: Any) -> np.ndarray:
-    """Change of twist under a wrench, in body axes: (f/m − ω × v, I⁻¹ (τ − ω × I ω)); Euler's equations.
+@_without_warnings
+def body_acceleration(body: MassProperties, twist: ArrayLike, wrench: ArrayLike) -> np.ndarray:
+    """Return the rate of the twist under a wrench, in body axes: (f/m − ω × v, I⁻¹ (τ − ω × I ω)), Euler's equations.
 
     Args:
         body: Mass and inertia.
@@ -113,11 +112,11 @@ def body_acceleration(body: MassProperties, twist: Any, wrench: Any) -> np.ndarr
     return _pair((wrench[..., :3] - force) / body.mass, _solve(body, wrench[..., 3:] - torque))
 
 
-@_too_large_shows_in_the_result
-def kinetic_energy(body: MassProperties, twist: Any) -> np.ndarray:
-    """K = ½ m ‖ṗ‖² + ½ ωᵀ I ω in [J], shape (...), from the twist (v, ω) of the centre of mass in body axes (..., 6).
+@_without_warnings
+def kinetic_energy(body: MassProperties, twist: ArrayLike) -> np.ndarray:
+    """Return K = ½ m ‖ṗ‖² + ½ ωᵀ I ω in [J], (...), for twists (v, ω) of the centre of mass in body axes (..., 6).
 
-    Only there does no term mix v and ω; for every other point use `MassProperties.spatial`.
+    Only for the centre of mass do v and ω decouple; for any other point use `MassProperties.spatial`.
 
     Raises:
         QueryError: If the shape is wrong or a value is not finite.
@@ -127,13 +126,13 @@ def kinetic_energy(body: MassProperties, twist: Any) -> np.ndarray:
     return _finite((body.mass * (v * v).sum(-1) + (omega * apply(body.inertia, omega)).sum(-1)) / 2)
 
 
-@_too_large_shows_in_the_result
-def point_velocity(twist: Any, r: Any) -> np.ndarray:
-    """Velocity ṗ = ṗ_c + ω × r of the point at r from the centre of mass, all in the same axes; (..., 3), in [m/s].
+@_without_warnings
+def point_velocity(twist: ArrayLike, r: ArrayLike) -> np.ndarray:
+    """Return the velocity ṗ = ṗ_c + ω × r of the point at r from the centre of mass, in the same axes; (..., 3), [m/s].
 
     Args:
-        twist: (ṗ_c, ω), shape (..., 6), in [m/s] and [rad/s].
-        r: Shape (..., 3), in [m].
+        twist: Twist (ṗ_c, ω), shape (..., 6), in [m/s] and [rad/s].
+        r: Point relative to the centre of mass, shape (..., 3), in [m].
 
     Raises:
         QueryError: If a shape is wrong or a value is not finite.
@@ -143,9 +142,9 @@ def point_velocity(twist: Any, r: Any) -> np.ndarray:
     return _finite(twist[..., :3] + np.cross(twist[..., 3:], r))
 
 
-@_too_large_shows_in_the_result
-def angular_momentum(body: MassProperties, R: Any, omega: Any) -> np.ndarray:
-    """Angular momentum I_s ω about the centre of mass in world axes, (..., 3), in [N m s]; constant without torque.
+@_without_warnings
+def angular_momentum(body: MassProperties, R: ArrayLike, omega: ArrayLike) -> np.ndarray:
+    """Return I_s ω about the centre of mass in world axes, (..., 3), in [N m s]; constant without torque.
 
     Args:
         body: Mass and inertia.
@@ -161,7 +160,7 @@ def angular_momentum(body: MassProperties, R: Any, omega: Any) -> np.ndarray:
 
 
 def _gyroscopic(body: MassProperties, twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """ω × m v and ω × I ω."""
+    """Return ω × m v and ω × I ω."""
     v, omega = twist[..., :3], twist[..., 3:]
     return np.cross(omega, body.mass * v), np.cross(omega, apply(body.inertia, omega))
 
@@ -171,7 +170,7 @@ def _solve(body: MassProperties, torque: np.ndarray) -> np.ndarray:
         return cholesky_solve(np.broadcast_to(body.inertia, (*torque.shape[:-1], 3, 3)), torque)
     except NotPositiveDefiniteError:
         raise QueryError(
-            "no angular acceleration: the inertia is singular, as of points on a line; give it extent"
+            "no angular acceleration: the inertia is singular, like that of points on a line; give it three extents"
         ) from None
 
 

@@ -1,8 +1,8 @@
-"""Comparison scales: divisors for the difference of two values of a quantity, and the tolerance on the result.
+"""Comparison scales: divisors for the difference of two values of a quantity, and tolerances on the result.
 
     |x − y| ≤ tolerance · (Σ of the absolute values of the terms summed in x)
 
-The terms are those of `Magnitudes`; an entry without terms takes the largest in its row and column. A solution of
+The terms are those of `Magnitudes`; an entry without terms uses the largest in its row and column. Solutions of
 M a = τ may differ by max(tolerance, 8 n u κ) times the terms of τ, where κ is the condition number of M scaled to a
 unit diagonal.
 """
@@ -17,16 +17,17 @@ from robot_dyn.foundations.arithmetic import apply
 
 
 def scaled(error: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """|error| / scale, with 0 / 0 = 0."""
+    """Return |error| / scale, with 0 / 0 = 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs(error) / scale
     return np.where(np.asarray(error) == 0, 0.0, ratio)
 
 
 def floored(scale: np.ndarray) -> np.ndarray:
-    """Scale of each entry, (n,), (m, n) or a number; an entry without terms takes the largest in its row and column.
+    """Return the scale of each entry, (n,), (m, n) or a number; an entry without terms uses the largest near it.
 
-    An entry without terms holds only rounding errors of its neighbours.
+    Of a matrix, that is the largest in its row and column: such an entry contains only rounding errors of its
+    neighbours.
     """
     if scale.ndim != 2:
         return np.where(scale == 0, np.max(scale, initial=0.0), scale)
@@ -36,57 +37,57 @@ def floored(scale: np.ndarray) -> np.ndarray:
 
 
 def diagonal_scale(M: np.ndarray) -> np.ndarray:
-    """√(M_ii M_jj), an upper bound of |M_ij| for positive definite matrices (..., n, n)."""
+    """Return √(M_ii M_jj), an upper bound of |M_ij| for positive definite matrices (..., n, n)."""
     d = np.sqrt(np.abs(np.diagonal(M, axis1=-2, axis2=-1)))
     return d[..., :, None] * d[..., None, :]
 
 
 def joint_units(M: np.ndarray) -> np.ndarray:
-    """D = √M_ii of matrices (..., n, n), which makes accelerations of large and small joints comparable, (..., n)."""
+    """Return D = √M_ii of matrices (..., n, n), which makes large and small joints comparable, (..., n)."""
     return np.sqrt(np.maximum(np.diagonal(M, axis1=-2, axis2=-1), 1e-300))
 
 
 def mass_norm(M: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """‖x‖_M = √(xᵀ M x) of x (..., n)."""
+    """Return ‖x‖_M = √(xᵀ M x) of x (..., n)."""
     return np.sqrt(np.maximum((x * apply(M, x)).sum(axis=-1), 0.0))
 
 
 def unit_diagonal_conditions(M: np.ndarray) -> np.ndarray:
-    """κ of each matrix in (..., n, n), scaled to a unit diagonal."""
+    """Return κ of each matrix in (..., n, n), scaled to a unit diagonal."""
     d = joint_units(M)
     return np.linalg.cond(M / (d[..., :, None] * d[..., None, :]))
 
 
 def unit_diagonal_condition(M: np.ndarray) -> float:
-    """The largest κ of `unit_diagonal_conditions`."""
+    """Return the largest κ of `unit_diagonal_conditions`."""
     return float(np.max(unit_diagonal_conditions(M)))
 
 
 def solved_tolerance(least: float, M: np.ndarray, dtype: str = "float64") -> float:
-    """Error allowed in a solution of M a = τ, max(least, 8 n u κ), with the largest κ of the matrices (..., n, n)."""
+    """Return the tolerance of solutions of M a = τ, max(least, 8 n u κ), κ the largest of the matrices (..., n, n)."""
     return max(least, 8 * M.shape[-1] * float(np.finfo(dtype).eps) / 2 * unit_diagonal_condition(M))
 
 
 def solved_norm(M: np.ndarray, torques: Iterable[np.ndarray]) -> np.ndarray:
-    """Σ ‖M⁻¹ τ_k‖_M of torques (..., n)."""
+    """Return Σ ‖M⁻¹ τ_k‖_M of torques (..., n)."""
     return np.sum([mass_norm(M, np.linalg.solve(M, torque[..., None])[..., 0]) for torque in torques], axis=0)
 
 
 def acceleration_norm(M: np.ndarray, torques: Iterable[np.ndarray], terms: np.ndarray) -> float:
-    """Scale of ‖a − a'‖_M at one state: the larger of `solved_norm` of the torques and ‖D⁻¹ terms‖.
+    """Return the scale of ‖a − a'‖_M at one state: the larger of `solved_norm` of the torques and ‖D⁻¹ terms‖.
 
-    Cancellation in sums such as C v and N shows only in their terms, (n,).
+    Cancellation in sums such as C v and N is visible only in their terms, (n,).
     """
     return max(float(solved_norm(M, torques)), float(np.linalg.norm(terms / joint_units(M))))
 
 
 def acceleration_entries(d: np.ndarray, terms: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """Scales (S, n) of the entries of accelerations a (S, n) at S states, from D and the terms of τ, both (S, n)."""
+    """Return scales (S, n) of accelerations a (S, n) at S states, from D and the terms of τ, both (S, n)."""
     return np.max([np.linalg.norm(terms / d, axis=-1), np.linalg.norm(a * d, axis=-1)]) / d
 
 
 def derivative_entries(d: np.ndarray, terms: np.ndarray, derivatives: np.ndarray) -> np.ndarray:
-    """The same for ∂a/∂q, ∂a/∂v and ∂a/∂τ, (S, 3, n, n): per column, the larger of its terms and its entries."""
+    """Return scales of ∂a/∂q, ∂a/∂v and ∂a/∂τ, (S, 3, n, n): per column the larger of its terms and entries."""
     whole = np.linalg.norm(terms / d, axis=-1)
     sides = np.stack([np.broadcast_to(whole[:, None], d.shape)] * 2 + [1 / d], axis=1)  # by q, by v, by τ
     columns = np.abs(derivatives * d[:, None, :, None]).max(axis=-2, keepdims=True)

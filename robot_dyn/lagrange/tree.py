@@ -1,7 +1,7 @@
-"""The Tree: joints and links as the file states them, in literals, for the library's own implementation.
+"""The Tree: joints and links as stated by the file, in literals, for the library's own implementation.
 
-Numbers stay the decimal literals of the file, so that each arithmetic converts them itself. No line is shared with
-Pinocchio or its URDF parser; `cross_check.second_reading` compares the checked file with the file.
+Numbers remain the decimal literals of the file, so that each arithmetic converts them itself. No code is shared with
+Pinocchio or its URDF parser; `cross_check.second_reading` compares the checked description with the original file.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from robot_dyn.description.edits import Edits
 
 
 class Described(Protocol):
-    """What the library's own implementation takes of a robot: its file, its edits and the order of q; no numbers."""
+    """Input of the library's own implementation: file, edits and the order of q, but no computed numbers."""
 
     @property
     def description(self) -> Description:
-        """The checked file."""
+        """Checked file."""
         ...
 
     @property
@@ -35,7 +35,7 @@ class Described(Protocol):
         ...
 
 
-Literal = Any  # the text of a decimal number, or a number that a user gave
+Literal = Any  # text of a decimal number, or a number from a user
 Triple = tuple[Literal, Literal, Literal]
 _ZERO: Triple = ("0", "0", "0")
 
@@ -43,7 +43,7 @@ _ZERO: Triple = ("0", "0", "0")
 @final
 @dataclass(frozen=True)
 class Inertial:
-    """A rigid body fastened to a link: mass [kg], centre of mass [m], inertia about it [kg m²] in axes turned by rpy.
+    """A rigid body fixed to a link: mass [kg], centre of mass [m], inertia about it [kg m²] in axes turned by rpy.
 
     `moments` are Ixx, Ixy, Ixz, Iyy, Iyz, Izz; mass and moments are multiplied by `scale`.
     """
@@ -58,7 +58,7 @@ class Inertial:
 @final
 @dataclass(frozen=True)
 class Link:
-    """A link: its name, and the bodies that make it up."""
+    """A link: its name and the bodies fixed to it."""
 
     name: str
     inertials: tuple[Inertial, ...]
@@ -67,13 +67,13 @@ class Link:
 @final
 @dataclass(frozen=True)
 class Joint:
-    """A joint: the child link's frame is that of the parent, moved by (xyz, rpy), then along or about the axis by q.
+    """A joint: the child's frame is the parent's, moved by (xyz, rpy), then by q along or about the axis.
 
     Attributes:
         kind: "revolute", "continuous", "prismatic" or "fixed".
-        mimic: The joint it follows, or None.
-        locked: The value it is held at, or None.
-        armature: [kg m²] or [kg].
+        mimic: Coupling to the joint it follows, or None.
+        locked: Value at which it is locked, or None.
+        armature: Armature in [kg m²] or [kg].
     """
 
     name: str
@@ -105,7 +105,7 @@ class Tree:
 
 
 def tree_of(description: Description, edits: Edits) -> Tree:
-    """The tree of a description with its edits."""
+    """Return the tree of a description with its edits."""
     file = description.element
     links = (Link(link.get("name"), _inertials(link)) for link in file.iterfind("link"))
     joints = (_joint(joint) for joint in file.iterfind("joint"))
@@ -156,7 +156,7 @@ def _triple(element: etree._Element, key: str) -> Triple:
 
 
 def _from_the_root(joint_of_child: dict[str, Joint]) -> tuple[str, list[Joint]]:
-    """The root link, and the joints with each parent before its children."""
+    """Return the root link, and the joints with each parent before its children."""
     children: dict[str, list[Joint]] = {}
     for joint in joint_of_child.values():
         children.setdefault(joint.parent, []).append(joint)
@@ -170,7 +170,7 @@ def _from_the_root(joint_of_child: dict[str, Joint]) -> tuple[str, list[Joint]]:
 
 
 def _loaded(link: Link, edits: Edits) -> Link:
-    """The link with its masses scaled and the payloads it carries."""
+    """Return the link with edited masses and with the payloads it carries."""
     mass, inertia = dict(edits.masses).get(link.name), dict(edits.inertias).get(link.name)
     more = [replace(part, scale=edits.mass_scale) for part in link.inertials]
     if mass is not None:

@@ -1,10 +1,11 @@
-"""The thin layer over Pinocchio: `Robot` gives M, C, N, inverse and forward dynamics by CRBA, RNEA and ABA.
+"""The thin layer over Pinocchio: `Robot` computes M, C, N, inverse and forward dynamics by CRBA, RNEA and ABA.
 
-robot: the class · calls: Pinocchio's call for each query · loading: `load` · from_pinocchio: of a `pinocchio.Model`
-pinocchio_model: how the model is built
+robot: the class · calls: Pinocchio's function for each query
+loading: `load` · from_pinocchio: robots from a `pinocchio.Model`
+pinocchio_model: builds the model
 evaluation: checks, batches and mimic joints around a call
-coriolis, regrouped: C without loss of digits · conditioning: M singular or nearly so
-findings: what is doubtful in a description that loads · right_angles: those of a file written out in full
+coriolis, regrouped: C without loss of digits · conditioning: singular or nearly singular M
+findings: doubtful values in a valid description · right_angles: right angles with all digits
 """
 
 from robot_dyn.foundations.public import public_names

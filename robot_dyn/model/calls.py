@@ -1,6 +1,6 @@
-"""Pinocchio's calls by the names of the queries.
+"""Pinocchio's functions by the names of the queries.
 
-A call is made for a built model, and for a frame and its axes if it has them. It computes one state of all joints,
+A call is created for a model, and for a frame and its axes if the query has them. It evaluates one state of all joints,
 (data, q, …) → a new array or a number, where `data` is Pinocchio's working memory.
 """
 
@@ -30,7 +30,7 @@ class Scratch(threading.local):
 
 
 def _coriolis_torque(built: Built) -> Call:
-    weightless = built.model.copy()  # of `model` less N would keep the digits of N
+    weightless = built.model.copy()  # subtracting N would keep its rounding errors
     weightless.gravity = pin.Motion.Zero()
     return partial(pin.nonLinearEffects, weightless)
 
@@ -46,13 +46,13 @@ def _momentum(built: Built) -> Call:
 
 
 def _kinetic_energy(built: Built) -> Call:
-    """pin.computeKineticEnergy leaves out the armature of joints whose axis is not x, y or z."""
+    """Return ½ vᵀ M v: pin.computeKineticEnergy omits the armature of joints whose axis is not x, y or z."""
     model, crba = built.model, pin.crba
     return lambda data, q, v: float(v.dot(crba(model, data, q).dot(v))) / 2
 
 
 def _regressor(built: Built) -> Call:
-    """Bodies in the order of their parameters; for one joint Pinocchio returns a flat array."""
+    """Return the regressor with bodies in the order of their parameters; Pinocchio's is flat for one joint."""
     model, names = built.model, list(built.model.names[1:])
     N, order = model.nv, [names.index(name) for name in built.body_names]
 
@@ -65,7 +65,7 @@ def _regressor(built: Built) -> Call:
 
 
 def _frame(built: Built, name: str) -> int:
-    """Return the index of the frame of a link or joint; QueryError if it is unknown."""
+    """Return the index of the frame of a link or joint; raise QueryError if it is unknown."""
     links = link_frames(built.model)
     return entry(links | {joint: links[child] for joint, child in built.description.joint_frames.items()}, name)
 
@@ -81,7 +81,7 @@ def _placement(built: Built, frame: str) -> Call:
 
 
 def _jacobian(built: Built, frame: str, expressed_in: str) -> Call:
-    """Computed in body axes and rotated here: the world-aligned one loses digits with distance from the base."""
+    """Return the Jacobian computed in body axes and rotated: the world-aligned one loses digits far from the base."""
     model, index, axes = built.model, _frame(built, frame), Axes.of(expressed_in)
     reference = pin.WORLD if axes is Axes.WORLD else pin.LOCAL
 
@@ -114,13 +114,13 @@ def _jacobian_rate(built: Built, frame: str, expressed_in: str) -> Call:
 
 
 def _rotation(model: Any, data: Any, frame: int, q: ndarray) -> ndarray:
-    """Rotation R from the axes of a frame to those of the base."""
+    """Return the rotation R from the axes of a frame to those of the base."""
     pin.forwardKinematics(model, data, q)
     return pin.updateFramePlacement(model, data, frame).rotation
 
 
 def _turned(R: ndarray, J: ndarray) -> ndarray:
-    """diag(R, R) J."""
+    """Return diag(R, R) J."""
     return (R @ J.reshape(2, 3, -1)).reshape(6, -1)
 
 

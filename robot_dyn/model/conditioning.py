@@ -1,6 +1,7 @@
-"""Regularity of M: M is singular at every configuration, nearly singular so that digits are lost, or neither.
+"""Regularity of M: singular at every configuration, so nearly singular that digits are lost, or regular.
 
-    κ = λ_max / λ_min  of  D⁻¹ M D⁻¹,  D = diag(√M_ii);    a solution of M a = τ errs by some u κ, by 8 n u κ at most
+    κ = λ_max / λ_min  of  D⁻¹ M D⁻¹,  D = diag(√M_ii);    solutions of M a = τ have an error of about u κ, at most 8 n
+    u κ
 
 [Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 2002, thm. 10.3]
 """
@@ -16,15 +17,15 @@ import numpy as np
 from robot_dyn.foundations.errors import SingularError, UndecidedError
 from robot_dyn.queries.dynamics import acceleration
 
-LEAST_DIGITS = 8  # of forward dynamics; with fewer, M is called nearly singular
+LEAST_DIGITS = 8  # of forward dynamics; with fewer, M counts as nearly singular
 
 
 class NearlySingular(NamedTuple):
     """A matrix M that leaves forward dynamics fewer than LEAST_DIGITS.
 
     Attributes:
-        condition: κ.
-        digits: What u κ leaves.
+        condition: Condition number κ.
+        digits: Digits of forward dynamics, −log₁₀(u κ).
         joint: The joint that moves most along the smallest eigenvector.
     """
 
@@ -34,11 +35,11 @@ class NearlySingular(NamedTuple):
 
 
 class Regularity(NamedTuple):
-    """Whether M can be solved for.
+    """Result of the check whether M can be inverted.
 
     Attributes:
-        singular: Returns the error to raise if forward dynamics has no answer at any q; None if it has.
-        near: How near M is to singular, or None if it is not, or is singular.
+        singular: Function that returns the error to raise if M is singular at every q; None if it is not.
+        near: Loss of digits if M is nearly singular, otherwise None.
     """
 
     singular: Callable[[], SingularError] | None
@@ -46,12 +47,12 @@ class Regularity(NamedTuple):
 
     @property
     def joint(self) -> str | None:
-        """The joint at which M is singular, or None."""
+        """Joint at which M is singular, or None."""
         return None if self.singular is None else self.singular().joint
 
 
 def regularity(M: np.ndarray, joint_names: tuple[str, ...]) -> Regularity:
-    """The regularity of M (n, n), which is the mass matrix at a configuration without symmetries."""
+    """Check M (n, n), the mass matrix at a configuration without symmetries."""
     try:
         acceleration(M, np.ones(len(M)), joint_names)
     except UndecidedError as error:
@@ -63,7 +64,7 @@ def regularity(M: np.ndarray, joint_names: tuple[str, ...]) -> Regularity:
 
 
 def _nearly_singular(M: np.ndarray, joint_names: tuple[str, ...]) -> NearlySingular | None:
-    """What M, with M_ii > 0, leaves of the digits of forward dynamics, or None if that is enough."""
+    """Return the loss of digits in forward dynamics for M with M_ii > 0, or None if enough remain."""
     d = np.sqrt(np.diagonal(M))
     eigenvalues, vectors = np.linalg.eigh(M / np.outer(d, d))
     u = np.finfo(float).eps / 2

@@ -1,14 +1,14 @@
 """The Coriolis matrix in the axes of each body: C = Σ J_bᵀ (𝓜_b J̇_b + 𝓖_b J_b), 𝓖 linear in the angular velocity ω_b.
 
-A point r of a body moves by ∂ṙ/∂v_j along joint j, and Christoffel's symbols of points are
-C_ij = ∫ ∂ṙ/∂v_i · d/dt(∂ṙ/∂v_j) dm. In the body's axes ∂ṙ/∂v = (1, −r̂) J and d/dt adds ω̂, so that
+A point r of a body moves by ∂ṙ/∂v_j along joint j, and the Christoffel symbols of points are C_ij = ∫ ∂ṙ/∂v_i ·
+d/dt(∂ṙ/∂v_j) dm. In the body's axes ∂ṙ/∂v = (1, −r̂) J and d/dt adds ω̂, so that
 
     𝓖 = ∫ (1, −r̂)ᵀ ω̂ (1, −r̂) dm = [[m ω̂, −m ω̂ ĉ], [m ĉ ω̂, (Σ ω)^]],   Σ = ∫ r rᵀ dm = ½ tr(I) 1 − I,
 
-a skew matrix: Ṁ = C + Cᵀ. [Echeandia, Wensing 2021, of which this is the factorisation in a body's own axes]
+a skew matrix: Ṁ = C + Cᵀ. [The factorisation of Echeandia, Wensing 2021, in the axes of each body]
 
-The only distances here are those from a joint to the bodies it moves. Pinocchio's own Coriolis matrix works in the axes
-of the world; it is taken where a bound of its rounding is small (`regrouped`).
+The only distances here are those from a joint to the bodies it moves. Pinocchio's own Coriolis matrix works in world
+axes; it is used where a bound on its rounding error is small (`regrouped`).
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ MOST_ROUNDING = 1e-13  # ε of C in the axes of the world, in the units √M_ii 
 @final
 @dataclass(frozen=True, eq=False)
 class Coriolis:
-    """C of all joints of a model, by Pinocchio where its rounding is bounded by 1e-13, otherwise by `Bodies`.
+    """C of all joints of a model, by Pinocchio where its rounding error is below 1e-13, otherwise by `Bodies`.
 
     Attributes:
-        bodies: The bodies of the model, each in its own axes.
-        regrouped: The model of which Pinocchio computes C; None where the bound is larger.
+        bodies: Bodies of the model, each in its body axes.
+        regrouped: Model from which Pinocchio computes C; None if the bound is larger.
         slides: Index and largest |q| of each prismatic joint for which the bound holds.
-        rounding: The bound ε of |δC_ij| ≤ ε Ω √(M_ii M_jj), see `regrouped`.
+        rounding: Bound ε in |δC_ij| ≤ ε Ω √(M_ii M_jj), see `regrouped`.
     """
 
     bodies: Bodies = field(repr=False)
@@ -49,14 +49,14 @@ class Coriolis:
 
     @classmethod
     def of(cls, model: Any, couplings: Couplings) -> Coriolis:
-        """Of a model and how its joints follow the coordinates."""
-        with np.errstate(all="ignore"):  # where masses overflow, the bound is not known
+        """Return the Coriolis matrix of a model with these couplings."""
+        with np.errstate(all="ignore"):  # overflowing masses give a NaN bound, which fails the test below
             near_base = regrouped(model)
             bound = rounding(model, near_base, couplings)
         return cls(Bodies.of(model), near_base if bound <= MOST_ROUNDING else None, slides(model), bound)
 
     def matrix(self, data: Any, q: ndarray, v: ndarray) -> ndarray:
-        """C of the Christoffel symbols at one state, (N, N)."""
+        """Return C of the Christoffel symbols at one state, (N, N)."""
         if self.regrouped is None:
             return self.bodies.coriolis_matrix(data, q, v)
         for j, most in self.slides:
@@ -68,13 +68,14 @@ class Coriolis:
 @final
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """The n bodies that move in a Pinocchio model, each in the frame of its joint.
+    """The n moving bodies of a Pinocchio model, each in the frame of its joint.
 
     Attributes:
         model: The `pinocchio.Model`; every joint has one degree of freedom.
-        inertia: 𝓜, (n, 6, 6).
-        wrench: 𝓜 [X, Y] + 𝓖(ω) X by the products of the 6 components of X and the 9 of (Y, ω), (n, 6, 54).
-        sums: Adds columns of the joints after each, and of all, (n, 2 n).
+        inertia: Spatial inertias 𝓜, (n, 6, 6).
+        wrench: Coefficients of 𝓜 [X, Y] + 𝓖(ω) X in the products of the 6 components of X and the 9 of (Y, ω),
+            (n, 6, 54).
+        sums: Matrix that sums the columns after each joint, and those of all joints, (n, 2 n).
     """
 
     model: Any
@@ -84,21 +85,21 @@ class Bodies:
 
     @classmethod
     def of(cls, model: Any) -> Bodies:
-        """The bodies of a model."""
+        """Return the bodies of a model."""
         inertia = np.array([body.matrix() for body in model.inertias[1:]])
         of_brackets = (inertia[:, None] @ bracket(np.eye(6))).swapaxes(1, 2)
-        of_spin = np.array([[_gyroscopic(each, axis) for axis in np.eye(3)] for each in inertia]).transpose(0, 2, 3, 1)
+        of_spin = np.array([[_gyroscopic(body, axis) for axis in np.eye(3)] for body in inertia]).transpose(0, 2, 3, 1)
         wrench = np.concatenate((of_brackets, of_spin), axis=-1).reshape(-1, 6, 54)
         n = len(inertia)
         return cls(model, inertia, wrench, np.hstack((np.tri(n, k=-1), np.ones((n, n)))))
 
     def jacobians(self, data: Any, q: ndarray) -> ndarray:
-        """J_b of each body at its frame, in its axes, (n, 6, n); a column is 0 where the joint does not move it."""
+        """Return J_b of each body at its frame, in body axes, (n, 6, n); columns of unrelated joints are 0."""
         n = len(self.inertia)
         return np.array([pin.computeJointJacobian(self.model, data, q, i + 1) for i in range(n)]).reshape(n, 6, n)
 
     def coriolis_matrix(self, data: Any, q: ndarray, v: ndarray) -> ndarray:
-        """C of the Christoffel symbols at one state, (n, n)."""
+        """Return C of the Christoffel symbols at one state, (n, n)."""
         J, n = self.jacobians(data, q), len(v)
         rows = J.reshape(6 * n, n)
         twists = (rows * v).dot(self.sums).reshape(n, 6, 2, n)
@@ -108,7 +109,7 @@ class Bodies:
 
 
 def jacobian_rate(J: ndarray, v: ndarray) -> tuple[ndarray, ndarray]:
-    """J̇ of body Jacobians J (..., 6, n) along v (n,), and the body twist J v (..., 6).
+    """Return J̇ of body Jacobians J (..., 6, n) along v (n,), and the body twist J v (..., 6).
 
     ∂J_j/∂q_k = [J_j, J_k] for joint j before joint k, and 0 otherwise: J̇_j = [J_j, Σ_{k after j} J_k v_k].
     """
@@ -117,22 +118,22 @@ def jacobian_rate(J: ndarray, v: ndarray) -> tuple[ndarray, ndarray]:
 
 
 def columnwise_bracket(X: ndarray, Y: ndarray) -> ndarray:
-    """[X_j, Y_j] of the columns of X and Y, (..., 6, n)."""
+    """Return [X_j, Y_j] of the columns of X and Y, (..., 6, n)."""
     return (_ad(X) @ Y.mT[..., None])[..., 0].mT
 
 
 def columnwise_dual(X: ndarray, F: ndarray) -> ndarray:
-    """ad_{X_j}ᵀ F of the columns of X (..., 6, n) and one wrench F (..., 6), (..., 6, n)."""
+    """Return ad_{X_j}ᵀ F of the columns of X (..., 6, n) and one wrench F (..., 6), (..., 6, n)."""
     return (_ad(X).mT @ F[..., None, :, None])[..., 0].mT
 
 
 def _ad(X: ndarray) -> ndarray:
-    """Ad of each column of X (..., 6, n), (..., n, 6, 6)."""
+    """Return ad of each column of X (..., 6, n), (..., n, 6, 6)."""
     return (X.mT @ _AD).reshape(*X.mT.shape, 6)
 
 
 def _gyroscopic(inertia: ndarray, omega: ndarray) -> ndarray:
-    """𝓖 of a body of generalised inertia 𝓜 (6, 6) at angular velocity ω (3,); (6, 6)."""
+    """Return 𝓖 of a body of spatial inertia 𝓜 (6, 6) at angular velocity ω (3,); (6, 6)."""
     mass, mc, moments, spin = inertia[0, 0], hat(first_moment(inertia)), inertia[3:, 3:], hat(omega)
     second_moment = np.trace(moments) / 2 * np.eye(3) - moments
     return np.block([[mass * spin, -spin @ mc], [mc @ spin, hat(second_moment @ omega)]])

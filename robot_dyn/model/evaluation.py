@@ -1,4 +1,4 @@
-"""Evaluate Pinocchio's calls: coupled joints by virtual work, lists and batches row by row.
+"""Evaluation of Pinocchio's calls: coupled joints by virtual work, lists and batches row by row.
 
     x = reduced(call(S q + s₀, S v, …))  for each state
 
@@ -32,8 +32,8 @@ class Evaluation:
     """Evaluates Pinocchio's calls for one robot.
 
     Attributes:
-        built: The model of the robot.
-        scratch: Memory that the algorithms of its model write to.
+        built: Model of the robot.
+        scratch: Working memory of Pinocchio's algorithms.
     """
 
     built: Built
@@ -41,16 +41,17 @@ class Evaluation:
 
     @cached_property
     def regularity(self) -> Regularity:
-        """Whether M is invertible, judged at a configuration without symmetries."""
+        """Regularity of M, judged at a configuration without symmetries."""
         names = self.built.joint_names
         return regularity(self._batched("M")(np.linspace(0.3, 0.9, len(names))), names)
 
     @cached_property
     def one_state(self) -> OnFirstUse:
-        """Queries of one state as functions (data, q, …), by name or (name, frame, axes), with coupled joints."""
+        """Queries at one state as functions (data, q, …), by name or (name, frame, axes), with coupled joints."""
         return OnFirstUse(self._one_state)
 
     def _one_state(self, query: str | tuple[str, ...]) -> Call:
+        """Return the function of one query at one state."""
         name, *frame = (query,) if isinstance(query, str) else query
         couplings, quantity = self.built.couplings, QUANTITIES[name]
         if quantity.solves:
@@ -67,17 +68,17 @@ class Evaluation:
 
     @cached_property
     def _calls(self) -> OnFirstUse:
-        """Calls of Pinocchio by (name, frame, axes)."""
+        """Pinocchio's calls by (name, frame, axes)."""
         return OnFirstUse(lambda query: PINOCCHIO[query[0]](self.built, *query[1:]))
 
     def answer(self, name: str, state: tuple[Any, ...], errors: str, *frame: str) -> Any:
-        """Return the answer to a query at one state or a batch; with errors="nan" NaN at states without one."""
+        """Return the result of a query at one state or a batch; errors="nan" gives NaN at states without one."""
         if QUANTITIES[name].solves:
             return self._forward_dynamics(state, errors)
         return self._answered(name, state, errors, self._batched(name, *frame))
 
     def _solved(self, data: Any, q: ndarray, v: ndarray, tau: ndarray) -> ndarray:
-        """Forward dynamics of one state, which is answered at once if joints are coupled and M is regular."""
+        """Return forward dynamics at one state; on the fast path if joints are coupled and M is regular."""
         built, couplings = self.built, self.built.couplings
         if self.regularity.singular is None and not couplings.trivial:
             M = self.one_state["M"](data, q)
@@ -88,7 +89,7 @@ class Evaluation:
         return self._forward_dynamics((q, v, tau), "raise")
 
     def _forward_dynamics(self, state: tuple[Any, ...], errors: str) -> ndarray:
-        """M⁻¹ (τ − C v − N), by ABA, or by factorising M if joints are coupled; raises where M is singular."""
+        """Return M⁻¹ (τ − C v − N), by ABA or, for coupled joints, a Cholesky factor of M; raise if M is singular."""
         if self.regularity.singular is not None:
             raise self.regularity.singular()
         names, trivial = self.built.joint_names, self.built.couplings.trivial
@@ -103,10 +104,10 @@ class Evaluation:
         return self._answered("forward_dynamics", state, errors, equation)
 
     def _batched(self, name: str, *frame: str) -> Callable[..., ndarray]:
-        """Return a query as a function (q, …) of arrays (..., n), which evaluates one state after the other."""
+        """Return a query as a function (q, …) of arrays (..., n), which evaluates one state after another."""
         try:
             call = self._calls[name, *frame]
-        except TypeError:  # not hashable: refused
+        except TypeError:  # an unhashable frame, which the call refuses
             call = PINOCCHIO[name](self.built, *frame)
         couplings, data = self.built.couplings, self.scratch.data
         axes = QUANTITIES[name].axes

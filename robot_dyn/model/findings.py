@@ -1,6 +1,6 @@
-"""Findings about a robot description that loads: each doubtful item and its remedy, in one sentence.
+"""Findings about a valid robot description: each doubtful item and its remedy, in one sentence.
 
-`urdf.py` rejects what is meaningless; a finding reports what is valid but probably unintended. Criteria and
+`urdf.py` refuses meaningless files; a finding reports valid but probably unintended values. Criteria and
 reasons are in docs/reference/findings.md. Each function yields the findings of one kind.
 """
 
@@ -21,13 +21,13 @@ from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import shorten
 from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, Regularity
 
-LONGEST = 1e4  # [m], also for a mimic's multiplier: a sum with such a length is rounded by about 1e-12 m
+LONGEST = 1e4  # [m], also for a mimic's multiplier: sums with such a length have rounding errors of 1e-12 m
 LIGHTEST = 1e-12  # [kg]
-_LISTED = 6  # names in a finding
+_LISTED = 6  # maximum number of names in a finding
 
 
 def findings_of(description: Description, edits: Edits, regularity: Regularity) -> tuple[str, ...]:
-    """Findings about a description, then about the robot with its edits: location, problem and remedy."""
+    """Return findings about a description, then about the robot with its edits: location, problem and remedy."""
     kinds = (
         massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, inertias_beyond_reach,
         centres_beyond_reach, long_lengths, large_ratios, welded_base, zero_limits, equal_limits,
@@ -41,28 +41,28 @@ def findings_of(description: Description, edits: Edits, regularity: Regularity) 
 
 
 def reservations(description: Description) -> tuple[str, ...]:
-    """What of a robot is estimated, and what was assumed or left out when its file was read."""
+    """Return findings on estimated inertias, and on assumptions and omissions when the file was read."""
     return (*estimated_links(description), *description.findings)
 
 
 def estimated_links(description: Description) -> Iterator[str]:
-    """Links with an inertia that was estimated from their shapes."""
+    """Report links whose inertia was estimated from shapes."""
     if names := [*description.estimated]:
         yield (
-            f"{_named('link', names)}: mass or inertia is estimated from shapes, not measured; take torques as rough,"
-            " and give measured values where you have them"
+            f"{_named('link', names)}: mass or inertia is estimated from shapes, not measured; torques are rough;"
+            " replace the estimates by measured values where you have them"
         )
 
 
 def impossible_inertias(robot: Structure) -> Iterator[str]:
-    """Moving links, before merging, with impossible mass and moments."""
+    """Report moving links, before merging, with impossible mass and moments."""
     for name, link in robot.links.items():
         if name not in robot.base and (why := _why_impossible(link)):
             yield f"link {name!r}: {why}; correct the inertia of this link"
 
 
 def impossible_inertias_of_the_base(robot: Structure) -> Iterator[str]:
-    """The same for links fixed to the world."""
+    """Report links fixed to the world with impossible mass and moments."""
     for name in robot.base:
         if why := _why_impossible(robot.links[name]):
             yield (
@@ -72,119 +72,118 @@ def impossible_inertias_of_the_base(robot: Structure) -> Iterator[str]:
 
 
 def massless_bodies(robot: Structure) -> Iterator[str]:
-    """Moving bodies that, with all their links, have neither mass nor moments."""
+    """Report moving bodies whose links have neither mass nor moments."""
     for joint in robot.bodies:
         if not _has_mass(robot, joint):
             yield (
-                f"link {robot.joints[joint].child!r} moves but has no mass; give it an <inertial>, or make its joint"
-                " fixed"
+                f"link {robot.joints[joint].child!r} moves but has no mass; add an <inertial>, or make its joint fixed"
             )
 
 
 def moments_without_mass(robot: Structure) -> Iterator[str]:
-    """Moving links with moments of inertia but no mass, which is unphysical; programs treat them differently."""
+    """Report moving links with moments of inertia but no mass, which is unphysical; programs differ on them."""
     for name, link in robot.links.items():
         if name not in robot.base and link.mass == 0 and any(link.moments):
             most = np.abs(np.linalg.eigvalsh(link.inertia)).max()
             yield (
-                f"link {name!r}: has moments of inertia up to {most:.3g} kg m² and no mass: they count here, and MuJoCo"
-                " drops them; give it a mass, or remove its <inertial>"
+                f"link {name!r}: has moments of inertia up to {most:.3g} kg m² but no mass; they are used here, and"
+                " MuJoCo drops them; add a mass, or remove its <inertial>"
             )
 
 
 def inertias_beyond_reach(robot: Structure) -> Iterator[str]:
-    """Moving links with ½ tr I > m (10 L)², L the longest distance between neighbouring joints: another unit."""
+    """Report moving links with ½ tr I > m (10 L)², L the longest distance between neighbouring joints: a wrong unit."""
     for name, link in robot.links.items():
-        tiny = link.mass < LIGHTEST  # a finding of its own
+        tiny = link.mass < LIGHTEST  # reported separately
         if name not in robot.base and not tiny and (radius := robot.radius_beyond_reach(link.mass, link.inertia)):
             yield (
-                f"link {name!r}: its inertia is that of {link.mass:g} kg at {radius:.3g} m and more from the centre of"
-                f" mass, and no joint of the robot is more than {robot.longest_link:.3g} m from the one before; correct"
-                " the inertia, or its unit"
+                f"link {name!r}: its inertia of {link.mass:g} kg needs mass at least {radius:.3g} m from the centre,"
+                f" but neighbouring joints of this robot are at most {robot.longest_link:.3g} m apart; correct"
+                " the inertia or its unit"
             )
 
 
 def centres_beyond_reach(robot: Structure) -> Iterator[str]:
-    """Moving links with |c| > 2 L and 0.3 m, L as above: a centre of mass in another frame, or in another unit."""
+    """Report moving links with |c| > 2 L and 0.3 m, L as above: a centre of mass in a wrong frame or unit."""
     for name, link in robot.links.items():
         if name not in robot.base and link.mass >= LIGHTEST and (distance := robot.beyond_reach(link.com)):
             yield (
-                f"link {name!r}: its centre of mass lies {distance:.3g} m from the origin of the link, and no joint of"
-                f" the robot is more than {robot.longest_link:.3g} m from the one before; give it in the frame of the"
-                " link, in metres"
+                f"link {name!r}: its centre of mass is {distance:.3g} m from the origin of the link, but neighbouring"
+                f" joints of this robot are at most {robot.longest_link:.3g} m apart; give it in the frame of the link,"
+                " in metres"
             )
 
 
 def no_inertia_about_axis(robot: Structure, joint: str | None) -> Iterator[str]:
-    """A joint whose bodies have mass only on its axis, so that M is singular."""
-    # next to a massless body, the axes of two joints may coincide: then that body is at fault
-    if joint is not None and all(_has_mass(robot, each) for each in robot.bodies):
+    """Report a joint whose bodies have mass only on its axis, so that M is singular."""
+    # next to a massless body the axes of two joints may coincide; that body is then the cause
+    if joint is not None and all(_has_mass(robot, other) for other in robot.bodies):
         yield (
-            f"joint {joint!r}: what it moves has mass but no inertia about its axis, so M is singular; give its link"
-            " moments of inertia, or give the joint armature"
+            f"joint {joint!r}: the bodies it moves have mass but no inertia about its axis, so M is singular; add"
+            " moments of inertia to its link, or armature to the joint"
         )
 
 
 def hardly_any_inertia(near: NearlySingular | None) -> Iterator[str]:
-    """A mass matrix M so close to singular that rounding destroys most digits of forward dynamics."""
+    """Report a mass matrix so close to singular that rounding destroys most digits of forward dynamics."""
     if near is not None:
         yield (
-            f"joint {near.joint!r}: M is nearly singular, κ = {near.condition:.1e}, so that forward dynamics may keep"
-            f" only {near.digits:.0f} digits; correct the inertia of what it moves, or give it armature (queries warn"
-            f" below {LEAST_DIGITS} digits; rd.accuracy.warn_below(robot, None) does not warn)"
+            f"joint {near.joint!r}: M is nearly singular, κ = {near.condition:.1e}, so forward dynamics may have only"
+            f" {near.digits:.0f} correct digits; correct the inertia it moves, or add armature (queries warn below"
+            f" {LEAST_DIGITS} digits; rd.accuracy.warn_below(robot, None) turns this off)"
         )
 
 
 def tiny_masses(robot: Structure) -> Iterator[str]:
-    """Links with a nonzero mass that is smaller than that of any part of an arm."""
+    """Report links with a nonzero mass smaller than that of any part of an arm."""
     for name, link in robot.links.items():
         if 0 < link.mass < LIGHTEST:
-            yield f"link {name!r}: its mass of {link.mass:g} kg is below {LIGHTEST:g} kg; correct it, or its unit"
+            yield f"link {name!r}: its mass of {link.mass:g} kg is below {LIGHTEST:g} kg; correct it or its unit"
 
 
 def long_lengths(robot: Structure) -> Iterator[str]:
-    """Origins of joints and centres of mass so far from their link's frame that digits are lost."""
+    """Report joint origins and centres of mass so far from their link's frame that digits are lost."""
     lengths = [(f"link {name!r}: its centre of mass", link.com) for name, link in robot.links.items()]
     lengths += [(f"joint {name!r}: its origin", joint.xyz) for name, joint in robot.joints.items()]
-    for what, xyz in lengths:
+    for item, xyz in lengths:
         if (length := hypot(*xyz)) > LONGEST:
-            yield f"{what} lies {length:g} m away, beyond {LONGEST:g} m, which costs digits; correct it, or its unit"
+            yield f"{item} is {length:g} m away, over {LONGEST:g} m, which loses digits; correct it or its unit"
 
 
 def large_ratios(robot: Structure) -> Iterator[str]:
-    """Mimic joints with a multiplier so large that digits are lost."""
+    """Report mimic joints with a multiplier so large that digits are lost."""
     for name in robot.mimics:
         source, ratio, _ = resolve(name, robot.mimics, FLOAT64)
         if abs(ratio) > LONGEST:
             yield (
-                f"joint {name!r}: moves {ratio:g} times as far as {source!r}, beyond {LONGEST:g}, which costs digits;"
+                f"joint {name!r}: moves {ratio:g} times as far as {source!r}, over {LONGEST:g}, which loses digits;"
                 " correct the multiplier of its <mimic>"
             )
 
 
 def zero_limits(robot: Structure) -> Iterator[str]:
-    """Effort and velocity limits of 0, which allow no effort or motion; usually a value that was never filled in."""
+    """Report effort and velocity limits of 0, usually values that were never filled in."""
     for limit, unit in (("effort", "N m or N"), ("velocity", "rad/s or m/s")):
         if names := [name for name in robot.free if getattr(robot.joints[name], limit) == 0]:
             yield (
-                f"{_joints(names)}: the {limit} limit is 0, which allows no {limit} at all; write the limit in {unit},"
-                f" or leave {limit} out for none"
+                f"{_joints(names)}: the {limit} limit is 0, which allows no {limit} at all; give the limit in {unit},"
+                f" or remove {limit} if there is none"
             )
 
 
 def equal_limits(robot: Structure) -> Iterator[str]:
-    """Joints whose lower and upper limits are equal."""
+    """Report joints whose lower and upper limits are equal."""
     if names := [name for name in robot.free if robot.joints[name].lower == robot.joints[name].upper]:
-        yield f"{_joints(names)}: the lower limit is the upper one; correct them, or make the joint fixed"
+        yield f"{_joints(names)}: the lower and upper limits are equal; correct them, or make the joint fixed"
 
 
 def welded_base(robot: Structure) -> Iterator[str]:
-    """A legged, wheeled or flying robot whose root link is fixed to the world."""
+    """Report a legged, wheeled or flying robot whose root link is fixed to the world."""
     if signs := stands_on(robot):
         yield (
             f"link {robot.root!r}: the base of a robot with legs, wheels or rotors"
-            f" ({', '.join(map(repr, signs[:_LISTED]))}) is fixed to the world here, since a floating base is not"
-            " simulated; take its numbers as those of the robot on a stand"
+            f" ({', '.join(map(repr, signs[:_LISTED]))}) is fixed to the world here, because floating bases are"
+            " not supported; the results are those of the robot on a stand"
         )
 
 
@@ -193,7 +192,7 @@ def _why_impossible(link: StatedLink) -> str | None:
 
 
 def _has_mass(robot: Structure, joint: str) -> bool:
-    """Whether the body that a joint carries has mass or moments, including payloads and the joint's armature."""
+    """Return True if the body that a joint carries has mass or moments, including payloads and armature."""
     links, edits = robot.bodies[joint], robot.edits
     stated = any(robot.links[name].mass or any(robot.links[name].moments) for name in links)
     carried = any(load.frame in links and (load.mass or np.any(load.inertia)) for load in edits.payloads)

@@ -1,7 +1,7 @@
-"""Description and edits of a `pinocchio.Model`: a URDF is written of it, and read as any other.
+"""Description and edits of a `pinocchio.Model`: it is written as a URDF, which is read like any other.
 
-Literals are the shortest that give the same float64, so masses, inertias, axes and positions keep every bit; rotations
-pass through roll, pitch and yaw and keep all but the last.
+Literals are the shortest with the same float64 value, so masses, inertias, axes and positions are exact; rotations are
+converted to roll, pitch and yaw and may change in the last bits.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ _KINDS = {
 }
 _FRAMES = (pin.FrameType.BODY, pin.FrameType.OP_FRAME, pin.FrameType.SENSOR)
 _UNBOUNDED = float(UNBOUNDED)
-_UNIT_SLACK = 1e-12  # of an axis: what normalising leaves
+_UNIT_SLACK = 1e-12  # of an axis: rounding of normalisation
 
 
 def described(model: Any) -> tuple[Description, Edits]:
-    """Return the description of a `pinocchio.Model`, and its gravity and armature; see `Robot.from_pinocchio`."""
+    """Return the description of a `pinocchio.Model`, and gravity and armature as edits; see `Robot.from_pinocchio`."""
     if not isinstance(model, pin.Model):
-        raise DescriptionError(f"from_pinocchio takes a pinocchio.Model, got {type(model).__name__}")
+        raise DescriptionError(f"from_pinocchio needs a pinocchio.Model, got {type(model).__name__}")
     writer = _Writer(model)
     description, names = check(writer.urdf(), writer.source, writer.findings), tuple(model.names.tolist()[1:])
     joints = build(description, Edits()).joint_names
     if joints != names:
-        order = f"its joints stand in another order than in the model: {shorten(', '.join(joints), 300)}"
+        order = f"the joint order differs from the model's: {shorten(', '.join(joints), 300)}"
         description = replace(
             description, findings=(*description.findings, f"{order}; arrange q, v and torques by these names")
         )
@@ -51,7 +51,7 @@ def described(model: Any) -> tuple[Description, Edits]:
 
 
 class _Writer:
-    """Writes the URDF of one model."""
+    """Writer of the URDF of one model."""
 
     def __init__(self, model: Any) -> None:
         self.model, self.source = model, f"pinocchio.Model {shorten(model.name)!r}" if model.name else "pinocchio.Model"
@@ -82,12 +82,12 @@ class _Writer:
         return etree.tostring(out)
 
     def joint_links(self, frames: list[Any]) -> list[str]:
-        """For the universe and each joint the name of the link that it carries: a frame of it, or its own name."""
+        """Return the link name of the universe and of each joint: a frame at the joint, or else the joint's name."""
         links: list[str] = []
-        named = {self.text(frame.name) for frame in frames}
+        frame_names = {self.text(frame.name) for frame in frames}
         for i, name in enumerate(self.model.names):
             at = (f.name for f in frames if f.parentJoint == i and f.placement.isIdentity(0) and f.name not in links)
-            links.append(next(at, None) or _new(self.text(name), named | set(links)))
+            links.append(next(at, None) or _new(self.text(name), frame_names | set(links)))
         return links
 
     def joint(self, out: etree._Element, i: int, link: list[str]) -> None:
@@ -95,9 +95,9 @@ class _Writer:
         name, joint = self.text(model.names[i]), model.joints[i].extract()
         where, kind = f"joint {name!r}", type(joint).__name__
         if kind not in _KINDS:
-            remedy = "only revolute, continuous and prismatic joints are taken"
+            remedy = "only revolute, continuous and prismatic joints are supported"
             if kind == "JointModelMimic":
-                remedy = "load its URDF by rd.load, which couples joints itself"
+                remedy = "load its URDF by rd.load, which handles mimic joints"
             self.refuse(where, f"is a {kind.removeprefix('JointModel')} joint; {remedy}")
         kind = _KINDS[kind]
         data = joint.createData()
@@ -125,11 +125,11 @@ class _Writer:
             bounds |= {"lower": model.lowerPositionLimit[q], "upper": model.upperPositionLimit[q]}
         return {key: repr(float(np.clip(value, -_UNBOUNDED, _UNBOUNDED))) for key, value in bounds.items()}
 
-    def symmetric(self, where: str, what: str, lower: float, upper: float) -> float:
-        """The bound of a range about 0; infinite with a finding for another range, which a URDF cannot state."""
-        if abs(lower) in (abs(upper), 0.0) or abs(lower) >= _UNBOUNDED:  # either sign is met; 0 and ∞ if not set
+    def symmetric(self, where: str, quantity: str, lower: float, upper: float) -> float:
+        """Return the bound of a range symmetric about 0; report any other range, for which inf is returned."""
+        if abs(lower) in (abs(upper), 0.0) or abs(lower) >= _UNBOUNDED:  # both signs occur; 0 and ∞ if unset
             return upper
-        self.findings.append(f"{where}: its {what} {lower:g}, {upper:g} are not opposite; none is taken")
+        self.findings.append(f"{where}: its {quantity} {lower:g}, {upper:g} are not symmetric about 0 and are ignored")
         return np.inf
 
     def ends(self, joint: etree._Element, placement: Any, parent: str, child: str) -> None:

@@ -1,4 +1,4 @@
-"""What is known of a robot: its joints, couplings, mass, edits and findings."""
+"""Summary of a robot: its joints, couplings, mass, edits and findings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _HEADINGS = "joint", "kind", "lower", "upper", "effort", "velocity", "damping", 
 @final
 @dataclass(frozen=True)
 class Joint:
-    """A joint: limits in [rad] or [m], [N m] or [N] and per second; what is not stated is infinite or 0."""
+    """A joint: limits in [rad] or [m], [N m] or [N] and per second; unstated values are infinite or 0."""
 
     name: str
     kind: str
@@ -44,22 +44,22 @@ class Coupling:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Info(Answer):
-    """What `info` tells of a robot.
+    """Result of `info`: a summary of a robot.
 
     Attributes:
         robot: Name in its file.
         source: Path of the file.
         n: Degrees of freedom.
-        total_mass: Of all links, in [kg].
+        total_mass: Mass of all links, in [kg].
         gravity: Acceleration of free fall in base axes, in [m/s²].
-        gravity_acts: Whether it has a torque on a joint at some position.
-        joints: In the order of q.
-        couplings: Joints that follow another one, as the file states them.
-        locked: Value of each joint that is held, in [rad] or [m].
-        payloads: Bodies that were added.
-        estimated: What inertias that nobody measured were made from, by link.
+        gravity_acts: True if gravity exerts a torque on a joint at some position.
+        joints: Independent joints, in the order of q.
+        couplings: Joints that follow another one, as stated by the file.
+        locked: Value of each locked joint, in [rad] or [m].
+        payloads: Payloads that were added.
+        estimated: Basis of each inertia that is estimated, not measured, by link.
         links: Names of the frames.
-        findings: What is doubtful in its description, each with its remedy.
+        findings: Doubtful values in the description, each with its remedy.
     """
 
     robot: str
@@ -82,16 +82,17 @@ class Info(Answer):
         if not self.gravity_acts:
             yield no_torque(self.gravity)
         yield Table(_HEADINGS, tuple(tuple(vars(joint).values()) for joint in self.joints), digits=4)
-        yield "units: rad and N m for a joint that turns, m and N for one that slides; — is not stated"
-        for each in self.couplings:
-            yield f"coupled: {each.joint} = {each.multiplier:g} · {each.source} + {each.offset:g}"
+        yield "units: rad and N m for revolute joints, m and N for prismatic joints; —: not stated"
+        for coupling in self.couplings:
+            equation = f"{coupling.multiplier:g} · {coupling.source} + {coupling.offset:g}"
+            yield f"coupled: {coupling.joint} = {equation}"
         yield from _edits(self.locked, self.payloads)
         yield from (f"estimated: {link}: {basis}" for link, basis in self.estimated.items())
         yield from (f"finding: {finding}" for finding in self.findings)
 
 
 def robot_line(name: str, n: int, total_mass: float, edits: Edits) -> str:
-    """Return the `repr` of a robot: one line, as it stands within the `repr` of controllers and other values."""
+    """Return the `repr` of a robot: one line, also used within the `repr` of controllers and other values."""
     heading = _heading(name, n, total_mass, edits.gravity)
     return f"<Robot: {'; '.join((heading, *_edits(dict(edits.lock), edits.payloads), *_other_edits(edits)))}>"
 
@@ -103,7 +104,7 @@ def _heading(name: str, n: int, total_mass: float, gravity: tuple[float, float, 
 
 def _edits(locked: Mapping[str, float], payloads: Iterable[Payload]) -> Iterator[str]:
     yield from (f"locked: {name} = {value:g}" for name, value in locked.items())
-    yield from (f"payload: {each.mass:g} kg on {each.frame}" for each in payloads)
+    yield from (f"payload: {payload.mass:g} kg on {payload.frame}" for payload in payloads)
 
 
 def _other_edits(edits: Edits) -> Iterator[str]:
@@ -115,7 +116,7 @@ def _other_edits(edits: Edits) -> Iterator[str]:
 
 
 def couplings_of(description: Description, moving: Collection[str]) -> Iterator[Coupling]:
-    """Yield the couplings of joints that move, as the file states them."""
+    """Return the couplings of moving joints, as stated by the file."""
     for joint in description.element.iterfind("joint[mimic]"):
         mimic: Any = joint.find("mimic")
         if joint.get("name") in moving:
@@ -124,7 +125,7 @@ def couplings_of(description: Description, moving: Collection[str]) -> Iterator[
 
 
 def no_torque(gravity: tuple[float, float, float]) -> str:
-    """Return the remark on a robot on which a gravity does not act."""
+    """Return the remark on a robot on which gravity exerts no torque."""
     if not any(gravity):
         return "gravity is zero, so N(q) = 0"
-    return f"gravity {gravity} m/s² has no torque on any joint at any position, so N(q) = 0"
+    return f"gravity {gravity} m/s² exerts no torque on any joint at any position, so N(q) = 0"

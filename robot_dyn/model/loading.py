@@ -1,4 +1,4 @@
-"""Loading: a name or path → a Robot in standard gravity."""
+"""Loading: maps a name or path to a Robot in standard gravity."""
 
 from __future__ import annotations
 
@@ -31,44 +31,48 @@ def load(
     download: bool = False,
     without: Iterable[str] = (),
 ) -> Robot:
-    """A robot in standard gravity, by its name in the catalog, its path, or its package:// address.
+    """Load a robot in standard gravity, by its name in the catalog, its path, or its package:// address.
 
     Args:
-        name_or_path: One of `list_robots()`, or a URDF file; or, where the package robot_descriptions is installed, a
-            name such as "robot_descriptions:ur10e_description". `Robot.from_text` takes the text of a URDF.
-        package_dirs: Folders in which packages are searched first; then those above the file, those beside its package,
-            ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
+        name_or_path: One of `list_robots()`, or a URDF file; or, if the package robot_descriptions is installed, a name
+            such as "robot_descriptions:ur10e_description". For the text of a URDF use `Robot.from_text`.
+        package_dirs: Folders in which packages are searched first, before the folders above the file, those next to
+            its package, ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
         xacro: Expand the file by xacro, with these values of its arguments; {} for their defaults. A xacro file is a
-            program: expand none that you would not run. Needs `pip install robot-dyn[xacro]`.
-        inertia: "stated", as in the file; or "from_shapes": links without one get that of their shape, which opens mesh
-            files, and a mass from the next three. `Robot.estimated` names them; what the file states stays.
+            program: only expand files that you would run. Needs `pip install robot-dyn[xacro]`.
+        inertia: "stated" to use the file as it is; or "from_shapes" to estimate missing inertias from the shapes of the
+            links, which opens mesh files, with masses from the next three arguments. `Robot.estimated` lists these
+            links; values stated by the file are not changed.
         mass: With "from_shapes": masses by link, in [kg].
-        total_mass: With "from_shapes": mass of the whole robot with its base, in [kg]; what the known masses leave is
+        total_mass: With "from_shapes": mass of the whole robot with its base, in [kg]; the mass not stated elsewhere is
             shared by the volume of convex hulls.
-        density: With "from_shapes": in [kg/m³], of links whose mass is not known otherwise, in place of `total_mass`.
-        allow_overlap: With "from_shapes": whether the space that several closed parts of a mesh fill counts as often as
-            they do; without it such a mesh is refused, since its mass is not known.
-        download: Whether robot_descriptions may download what is not on disk.
-        without: What is left out of a file of MJCF, of "tendon", "equality", "free" and "ball"; findings name it. MJCF,
-            in a file that ends with .xml or .mjcf, is compiled by MuJoCo, which opens its meshes; needs
+        density: With "from_shapes": density in [kg/m³] of links without a mass, instead of `total_mass`.
+        allow_overlap: With "from_shapes": accept meshes whose closed parts overlap, and count the shared volume once
+            for each part; by default they are refused, because their mass is ambiguous.
+        download: Allow robot_descriptions to download missing files.
+        without: Elements to leave out of an MJCF file, from "tendon", "equality", "free" and "ball"; findings list
+            them. MJCF, in a file with suffix .xml or .mjcf, is compiled by MuJoCo, which opens its meshes; needs
             `pip install robot-dyn[mjcf]`.
 
     Raises:
         CatalogError: If there is no such robot or file, an entry of `package_dirs` is not a folder, or a description
             is not on disk.
-        MissingExtraError: If robot_descriptions is asked for and not installed: pip install 'robot-dyn[robots]'.
+        MissingExtraError: If robot_descriptions is needed but not installed: pip install 'robot-dyn[robots]'.
         DescriptionError: If the file is refused, or cannot be expanded, or the shape of a link without inertia cannot
             be read.
-        QueryError: If no mass is given for an estimate, or one that is not positive, known already or of no link.
+        QueryError: If an estimate needs a mass and there is none, or a given mass is not positive, already stated, or
+            of an unknown link.
 
     Warns:
-        ModelWarning: Once, if there are findings about the description; the robot loads all the same.
+        ModelWarning: Once, if there are findings about the description; the robot is loaded anyway.
     """
     choice("inertia", inertia, (STATED, FROM_SHAPES))
-    given = any(each is not None for each in (mass, total_mass, density)) or truth("allow_overlap", allow_overlap)
-    if inertia == STATED and given:
+    has_masses = any(value is not None for value in (mass, total_mass, density)) or truth(
+        "allow_overlap", allow_overlap
+    )
+    if inertia == STATED and has_masses:
         raise QueryError(
-            f"mass, total_mass, density and allow_overlap are for inertia={FROM_SHAPES!r}; add it, or leave them out"
+            f"mass, total_mass, density and allow_overlap need inertia={FROM_SHAPES!r}; add it, or remove them"
         )
     package_dirs, without = searched(package_dirs), mjcf.leavable(without)
     if isinstance(name_or_path, str) and name_or_path.startswith(robot_descriptions.PREFIX):
@@ -76,13 +80,13 @@ def load(
         path, xacro = described.path, described.expansion(xacro)
         package_dirs = (*package_dirs, *described.package_dirs)
     elif truth("download", download):
-        raise CatalogError("download=True is for names such as robot_descriptions:ur10e_description; leave it out")
+        raise CatalogError("download=True needs a name such as robot_descriptions:ur10e_description; remove it")
     else:
         path = catalog.find(name_or_path, package_dirs)
     if xacro is None and is_mjcf(path):
         return _compiled(path, without, inertia)
     if without:
-        raise DescriptionError(f"{path}: without={set(without)} is for files of MJCF; leave it out")
+        raise DescriptionError(f"{path}: without={set(without)} applies to MJCF files only; remove it")
     description = read(path) if xacro is None else _expanded(path, xacro, package_dirs)
     if inertia == FROM_SHAPES:
         from robot_dyn.shapes.estimate import with_estimates
@@ -94,15 +98,16 @@ def load(
 
 
 def _expanded(path: Path, xacro: Mapping[str, str | float | bool], package_dirs: tuple[Path, ...]) -> Description:
+    """Return the description of an expanded xacro file."""
     text, warnings = expand(path, xacro, package_dirs)
     return check(text, source=str(path), findings=warnings)
 
 
 def _compiled(path: Path, without: frozenset[str], inertia: str) -> Robot:
-    """The robot of a file of MJCF, whose compiler takes inertias from shapes by its own rules."""
+    """Return the robot of an MJCF file, whose compiler derives missing inertias from shapes by its own rules."""
     if inertia != STATED:
         raise QueryError(
-            "inertia='from_shapes' is for URDF: MuJoCo takes those that a file of MJCF lacks; leave it out"
+            "inertia='from_shapes' applies to URDF only: MuJoCo itself computes inertias missing from MJCF; remove it"
         )
     compiled = mjcf.read(path, without)
     robot = Robot(check(compiled.urdf, source=str(path), findings=compiled.findings))

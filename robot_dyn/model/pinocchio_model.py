@@ -22,20 +22,20 @@ from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import DescriptionError, EditError, nearest
 from robot_dyn.model.coriolis import Coriolis
 
-MAX_MOVING = 250  # Pinocchio's scratch memory for n joints is 63 n³ bytes: here 1 GB
-_MARK = "joint:"  # prefix while Pinocchio works by name: a joint may share a link's name or be called "universe"
+MAX_MOVING = 250  # Pinocchio's working memory for n joints is 63 n³ bytes: 1 GB at this limit
+_MARK = "joint:"  # prefix during building: a joint may share a link's name or be called "universe"
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Built:
-    """A Pinocchio model with the values that calls of Pinocchio need besides.
+    """A Pinocchio model with the other values that its calls need.
 
     Attributes:
-        model: The `pinocchio.Model` of all joints that move.
-        couplings: How its joints follow q.
+        model: The `pinocchio.Model` of all moving joints.
+        couplings: Map from q to the positions of its joints.
         joint_names: Names of the n independent joints, in the order of q.
-        description: The checked file, without the edits.
+        description: Checked file, without the edits.
     """
 
     model: Any
@@ -45,12 +45,12 @@ class Built:
 
     @cached_property
     def coriolis(self) -> Coriolis:
-        """How C of `model` is computed, and the bound of its rounding."""
+        """Coriolis matrix of `model`, with the bound on its rounding error."""
         return Coriolis.of(self.model, self.couplings)
 
     @cached_property
     def sizes(self) -> Mapping[str, int]:
-        """The numbers that letters in the shapes of quantities stand for."""
+        """Numbers for the letters in the shapes of quantities."""
         return MappingProxyType({"n": len(self.joint_names), "p": len(NAMES) * self.model.nv})
 
     @property
@@ -60,11 +60,11 @@ class Built:
 
 
 def build(description: Description, edits: Edits) -> Built:
-    """Return the Pinocchio model of a description with its edits.
+    """Build the Pinocchio model of a description with its edits.
 
     Raises:
         DescriptionError: If Pinocchio rejects it, or no joint moves.
-        EditError: If a payload's frame is unknown, or no joint is left to move.
+        EditError: If a payload's frame is unknown, or all joints are locked.
     """
     robot = description.element
     state_edits(robot, edits)
@@ -79,12 +79,12 @@ def build(description: Description, edits: Edits) -> Built:
         raise DescriptionError(f"{description.source}: Pinocchio refuses it: {error}") from None
     if model.nv == 0:
         raise DescriptionError(
-            f"{description.source}: no joint moves, and with a fixed base there is no dynamics to query;"
+            f"{description.source}: no joint moves, so the robot has no dynamics;"
             " make a joint revolute, continuous or prismatic"
         )
     if model.nv > MAX_MOVING:
         raise DescriptionError(
-            f"{description.source}: {model.nv} joints move; at most {MAX_MOVING} are taken, since the memory of"
+            f"{description.source}: {model.nv} joints move, more than the maximum of {MAX_MOVING}: the memory of"
             " Pinocchio's algorithms grows with their cube; make some fixed or split the robot"
         )
     _apply(edits, model)
@@ -96,11 +96,11 @@ def build(description: Description, edits: Edits) -> Built:
 def state_edits(robot: Any, edits: Edits) -> None:
     """Replace masses and inertias of links in the file by those of the edits."""
     links = {link.get("name"): link.find("inertial") for link in robot.iterfind("link")}
-    known = [name for name, inertial in links.items() if inertial is not None]
-    for what, names in (("masses", dict(edits.masses)), ("inertias", dict(edits.inertias))):
+    with_mass = [name for name, inertial in links.items() if inertial is not None]
+    for edit, names in (("masses", dict(edits.masses)), ("inertias", dict(edits.inertias))):
         for name in names:
-            if name not in known:
-                raise EditError(f"{what}: no link {name!r} with a mass in the file; {nearest(name, known)}")
+            if name not in with_mass:
+                raise EditError(f"{edit}: no link {name!r} with a mass in the file; {nearest(name, with_mass)}")
     for name, mass in edits.masses:
         links[name].find("mass").set("value", repr(float(mass)))
     for name, inertia in edits.inertias:
@@ -118,18 +118,19 @@ def _unmark(model: Any) -> None:
 
 
 def joint_ids(model: Any, mark: str = "") -> dict[str, int]:
-    """Index of each joint by name, even one called "universe"; the prefix `mark` is removed."""
+    """Return the index of each joint by name, even of one called "universe"; the prefix `mark` is removed."""
     return {name.removeprefix(mark): i for i, name in enumerate(model.names) if i}
 
 
 def _apply(edits: Edits, model: Any) -> None:
+    """Apply gravity, armature, mass scale and payloads to a model."""
     model.gravity = pin.Motion(np.array(edits.gravity), np.zeros(3))
     ids = joint_ids(model, _MARK)
     for name, value in edits.armature:
         model.armature[model.idx_vs[ids[name]]] = value
     if edits.mass_scale != 1.0:
         for i, body in enumerate(model.inertias):
-            scaled = pin.Inertia(body)  # the constructor of numbers refuses moments that no body has
+            scaled = pin.Inertia(body)  # its other constructors refuse non-physical moments
             scaled.mass, scaled.inertia = edits.mass_scale * body.mass, edits.mass_scale * body.inertia
             model.inertias[i] = scaled
     links = link_frames(model)
@@ -142,17 +143,17 @@ def _apply(edits: Edits, model: Any) -> None:
 
 
 def _locked(model: Any, edits: Edits, mimics: dict[str, Mimic]) -> Any:
-    """The model without the held joints and the joints that mimic them."""
+    """Return the model without locked joints and the joints that mimic them."""
     values = dict(edits.lock)
-    q, held, ids = np.zeros(model.nq), [], joint_ids(model, _MARK)
+    q, locked, ids = np.zeros(model.nq), [], joint_ids(model, _MARK)
     for name, index in ids.items():
         source, ratio, offset = resolve(name, mimics, FLOAT64)
         if source in values:
-            held.append(index)
+            locked.append(index)
             q[model.idx_qs[index]] = ratio * values[source] + offset
-    if len(held) == model.nv:
-        raise EditError(f"lock: no joint is left to move, of {', '.join(ids)}")
-    return pin.buildReducedModel(model, held, q) if held else model
+    if len(locked) == model.nv:
+        raise EditError(f"lock: all joints are locked ({', '.join(ids)}); leave at least one free")
+    return pin.buildReducedModel(model, locked, q) if locked else model
 
 
 def _couplings(joints: tuple[str, ...], mimics: dict[str, Mimic]) -> tuple[Couplings, tuple[str, ...]]:
@@ -165,5 +166,5 @@ def _couplings(joints: tuple[str, ...], mimics: dict[str, Mimic]) -> tuple[Coupl
 
 
 def link_frames(model: Any) -> dict[str, int]:
-    """Index of the frame of each link, by name."""
+    """Return the index of the frame of each link, by name."""
     return {frame.name: i for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY}

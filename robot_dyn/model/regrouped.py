@@ -1,14 +1,14 @@
-"""Pinocchio's Coriolis matrix of a regrouped model, and a bound of its rounding.
+"""Pinocchio's Coriolis matrix of a regrouped model, and a bound on its rounding error.
 
 A point on the axis of a revolute joint moves with both bodies that the joint connects, so a point mass there may be
-counted with either of them [Gautier, Khalil 1990]; and C does not depend on where a joint that is fixed to the
-base stands. Pinocchio adds up in the axes of the world C_ij = Σ_b J_iᵀ (Y_b dJ_j/dt + B_b J_j), terms of the size of
+counted with either of them [Gautier, Khalil 1990]. C does not depend on the location of a joint that is attached to the
+base. In world axes, Pinocchio sums C_ij = Σ_b J_iᵀ (Y_b dJ_j/dt + B_b J_j), terms of the size of
 
     T_ij Ω,   T_ij = Σ_b m_b r_ib r_jb + ‖I_b‖,   r_ib = D_i + D_b + |c_b|
 
-with D the largest distance of a joint from the origin and Ω the sum of the joint speeds; of a prismatic joint r is 1,
-‖I_b‖ does not count, and its speed is divided by the largest D. Where a wrist of mass m and radius r loses digits by
-(D/r)², it loses them by D/r after its mass is moved to its parents. To a few roundings of the terms
+with D the largest distance of a joint from the origin and Ω the sum of the joint speeds. For a prismatic joint r is 1,
+‖I_b‖ does not count, and the speed is divided by the largest D. A wrist of mass m and radius r loses digits by (D/r)²;
+after its mass is moved to its parents, only by D/r. Up to a few roundings of the terms
 
     |δC_ij| ≤ ε Ω √(M_ii M_jj),   ε = u (8 N + max T_ij / √(least M_ii · least M_jj))
 """
@@ -28,10 +28,10 @@ from robot_dyn.description.urdf import UNBOUNDED
 
 
 def regrouped(model: Any) -> Any:
-    """A model with the same C, whose first joints stand at the origin and whose distal bodies have little mass.
+    """Return a model with the same C whose first joints are at the origin and whose distal bodies have little mass.
 
-    Of a body at reach D whose centre of mass is at p + r e, p on the joint's axis and e normal to it, there remain a
-    mass m r/R at p + R e with R = max(r, D), and I − m r (R − r) (1 − e eᵀ); the parent gets m − m r/R at p.
+    A body at reach D has its centre of mass at p + r e, with p on the joint's axis and e normal to it. It is replaced
+    by a mass m r/R at p + R e with R = max(r, D), and I − m r (R − r) (1 − e eᵀ); the parent gets m − m r/R at p.
     """
     model = model.copy()
     for j, parent in enumerate(model.parents):
@@ -46,7 +46,7 @@ def regrouped(model: Any) -> Any:
         if not (axis.any() and r < D[j] < inf):
             continue
         e, mass = offset / (r or 1.0), body.mass * r / D[j]
-        rest = pin.Inertia.Zero()  # set by attributes: a part of a body need not be one that can exist
+        rest = pin.Inertia.Zero()  # set by attributes, which are not checked: part of a body may be non-physical
         rest.mass, rest.lever = mass, on_axis + D[j] * e
         rest.inertia = body.inertia - body.mass * r * (D[j] - r) * (np.eye(3) - np.outer(e, e))
         model.inertias[j] = rest
@@ -57,7 +57,7 @@ def regrouped(model: Any) -> Any:
 
 
 def joint_axes(model: Any) -> ndarray:
-    """The twist of each joint in its own frame, (N, 6)."""
+    """Return the twist of each joint in its own frame, (N, 6)."""
     axes, q = np.empty((model.nv, 6)), np.zeros(model.nq)
     for j in range(model.nv):
         joint = model.joints[j + 1]
@@ -68,7 +68,7 @@ def joint_axes(model: Any) -> ndarray:
 
 
 def moved(model: Any) -> ndarray:
-    """Whether a body (row) is moved by a joint (column), (N, N)."""
+    """Return True where a body (row) is moved by a joint (column), (N, N)."""
     table = np.zeros((model.nv, model.nv), dtype=bool)
     for b in range(model.nv):
         table[b, [j - 1 for j in model.supports[b + 1] if j]] = True
@@ -76,14 +76,14 @@ def moved(model: Any) -> ndarray:
 
 
 def slides(model: Any) -> tuple[tuple[int, float], ...]:
-    """Index and largest |q| within its limits of each prismatic joint; inf if it has no limits."""
+    """Return the index and largest |q| within its limits of each prismatic joint; inf without limits."""
     most = np.maximum(np.abs(model.lowerPositionLimit), np.abs(model.upperPositionLimit))
     most[most >= float(UNBOUNDED)] = inf
     return tuple((j, float(most[j])) for j, axis in enumerate(joint_axes(model)) if not axis[3:].any())
 
 
 def reach(model: Any) -> ndarray:
-    """Largest distance D of each joint from the world's origin, within the limits of prismatic joints, (N + 1,)."""
+    """Return the largest distance D of each joint from the world's origin, within prismatic limits, (N + 1,)."""
     D, slide = np.zeros(model.njoints), dict(slides(model))
     for j in range(1, model.njoints):
         D[j] = D[model.parents[j]] + norm(model.jointPlacements[j].translation) + slide.get(j - 1, 0.0)
@@ -91,10 +91,10 @@ def reach(model: Any) -> ndarray:
 
 
 def least_inertia(model: Any, couplings: Couplings) -> ndarray:
-    """A number below M_ii at every q, (n,): of a joint's own body the inertia about it, of later ones the least.
+    """Return a lower bound of M_ii at every q, (n,): the joint's own body counts with its inertia about the axis.
 
-    The least is the smallest principal moment, or for a prismatic joint the mass. Bodies that several joints of one
-    coordinate move may stand still, and count as 0.
+    Later bodies count with their smallest principal moment, or for a prismatic joint with their mass. Bodies that
+    several joints of one coordinate move may be at rest, and count as 0.
     """
     axes, table, bodies, S = joint_axes(model), moved(model), model.inertias[1:], couplings.S
     moment = [np.linalg.eigvalsh(body.inertia)[0] for body in bodies]
@@ -107,7 +107,7 @@ def least_inertia(model: Any, couplings: Couplings) -> ndarray:
 
 
 def rounding(model: Any, regrouped: Any, couplings: Couplings) -> float:
-    """ε of `regrouped`; inf if some joint may have no inertia, or a prismatic joint has no limits."""
+    """Return ε of the bound above; inf if some joint may have no inertia, or a prismatic joint has no limits."""
     least, D, table = least_inertia(model, couplings), reach(regrouped)[1:], moved(model)
     if not (np.all(least > 0) and np.isfinite(D).all()):
         return inf

@@ -1,7 +1,8 @@
-"""Right angles that a file states with too few digits: rpy = 1.57079632679 means π/2, and R gets its exact zeros.
+"""Right angles stated with too few digits: rpy = 1.57079632679 means π/2, which gives R its exact zeros.
 
-A literal of nine decimals or more within one unit of its last digit of a multiple of π/2 is written out in full. That
-turns a frame by less than 1e-9 rad, and halves the kernel. Masses, inertias and translations are never touched.
+A literal with nine or more decimals within one unit of its last digit of a multiple of π/2 is replaced by that
+multiple. This turns a frame by less than 1e-9 rad, and halves the machine code. Masses, inertias and translations are
+unchanged.
 """
 
 from __future__ import annotations
@@ -18,21 +19,20 @@ from robot_dyn.description.description import Description
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.model.robot import Robot
 
-_LEAST_DECIMALS = (
-    9  # with fewer, the angle meant is a guess, and the change could be seen in a comparison of implementations
-)
-_FULL = 15  # decimals: nothing to add
+# With fewer, the intended angle is a guess, and a comparison of implementations could detect the change.
+_LEAST_DECIMALS = 9
+_FULL = 15  # decimals that need no change
 
 
 @final
 @dataclass(frozen=True)
 class RightAngle:
-    """A joint whose rpy is taken as right angles.
+    """A joint whose rpy is replaced by exact right angles.
 
     Attributes:
-        joint: Its name.
-        rpy: As the file states it.
-        change: The largest change of an angle, in [rad].
+        joint: Name of the joint.
+        rpy: Angles as stated by the file.
+        change: Largest change of an angle, in [rad].
     """
 
     joint: str
@@ -44,27 +44,27 @@ class RightAngle:
 
 
 def completed(robot: Robot) -> tuple[Robot, tuple[RightAngle, ...]]:
-    """The robot with right angles written out in full, and what was changed."""
+    """Return the robot with exact right angles, and the changes."""
     description, changes = _written_out(robot.description)
     return (Robot(description, robot.edits) if changes else robot), changes
 
 
 def models_in_full(controller: Any, full: Callable[[Robot], Robot]) -> Any:
-    """A controller whose models have their right angles written out by `full`; itself if none changes."""
+    """Return a controller whose models are completed by `full`; the controller itself if none changes."""
     models = {} if controller is None else controller.models
-    made = {name: full(model) for name, model in models.items() if isinstance(model, Robot)}
-    return with_values(controller, {name: robot for name, robot in made.items() if robot is not models[name]})
+    full_models = {name: full(model) for name, model in models.items() if isinstance(model, Robot)}
+    return with_values(controller, {name: robot for name, robot in full_models.items() if robot is not models[name]})
 
 
 def robot_of(dynamics: Any) -> Robot | None:
-    """The robot whose equations a dynamics has, its right angles written out in full; None if it has no robot."""
+    """Return the robot that defines a dynamics, with exact right angles; None if there is none."""
     robot = _described(dynamics)
     return None if robot is None else completed(robot)[0]
 
 
-def written_out(*given: Any) -> str:
-    """The right angles that machine code of these dynamics writes out in full, in one sentence, or ""."""
-    robots = [robot for each in given if (robot := _described(each)) is not None]
+def written_out(*dynamics: Any) -> str:
+    """Describe the right angles that machine code of these dynamics makes exact, in one sentence, or ""."""
+    robots = [robot for item in dynamics if (robot := _described(item)) is not None]
     changes = tuple(dict.fromkeys(change for robot in robots for change in completed(robot)[1]))
     return _sentence(changes) if changes else ""
 
@@ -75,9 +75,9 @@ def _described(dynamics: Any) -> Robot | None:
 
 
 def _sentence(changes: tuple[RightAngle, ...]) -> str:
-    """At least one change, in one sentence."""
-    names, most = ", ".join(each.joint for each in changes), max(each.change for each in changes)
-    return f"rpy of {names} taken as exact multiples of π/2 (changed by {most:.0e} rad at most)"
+    """Describe at least one change in one sentence."""
+    names, most = ", ".join(angle.joint for angle in changes), max(angle.change for angle in changes)
+    return f"rpy of {names} taken as exact multiples of π/2 (changed by at most {most:.0e} rad)"
 
 
 @lru_cache(maxsize=32)

@@ -1,7 +1,8 @@
 """Robot: the dynamics of a URDF arm, M(q) a + C(q, v) v + N(q) = τ, computed by Pinocchio.
 
-A thin layer over CRBA, RNEA and ABA [Featherstone 2008, ch. 5–7], and C by `coriolis`. One state of float64 goes
-straight to Pinocchio, after checks of a fraction of a microsecond; coupled joints, lists and batches to `evaluation`.
+A thin layer over CRBA, RNEA and ABA [Featherstone 2008, ch. 5–7], with C from `coriolis`. A single float64 state is
+passed straight to Pinocchio after checks of a fraction of a microsecond; coupled joints, lists and batches go through
+`evaluation`.
 """
 
 from __future__ import annotations
@@ -50,23 +51,23 @@ from robot_dyn.queries.quantity import DOUBTFUL
 
 _F8 = np.dtype(float)
 _RAISE = "raise"
-_STATES = 3  # N is analytic in q: zero at random states, it is zero at all
-# named as an entry point is: a model needs no balls, and does not import what counts digits
+_STATES = 3  # N is analytic in q: if zero at random states, it is zero everywhere
+# named like an entry point, so that building a model does not import the digit counter
 _CHECK_OF_NEARLY_SINGULAR = "robot_dyn.accuracy.correct_digits:DigitCheck"
-_ROUNDING = 1e-12  # of the weight times the length of the robot
+_ROUNDING = 1e-12  # relative to weight × length of the robot
 AnswerCheck = Callable[["Robot", str, tuple[ArrayLike, ...], ArrayLike], None]
 
 
 @final
 @dataclass(frozen=True)
 class Robot(Dynamics[ndarray], Parametrised):
-    """A robot: its description and its edits. Immutable; may be shared between threads and pickled.
+    """A robot: its description and edits. Immutable; can be shared between threads and pickled.
 
     Attributes:
-        description: The checked file.
-        edits: Gravity, locks, payloads, armature.
-        answer_check: A function (robot, query, arguments, answer) called after each query, which may warn or raise;
-            None for none. `rd.accuracy.warn_below` sets it.
+        description: Checked file.
+        edits: Gravity, locks, payloads, armature, masses.
+        answer_check: Function (robot, query, arguments, answer) called after each query, which may warn or raise, or
+            None. `rd.accuracy.warn_below` sets it.
     """
 
     description: Description
@@ -82,7 +83,7 @@ class Robot(Dynamics[ndarray], Parametrised):
             else:
                 try:
                     call = one_state[(name, *frame) if frame else name]
-                except TypeError:  # a frame that is not hashable is refused below
+                except TypeError:  # an unhashable frame is refused below
                     pass
                 else:
                     return call(scratch.data, *state)
@@ -91,7 +92,7 @@ class Robot(Dynamics[ndarray], Parametrised):
             self.answer_check(self, name, state, answer)
         return into(out, answer)
 
-    # --- queries of microseconds, answered at once
+    # --- queries that take microseconds, with a fast path
 
     def M(self, q: ArrayLike, *, out: ndarray | None = None, errors: str = "raise") -> ndarray:
         if out is None and is_plain(q, self._uncoupled_shape):
@@ -109,7 +110,7 @@ class Robot(Dynamics[ndarray], Parametrised):
         shape = self._uncoupled_shape
         if out is None and is_state(q, shape) and is_state(v, shape) and is_state(a, shape):
             tau = pin.rnea(self.model, self._scratch.data, q, v, a)
-            if is_moderate(tau):  # NaN and inf, in any argument, show in tau
+            if is_moderate(tau):  # NaN and inf in any argument propagate to tau
                 return tau
         return self._answer("inverse_dynamics", (q, v, a), out, errors)
 
@@ -127,7 +128,7 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     @cached_property
     def name(self) -> str:
-        """The robot's name in its file."""
+        """Name of the robot in its file."""
         return self.description.name
 
     @cached_property
@@ -152,22 +153,22 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     @cached_property
     def lower(self) -> ndarray:
-        """Lower position limits, −inf where none is stated, (n,) in [rad] or [m]."""
+        """Lower position limits, (n,) in [rad] or [m]; −inf if unstated."""
         return self._per_joint(self.model.lowerPositionLimit)
 
     @cached_property
     def upper(self) -> ndarray:
-        """Upper position limits, inf where none is stated, (n,) in [rad] or [m]."""
+        """Upper position limits, (n,) in [rad] or [m]; inf if unstated."""
         return self._per_joint(self.model.upperPositionLimit)
 
     @cached_property
     def effort_limit(self) -> ndarray:
-        """Effort limits, inf where none is stated, (n,) in [N m] or [N]."""
+        """Effort limits, (n,) in [N m] or [N]; inf if unstated."""
         return self._per_joint(self.model.effortLimit)
 
     @cached_property
     def velocity_limit(self) -> ndarray:
-        """Velocity limits, inf where none is stated, (n,) in [rad/s] or [m/s]."""
+        """Velocity limits, (n,) in [rad/s] or [m/s]; inf if unstated."""
         return self._per_joint(self.model.velocityLimit)
 
     @cached_property
@@ -177,47 +178,47 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     @cached_property
     def armature(self) -> ndarray:
-        """Inertia of the drives felt at the joints, (n,) in [kg m²] or [kg]; part of M."""
+        """Inertia of the drives reflected to the joints, (n,) in [kg m²] or [kg]; part of M."""
         return self._per_joint(self.model.armature)
 
     @cached_property
     def damping(self) -> ndarray:
-        """Viscous friction the file states, with coupled joints Σ s² b, (n,) in [N m s/rad] or [N s/m]; see `Plant`."""
+        """Viscous friction stated by the file, Σ s² b for coupled joints, (n,) in [N m s/rad] or [N s/m]."""
         return _frozen(self.model.damping @ self.couplings.S**2)
 
     @cached_property
     def friction(self) -> ndarray:
-        """Dry friction the file states, with coupled joints Σ |s| f, (n,) in [N m] or [N]; see `Plant`."""
+        """Dry friction stated by the file, Σ |s| f for coupled joints, (n,) in [N m] or [N]; see `Plant`."""
         return _frozen(self.model.friction @ np.abs(self.couplings.S))
 
     @cached_property
     def total_mass(self) -> float:
-        """Mass of all links, those of the base included, in [kg]."""
+        """Mass of all links, including the base, in [kg]."""
         return sum(body.mass for body in self.model.inertias)
 
     @cached_property
     def estimated(self) -> Mapping[str, str]:
-        """Links whose inertia was estimated from shapes, not measured, and what from: see `load`."""
+        """Basis of each inertia that is estimated from shapes, not measured, by link; see `load`."""
         return MappingProxyType(self.description.estimated)
 
     @cached_property
     def model(self) -> Any:
-        """The `pinocchio.Model` of all joints that move, coupled ones included. Read it, do not change it."""
+        """The `pinocchio.Model` of all moving joints, including coupled ones. Do not modify it."""
         return self._built.model
 
     @cached_property
     def couplings(self) -> Couplings:
-        """How the joints of `model` follow q."""
+        """Map from q to the positions of the joints of `model`."""
         return self._built.couplings
 
     @cached_property
     def coriolis(self) -> Coriolis:
-        """How C of `model` is computed, and the bound of its rounding."""
+        """Coriolis matrix of `model`, with the bound on its rounding error."""
         return self._built.coriolis
 
     @property
     def sizes(self) -> Mapping[str, int]:
-        """The numbers that letters in the shapes of quantities stand for."""
+        """Numbers for the letters in the shapes of quantities."""
         return self._built.sizes
 
     @property
@@ -230,7 +231,7 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     @property
     def joint_without_inertia(self) -> str | None:
-        """The joint at which M is singular at every configuration, or None: then forward dynamics has no answer."""
+        """Joint at which M is singular at every configuration, so that forward dynamics fails, or None."""
         return self._evaluation.regularity.joint
 
     @cached_property
@@ -240,7 +241,7 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     @cached_property
     def gravity_acts(self) -> bool:
-        """True if gravity has a torque or force on a joint, at some position."""
+        """True if gravity exerts a torque or force on a joint at some position."""
         g = float(np.linalg.norm(self.edits.gravity))
         q = np.random.default_rng(0).uniform(-1.0, 1.0, (_STATES, self.n))
         length = 1.0 + sum(float(np.linalg.norm(place.translation)) for place in self.model.jointPlacements)
@@ -255,7 +256,7 @@ class Robot(Dynamics[ndarray], Parametrised):
     def random_configuration(self, rng: np.random.Generator) -> ndarray:
         """Return a position within the joint limits, uniformly distributed.
 
-        A revolute joint without limits, or with more than a turn between them, has a turn near 0; a prismatic one ±1 m.
+        A revolute joint without limits, or with over a turn between them, gets one turn around 0; a prismatic one ±1 m.
 
         Args:
             rng: Source of random numbers, such as numpy.random.default_rng(0).
@@ -266,8 +267,8 @@ class Robot(Dynamics[ndarray], Parametrised):
         Raises:
             QueryError: If rng is not a numpy.random.Generator.
         """
-        instance("rng", rng, np.random.Generator, "give one, such as numpy.random.default_rng(0)")
-        slides = np.array([each == "prismatic" for each in self.joint_types])
+        instance("rng", rng, np.random.Generator, "give a generator, for example numpy.random.default_rng(0)")
+        slides = np.array([kind == "prismatic" for kind in self.joint_types])
         half = (self.upper - self.lower) / 2
         half = np.where(np.isfinite(half) & slides, half, np.minimum(half, np.where(slides, 1.0, np.pi)))
         middle = np.clip(0.0, self.lower + half, self.upper - half)
@@ -275,11 +276,11 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     @staticmethod
     def from_text(urdf: str | bytes, *, source: str = "the text of the URDF") -> Robot:
-        """A robot in standard gravity, from the text of a URDF; warns as `load` does.
+        """Return a robot in standard gravity from the text of a URDF; warns like `load`.
 
         Args:
-            urdf: The text, or the bytes of a file.
-            source: What messages call it; meshes with relative paths are searched in its folder, if it is a path.
+            urdf: Text, or bytes of a file.
+            source: Name used in messages. If it is a path, meshes with relative paths are searched in its folder.
 
         Raises:
             DescriptionError: If the text is refused.
@@ -288,9 +289,10 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     @staticmethod
     def from_pinocchio(model: Any) -> Robot:
-        """A robot of a `pinocchio.Model` that was built elsewhere, with its gravity and armature; warns as `load` does.
+        """Return a robot from a `pinocchio.Model`, with its gravity and armature; warns like `load`.
 
-        It is written as a URDF and read as any other; an unbounded joint is one angle; a warning says if order changes.
+        The model is written as a URDF and read like any other. An unbounded joint becomes one angle. A warning reports
+        a changed order of joints.
 
         Raises:
             DescriptionError: If it is not a `pinocchio.Model`, or has joints that are not revolute or prismatic.
@@ -298,7 +300,7 @@ class Robot(Dynamics[ndarray], Parametrised):
         return Robot(*described(model)).announced()
 
     def announced(self) -> Robot:
-        """Return the robot as it is loaded: warn of its findings, and let its queries warn if M is nearly singular."""
+        """Warn of the robot's findings, and return it with warnings of its queries if M is nearly singular."""
         announce(self.name, self.findings)
         regularity = self._evaluation.regularity
         if regularity.singular or not regularity.near:
@@ -307,18 +309,18 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     @takes_changes
     def with_(self, **changes: Unpack[Changes]) -> Robot:
-        """A new robot with more edits. Locks and payloads add up; the others replace what was given before.
+        """Return a robot with more edits. Locks and payloads accumulate; others replace earlier values.
 
         Args:
             **changes: gravity (3,) in base axes, in [m/s²]; lock: values by joint, in [rad] or [m]; payload: one or
                 several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg]; mass_scale;
-                masses and inertias: values by link in place of the file's, in [kg], and (3, 3) in [kg m²].
+                masses and inertias: values by link that replace the file's, in [kg], and (3, 3) in [kg m²].
 
         Raises:
             EditError: If a name is unknown or a value is not allowed.
 
         Warns:
-            ModelWarning: If the new gravity is not zero and has no torque on any joint.
+            ModelWarning: If the new gravity is not zero and exerts no torque on any joint.
         """
         robot = Robot(self.description, self.edits.with_(self.joint_names, **changes))
         gravity = robot.edits.gravity
@@ -328,13 +330,13 @@ class Robot(Dynamics[ndarray], Parametrised):
         return robot if self.answer_check is None else replace(robot, answer_check=self.answer_check)
 
     def to_urdf(self, path: str | Path) -> Path:
-        """Write the robot with its edits as a URDF; an older one of that name is replaced.
+        """Write the robot with its edits as a URDF; an existing file is replaced.
 
-        Locks become fixed joints and payloads links; meshes keep their addresses, relative ones are those from the new
-        place.
+        Locked joints become fixed joints, payloads become links. Mesh addresses are kept; relative ones are adapted to
+        the new folder.
 
         Args:
-            path: Ends with .urdf, which is added if it has no suffix; not the file that the robot was read from.
+            path: Path with suffix .urdf, which is added if missing; not the file that the robot was read from.
 
         Returns:
             The path.
@@ -343,7 +345,7 @@ class Robot(Dynamics[ndarray], Parametrised):
             DescriptionError: If the file cannot be written there.
 
         Warns:
-            ModelWarning: If there is armature, or a gravity that is not the standard one: URDF has no place for them.
+            ModelWarning: If there is armature or nonstandard gravity, which URDF cannot express.
         """
         return write_urdf(self.description, self.edits, path)
 
@@ -355,13 +357,13 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     def __post_init__(self) -> None:
         function("answer_check", self.answer_check, "(robot, query, arguments, answer)")
-        instance("edits", self.edits, Edits, "give those of another robot, or use with_", error=EditError)
+        instance("edits", self.edits, Edits, "use the edits of another robot, or with_", error=EditError)
         if not isinstance(self.description, Description):
-            given = type(self.description).__name__
+            kind = type(self.description).__name__
             raise DescriptionError(
-                f"a Robot is made of a Description, got {given}; use rd.load, Robot.from_text or Robot.from_pinocchio"
+                f"description must be a Description, got {kind}; use rd.load, Robot.from_text or Robot.from_pinocchio"
             )
-        _ = self._built  # so that errors are raised now, not by the first query
+        _ = self._built  # raises errors now, not at the first query
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Robot, (self.description, self.edits, self.answer_check)
@@ -376,27 +378,27 @@ class Robot(Dynamics[ndarray], Parametrised):
 
     @cached_property
     def _shape(self) -> tuple[int] | None:
-        """Shape of one state that is answered at once; None if answers are checked."""
+        """Input shape of the fast path for one state; None if an `answer_check` is set."""
         return (self.n,) if self.answer_check is None else None
 
     @cached_property
     def _at_once(self) -> tuple[tuple[int] | None, Scratch, OnFirstUse]:
-        """That shape, and the calls that answer it."""
+        """Input shape of the fast path, working memory, and the functions by query."""
         return self._shape, self._scratch, self._evaluation.one_state
 
     @cached_property
     def _uncoupled_shape(self) -> tuple[int] | None:
-        """Shape of arguments that Pinocchio takes as they are; None if joints are coupled, or answers are checked."""
+        """Input shape passed straight to Pinocchio; None if joints are coupled or an `answer_check` is set."""
         return self._shape if self.couplings.trivial else None
 
     @cached_property
     def _regular_shape(self) -> tuple[int] | None:
-        """The same for forward dynamics; None if M is singular too."""
+        """Input shape of forward dynamics passed straight to Pinocchio; None also if M is singular."""
         return None if self._evaluation.regularity.singular else self._uncoupled_shape
 
     @cached_property
     def _scratch(self) -> Scratch:
-        """Memory that the algorithms of `model` write to."""
+        """Working memory of Pinocchio's algorithms."""
         return Scratch(self.model)
 
     @cached_property
@@ -405,7 +407,7 @@ class Robot(Dynamics[ndarray], Parametrised):
         return _frozen(np.concatenate([self.model.inertias[ids[x]].toDynamicParameters() for x in self.body_names]))
 
     def _per_joint(self, full: ndarray) -> ndarray:
-        """Values of the joints of `model` in the order of q; infinite where the file states no limit."""
+        """Return values of the joints of `model` in the order of q; infinite where the file states no limit."""
         ids = joint_ids(self.model)
         values = full[[self.model.idx_vs[ids[name]] for name in self.joint_names]]
         values[np.abs(values) >= float(UNBOUNDED)] *= np.inf
@@ -413,24 +415,34 @@ class Robot(Dynamics[ndarray], Parametrised):
 
 
 def info(robot: Robot) -> Info:
-    """What is known of a robot: joints with limits and stated friction, couplings, mass, edits and findings.
+    """Return a summary of a robot: joints with limits and stated friction, couplings, mass, edits and findings.
 
     Its `repr` is the table that `robot-dyn info` prints, `to_json()` the document of `robot-dyn info --json`.
 
     Args:
-        robot: Of `rd.load`, with its edits.
+        robot: A robot with its edits, for example from `rd.load`.
 
     Raises:
-        QueryError: If it is no robot.
+        QueryError: If `robot` is not a Robot.
     """
-    instance("robot", robot, Robot, "give one, such as rd.load('ur5')")
+    instance("robot", robot, Robot, "give a robot, for example rd.load('ur5')")
     columns = [getattr(robot, name) for name in list(Joint.__dataclass_fields__)[2:]]
     rows = zip(robot.joint_names, robot.joint_types, *(np.asarray(x).tolist() for x in columns), strict=True)
     return Info(
-        robot.name, robot.description.source, robot.n, robot.total_mass, robot.edits.gravity, robot.gravity_acts,
-        tuple(Joint(*row) for row in rows), tuple(couplings_of(robot.description, set(robot.model.names[1:]))),
-        dict(robot.edits.lock), robot.edits.payloads, dict(robot.estimated), robot.frame_names, robot.findings,
-    )  # fmt: skip
+        robot=robot.name,
+        source=robot.description.source,
+        n=robot.n,
+        total_mass=robot.total_mass,
+        gravity=robot.edits.gravity,
+        gravity_acts=robot.gravity_acts,
+        joints=tuple(Joint(*row) for row in rows),
+        couplings=tuple(couplings_of(robot.description, set(robot.model.names[1:]))),
+        locked=dict(robot.edits.lock),
+        payloads=robot.edits.payloads,
+        estimated=dict(robot.estimated),
+        links=robot.frame_names,
+        findings=robot.findings,
+    )
 
 
 def _frozen(x: ndarray) -> ndarray:

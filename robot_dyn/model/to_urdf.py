@@ -1,8 +1,8 @@
-"""A robot as a URDF with its edits applied, which other programs read.
+"""Export of a robot with its edits as a URDF, for other programs.
 
-Locked joints, and those that follow them, are fixed at T · exp(ξ̂ q); payloads are links of their own; masses and
-inertias are those of the edits. Other literals stay as the file has them; rotations of locked joints pass through roll,
-pitch and yaw. Shapes and materials are those of the file; its other elements, such as transmissions, are left out.
+Locked joints, and joints that follow them, are fixed at T · exp(ξ̂ q); payloads become separate links; edited masses
+and inertias replace the file's. Other literals are unchanged; rotations of locked joints are converted to roll, pitch
+and yaw. Shapes and materials are copied; other elements, for example transmissions, are left out.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _UNIT_SLACK = 1e-15  # of an axis: its rounding
 
 
 def write_urdf(description: Description, edits: Edits, path: str | Path) -> Path:
-    """Write the file of `Robot.to_urdf`, which documents arguments, errors and warnings; return its path."""
+    """Write the file of `Robot.to_urdf`, where arguments, errors and warnings are documented; return its path."""
     source = Path(description.source)
     path = target(path, _URDF, DescriptionError, [source] if source.is_file() else [])
     lacking = _not_stated(edits)
@@ -46,7 +46,7 @@ def write_urdf(description: Description, edits: Edits, path: str | Path) -> Path
 
 
 def _urdf_text(description: Description, edits: Edits, lacking: list[str], folder: Path) -> bytes:
-    """Return the bytes of that file, with addresses of meshes relative to `folder`."""
+    """Return the bytes of the file, with mesh addresses relative to `folder`."""
     out = description.element
     state_edits(out, edits)
     for inertial in out.iterfind("link/inertial") if edits.mass_scale != 1.0 else ():
@@ -66,16 +66,16 @@ def _urdf_text(description: Description, edits: Edits, lacking: list[str], folde
 
 
 def _not_stated(edits: Edits) -> list[str]:
-    """What a URDF cannot state of the edits."""
+    """Return a message for each edit that URDF cannot express."""
     armature = {name: value for name, value in edits.armature if value}
-    told = [f"armature is not in the URDF, which has no place for it: {armature}"] if armature else []
+    messages = [f"armature is not in the URDF, which cannot express it: {armature}"] if armature else []
     if edits.gravity != STANDARD_GRAVITY:
-        told.append(f"gravity is not in the URDF, which has no place for it: {edits.gravity} m/s²")
-    return told
+        messages.append(f"gravity is not in the URDF, which cannot express it: {edits.gravity} m/s²")
+    return messages
 
 
 def _fix_locked(out: Any, values: dict[str, float]) -> None:
-    """Joints that are held, and those that follow them, as fixed ones; chains of followers as single steps."""
+    """Make locked joints and their followers fixed, and reduce chains of followers to single steps."""
     mimics = stated_mimics(out)
     for joint in out.iterfind("joint"):
         name, mimic = joint.get("name"), joint.find("mimic")
@@ -88,6 +88,7 @@ def _fix_locked(out: Any, values: dict[str, float]) -> None:
 
 
 def _hold(joint: Any, value: float) -> None:
+    """Make a joint fixed at a value."""
     origin, axis = joint.find("origin"), _numbers(joint.find("axis").get("xyz"))
     axis, R, p = axis / np.linalg.norm(axis), rotation_rpy(_numbers(origin.get("rpy"))), _numbers(origin.get("xyz"))
     if joint.get("type") == "prismatic":
@@ -101,7 +102,7 @@ def _hold(joint: Any, value: float) -> None:
 
 
 def _restate(joint: Any) -> None:
-    """Axes of length 1, as some programs need them, and limits left out that the file does not state."""
+    """Normalise the axis of a joint, as some programs require, and remove limits that its file does not state."""
     limit, axis = joint.find("limit"), joint.find("axis")
     if axis is not None and abs((length := np.linalg.norm(_numbers(axis.get("xyz")))) - 1) > _UNIT_SLACK:
         axis.set("xyz", _words(_numbers(axis.get("xyz")) / length))
@@ -114,12 +115,12 @@ def _restate(joint: Any) -> None:
 
 
 def _draw(out: Any, description: Description, folder: Path) -> None:
-    """Add the shapes of links, and materials, of the text that was read."""
+    """Copy the shapes of links, and the materials, from the original text."""
     read, _ = parse(description.text, description.source)
     shapes = {(link.get("name") or "").strip(): link for link in read.iterfind("link")}
     for link in out.iterfind("link"):
         if (drawn := shapes.get(link.get("name"))) is not None:
-            link.extend(deepcopy(each) for each in drawn if each.tag in _DRAWN)
+            link.extend(deepcopy(element) for element in drawn if element.tag in _DRAWN)
     for material in reversed(read.findall("material")):
         out.insert(0, deepcopy(material))
     source = Path(description.source)
@@ -130,9 +131,9 @@ def _draw(out: Any, description: Description, folder: Path) -> None:
 
 
 def _add_payload(out: Any, payload: Payload) -> None:
-    """A link of its own, fixed to the frame that carries it."""
-    taken = {each.get("name") for each in out.iter("link", "joint")}
-    name = next(each for k in range(len(taken) + 1) if (each := f"payload_{k}") not in taken)
+    """Add a payload as a separate link, fixed to its frame."""
+    taken = {element.get("name") for element in out.iter("link", "joint")}
+    name = next(free for k in range(len(taken) + 1) if (free := f"payload_{k}") not in taken)
     inertial = etree.SubElement(etree.SubElement(out, "link", name=name), "inertial")
     etree.SubElement(inertial, "origin", xyz=_words(payload.com), rpy="0 0 0")
     etree.SubElement(inertial, "mass", value=repr(payload.mass))

@@ -1,6 +1,7 @@
-"""Batches: a query answers every state, or names the first that has no answer; errors="nan" answers the others.
+"""Batches: a query evaluates all states, or raises an error that names the first one without a result.
 
-A batch is evaluated as a whole. Only if that fails is it halved, until the states without an answer are found.
+With errors="nan" states without a result become NaN. A batch is evaluated as a whole; if that fails, it is halved until
+the states without a result are isolated.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from robot_dyn.foundations.errors import (
 )
 from robot_dyn.foundations.validate import check_batches, converted
 
-_REFUSALS = (NotFiniteError, OverflowedError, SingularError)  # of a state; all else is wrong with the query
+_REFUSALS = (NotFiniteError, OverflowedError, SingularError)  # of one state; other errors concern the query
 
 
 class DoubtError(RobotDynError):
-    """Internal: some state of a batch must be evaluated by itself."""
+    """Internal: a state of a batch must be evaluated separately."""
 
 
 def answered(
@@ -37,38 +38,38 @@ def answered(
     errors: str = "raise",
     arithmetic: Arithmetic = FLOAT64,
 ) -> Array:
-    """The answers to a batch of states, (..., *shape).
+    """Return the results of a batch of states, (..., *shape).
 
     Args:
-        equation: (x₁, x₂, …) → answers, for one state (n,) or a batch; may raise SingularError or OverflowedError.
-        arrays: Its arguments by name, each (..., n), or (..., 1) for the time t; floats and integers of any type.
-        shape: Of the answer for one state.
-        joint_names: For messages.
-        errors: "raise", or "nan" to answer NaN where a state has no answer.
-        arithmetic: Of arguments and answers.
+        equation: (x₁, x₂, …) → results, for one state (n,) or a batch; may raise SingularError or OverflowedError.
+        arrays: Arguments by name, each (..., n), or (..., 1) for the time t; floats and integers of any type.
+        shape: Shape of the result for one state.
+        joint_names: Names of the joints, for messages.
+        errors: "raise", or "nan" for NaN at states without a result.
+        arithmetic: Arithmetic of arguments and results.
 
     Raises:
-        QueryError: If the batch axes do not match, or `errors` is neither; NotFiniteError if an argument is not finite.
-        OverflowedError: If the answer of a state is not finite, or the arithmetic does not hold its q or t.
-        SingularError: Where forward dynamics has no answer. In a batch each names the row.
+        QueryError: If the batch axes do not match or `errors` is invalid.
+        NotFiniteError: If an argument is not finite.
+        OverflowedError: If a result is not finite, or q or t is too large for the arithmetic.
+        SingularError: If M is singular in forward dynamics. In a batch, all of these name the row.
     """
     if errors.__class__ is not str or errors not in ("raise", "nan"):
         raise QueryError(f"errors must be 'raise' or 'nan', got {shown(errors)}")
     batch = check_batches(**arrays)
 
-    def attempt(*given: Array) -> Array:
-        answer = equation(*(converted(*each, joint_names, arithmetic) for each in zip(arrays, given, strict=True)))
-        if (
-            isinstance(answer, np.ndarray) and answer.dtype == object
-        ):  # entries that are 0 or 1 whatever the state are integers still
-            answer = arithmetic.array(answer)
+    def attempt(*values: Array) -> Array:
+        named = zip(arrays, values, strict=True)
+        answer = equation(*(converted(name, x, joint_names, arithmetic) for name, x in named))
+        if isinstance(answer, np.ndarray) and answer.dtype == object:
+            answer = arithmetic.array(answer)  # constant entries 0 and 1 may still be integers
         if not arithmetic.finite(answer).all():
             raise OverflowedError(f"{', '.join(arrays)} are so large that the result overflows")
         return answer
 
     if 0 in batch:
         return np.zeros((*batch, *shape), dtype=arithmetic.dtype)
-    with np.errstate(all="ignore"):  # overflow is reported by an error
+    with np.errstate(all="ignore"):  # overflow raises an error below
         try:
             return attempt(*arrays.values())
         except (*_REFUSALS, DoubtError):
@@ -82,17 +83,17 @@ def answered(
 
 
 def _together(attempt: Callable[..., Array], rows: list[Array], result: Array, arithmetic: Arithmetic) -> None:
-    """Answer the states that have an answer in one batch, another state in place of those that have none.
+    """Evaluate all states with a result in one batch, in which they also replace the others.
 
-    So they are what they would be beside any other states, to the last bit: a kernel may round a part of a batch, or
-    one state, in another way.
+    Their bits then do not depend on the other states of the batch: a kernel may round one state, or part of a batch,
+    differently.
     """
     answers: np.ndarray = np.all(arithmetic.finite(result).reshape(len(result), -1), axis=1)
     if answers.all() or not answers.any():
         return
-    some = int(np.argmax(answers))
-    with suppress(*_REFUSALS, DoubtError):  # a doubt about the batch as a whole
-        whole = attempt(*(np.where(answers[:, None], x, x[some]) for x in rows))
+    replacement = int(np.argmax(answers))
+    with suppress(*_REFUSALS, DoubtError):  # if the whole batch is in doubt, the separate results remain
+        whole = attempt(*(np.where(answers[:, None], x, x[replacement]) for x in rows))
         result[answers] = whole[answers]
 
 
@@ -105,7 +106,7 @@ def _halved(
     batch: tuple[int, ...],
     errors: str,
 ) -> None:
-    """Answer the states start … stop − 1; with errors="nan" those without an answer stay as they are."""
+    """Evaluate the states start … stop − 1; with errors="nan" states without a result are left unchanged."""
     alone = stop - start == 1
     try:
         result[start:stop] = attempt(*(x[start] if alone else x[start:stop] for x in rows))
@@ -122,7 +123,7 @@ def _halved(
 
 
 def into(out: Any, result: Any) -> Any:
-    """Return the result, in `out` if that is an array; QueryError if it does not fit."""
+    """Return the result, in `out` if that is an array; raise QueryError if it does not fit."""
     if out is None:
         return result
     result = np.asarray(result)

@@ -1,7 +1,7 @@
 """The queries of every engine, one table: rigid bodies in gravity, M(q) a + C(q, v) v + N(q) = τ, N = ∂V/∂q.
 
-A new query is a method of `Dynamics` with its row, Pinocchio's call in `model/calls.py` and the own formula in
-`lagrange/formulas.py`, both by its name. Engines, machine code, cross-check, certificates and commands follow.
+A new query is a method of `Dynamics` with its row, Pinocchio's call in `model/calls.py` and the formula in
+`lagrange/formulas.py`, both under its name. Engines, machine code, cross-check, certificates and commands follow.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ Answer = TypeVar("Answer")  # array type of an engine
 
 
 class Axes(StrEnum):
-    """The axes and reference point of a twist of a frame.
+    """Axes and reference point of the twist of a frame.
 
     WORLD_ALIGNED: at the frame's origin, along the base's axes: its linear part is ṗ. Pinocchio's LOCAL_WORLD_ALIGNED.
     BODY: at the frame's origin, along the frame's axes: the body twist g⁻¹ġ. Pinocchio's LOCAL.
     WORLD: at the base's origin, along the base's axes: the spatial twist ġg⁻¹. Pinocchio's WORLD.
 
-    Pinocchio's names are taken too, as texts or as `pinocchio.ReferenceFrame`.
+    Pinocchio's names are accepted too, as strings or as `pinocchio.ReferenceFrame`.
     """
 
     WORLD_ALIGNED = "world_aligned"
@@ -41,7 +41,7 @@ class Axes(StrEnum):
 
     @classmethod
     def of(cls, name: Any) -> Axes:
-        """The axes of that name; raises QueryError for any other."""
+        """Return the axes of that name; raise QueryError for any other."""
         text = name if isinstance(name, str) else str(getattr(name, "name", shown(name)))  # Pinocchio's have names
         return cls(choice("expressed_in", _OF_PINOCCHIO.get(text, text), list(cls)))
 
@@ -56,13 +56,13 @@ def _solved_torque(size: Any, x: Mapping[str, Array]) -> Any:
 
 
 def _placement_terms(size: Any, x: Mapping[str, Array], frame: str) -> np.ndarray:
-    """Return 1 for the rotation and the distance from the base for the position, which is exact where that is 0."""
-    distance = max(size.reach[frame], np.finfo(float).tiny)  # 0 would stand for an entry without terms
+    """Return 1 for the rotation, and the distance from the base for the position."""
+    distance = max(size.reach[frame], np.finfo(float).tiny)  # 0 would mean an entry without terms
     return np.vstack([np.hstack([np.ones((3, 3)), np.full((3, 1), distance)]), [0.0, 0.0, 0.0, 1.0]])
 
 
 def _jacobian_terms(size: Any, x: Mapping[str, Array], frame: str) -> np.ndarray:
-    """Return the scale of both levers: each is a difference of positions, whose scale is their size."""
+    """Return the sum of lever and reach: a lever is a difference of positions, whose scale is their size."""
     arm = size.lever[frame] + size.reach[frame]
     return np.vstack([np.tile(arm, (3, 1)), np.ones((3, len(arm)))])
 
@@ -77,11 +77,11 @@ class Dynamics(ABC, Generic[Answer]):
 
     `q`, `v`, `a`, `tau` have shape (n,), or (..., n) in a batch, in [rad], [rad/s], [rad/s²], [N m] for a revolute
     joint and [m], [m/s], [m/s²], [N] for a prismatic one. Twists are (linear, angular). Every method raises
-    QueryError for a wrong shape, a value that is not finite or an unknown frame, and OverflowedError where the answer
-    would not be finite; in a batch the message and the error's `row` name the state. With errors="nan" the states
-    of a batch that have no answer get NaN, and the others theirs.
+    QueryError for a wrong shape, a non-finite value or an unknown frame, and OverflowedError if the result would not be
+    finite; in a batch the message and the error's `row` identify the state. With errors="nan" only the states of a
+    batch without a result become NaN.
 
-    An engine defines `n`, `joint_names` and `_answer`; it overrides a query only to answer one state sooner.
+    An engine defines `n`, `joint_names` and `_answer`; it overrides a query only to add a fast path for one state.
     """
 
     @property
@@ -96,14 +96,14 @@ class Dynamics(ABC, Generic[Answer]):
 
     @abstractmethod
     def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
-        """Return the answer to the query of a name.
+        """Return the result of a query.
 
         Args:
             name: Name of the query.
-            state: Its arguments, as the user gave them.
+            state: Arguments as passed by the user.
             out: Array for the result, or None.
             errors: "raise" or "nan".
-            frame: The frame, and the axes of its twist, of a query that has them.
+            frame: Frame and axes of its twist, if the query has them.
         """
 
     @query("n", "n", unit="kg m²", terms=lambda size, x: size.M, definite=True, digits=True)
@@ -132,7 +132,7 @@ class Dynamics(ABC, Generic[Answer]):
     def coriolis_transpose(
         self, q: ArrayLike, v: ArrayLike, *, out: Answer | None = None, errors: str = "raise"
     ) -> Answer:
-        """Cᵀ(q, v) v = ∂K/∂q, as momentum observers use it: d(M v)/dt = τ + Cᵀ v − N."""
+        """Cᵀ(q, v) v = ∂K/∂q, used by momentum observers: d(M v)/dt = τ + Cᵀ v − N."""
         return self._answer("coriolis_transpose", (q, v), out, errors)
 
     @query("n", unit="N m", terms=lambda size, x: size.inverse_dynamics(x["v"], x["a"]), digits=True)
@@ -156,7 +156,7 @@ class Dynamics(ABC, Generic[Answer]):
 
     @query(unit="J", terms=lambda size, x: size.V)
     def potential_energy(self, q: ArrayLike, *, out: Answer | None = None, errors: str = "raise") -> Any:
-        """Potential energy of gravity V = −Σ mᵢ gᵀ pᵢ of the bodies that move, 0 at the origin of the base."""
+        """Potential energy of gravity V = −Σ mᵢ gᵀ pᵢ of the moving bodies, 0 at the origin of the base."""
         return self._answer("potential_energy", (q,), out, errors)
 
     @query("n", unit="N m s", terms=lambda size, x: size.M @ x["v"])
@@ -170,8 +170,8 @@ class Dynamics(ABC, Generic[Answer]):
     ) -> Answer:
         """Regressor of the joint torques, Y(q, v, a) with M a + C v + N = Y θ + armature · a, θ `inertial_parameters`.
 
-        Y holds geometry, gravity and couplings and no mass: θ can be identified from measured torques, except for
-        combinations that no motion distinguishes, for which Y is rank-deficient.
+        Y depends on geometry, gravity and couplings, but not on masses: θ can be identified from measured torques,
+        except for combinations that no motion distinguishes, for which Y is rank-deficient.
         [Atkeson, An, Hollerbach 1986; Siciliano et al. 2009, §7.2.2]
         """
         return self._answer("regressor", (q, v, a), out, errors)
@@ -198,12 +198,12 @@ class Dynamics(ABC, Generic[Answer]):
         return self._answer("jacobian_rate", (q, v), out, errors, (frame, expressed_in))
 
     def total_energy(self, q: ArrayLike, v: ArrayLike, *, errors: str = "raise") -> Any:
-        """Total energy E = K + V, constant where nothing but gravity acts.
+        """Return the total energy E = K + V, which is constant if only gravity acts.
 
         Args:
             q: Positions, shape (..., n), in [rad] or [m] by joint.
             v: Velocities, shape (..., n), in [rad/s] or [m/s].
-            errors: "raise", or "nan" for NaN at the states of a batch that have no answer.
+            errors: "raise", or "nan" for NaN at states of a batch without a result.
 
         Returns:
             Energy, shape (...), in [J].
@@ -212,15 +212,17 @@ class Dynamics(ABC, Generic[Answer]):
 
 
 QUANTITIES = table(Dynamics)
-EQUATION = {name: quantity for name, quantity in QUANTITIES.items() if not quantity.framed}  # those of machine code
+EQUATION = {
+    name: quantity for name, quantity in QUANTITIES.items() if not quantity.framed
+}  # the queries of machine code
 M, C, N = (QUANTITIES[name] for name in ("M", "C", "N"))
 CORIOLIS_TORQUE, INVERSE_DYNAMICS, FORWARD_DYNAMICS = (
     QUANTITIES[name] for name in ("coriolis_torque", "inverse_dynamics", "forward_dynamics")
 )
-FORWARD_DYNAMICS_DERIVATIVES = Quantity(  # of machine code alone
+FORWARD_DYNAMICS_DERIVATIVES = Quantity(  # machine code only
     "forward_dynamics_derivatives", ("q", "v", "tau"), (3, "n", "n"), terms=_solved_torque, solves=True
 )
-PLANT = {  # a plant's; its effects are terms too
+PLANT = {  # queries of a plant, which include its effects
     "N": replace(N, arguments=("t", "q", "v")),
     "torque": Quantity("torque", ("t", "q", "v"), ("n",)),
     "inverse_dynamics": replace(INVERSE_DYNAMICS, arguments=("t", "q", "v", "a")),
@@ -232,7 +234,8 @@ def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
     """Solve M a = τ for M (..., n, n) and the remaining torque τ (..., n).
 
     Raises:
-        SingularError: If M is not positive definite; names the joint. UndecidedError if rounding hides whether it is.
+        SingularError: If M is not positive definite; names the joint.
+        UndecidedError: If rounding makes this undecidable.
     """
     if M.shape[:-2] != tau.shape[:-1]:
         batch = np.broadcast_shapes(M.shape[:-2], tau.shape[:-1])
@@ -241,7 +244,7 @@ def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
         return cholesky_solve(M, tau)
     except NotPositiveDefiniteError as error:
         if M.dtype.kind == "f" and not np.isfinite(M).all():
-            raise OverflowedError("q is so large that M overflows") from None
+            raise OverflowedError("q is so large that M overflows; take a smaller q") from None
         joint = joint_names[error.row]
         if error.decided:
             raise SingularError(joint, "at this q") from None
@@ -249,5 +252,5 @@ def acceleration(M: Array, tau: Array, joint_names: tuple[str, ...]) -> Array:
 
 
 def entry(table: Mapping[str, T], frame: str) -> T:
-    """The entry of a table for a frame; QueryError with the nearest names if it is unknown."""
+    """Return the entry of a table for a frame; raise QueryError with similar names if it is unknown."""
     return table[choice("frame", frame, table)]

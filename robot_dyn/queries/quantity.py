@@ -11,13 +11,13 @@ from inspect import cleandoc, signature
 from math import inf
 from typing import Any, TypeVar, final
 
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Scalar
 from robot_dyn.queries.units import of_joint
 
-DOUBTFUL = 1e10  # of ‖a‖: M may be singular at this q, which rounding hides
-MOST_DIGITS = 20  # of an answer that are counted
+DOUBTFUL = 1e10  # ‖a‖ above which M may be singular at this q, hidden by rounding
+MOST_DIGITS = 20  # maximum number of digits counted
 
-State = Mapping[str, Array]
+State = Mapping[str, Scalar]
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 _PARAMETERS = {
@@ -25,12 +25,12 @@ _PARAMETERS = {
     "v": "Velocities, shape (..., n), in [rad/s] or [m/s].",
     "a": "Accelerations, shape (..., n), in [rad/s²] or [m/s²].",
     "tau": "Torques, shape (..., n), in [N m] or [N].",
-    "frame": "Name of a link, or of a joint, whose frame is that of its child link. A shared name is the link's.",
+    "frame": "Name of a link, or of a joint, whose frame is that of its child link. A shared name means the link.",
     "expressed_in": """Axes and point of the twist: "world_aligned" (at the frame's origin, along the base's axes),
         "body" (along the frame's axes) or "world" (at the base's origin); or Pinocchio's names "local_world_aligned",
         "local", "world".""",
     "out": "Array that receives the result and is returned; it is unchanged if the query raises.",
-    "errors": '"raise", or "nan" for NaN at the states of a batch that have no answer.',
+    "errors": '"raise", or "nan" for NaN at states of a batch without a result.',
 }
 
 
@@ -42,22 +42,22 @@ def _no_terms(size: Any, x: State) -> float:
 @final
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity that an engine answers by the method of its name.
+    """A quantity that an engine computes in the method of its name.
 
     Attributes:
         name: Name of the method.
         description: First line of its docstring.
         arguments: Names of its arguments, each of shape (..., n); "t" is a time.
-        axes: Shape for one state: numbers, or letters for those of a robot (`sizes`), "n" its degrees of freedom,
-            "p" its inertial parameters. Every query takes batches, by the rules of `queries.batch`.
+        axes: Shape for one state: numbers, or letters for numbers of a robot (`sizes`): "n" its degrees of freedom,
+            "p" its inertial parameters. Every query accepts batches, see `queries.batch`.
         unit: Unit for revolute joints; `units.of_joint` converts it for prismatic ones.
-        terms: Sum of the absolute values of the terms added into each entry, from `lagrange.magnitude.Magnitudes` at q,
-            the absolute values of the arguments by name, and the frame if it has one. Where M a = τ is solved, the
-            terms of that τ.
+        terms: Function that returns the sum of the absolute values of the terms of each entry, from
+            `lagrange.magnitude.Magnitudes` at q, the absolute values of the arguments by name, and the frame if it
+            has one. Where M a = τ is solved, the terms of that τ.
         framed: True for a quantity of a frame.
         directed: True if the axes of its twist are an option.
         definite: True for a symmetric positive definite matrix, so that |x_ij| ≤ √(x_ii x_jj).
-        solves: True if M a = τ is solved: no answer where M is singular, an error that grows as M's condition.
+        solves: True if M a = τ is solved: no result where M is singular, and errors proportional to M's condition.
         doubtful: Size of a result above which M may be singular.
         digits: True if `rd.accuracy.digits` and certificates count its digits.
     """
@@ -80,23 +80,23 @@ class Quantity:
         return tuple(axis if isinstance(axis, int) else sizes[axis] for axis in self.axes)
 
     def units(self, joint_types: Iterable[str]) -> tuple[str, ...]:
-        """Return the units of entries, each once, for joints of these types."""
+        """Return the distinct units of entries, for joints of these types."""
         if self.axes[:1] != ("n",):
             return (self.unit,)
         return tuple(dict.fromkeys(of_joint(self.unit, kind) for kind in joint_types))
 
     def ask(self, engine: Any, state: State, *frame: str, **options: Any) -> Any:
-        """Return the answer of an engine at a state, arguments by name."""
+        """Return the result of an engine at a state, with arguments by name."""
         return getattr(engine, self.name)(*(state[name] for name in self.arguments), *frame, **options)
 
 
 def query(*axes: int | str, unit: str, terms: Callable[..., Any], **properties: Any) -> Callable[[Method], Method]:
-    """Return a decorator that makes a method a row of the table, and completes its docstring.
+    """Return a decorator that makes a method a row of the table and completes its docstring.
 
     Args:
-        *axes: Shape of the answer for one state, as in `Quantity`.
-        unit: Its unit for revolute joints.
-        terms: Scale of its entries, as in `Quantity`.
+        *axes: Shape for one state, as in `Quantity`.
+        unit: Unit for revolute joints.
+        terms: Scale of entries, as in `Quantity`.
         **properties: Other fields of `Quantity`: definite, solves, doubtful, digits.
     """
 
@@ -129,5 +129,5 @@ def _sections(quantity: Quantity, parameters: list[str]) -> str:
     lines += ["Returns:", f"    Array of shape ({shape}), in {units}.", ""]
     unknown = ", or the frame or its axes are unknown" if quantity.framed else ""
     lines += ["Raises:", f"    QueryError: If an argument has the wrong shape or is not finite{unknown}."]
-    lines += ["    OverflowedError: If the answer would not be finite."]
+    lines += ["    OverflowedError: If the result would not be finite."]
     return "\n".join(lines + ["    SingularError: If M is singular."] * quantity.solves)

@@ -1,4 +1,4 @@
-"""SI units of joints, revolute and prismatic, and numbers with their units as texts."""
+"""SI units of revolute and prismatic joints, and numbers with their units as text."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 
 from robot_dyn.foundations.coefficients import Coefficient, declared
 
-_ROUNDING = 1e-12  # some thousand units of rounding, 2⁻⁵³: what sums of terms of that size may leave of 0
-_NONE = 1e9  # a stop farther away does not exist
+_ROUNDING = 1e-12  # some thousand rounding units 2⁻⁵³, which sums of terms of that size may leave instead of 0
+_NONE = 1e9  # stops farther away count as none
 _UNITS = {"q": ("rad", "m"), "v": ("rad/s", "m/s"), "a": ("rad/s²", "m/s²"), "tau": ("N m", "N"), "u": ("N m", "N")}
 
 
 def unit(quantity: str, joint_type: str | None) -> str:
-    """The unit of "q", "v", "a", "tau" or "u" of a joint; both where its type is not known."""
+    """Return the unit of "q", "v", "a", "tau" or "u" of a joint; both units if its type is unknown."""
     turns, slides = _UNITS[quantity]
     if joint_type is None:
         return f"{turns} or {slides}"
@@ -24,58 +24,58 @@ def unit(quantity: str, joint_type: str | None) -> str:
 
 
 def of_joint(stated: str, joint_type: str | None) -> str:
-    """A unit that is stated of a revolute joint, such as "N m s/rad", for a joint of a type: "N s/m" if it slides."""
+    """Convert a unit for revolute joints, such as "N m s/rad", to a joint type: "N s/m" for a prismatic one."""
     if joint_type != "prismatic":
         return stated
     return stated.replace("N m", "N").replace("kg m²", "kg").replace("rad", "m")
 
 
-def coefficient_unit(known: Coefficient, joint_types: Iterable[str | None]) -> str:
-    """The unit of a coefficient, each once where joints turn and slide."""
-    kinds = joint_types if known.of_joints else (None,)
-    return " or ".join(dict.fromkeys(of_joint(known.unit, each) for each in kinds))
+def coefficient_unit(coefficient: Coefficient, joint_types: Iterable[str | None]) -> str:
+    """Return the unit of a coefficient, or both distinct units for revolute and prismatic joints."""
+    kinds = joint_types if coefficient.of_joints else (None,)
+    return " or ".join(dict.fromkeys(of_joint(coefficient.unit, kind) for kind in kinds))
 
 
 def joint_types_of(dynamics: Any) -> tuple[str | None, ...]:
-    """Those of the robot that a dynamics is of; None of each where it has none."""
+    """Return the joint types of a dynamics' robot; None for each joint if it has no robot."""
     return getattr(getattr(dynamics, "robot", dynamics), "joint_types", (None,) * dynamics.n)
 
 
 def joint_units(quantity: str, joint_types: Iterable[str | None]) -> str:
-    """The units of a vector over joints, such as "rad or m": each once."""
-    of_joints = dict.fromkeys(unit(quantity, each) for each in joint_types)
+    """Return the distinct units of a vector over joints, such as "rad or m"."""
+    of_joints = dict.fromkeys(unit(quantity, kind) for kind in joint_types)
     both = unit(quantity, None)
     return both if both in of_joints else " or ".join(of_joints)
 
 
 def coefficient_texts(part: Any, joint_types: Sequence[str | None], signal: str = "signal") -> dict[str, str]:
-    """The coefficients of a part on joints of some types, by name: symbol, value and unit, as "b = 0.5 N m s/rad".
+    """Return the coefficients of a part, by name: symbol, value and unit, for example "b = 0.5 N m s/rad".
 
-    `signal` is the unit of what goes through a block of a digital loop.
+    `signal` is the unit of the signal through a block of a digital loop.
     """
     texts = {}
-    for name, stated in declared(type(part)).items():
-        each = replace(stated, unit=stated.unit.replace("signal", signal))
-        values, symbol = getattr(part, name), each.symbol.partition(",")[0] or name
+    for name, original in declared(type(part)).items():
+        coefficient = replace(original, unit=original.unit.replace("signal", signal))
+        values, symbol = getattr(part, name), coefficient.symbol.partition(",")[0] or name
         if values is None or name.startswith("_"):  # internal to a run
             continue
-        if each.of_joints:
+        if coefficient.of_joints:
             values = np.broadcast_to(values, len(joint_types))
-            stated = [_one(x, each, kind) for x, kind in zip(values, joint_types, strict=True)]
-            texts[name] = f"{symbol} = {', '.join(stated if len(set(stated)) > 1 else stated[:1])}"
+            original = [_one(x, coefficient, kind) for x, kind in zip(values, joint_types, strict=True)]
+            texts[name] = f"{symbol} = {', '.join(original if len(set(original)) > 1 else original[:1])}"
         else:
             shown = f"{values:g}" if np.ndim(values) == 0 else np.array2string(np.asarray(values), precision=6)
-            texts[name] = f"{symbol} = {shown} {each.unit}".rstrip()
+            texts[name] = f"{symbol} = {shown} {coefficient.unit}".rstrip()
     return texts
 
 
-def _one(x: float, known: Coefficient, kind: str | None) -> str:
-    """A number and its unit; for a limit that does not exist, "none"."""
-    return "none" if known.infinite and abs(x) >= _NONE else f"{x:g} {of_joint(known.unit, kind)}".rstrip()
+def _one(x: float, coefficient: Coefficient, kind: str | None) -> str:
+    """Format a number with its unit; a limit that does not exist is "none"."""
+    return "none" if coefficient.infinite and abs(x) >= _NONE else f"{x:g} {of_joint(coefficient.unit, kind)}".rstrip()
 
 
 def format_duration(seconds: float) -> str:
-    """A time in two digits, with its unit."""
+    """Format a time with two digits and its unit."""
     for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min"), (1.0, "s"), (1e-3, "ms")):
         if seconds >= size:
             return f"{float(f'{seconds / size:.2g}'):g} {unit}"
@@ -83,13 +83,13 @@ def format_duration(seconds: float) -> str:
 
 
 def without_rounding(values: Any) -> np.ndarray:
-    """Numbers as they are shown: 0 in place of −0, and of what is below 1e-12 of the largest finite one of the array.
+    """Return numbers for display, with 0 for −0 and for values below 1e-12 of the array's largest finite one.
 
-    Where terms cancel, float64 leaves some units of 1e-16 of the terms; such a rest says nothing. Files and JSON hold
-    the numbers as they are.
+    Where terms cancel, float64 leaves some units of 1e-16 of the terms; such a remainder is meaningless. Files and JSON
+    contain the exact numbers.
 
     Args:
-        values: Of one quantity, in one unit of force or motion, any shape.
+        values: Numbers of one quantity, in one unit of force or motion, any shape.
     """
     values = np.asarray(values, dtype=float)
     sizes = np.abs(values)
@@ -98,5 +98,5 @@ def without_rounding(values: Any) -> np.ndarray:
 
 
 def numbers_row(numbers: Any) -> str:
-    """The numbers of a vector in columns of equal width, 0 for what rounding leaves of it."""
+    """Format the numbers of a vector in columns of equal width, with 0 for rounding residues."""
     return " ".join(f"{x:10.5g}" for x in without_rounding(numbers))

@@ -1,4 +1,4 @@
-"""Where the addresses of meshes in a URDF point: package://, file://, or a path from the URDF's folder."""
+"""Mesh addresses in a URDF, resolved to files: package://, file://, or a path relative to the URDF's folder."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LEVELS = 4  # of folders above a URDF that may be its package, as in package/ro
 
 
 def shown(address: str | None) -> str:
-    """Return an address as a page shows it: without the folders of this machine, which stay private."""
+    """Return an address for display, without the folders of this machine, which are private."""
     address = (address or "").strip()
     rooted = address.startswith(("file:", "/", "\\", "~")) or address[1:2] == ":"
     return shorten(re.split(r"[/\\]", address)[-1] if rooted else address)
@@ -28,8 +28,8 @@ def find_file(
 ) -> Path:
     """Return the file of an address in the URDF `source`; it need not exist.
 
-    Where a package is not found, its file is taken from a folder above the URDF that has one at the same place; a
-    remark says so.
+    If a package is not found, its file is taken from a folder above the URDF that contains the same relative path, and
+    a remark is added.
 
     Raises:
         MeshError: If the address does not name a file.
@@ -37,7 +37,9 @@ def find_file(
     address = (address or "").strip()
     kind = address.partition("://")[0] if "://" in address else ""
     if not address or kind not in ("", "file", "package"):
-        raise MeshError(f"the address {shown(address)!r} names no file on this machine; write the file's")
+        raise MeshError(
+            f"the address {shown(address)!r} is not that of a local file; write a path, file:// or package://"
+        )
     if kind != "package":
         return source.absolute().parent / (unquote(address.removeprefix("file://")) if kind else address)
     for folders in (package_dirs, _installed()):
@@ -51,17 +53,17 @@ def find_file(
                 remarks.append(remark)
             return (folder / inside).resolve()
     raise MeshError(
-        f"no file for {shown(address)}; name the folder of its package: package_dirs, --package-dir, ROS_PACKAGE_PATH"
+        f"no file for {shown(address)}; add its package's folder to package_dirs, --package-dir or ROS_PACKAGE_PATH"
     )
 
 
 def _above(inside: str, source: Path) -> Path | None:
-    """The folder above the URDF that holds this file: of packages that were renamed, or are not there."""
+    """Return the folder above the URDF that contains this file, for packages that were renamed or are missing."""
     folders = source.absolute().parents[:_LEVELS] if inside and ".." not in Path(inside).parts else ()
     return next((folder for folder in folders if (folder / inside).is_file()), None)
 
 
 def _installed() -> Iterator[Path]:
-    """The folder of the installed package example-robot-data, for runs that were made where it lies elsewhere."""
+    """Return the folder of the installed package example-robot-data, for runs from a machine with another one."""
     parents = (folder for name in catalog.list_robots() for folder in catalog.find(name).parents)
     return islice((folder.parent for folder in parents if folder.name == "example-robot-data"), 1)

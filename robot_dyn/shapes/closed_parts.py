@@ -1,7 +1,7 @@
-"""The closed parts of a mesh: connected surfaces, turned so that they face outward, cavities inward.
+"""Closed parts of a mesh: connected surfaces, oriented outward, and cavities, oriented inward.
 
-A part within another one that faces inward is a cavity; one that faces outward fills a space that the other fills too.
-Which part lies in which, and which two cross, is decided by winding numbers at points just inside their surfaces.
+A part inside another one is a cavity if it faces inward; if it faces outward, both fill the same space. Winding numbers
+at points just inside the surfaces decide which part contains another one, and which parts intersect.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from robot_dyn.shapes.winding import just_inside, winding
 
-_SAME = 1e-7  # of the size of a mesh: corners that are nearer are one
-_FLAT = 1e-9  # of the cube of its length: the volume of a part that encloses none
-_MOST, _FEWEST, _WORK = 192, 48, 4_000_000  # points on a part, and triangles of another one times these
+_SAME = 1e-7  # relative to the size of a mesh: closer corners are merged
+_FLAT = 1e-9  # relative to the cube of its length: smaller volumes count as none
+_MOST, _FEWEST, _WORK = 192, 48, 4_000_000  # limits of the points on a part; limit of points × triangles
 
 
 @final
@@ -28,9 +28,9 @@ class ClosedParts:
     """The closed parts of a mesh.
 
     Attributes:
-        corners: Of the triangles of each part, (m, 3, 3), in [m], counter-clockwise seen from outside the material.
-        turned: Parts that were inside out, or had faces that were, by their index.
-        overlaps: Pairs of parts that fill a common space.
+        corners: Triangle corners of each part, (m, 3, 3), in [m], counter-clockwise seen from outside the material.
+        turned: Indices of parts whose faces, some or all, were inside out and were flipped.
+        overlaps: Pairs of parts that share some volume.
     """
 
     corners: tuple[ndarray, ...]
@@ -38,17 +38,17 @@ class ClosedParts:
     overlaps: tuple[tuple[int, int], ...]
 
     def place(self, part: int) -> str:
-        """The number of a part, and its middle, for messages."""
+        """Return the number and centre of a part, for messages."""
         points = self.corners[part].reshape(-1, 3)
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         return f"part {part + 1} at ({', '.join(f'{x:.3g}' for x in middle)}) m"
 
 
 def closed_parts(corners: ndarray) -> ClosedParts | None:
-    """Return the closed parts of a mesh; None if a part has an edge that its faces do not close.
+    """Return the closed parts of a mesh; None if a part has an open edge.
 
     Args:
-        corners: Of its triangles, (m, 3, 3), in [m].
+        corners: Corners of the triangles, (m, 3, 3), in [m].
     """
     from trimesh.grouping import unique_rows
 
@@ -58,7 +58,7 @@ def closed_parts(corners: ndarray) -> ClosedParts | None:
         return None
     _, vertex = unique_rows(np.rint((corners - middle).reshape(-1, 3) / (_SAME * size)).astype(np.int64))
     faces = vertex.reshape(-1, 3)
-    proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)  # two corners of one place: a line, which has no area
+    proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)  # a triangle with two equal corners has no area
     faces, corners = faces[proper], corners[proper]
     if not len(faces):
         return None
@@ -66,21 +66,21 @@ def closed_parts(corners: ndarray) -> ClosedParts | None:
     if parts is None:
         return None
     corners = np.where(turned[:, None, None], corners[:, ::-1], corners)
-    found, was_turned = [], []
+    solid_parts, was_turned = [], []
     for part in range(parts.max() + 1):
         within = corners[parts == part]
         if abs(_volume(within)) > _FLAT * float(np.ptp(within.reshape(-1, 3), axis=0).max()) ** 3:
-            found.append(within)
+            solid_parts.append(within)
             was_turned.append(bool(any_turned[part]))
-    return _nested(found, was_turned)
+    return _nested(solid_parts, was_turned)
 
 
 def _oriented(faces: ndarray) -> tuple[ndarray | None, ndarray, ndarray]:
-    """The part of each face, whether it must be turned to agree with the others of it, and whether a part has such.
+    """Return the part of each face, the faces to flip so that each part is consistent, and the parts with such faces.
 
-    None for the parts if they are not closed.
+    Return None for the parts if they are not closed.
     """
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)  # of three edges of each face
+    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)  # ends of the three edges of each face
     _, edge = np.unique(ends.min(axis=1) * (ends.max() + 1) + ends.max(axis=1), return_inverse=True)
     face, sign = np.repeat(np.arange(len(faces)), 3), np.where(ends[:, 0] < ends[:, 1], 1, -1)
     count, n = np.bincount(edge), len(faces)
@@ -97,15 +97,15 @@ def _oriented(faces: ndarray) -> tuple[ndarray | None, ndarray, ndarray]:
         return None, turned, any_turned
     order = np.argsort(edge[touched], kind="stable")
     pairs, signs = face[touched][order].reshape(-1, 2), sign[touched][order].reshape(-1, 2)
-    agree = signs[:, 0] != signs[:, 1]  # the faces of an edge run along it in opposite directions
+    agree = signs[:, 0] != signs[:, 1]  # two consistent faces traverse their edge in opposite directions
     _turn(turned, np.flatnonzero(any_turned), parts, pairs, agree)
     if (turned[pairs[:, 0]] ^ turned[pairs[:, 1]] == agree).any():
-        return None, turned, any_turned  # one-sided, as a Klein bottle
+        return None, turned, any_turned  # not orientable, for example a Klein bottle
     return parts, turned, any_turned
 
 
 def _turn(turned: ndarray, mixed: ndarray, parts: ndarray, pairs: ndarray, agree: ndarray) -> None:
-    """Turn faces of mixed parts so that each agrees with the first one, along a tree of neighbours."""
+    """Flip faces of inconsistent parts so that all agree with the first face, along a tree of neighbours."""
     n = len(parts)
     graph = coo_matrix((np.where(agree, 1.0, 2.0), (pairs[:, 0], pairs[:, 1])), shape=(n, n)).tocsr()
     graph = graph.maximum(graph.T).tocsr()
@@ -123,13 +123,13 @@ def _volume(corners: ndarray) -> float:
 
 
 def _nested(parts: Sequence[ndarray], was_turned: Sequence[bool]) -> ClosedParts:
-    """Turn parts outward, cavities inward, and find those that fill a common space."""
+    """Orient parts outward and cavities inward, and find parts that overlap."""
     outward = [part if _volume(part) > 0 else part[:, ::-1] for part in parts]
     faces_in = [_volume(part) < 0 for part in parts]
     around: list[set[int]] = [set() for _ in parts]  # the parts that contain a part
     overlaps = []
     for i, j in _with_common_boxes(parts):
-        in_j, in_i = _share_inside(outward[i], outward[j]), _share_inside(outward[j], outward[i])
+        in_j, in_i = _fraction_inside(outward[i], outward[j]), _fraction_inside(outward[j], outward[i])
         if in_j == 1 and in_i < 1:
             around[i].add(j)
         elif in_i == 1 and in_j < 1:
@@ -138,7 +138,7 @@ def _nested(parts: Sequence[ndarray], was_turned: Sequence[bool]) -> ClosedParts
             overlaps.append((i, j))
     turned = [*was_turned]
     for part in sorted(range(len(parts)), key=lambda part: len(around[part])):
-        if faces_in[part] and len(around[part]) % 2 == 0:  # not a cavity: it is inside out, with all that it contains
+        if faces_in[part] and len(around[part]) % 2 == 0:  # not a cavity: the part and all it contains are inside out
             for inner in (part, *(k for k in range(len(parts)) if part in around[k])):
                 faces_in[inner], turned[inner] = not faces_in[inner], not turned[inner] or was_turned[inner]
         elif not faces_in[part] and len(around[part]) % 2 == 1:
@@ -148,7 +148,7 @@ def _nested(parts: Sequence[ndarray], was_turned: Sequence[bool]) -> ClosedParts
 
 
 def _with_common_boxes(parts: Sequence[ndarray]) -> list[tuple[int, int]]:
-    """The pairs of parts whose boxes, along the axes, have a common space."""
+    """Return the pairs of parts whose axis-aligned bounding boxes overlap."""
     low, high = (np.array([f(part, axis=(0, 1)) for part in parts]).reshape(-1, 3) for f in (np.min, np.max))
     return [(i, i + 1 + j) for i in range(len(parts)) for j in _common(low[i], high[i], low[i + 1 :], high[i + 1 :])]
 
@@ -157,8 +157,8 @@ def _common(low: ndarray, high: ndarray, lows: ndarray, highs: ndarray) -> list[
     return np.flatnonzero(((low < highs) & (lows < high)).all(axis=1)).tolist()
 
 
-def _share_inside(part: ndarray, other: ndarray) -> float:
-    """The share of points just inside a part that lie inside another one."""
+def _fraction_inside(part: ndarray, other: ndarray) -> float:
+    """Return the fraction of points just inside a part that lie inside another one."""
     points = just_inside(part, int(np.clip(_WORK // max(len(part), len(other)), _FEWEST, _MOST)))
     low, high = other.min(axis=(0, 1)), other.max(axis=(0, 1))
     near = ((points > low) & (points < high)).all(axis=1)

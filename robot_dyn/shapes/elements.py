@@ -1,4 +1,4 @@
-"""Numbers of the <visual> and <collision> elements of a URDF, which the hardened read leaves out."""
+"""Numbers of the <visual> and <collision> elements of a URDF, which the checked description leaves out."""
 
 from __future__ import annotations
 
@@ -12,12 +12,16 @@ from robot_dyn.foundations.errors import shorten
 from robot_dyn.foundations.spatial import homogeneous, rotation_rpy
 from robot_dyn.shapes.mesh_files import MeshError
 
-SMALLEST, LARGEST = 1e-9, 1e6  # [m], of a length; the latter of a position, too
-LENGTHS = {"box": {"size": 3}, "cylinder": {"radius": 1, "length": 1}, "sphere": {"radius": 1}}  # numbers in each
+SMALLEST, LARGEST = 1e-9, 1e6  # limits of lengths in [m]; LARGEST also of positions
+LENGTHS = {
+    "box": {"size": 3},
+    "cylinder": {"radius": 1, "length": 1},
+    "sphere": {"radius": 1},
+}  # attributes of each shape, with their number of values
 
 
 def numbers(element: Any, key: str, count: int, default: str = "") -> tuple[float, ...]:
-    """The numbers of an attribute; raises MeshError if they are not `count` finite ones."""
+    """Return the numbers of an attribute; raise MeshError unless they are `count` finite numbers."""
     text, values = element.get(key, default), ()
     with suppress(ValueError):
         values = tuple(map(float, text.split()))
@@ -27,7 +31,7 @@ def numbers(element: Any, key: str, count: int, default: str = "") -> tuple[floa
 
 
 def pose(element: Any) -> ndarray:
-    """The placement (4, 4) of a shape in its link, of the first <origin>; MeshError if it is not six numbers."""
+    """Return the placement (4, 4) of a shape in its link, from the first <origin>; raise MeshError if malformed."""
     origin = element.find("origin")
     if origin is None:
         return np.eye(4)
@@ -36,18 +40,18 @@ def pose(element: Any) -> ndarray:
 
 
 def shape(element: Any) -> Any:
-    """The box, cylinder, sphere or mesh of a <visual> or <collision>; MeshError if it has none."""
+    """Return the box, cylinder, sphere or mesh of a <visual> or <collision>; raise MeshError if it has none."""
     geometry = element.find("geometry")
     if geometry is None or not len(geometry):
-        raise MeshError("<geometry> is empty; name a box, cylinder, sphere or mesh")
-    found = geometry[0]
-    if found.tag != "mesh" and found.tag not in LENGTHS:
-        raise MeshError(f"<{shorten(found.tag)}> is not a shape of URDF; give a box, cylinder, sphere or mesh")
-    return found
+        raise MeshError("<geometry> is empty; add a box, cylinder, sphere or mesh")
+    geometric = geometry[0]
+    if geometric.tag != "mesh" and geometric.tag not in LENGTHS:
+        raise MeshError(f"<{shorten(geometric.tag)}> is not a shape of URDF; give a box, cylinder, sphere or mesh")
+    return geometric
 
 
 def is_empty(primitive: Any) -> bool:
-    """Whether a length of a box, cylinder or sphere is 0; MeshError if one is not a number."""
+    """Return True if a length of a box, cylinder or sphere is 0; raise MeshError if one is not a number."""
     return 0.0 in _lengths(primitive)
 
 
@@ -56,8 +60,8 @@ def _lengths(primitive: Any) -> tuple[float, ...]:
 
 
 def lengths(primitive: Any) -> tuple[float, ...]:
-    """The lengths of a box, cylinder or sphere, in [m]; MeshError if one is not positive."""
-    found = _lengths(primitive)
-    if min(found) < SMALLEST:
-        raise MeshError(f"<{primitive.tag}> has a length that is not positive, or below {SMALLEST:g} m; correct it")
-    return found
+    """Return the lengths of a box, cylinder or sphere, in [m]; raise MeshError unless all are positive."""
+    values = _lengths(primitive)
+    if min(values) < SMALLEST:
+        raise MeshError(f"<{primitive.tag}> has a length below {SMALLEST:g} m; correct it")
+    return values

@@ -1,8 +1,8 @@
-"""Inertials that a file does not state, estimated from the shapes of links and from masses.
+"""Inertials missing from a file, estimated from the shapes of links and from masses.
 
-A link without mass and moments gets both, and its centre of mass; one with a mass and without moments gets these alone.
-Its body is the solid of its shape, and below 200 kg/m³ of its convex hull a shell. What the file states is not changed,
-and what is estimated is marked: <inertial estimated="…">, which every later read finds.
+A link without mass and moments gets both, and a centre of mass; a link with a mass but no moments gets only the
+moments. The body is the solid of the link's shape, or a shell of its convex hull below 200 kg/m³. Values stated by the
+file are not changed. Estimates are marked with <inertial estimated="…">, which later reads report.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ class Estimate:
     """The estimated inertial of one link.
 
     Attributes:
-        link: Its name.
-        body: Its mass properties in the frame of the link.
-        basis: What they were made from.
-        moments_only: Whether mass and centre of mass are those of the file.
+        link: Name of the link.
+        body: Mass properties in the frame of the link.
+        basis: Shape and mass on which the estimate is based, in words.
+        moments_only: True if mass and centre of mass are those of the file.
     """
 
     link: str
@@ -46,52 +46,52 @@ class Estimate:
     moments_only: bool = False
 
     def write(self, link: Any) -> Any:
-        """Write the estimate into the <link> of a document, and return its <inertial>."""
+        """Write the estimate into the <link> of a document and return its <inertial>."""
         inertial = link.find("inertial") if self.moments_only else None
         if inertial is None:
-            for each in link.findall("inertial"):
-                link.remove(each)
+            for old in link.findall("inertial"):
+                link.remove(old)
             inertial = etree.SubElement(link, "inertial")
             etree.SubElement(inertial, "origin", xyz=" ".join(map(repr, self.body.com.tolist())), rpy="0 0 0")
             etree.SubElement(inertial, "mass", value=repr(self.body.mass))
         for origin in inertial.findall("origin"):
             origin.set("rpy", "0 0 0")  # the moments are along the axes of the link
-        for each in inertial.findall("inertia"):
-            inertial.remove(each)
+        for old in inertial.findall("inertia"):
+            inertial.remove(old)
         etree.SubElement(inertial, "inertia", {key: repr(float(self.body.inertia[at])) for key, at in _MOMENTS.items()})
         inertial.set("estimated", self.basis)
         return inertial
 
 
 def with_estimates(description: Description, masses: Masses, package_dirs: Iterable[str | Path] = ()) -> Description:
-    """The description with the estimates of all links that lack mass or moments and have a shape.
+    """Return the description with estimates for all links that have a shape but lack mass or moments.
 
     Args:
         description: The file; its meshes are opened.
-        masses: Those that it does not state.
+        masses: Masses that the file does not state.
         package_dirs: Folders in which packages of meshes are searched first.
 
     Returns:
-        The description with each estimate in its text, marked, after a comment.
+        The description; each estimate in its text is marked and follows a comment.
 
     Raises:
-        QueryError: If a mass is of an unknown link, or of one that has a mass; if the total is used up; if a body that
-            moves is left without mass.
-        DescriptionError: If the shape of such a link cannot be read and the link moves; a link of the base, on which
-            no equation depends, is left out with a finding.
+        QueryError: If a mass is given for an unknown link or for one that has a mass, no mass is left to share, or a
+            moving body remains without mass.
+        DescriptionError: If the shape of such a link cannot be read and the link moves. A link of the base, which does
+            not affect the dynamics, is left out with a finding.
     """
     shapes, unread = shapes_of_lacking(description, package_dirs, masses.allow_overlap)
-    found, left_out = estimates(description, shapes, masses, unread)
-    return replace(marked(description, found), findings=tuple(dict.fromkeys((*description.findings, *left_out))))
+    new, left_out = estimates(description, shapes, masses, unread)
+    return replace(marked(description, new), findings=tuple(dict.fromkeys((*description.findings, *left_out))))
 
 
 def shapes_of_lacking(
     description: Description, package_dirs: Iterable[str | Path] = (), allow_overlap: bool = False
 ) -> tuple[dict[str, LinkShape], dict[str, str]]:
-    """Shapes of the links without mass or without moments, and why that of a link of the base cannot be read.
+    """Return the shapes of links without mass or moments, and read errors for links of the base.
 
     Raises:
-        DescriptionError: If that of a link that moves cannot be read.
+        DescriptionError: If the shape of a moving link cannot be read.
     """
     stated = structure_of(description, Edits())
     lacking = [name for name, link in stated.links.items() if not any(link.moments)]
@@ -105,36 +105,37 @@ def shapes_of_lacking(
 def estimates(
     description: Description, shapes: Mapping[str, LinkShape], masses: Masses, unread: Mapping[str, str]
 ) -> tuple[tuple[Estimate, ...], tuple[str, ...]]:
-    """The estimates of links with these shapes, and what is said of those that get none; QueryError as above.
+    """Return the estimates of links with these shapes, and findings on links that get none.
 
-    A mass that is given for a link whose shape is unread is a part of the total, and of no equation.
+    A mass given for a link whose shape cannot be read counts in the total only.
     """
     stated = structure_of(description, Edits())
     measured = {name: link.mass for name, link in stated.links.items() if link.mass}
     masses.check_links(stated.links, measured)
-    for name in masses.of:
+    for name in masses.by_link:
         if name not in shapes and name not in unread:
             raise QueryError(f"mass: link {name!r} has no <collision> or <visual> of some volume; add one")
     without = {name: shape for name, shape in shapes.items() if name not in measured}
-    known = masses.shared(without, sum(measured.values()))
-    found = [_new(name, shapes[name], *known[name]) for name in known if name in shapes]
-    found += [_moments(name, stated.links[name], shapes[name]) for name in shapes if name in measured]
-    _refuse_massless(stated, {each.link for each in found}, without)
-    return tuple(found), (*_left_out(without, known), *_unread(unread, masses, measured))
+    mass_of = masses.shared(without, sum(measured.values()))
+    new = [_new(name, shapes[name], *mass_of[name]) for name in mass_of if name in shapes]
+    new += [_moments(name, stated.links[name], shapes[name]) for name in shapes if name in measured]
+    _refuse_massless(stated, {estimate.link for estimate in new}, without)
+    return tuple(new), (*_left_out(without, mass_of), *_unread(unread, masses, measured))
 
 
-def marked(description: Description, found: Iterable[Estimate]) -> Description:
-    """The description with these estimates in its text, each marked, after a comment."""
+def marked(description: Description, new: Iterable[Estimate]) -> Description:
+    """Return the description with these estimates in its text, each marked and following a comment."""
     root, _ = parse(description.text, description.source, comments=True)
     links = {(link.get("name") or "").strip(): link for link in root.iterfind("link")}
-    for each in found:
-        inertial = each.write(links[each.link])
-        inertial.addprevious(etree.Comment(f" estimated, not measured: {each.basis} "))
+    for estimate in new:
+        inertial = estimate.write(links[estimate.link])
+        inertial.addprevious(etree.Comment(f" estimated, not measured: {estimate.basis} "))
     text = etree.tostring(root.getroottree(), xml_declaration=True, encoding="UTF-8")
     return check(text, description.source)
 
 
 def _new(name: str, shape: LinkShape, mass: float, origin: str) -> Estimate:
+    """Return the estimate of a link without mass."""
     hollow = mass < _HOLLOW * shape.hull.mass
     body = shape.shell if hollow else shape.solid
     shell = f" as a shell, at less than {_HOLLOW:g} kg/m³" if hollow else ""
@@ -142,33 +143,33 @@ def _new(name: str, shape: LinkShape, mass: float, origin: str) -> Estimate:
 
 
 def _moments(name: str, link: StatedLink, shape: LinkShape) -> Estimate:
-    """The moments of a link whose file states its mass."""
-    at = _new(name, shape, link.mass, "of the file")
-    return Estimate(name, at.body, f"moments alone, of {at.basis}", moments_only=True)
+    """Return the estimate of the moments of a link whose file states its mass."""
+    whole = _new(name, shape, link.mass, "of the file")
+    return Estimate(name, whole.body, f"moments alone, of {whole.basis}", moments_only=True)
 
 
 def _of_mass(mass: float, body: MassProperties) -> MassProperties:
     return MassProperties(mass, body.com, mass / body.mass * body.inertia)
 
 
-def _left_out(without: Mapping[str, LinkShape], known: Mapping[str, Any]) -> Iterator[str]:
+def _left_out(without: Mapping[str, LinkShape], mass_of: Mapping[str, Any]) -> Iterator[str]:
     for name in without:
-        if name not in known:
-            yield f"link {name!r}: has a shape and no <inertial>, and no mass was given for it; it has none"
+        if name not in mass_of:
+            yield f"link {name!r}: has a shape but no <inertial>, and no mass was given; it stays massless"
 
 
 def _unread(unread: Mapping[str, str], masses: Masses, measured: Mapping[str, float]) -> Iterator[str]:
     for name, why in unread.items():
-        no_share = masses.total is not None and name not in masses.of and name not in measured
-        share = ", nor a share of the total mass, so that the other links are too heavy" if no_share else ""
+        no_share = masses.total is not None and name not in masses.by_link and name not in measured
+        share = " and no share of the total mass, so the other links are too heavy" if no_share else ""
         remedy = f", or give mass={{{name!r}: …}}" if no_share else ""
-        yield f"link {name!r}: its shape is not read, and it has no estimate{share}; {why}{remedy}"
+        yield f"link {name!r}: its shape cannot be read, so it has no estimate{share}; {why}{remedy}"
 
 
-def _refuse_massless(stated: Structure, found: set[str], without: Mapping[str, LinkShape]) -> None:
-    """Refuse masses that leave a moving body without any, though one of its links has a shape."""
+def _refuse_massless(stated: Structure, estimated: set[str], without: Mapping[str, LinkShape]) -> None:
+    """Raise QueryError if a moving body remains without mass although one of its links has a shape."""
     for joint, links in stated.bodies.items():
-        if any(stated.links[name].mass for name in links) or found.intersection(links):
+        if any(stated.links[name].mass for name in links) or estimated.intersection(links):
             continue
         if shaped := [name for name in links if name in without]:
             raise QueryError(

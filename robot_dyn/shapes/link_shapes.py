@@ -1,7 +1,7 @@
-"""The shape of a link as bodies of density 1: of its <collision> elements, else of its <visual> ones.
+"""Shape of a link as bodies of density 1, from its <collision> elements, or else from its <visual> elements.
 
-A box, cylinder or sphere is exact; a closed mesh is the solid within; an open one its convex hull. Elements add up,
-also where they overlap, as the cylinder and the two spheres of a capsule do.
+A box, cylinder or sphere is exact; a closed mesh is its enclosed solid; an open mesh is its convex hull. Elements are
+summed even where they overlap, for example the cylinder and the two spheres of a capsule.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from robot_dyn.shapes.mesh_files import MeshError
 
 
 class _Bodies(NamedTuple):
-    """What one element gives, None without a volume; whether the solid is not a hull in its place; turned parts."""
+    """Bodies of one element, None without a volume; `closed` is False for a hull; `turned` counts flipped parts."""
 
     solid: MassProperties | None
     hull: MassProperties | None
@@ -38,10 +38,10 @@ class LinkShape:
     """The shape of a link, in its frame.
 
     Attributes:
-        solid: Primitives and closed meshes as they are, open meshes by their convex hulls; at 1 kg/m³.
-        hull: The convex hulls; at 1 kg/m³.
-        shell: The surfaces; at 1 kg/m².
-        origin: What it was made from, such as "open collision mesh, by its convex hull".
+        solid: Primitives, closed meshes, and the convex hulls of open meshes; at 1 kg/m³.
+        hull: Convex hulls of all elements; at 1 kg/m³.
+        shell: Surfaces of all elements; at 1 kg/m².
+        origin: Elements used, in words, for example "open collision mesh, by its convex hull".
     """
 
     solid: MassProperties
@@ -57,56 +57,56 @@ def link_shapes(
     *,
     allow_overlap: bool = False,
 ) -> tuple[dict[str, LinkShape], dict[str, str]]:
-    """The shapes of links of a robot, and why others have none although the file states one.
+    """Return the shapes of links, and the errors of links whose stated shape cannot be read.
 
     Args:
-        description: Its file; meshes are searched as in `rd.show`.
-        links: Names.
-        package_dirs: Searched first.
-        allow_overlap: Whether what closed parts of a mesh share counts as often as they fill it.
+        description: The robot's file; meshes are searched as in `rd.show`.
+        links: Names of the links.
+        package_dirs: Folders searched first.
+        allow_overlap: Accept closed parts of a mesh that overlap, and count the shared volume once for each part.
 
     Returns:
-        Shape by link, without links for which none is stated, or primitives of length 0; and reason by link.
+        Shape by link, without links that have no shape or only primitives of length 0; and error message by link.
     """
     root, _ = parse(description.text, description.source)
     stated = {(link.get("name") or "").strip(): link for link in root.iterfind("link")}
     reader = _Reader(Path(description.source), package_dirs, allow_overlap)
-    found, failed = dict[str, LinkShape](), dict[str, str]()
+    shapes, errors = dict[str, LinkShape](), dict[str, str]()
     for name in links:
         reasons = []
         for kind in ("collision", "visual"):
             of_kind = [*stated[name].iterfind(kind)] if name in stated else []
             try:
                 if of_kind and (shape := reader.shape(kind, of_kind)) is not None:
-                    found[name] = shape
+                    shapes[name] = shape
                     break
             except MeshError as error:
                 reasons.append(f"<{kind}>: {error}")
-        if name not in found and reasons:
-            failed[name] = reasons[0]
-    return found, failed
+        if name not in shapes and reasons:
+            errors[name] = reasons[0]
+    return shapes, errors
 
 
 class _Reader:
-    """Reads the shapes of one file, each mesh once."""
+    """Reader of the shapes of one file, which reads each mesh once."""
 
     def __init__(self, source: Path, package_dirs: tuple[str | Path, ...], allow_overlap: bool) -> None:
         self.file = partial(find_file, source=source, package_dirs=package_dirs)
         self._mesh = cache(partial(_of_mesh, allow_overlap=allow_overlap))
 
     def shape(self, kind: str, stated: list[Any]) -> LinkShape | None:
-        """The bodies of all elements of a kind together, None if all are of length 0.
+        """Return the combined bodies of all elements of a kind, None if all have length 0.
 
         Raises:
             MeshError: If one cannot be read, or all of them are flat.
         """
-        read = [self.bodies(each) for each in stated]
+        read = [self.bodies(element) for element in stated]
         solid, hull, shell = (
             [body for bodies in read if (body := getattr(bodies, key)) is not None]
             for key in ("solid", "hull", "shell")
         )
         if not hull:
-            flat = next((shape for each in stated if (shape := elements.shape(each)).tag == "mesh"), None)
+            flat = next((shape for element in stated if (shape := elements.shape(element)).tag == "mesh"), None)
             if flat is None:
                 return None
             raise MeshError(
@@ -116,12 +116,12 @@ class _Reader:
         return LinkShape(combined(solid), combined(hull), combined(shell), _origin(kind, stated, read))
 
     def bodies(self, element: Any) -> _Bodies:
-        """The bodies of one element, in the frame of the link."""
+        """Return the bodies of one element, in the frame of the link."""
         shape, placement = elements.shape(element), elements.pose(element)
         R, p = placement[:3, :3], placement[:3, 3]
-        found = self.mesh(shape) if shape.tag == "mesh" else _of_primitive(shape)
-        solid, hull, shell = (None if each is None else each.moved(R, p) for each in found[:3])
-        return _Bodies(solid, hull, shell, found.closed, found.turned)
+        own = self.mesh(shape) if shape.tag == "mesh" else _of_primitive(shape)
+        solid, hull, shell = (None if body is None else body.moved(R, p) for body in own[:3])
+        return _Bodies(solid, hull, shell, own.closed, own.turned)
 
     def mesh(self, element: Any) -> _Bodies:
         address = element.get("filename")
@@ -132,7 +132,7 @@ class _Reader:
 
 
 def _of_mesh(path: Path, scale: tuple[float, ...], allow_overlap: bool) -> _Bodies:
-    """The bodies of a mesh file, all of its materials together."""
+    """Return the bodies of a mesh file, all of its materials together."""
     corners = meshes.corners(path, scale)
     vertices, faces = corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
     if (hull := surface.hull(vertices)) is None:
@@ -145,7 +145,7 @@ def _of_mesh(path: Path, scale: tuple[float, ...], allow_overlap: bool) -> _Bodi
 
 
 def _of_primitive(shape: Any) -> _Bodies:
-    """The bodies of a primitive; none of one that stands for a frame, with a length of 0."""
+    """Return the bodies of a primitive; none if a length is 0, which exporters use to mark frames."""
     if elements.is_empty(shape):
         return _Bodies(None, None, None, True)
     lengths = elements.lengths(shape)
@@ -154,14 +154,14 @@ def _of_primitive(shape: Any) -> _Bodies:
 
 
 def _origin(kind: str, stated: list[Any], read: list[_Bodies]) -> str:
-    """What a shape was made from, in words."""
-    tags = [elements.shape(each).tag for each in stated]
-    of_mesh = [each.closed for tag, each in zip(tags, read, strict=True) if tag == "mesh"]
+    """Describe the elements of a shape in words."""
+    tags = [elements.shape(element).tag for element in stated]
+    closed_meshes = [bodies.closed for tag, bodies in zip(tags, read, strict=True) if tag == "mesh"]
     words = [f"{kind} {tag}" for tag in dict.fromkeys(tags) if tag != "mesh"]
-    if closed := sum(of_mesh):
+    if closed := sum(closed_meshes):
         words.append(f"closed {kind} mesh" + "es" * (closed > 1))
-    if number := len(of_mesh) - sum(of_mesh):
+    if number := len(closed_meshes) - sum(closed_meshes):
         words.append(f"open {kind} mesh" + ("es, by their convex hulls" if number > 1 else ", by its convex hull"))
-    if turned := sum(each.turned for each in read):
+    if turned := sum(bodies.turned for bodies in read):
         words[-1] += f" ({turned} part{'s' * (turned > 1)} turned, whose faces were inside out)"
     return " and ".join(words)

@@ -1,7 +1,7 @@
 """Masses of links that a file leaves out: given by link, by the total of the robot, or by a density.
 
-total    mᵢ = (total − Σ known) Vᵢ / Σ V     V: volume of the convex hulls of the shapes
-density  mᵢ = ρ Vᵢ                           V: volume of the solids, of open meshes that of their convex hulls
+total    mᵢ = (total − Σ stated) Vᵢ / Σ V     V: volume of the convex hulls of the shapes
+density  mᵢ = ρ Vᵢ                           V: volume of the solids; convex hulls for open meshes
 """
 
 from __future__ import annotations
@@ -18,72 +18,77 @@ from robot_dyn.shapes.link_shapes import LinkShape
 @final
 @dataclass(frozen=True, eq=False)
 class Masses:
-    """What is known of the masses that a file leaves out.
+    """Masses to use where a file states none.
 
     Attributes:
-        of: Mass by link, positive, in [kg].
-        total: Mass of the whole robot with its base, in [kg]: what the known masses leave is shared by volume; or None.
-        density: In [kg/m³], of links whose mass is not known otherwise; or None.
-        allow_overlap: Whether what closed parts of a mesh share counts as often as they fill it; otherwise such meshes
-            are refused.
+        by_link: Mass by link, positive, in [kg].
+        total: Mass of the whole robot with its base, in [kg], or None; mass not stated elsewhere is shared by volume.
+        density: Density in [kg/m³] of links without a mass, or None.
+        allow_overlap: Accept closed parts of a mesh that overlap, and count the shared volume once for each part.
 
     Raises:
-        QueryError: If a value is not a positive number, both total and density are given, or neither any mass.
+        QueryError: If a value is not a positive number, both total and density are given, or no mass at all is given.
     """
 
-    of: Mapping[str, float]
+    by_link: Mapping[str, float]
     total: float | None = None
     density: float | None = None
     allow_overlap: bool = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.of, Mapping):
-            raise QueryError(f"mass must give masses by link, such as {{'link_1': 2.5}}, got {shown(self.of)}")
-        of = {link: number(f"mass of link {link!r}", mass, above=0) for link, mass in self.of.items()}
-        object.__setattr__(self, "of", of)
+        if not isinstance(self.by_link, Mapping):
+            raise QueryError(
+                f"mass must map links to masses in kg, for example {{'link_1': 2.5}}, got {shown(self.by_link)}"
+            )
+        masses = {link: number(f"mass of link {link!r}", mass, above=0) for link, mass in self.by_link.items()}
+        object.__setattr__(self, "by_link", masses)
         truth("allow_overlap", self.allow_overlap)
         for name, key in (("total_mass", "total"), ("density", "density")):
             if (value := getattr(self, key)) is not None:
                 object.__setattr__(self, key, number(name, value, above=0))
         if self.total is not None and self.density is not None:
             raise QueryError("total_mass and density contradict each other; give one of them")
-        if not of and self.total is None and self.density is None:
+        if not masses and self.total is None and self.density is None:
             raise QueryError("inertias from shapes need a mass: give mass by link, total_mass or density")
 
     def check_links(self, links: Mapping[str, Any], measured: Mapping[str, float]) -> None:
-        """Raise QueryError for a link that is unknown, or whose mass the file states already, (link: [kg])."""
-        for link in self.of:
+        """Raise QueryError for an unknown link, or one whose mass the file states; `measured` has these, in [kg]."""
+        for link in self.by_link:
             if link not in links:
                 raise QueryError(f"mass: no link {link!r}; {nearest(str(link), [*links])}")
             if link in measured:
                 raise QueryError(
-                    f"mass: link {link!r} has {measured[link]:g} kg in its file, which is not estimated; leave it out,"
-                    " or replace it by Robot.with_(masses=…)"
+                    f"mass: link {link!r} has {measured[link]:g} kg in its file, which estimates cannot replace;"
+                    " remove it, or change the mass with Robot.with_(masses=…)"
                 )
 
     def shared(self, shapes: Mapping[str, LinkShape], measured: float) -> dict[str, tuple[float, str]]:
-        """Mass and its origin of each link with a shape, as far as it is known.
+        """Return mass and origin of the mass of each link with a shape, where these masses define it.
 
         Args:
-            shapes: Of the links whose mass the file leaves out.
+            shapes: Shapes of the links whose mass the file leaves out.
             measured: Mass of the other links together, in [kg].
 
         Raises:
-            QueryError: If the total leaves no mass to be shared, or there is no link to share it.
+            QueryError: If the total leaves no mass to share, or no link can take a share.
         """
-        found = {link: (mass, "given") for link, mass in self.of.items()}
-        others = {link: shape for link, shape in shapes.items() if link not in found}
+        result = {link: (mass, "given") for link, mass in self.by_link.items()}
+        others = {link: shape for link, shape in shapes.items() if link not in result}
         if self.density is not None:
             origin = f"at {self.density:g} kg/m³"
-            found |= {link: (self.density * shape.solid.mass, origin) for link, shape in others.items()}
+            result |= {link: (self.density * shape.solid.mass, origin) for link, shape in others.items()}
         if self.total is not None:
-            left = self.total - measured - sum(self.of.values())
+            left = self.total - measured - sum(self.by_link.values())
             if not others:
-                raise QueryError("total_mass: no link without a mass has a shape that could take a share; leave it out")
+                raise QueryError(
+                    "total_mass: no link without a mass has a shape that could take a share; remove total_mass"
+                )
             if left <= 0:
-                known = self.total - left
-                raise QueryError(f"total_mass of {self.total:g} kg leaves nothing: {known:g} kg are known; correct it")
+                stated = self.total - left
+                raise QueryError(
+                    f"total_mass of {self.total:g} kg leaves nothing to share: {stated:g} kg are stated; correct it"
+                )
             volume = sum(shape.hull.mass for shape in others.values())
             origin = f"its share, by volume, of a total of {self.total:g} kg: {left / volume:.4g} kg/m³ of its hull"
-            found |= {link: (left * shape.hull.mass / volume, origin) for link, shape in others.items()}
-        return found
+            result |= {link: (left * shape.hull.mass / volume, origin) for link, shape in others.items()}
+        return result

@@ -1,4 +1,4 @@
-"""Bounded reading of mesh files: which files they may open, and checks of their content before a library parses it."""
+"""Bounded reading of mesh files: the files they may open, and checks of their content before a library parses it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from robot_dyn.foundations.errors import RobotDynError, shorten
 
-MAX_BYTES = 64 * 2**20  # of one mesh or texture; the largest in example-robot-data is 28 MiB
+MAX_BYTES = 64 * 2**20  # per mesh or texture; the largest in example-robot-data has 28 MiB
 MAX_NODES = 20_000  # of a scene, counting every instance
 _SHAPING = {
     "EXT_mesh_gpu_instancing": "instances by EXT_mesh_gpu_instancing",
@@ -26,11 +26,11 @@ _UNSEEN = ("library_lights", "library_cameras", "library_animations", "instance_
 
 
 class MeshError(RobotDynError):
-    """A shape or texture cannot be drawn; the message gives the reason, to follow the name of the file or link."""
+    """A shape or texture cannot be read; the message gives the reason, to follow the name of the file or link."""
 
 
 def bounded(path: Path) -> bytes:
-    """Return the bytes of a regular file of at most `MAX_BYTES`; raises MeshError for any other file."""
+    """Return the bytes of a regular file of at most `MAX_BYTES`; raise MeshError for any other file."""
     try:
         status = path.stat()
         if not S_ISREG(status.st_mode):
@@ -43,7 +43,7 @@ def bounded(path: Path) -> bytes:
 
 
 def beside(folder: Path, missing: list[str], anywhere: bool) -> Any:
-    """Return a resolver for files named by a mesh: regular files, `MAX_BYTES` in total; others go to `missing`."""
+    """Return a resolver of files named by a mesh: regular files, `MAX_BYTES` in total; others go to `missing`."""
     from trimesh.resolvers import FilePathResolver
 
     class Beside(FilePathResolver):
@@ -63,11 +63,11 @@ def beside(folder: Path, missing: list[str], anywhere: bool) -> Any:
         if not anywhere:
             path = Path(unquote(name))  # a glTF URI
             if path.is_absolute() or ".." in path.parts or "://" in name:
-                raise MeshError("is not beside the mesh, nor below it; put it there")
+                raise MeshError("is not in the folder of the mesh or below it; move it there")
         data = bounded(folder / path)
         left -= len(data)
         if left < 0:
-            raise MeshError(f"is one file too many: together they have more than {MAX_BYTES >> 20} MiB; simplify it")
+            raise MeshError(f"makes the total exceed {MAX_BYTES >> 20} MiB; simplify the mesh")
         return data
 
     return Beside(str(folder), allow_anywhere=True)
@@ -82,7 +82,7 @@ def checked_collada(data: bytes) -> etree._Element:
             break
     if first and first[1].getroottree().docinfo.internalDTD is not None:
         raise MeshError("declares a document type (<!DOCTYPE …>), through which it can read other files; remove it")
-    # geometry exceeds the parser's limits on text; lifting them is safe once no entity can be declared
+    # geometry exceeds the parser's limits on text; without entities, lifting them is safe
     safe = {"resolve_entities": False, "no_network": True, "remove_comments": True, "remove_pis": True}
     root = etree.fromstring(data, etree.XMLParser(**safe, huge_tree=True))
     for tag in _UNSEEN:  # pycollada rejects a scene with an undefined light
@@ -105,34 +105,34 @@ def checked_collada(data: bytes) -> etree._Element:
     return root
 
 
-def check_gltf(data: bytes, named: Any) -> None:
-    """Reject files that trimesh would silently draw wrong, and accessors that claim more numbers than the file holds.
+def check_gltf(data: bytes, resolver: Any) -> None:
+    """Raise MeshError for files that trimesh would silently draw wrong, and for accessors larger than the file.
 
-    For such accessors, trimesh would allocate arrays of zeros.
+    For such accessors trimesh would allocate arrays of zeros.
     """
     binary = data[:4] == b"glTF"
     head = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")] if binary else data)
-    addresses = [each.get("uri", "") for each in head.get("buffers", ())]
-    room = len(data) + sum(len(named[uri]) for uri in addresses if uri and not uri.startswith("data:"))
-    if sum(each["count"] for each in head.get("accessors", ())) > room:
+    addresses = [buffer.get("uri", "") for buffer in head.get("buffers", ())]
+    available = len(data) + sum(len(resolver[uri]) for uri in addresses if uri and not uri.startswith("data:"))
+    if sum(accessor["count"] for accessor in head.get("accessors", ())) > available:
         raise MeshError("claims more vertices than it has bytes; export it again")
     if len(head.get("nodes", ())) > MAX_NODES:
         raise MeshError(f"has more than {MAX_NODES} nodes; simplify it")
     if unread := next(_unread(head), None):
-        raise MeshError(f"has {unread}, which are not read; export it without them")
+        raise MeshError(f"has {unread}, which are not supported; export it without them")
 
 
 def _unread(head: Any) -> Iterator[str]:
     """Yield the features of a glTF file that affect its triangles but are ignored by trimesh."""
-    yield from (what for name, what in _SHAPING.items() if name in head.get("extensionsUsed", ()))
+    yield from (features for name, features in _SHAPING.items() if name in head.get("extensionsUsed", ()))
     accessors, meshes, nodes = (head.get(key, ()) for key in ("accessors", "meshes", "nodes"))
-    if any("sparse" in each for each in accessors):
+    if any("sparse" in accessor for accessor in accessors):
         yield "sparse accessors"
-    if any("skin" in each for each in nodes):
+    if any("skin" in node for node in nodes):
         yield "skins"
-    if any(any(each.get("weights", ())) for each in (*meshes, *nodes)):
+    if any(any(item.get("weights", ())) for item in (*meshes, *nodes)):
         yield "weights of morph targets"
-    for primitive in (each for mesh in meshes for each in mesh["primitives"]):
+    for primitive in (item for mesh in meshes for item in mesh["primitives"]):
         if primitive.get("mode") == _FAN:
             yield "triangle fans"
         if accessors[primitive["attributes"]["POSITION"]].get("normalized"):

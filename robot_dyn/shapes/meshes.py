@@ -1,8 +1,8 @@
-"""Mesh files as plain triangles: one mesh for each material, creased normals, equal corners merged.
+"""Mesh files as plain triangles: one mesh per material, creased normals, equal corners merged.
 
-The nodes of a scene are applied, and a Collada `<unit>`. In glTF y is up, by its specification; it is turned to z up,
-before the scale of the URDF, as in Drake and rviz. A Collada `<up_axis>` is not followed, as in rviz, but reported, as
-Gazebo follows it. STL, OBJ and PLY have no axis. [rviz, mesh_loader.cpp; drake, internal_render_engine_vtk.cc]
+The transforms of a scene and a Collada `<unit>` are applied. glTF specifies y up: it is turned to z up before the scale
+of the URDF is applied, as in Drake and rviz. A Collada `<up_axis>` is ignored, as in rviz, but reported, because Gazebo
+applies it. STL, OBJ and PLY define no up axis. [rviz, mesh_loader.cpp; drake, internal_render_engine_vtk.cc]
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from robot_dyn.shapes.triangles import Mesh, welded
 MAX_PIXELS = 1024  # of a texture's longer side in the page
 FORMATS = ("stl", "dae", "obj", "ply", "glb", "gltf")
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of a binary STL file
-_HEADER = 84  # bytes of it: 80 of text and the count
+_HEADER = 84  # bytes before the records: 80 of text and the count
 _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 _BAD_NORMAL = re.compile(rb"\bnormal\b(?!(?:\s+[-+.\deE]+|\s+[-+]?(?:nan|inf)){3}\s)", re.IGNORECASE)
-COLLADA, GLTF = "Collada", "glTF"  # the formats with files in which y is up
+COLLADA, GLTF = "Collada", "glTF"  # formats whose files can have y up
 Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # from y up: a quarter turn about x
 
 Rgba = tuple[float, float, float, float]
 WHITE: Rgba = (1.0, 1.0, 1.0, 1.0)
-Node = tuple[ndarray, ndarray | None, Any]  # corners and normals (m, 3, 3), and what trimesh holds of it, not of STL
+Node = tuple[ndarray, ndarray | None, Any]  # corners and normals (m, 3, 3), and trimesh's geometry (None for STL)
 
 
 @final
@@ -46,10 +46,10 @@ class Part:
     """The triangles of a file that share one material.
 
     Attributes:
-        mesh: The triangles, scaled, in the frame of the file or turned to z up.
-        rgba: Their colour, or None if the file gives them none.
-        image: Their texture as PNG, or None.
-        y_up: The format of a file that says that y is up, else None.
+        mesh: Scaled triangles, in the frame of the file or turned to z up.
+        rgba: Colour, or None if the file has none.
+        image: Texture as PNG, or None.
+        y_up: Format of the file if it declares y up, else None.
     """
 
     mesh: Mesh
@@ -61,15 +61,15 @@ class Part:
 def read(
     path: Path, scale: Any = (1.0, 1.0, 1.0), turned: frozenset[str] = frozenset({GLTF})
 ) -> tuple[tuple[Part, ...], tuple[str, ...]]:
-    """Read the triangles of a mesh file, scaled; faces are flipped where the scale is a mirror image.
+    """Read the triangles of a mesh file, scaled; faces are flipped where the scale mirrors.
 
     Args:
         path: The file.
-        scale: Factors along the axes of the shape, after a turn.
-        turned: The formats whose files, where they say that y is up, are turned to z up.
+        scale: Factors along the axes of the shape, after a turn to z up.
+        turned: Formats whose files are turned to z up if they declare y up.
 
     Returns:
-        The parts, and what of their materials and textures cannot be read.
+        The parts, and messages on unreadable materials and textures.
 
     Raises:
         MeshError: If there is no such file, or it is too large, damaged, empty or of another format.
@@ -79,73 +79,78 @@ def read(
         nodes, y_up = _nodes(path, np.array(scale, dtype=float), turned, missing)
         parts = tuple(_parts(nodes, missing, y_up))
     if not parts:
-        raise MeshError("holds no triangles; export it again")
+        raise MeshError("contains no triangles; export it again")
     return parts, tuple(dict.fromkeys(missing))
 
 
 def corners(path: Path, scale: Any = (1.0, 1.0, 1.0)) -> ndarray:
-    """Read the corners of the triangles of a mesh file where `read` has them, with all the digits of the file.
+    """Read the corners of the same triangles as `read`, with all digits of the file.
 
     Args:
         path: The file.
-        scale: Factors along the axes of the shape, after a turn; faces are flipped where it is a mirror image.
+        scale: Factors along the axes of the shape, after a turn to z up; faces are flipped where it mirrors.
 
     Returns:
-        (m, 3, 3) float64, in [m], without triangles that are not finite.
+        Finite triangles, (m, 3, 3) float64, in [m].
 
     Raises:
         MeshError: See `read`.
     """
     with _reading([]):
         nodes, _ = _nodes(path, np.array(scale, dtype=float), frozenset({GLTF}), [], "f8")
-        found = np.concatenate([np.zeros((0, 3, 3)), *(placed for placed, _, _ in nodes)])
-        found = found[np.isfinite(found).all(axis=(1, 2))]
-    if not len(found):
-        raise MeshError("holds no triangles; export it again")
-    return found
+        triangles = np.concatenate([np.zeros((0, 3, 3)), *(placed for placed, _, _ in nodes)])
+        triangles = triangles[np.isfinite(triangles).all(axis=(1, 2))]
+    if not len(triangles):
+        raise MeshError("contains no triangles; export it again")
+    return triangles
 
 
 @contextmanager
 def _reading(missing: list[str]) -> Iterator[None]:
-    """Raise MeshError for anything that a reader raises, and silence its warnings."""
+    """Convert all exceptions of readers to MeshError, and silence their warnings."""
     try:
-        with warnings.catch_warnings(action="ignore"), _logged(missing):  # of numpy and Pillow, on what is refused here
+        with (
+            warnings.catch_warnings(action="ignore"),
+            _logged(missing),
+        ):  # numpy and Pillow warn of content that is refused here
             yield
     except MeshError:
         raise
-    except Exception as error:  # a damaged file makes the readers raise anything
+    except Exception as error:  # readers can raise anything on a damaged file
         raise MeshError(f"is damaged ({type(error).__name__}: {shorten(error, 120)}); export it again") from None
 
 
 def _stl(data: bytes, missing: list[str], digits: str) -> ndarray:
-    """Corners (m, 3, 3) of the triangles of an STL file, as floats of a type; stated normals are not used.
+    """Return the triangle corners (m, 3, 3) of an STL file, as floats of type `digits`; stated normals are ignored.
 
-    A normal that is not three numbers is added to `missing`.
+    A malformed normal is reported in `missing`.
 
     Raises:
-        ValueError: If it is cut off, or a corner is not three numbers.
+        ValueError: If the file is truncated, or a corner is not three numbers.
     """
     count = struct.unpack_from("<I", data, 80)[0] if len(data) >= _HEADER else 0
     stated = _HEADER + count * _RECORD.itemsize
-    ascii_ = data.lstrip()[:5].lower() == b"solid" and stated != len(data)  # exporters write "solid" in binary ones too
+    ascii_ = data.lstrip()[:5].lower() == b"solid" and stated != len(
+        data
+    )  # some exporters also start binary files with "solid"
     if not ascii_:
         if stated > len(data):
-            raise ValueError(f"it states {count} triangles and holds {(len(data) - _HEADER) // _RECORD.itemsize}")
+            raise ValueError(f"it declares {count} triangles but has {(len(data) - _HEADER) // _RECORD.itemsize}")
         return np.frombuffer(data, _RECORD, count, _HEADER)["corners"].astype(digits)
     if _BAD_NORMAL.search(data):
         missing.append("a normal is not three numbers")
     corners = np.fromiter((float(word) for match in _VERTEX.finditer(data) for word in match.groups()), digits)
     if len(corners) % 9:
-        raise ValueError("a facet has not three corners")
+        raise ValueError("a facet does not have three corners")
     return corners.reshape(-1, 3, 3)
 
 
 @contextmanager
 def _logged(missing: list[str]) -> Iterator[None]:
-    """Add what trimesh logs, which would go to stderr with a traceback, to what cannot be read."""
+    """Add log messages of trimesh to `missing`; otherwise they would go to stderr with a traceback."""
     logger = logging.getLogger("trimesh")
     handler = logging.Handler(logging.WARNING)
-    handler.emit = lambda record: missing.append(f"its reader says: {shorten(record.getMessage(), 120)}")
+    handler.emit = lambda record: missing.append(f"its reader reports: {shorten(record.getMessage(), 120)}")
     logger.addHandler(handler)
     propagate, logger.propagate = logger.propagate, False
     try:
@@ -156,11 +161,11 @@ def _logged(missing: list[str]) -> Iterator[None]:
 
 
 def png(picture: Any) -> bytes:
-    """A picture, as bytes or as Pillow holds it, as PNG of at most `MAX_PIXELS` a side; MeshError if it is damaged."""
+    """Convert a picture, as bytes or a Pillow image, to PNG of at most `MAX_PIXELS` a side; MeshError if damaged."""
     from PIL import Image
 
     try:
-        with warnings.catch_warnings(action="ignore"):  # Pillow warns of the size that is checked here
+        with warnings.catch_warnings(action="ignore"):  # Pillow warns of sizes, which are checked here
             image = Image.open(io.BytesIO(picture)) if isinstance(picture, bytes) else picture
             if image.width * image.height > 2**26:
                 raise MeshError(f"has {image.width} by {image.height} pixels; make it smaller")
@@ -170,18 +175,18 @@ def png(picture: Any) -> bytes:
             return out.getvalue()
     except MeshError:
         raise
-    except Exception as error:  # Pillow reads late, and raises anything
+    except Exception as error:  # Pillow reads lazily and can raise anything
         raise MeshError(f"is damaged ({type(error).__name__}: {shorten(error, 80)})") from None
 
 
 def _scene(data: bytes, kind: str, folder: Path, missing: list[str]) -> tuple[Any, float, str | None]:
-    """What trimesh reads, nothing merged; the unit of its lengths in [m]; and its format if it says that y is up."""
+    """Return trimesh's scene, nothing merged; its unit of length in [m]; and its format if it declares y up."""
     import trimesh
 
-    named = beside(folder, missing, anywhere=kind not in ("glb", "gltf"))  # textures often stand in ../textures
-    choices = {"file_type": kind, "resolver": named, "process": False}
+    resolver = beside(folder, missing, anywhere=kind not in ("glb", "gltf"))  # textures are often in ../textures
+    choices = {"file_type": kind, "resolver": resolver, "process": False}
     if kind in ("glb", "gltf"):
-        check_gltf(data, named)
+        check_gltf(data, resolver)
         return trimesh.load_scene(io.BytesIO(data), **choices), 1.0, GLTF
     if kind != "dae":
         return trimesh.load_scene(io.BytesIO(data), **choices), 1.0, None
@@ -190,20 +195,20 @@ def _scene(data: bytes, kind: str, folder: Path, missing: list[str]) -> tuple[An
     try:
         metres = float("1" if unit is None else unit.get("meter", "1"))
     except ValueError:
-        metres = 1.0  # as rviz takes a unit it cannot read
+        metres = 1.0  # as rviz does for a malformed unit
     try:
         scene = trimesh.load_scene(io.BytesIO(etree.tostring(root)), **choices, ignore_broken=False)
-    except Exception as error:  # with broken materials left in, trimesh drops their triangles in silence
+    except Exception as error:  # trimesh would silently drop triangles with broken materials
         missing.append(f"part of it is damaged ({shorten(error, 120)})")
-        for each in (*root.iterfind(".//{*}bind_material"), *root.iterfind("{*}library_effects")):
-            each.getparent().remove(each)
+        for broken in (*root.iterfind(".//{*}bind_material"), *root.iterfind("{*}library_effects")):
+            broken.getparent().remove(broken)
         scene = trimesh.load_scene(io.BytesIO(etree.tostring(root)), **choices)
     y_up = root.findtext("{*}asset/{*}up_axis", "").strip() == "Y_UP"
     return scene, metres if 0 < metres < np.inf else 1.0, COLLADA if y_up else None
 
 
 def _parts(nodes: Iterable[Node], missing: list[str], y_up: str | None) -> Iterator[Part]:
-    """One part for each material, from all nodes that wear it."""
+    """Return one part for each material, from all nodes that use it."""
     groups: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}
     images: dict[int, bytes | None] = {}
     for corners, normals, geometry in nodes:
@@ -219,7 +224,7 @@ def _parts(nodes: Iterable[Node], missing: list[str], y_up: str | None) -> Itera
     for (rgba, image, *_), pieces in groups.items():
         columns: Any = pieces[0]
         if len(pieces) > 1:
-            columns = [None if each[0] is None else np.concatenate(each) for each in zip(*pieces, strict=True)]
+            columns = [None if column[0] is None else np.concatenate(column) for column in zip(*pieces, strict=True)]
         if (mesh := welded(*columns)) is not None:
             yield Part(mesh, rgba, image, y_up)
 
@@ -227,10 +232,10 @@ def _parts(nodes: Iterable[Node], missing: list[str], y_up: str | None) -> Itera
 def _nodes(
     path: Path, factors: ndarray, turned: frozenset[str], missing: list[str], digits: str = "f4"
 ) -> tuple[Iterable[Node], str | None]:
-    """Return the scaled nodes of a mesh file, and its format if y is up in it; STL has the type of `digits`."""
+    """Return the scaled nodes of a mesh file, and its format if it has y up; STL corners have type `digits`."""
     kind, data = path.suffix.lower().removeprefix("."), bounded(path)
     if kind not in FORMATS:
-        raise MeshError(f"its format {path.suffix!r} is not read; convert it to {', '.join(FORMATS)}")
+        raise MeshError(f"its format {path.suffix!r} is not supported; convert it to {', '.join(FORMATS)}")
     if kind == "stl":
         corners = _stl(data, missing, digits)
         np.multiply(corners, factors, out=corners, casting="unsafe")
@@ -238,16 +243,18 @@ def _nodes(
     scene, unit, y_up = _scene(data, kind, path.parent, missing)
     A = unit * factors[:, None] * (Z_UP if y_up in turned else np.eye(3))
     places = ((scene.graph[node][0], scene.geometry[scene.graph[node][1]]) for node in scene.graph.nodes_geometry)
-    has_faces = ((g, geometry) for g, geometry in places if len(getattr(geometry, "faces", ())))  # not lines and points
+    has_faces = (
+        (g, geometry) for g, geometry in places if len(getattr(geometry, "faces", ()))
+    )  # skips lines and points
     return ((*_placed(geometry, A @ g[:3]), geometry) for g, geometry in has_faces), y_up
 
 
 def _placed(geometry: Any, A: ndarray) -> tuple[ndarray, ndarray | None]:
-    """Corners and their normals (or None), (m, 3, 3), after x ↦ A x, turned over where A mirrors."""
+    """Return corners and normals (or None), (m, 3, 3), after x ↦ A x; faces are flipped if A mirrors."""
     mirrors = np.linalg.det(A[:, :3]) < 0
     faces = np.asarray(geometry.faces)[:, :: -1 if mirrors else 1]
     corners = (np.asarray(geometry.vertices) @ A[:, :3].T + A[:, 3])[faces]
-    if "vertex_normals" not in geometry._cache:  # trimesh would make some up, smooth across edges
+    if "vertex_normals" not in geometry._cache:  # trimesh would compute them, smooth across edges
         return corners, None
     x, y, z = A[:, :3]
     cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])  # det A · A⁻ᵀ
@@ -255,7 +262,7 @@ def _placed(geometry: Any, A: ndarray) -> tuple[ndarray, ndarray | None]:
 
 
 def _look(geometry: Any) -> tuple[Rgba | None, Any, ndarray | None, ndarray | None]:
-    """Colour, picture, texture coordinates and colours of the corners, each None where the file has none."""
+    """Return colour, picture, texture coordinates and colours of the corners; None where the file has none."""
     if geometry is None:
         return None, None, None, None
     visual, faces = geometry.visual, np.asarray(geometry.faces)
@@ -271,12 +278,12 @@ def _look(geometry: Any) -> tuple[Rgba | None, Any, ndarray | None, ndarray | No
     else:
         rgba, picture = _rgba(material.diffuse), material.image
         if picture is not None and "file_path" not in picture.info:
-            return None, None, uv, None  # the stand-in trimesh gives to an OBJ that names no material
-        rgba = rgba if picture is None else WHITE  # trimesh takes grey for a colour that is not stated
+            return None, None, uv, None  # trimesh's placeholder for an OBJ without a material
+        rgba = rgba if picture is None else WHITE  # trimesh uses grey for an unstated colour
     return (rgba, picture, uv, None) if picture is not None and uv is not None else (rgba, None, None, None)
 
 
 def _rgba(color: Any) -> Rgba:
-    """The colour of a material. One without any opacity is drawn opaque: exporters mean both 0 and 1 by opaque."""
+    """Return the colour of a material. Opacity 0 is drawn opaque: exporters mean both 0 and 1 by opaque."""
     r, g, b, a = (1.0, 1.0, 1.0, 1.0) if color is None else (float(value) / 255 for value in color)
     return r, g, b, a if a > 0 else 1.0

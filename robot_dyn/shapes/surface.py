@@ -1,12 +1,12 @@
-"""Triangles as a body of density 1: the solid they enclose, its convex hull, and the shell they are themselves.
+"""Triangles as a body of density 1: the solid they enclose, its convex hull, or the shell they form.
 
     solid, hull   m = ∫ dx,  c = (1/m) ∫ x dx,  I = ∫ r̂ᵀ r̂ dx,   r = x − c     at 1 kg/m³, m is the volume
-    shell         the same over the surface                                     at 1 kg/m², m is the area
+    shell         same, over the surface                                         at 1 kg/m², m is the area
 
 Over a triangle with corners v₁, v₂, v₃ and area A, ∫ x dA = A s/3 and ∫ x xᵀ dA = A (Σ vᵢ vᵢᵀ + s sᵀ)/12, s = Σ vᵢ.
-Solids are integrated by trimesh. The origin is the middle of the triangles, so that bodies far from the frame lose no
-digits. [Tonon, Explicit exact formulas for the 3-D tetrahedron inertia tensor, 2005, of which the triangle is the plane
-case]
+trimesh integrates the solids. The origin is moved to the middle of the triangles, so that bodies far from the frame
+lose no digits. [Tonon, Explicit exact formulas for the 3-D tetrahedron inertia tensor, 2005, whose plane case is the
+triangle]
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from robot_dyn.foundations.errors import QueryError
 from robot_dyn.shapes.closed_parts import closed_parts
 from robot_dyn.shapes.mesh_files import MeshError
 
-_FLAT = 1e-9  # of the cube of its length: the volume of a surface that encloses none
-_ROUNDED = 1.001  # of the volume of the hull, which no solid exceeds: float32 corners
-_NAMED = 3  # overlaps that a message names
-REMEDY = "export their union, or count what they share twice: allow_overlap=True, --allow-overlap"
+_FLAT = 1e-9  # relative to the cube of its length: smaller volumes count as none
+_ROUNDED = 1.001  # relative to the hull's volume, which a solid exceeds only by float32 rounding
+_NAMED = 3  # maximum number of overlaps in a message
+REMEDY = "export their union, or count the shared volume twice: allow_overlap=True, --allow-overlap"
 
 
 @final
@@ -35,9 +35,9 @@ class Solid:
     """The solid that closed surfaces enclose.
 
     Attributes:
-        body: Its mass properties at 1 kg/m³.
-        parts: The number of its closed parts.
-        turned: The number of parts that were inside out, or had faces that were, and were turned.
+        body: Mass properties at 1 kg/m³.
+        parts: Number of closed parts.
+        turned: Number of parts with faces that were inside out and were flipped.
     """
 
     body: MassProperties
@@ -46,24 +46,24 @@ class Solid:
 
 
 def solid(vertices: ndarray, faces: ndarray, *, allow_overlap: bool = False) -> Solid | None:
-    """Return the solid that triangles enclose; None if they do not close, or enclose no volume.
+    """Return the solid that triangles enclose; None if they are not closed or enclose no volume.
 
-    Parts that are inside out are turned over. A part within another one is a cavity if it faces inward.
+    Parts that are inside out are flipped. A part inside another one is a cavity if it faces inward.
 
     Args:
         vertices: (k, 3), in [m].
         faces: (m, 3), indices of vertices, counter-clockwise seen from outside.
-        allow_overlap: Whether the space that several parts fill counts as often as they do.
+        allow_overlap: Count the volume shared by several parts once for each of them.
 
     Raises:
-        MeshError: If parts overlap and `allow_overlap` is False: their mass is not known.
+        MeshError: If parts overlap and `allow_overlap` is False, because their mass is ambiguous.
     """
     if not len(faces) or (closed := closed_parts(np.asarray(vertices, dtype=float)[faces])) is None:
         return None
     if closed.overlaps and not allow_overlap:
-        named = "; ".join(f"{closed.place(i)} and {closed.place(j)}" for i, j in closed.overlaps[:_NAMED])
+        listed = "; ".join(f"{closed.place(i)} and {closed.place(j)}" for i, j in closed.overlaps[:_NAMED])
         more = f", and {len(closed.overlaps) - _NAMED} more pairs" if len(closed.overlaps) > _NAMED else ""
-        raise MeshError(f"{len(closed.corners)} closed parts, and some overlap ({named}{more}); {REMEDY}")
+        raise MeshError(f"some of its {len(closed.corners)} closed parts overlap ({listed}{more}); {REMEDY}")
     body = _enclosed(closed.corners)
     if body is None:
         return None
@@ -91,7 +91,7 @@ def hull(points: ndarray) -> MassProperties | None:
 
 
 def shell(vertices: ndarray, faces: ndarray) -> MassProperties | None:
-    """Return the triangles themselves, at 1 kg/m²; None if they have no area.
+    """Return the triangles themselves as a body, at 1 kg/m²; None if they have no area.
 
     Args:
         vertices: (k, 3), in [m].
@@ -112,7 +112,7 @@ def shell(vertices: ndarray, faces: ndarray) -> MassProperties | None:
 
 @np.errstate(all="ignore")
 def _enclosed(parts: Iterable[ndarray]) -> MassProperties | None:
-    """The mass properties of the space within parts, those of cavities subtracted; None without a volume.
+    """Return the mass properties of the space inside parts, without cavities; None without a volume.
 
     Args:
         parts: Corners of the triangles of each closed part, (m, 3, 3), in [m].
@@ -129,5 +129,5 @@ def _enclosed(parts: Iterable[ndarray]) -> MassProperties | None:
         return None
     try:
         return MassProperties(body.mass, body.center_mass + middle, body.inertia)
-    except QueryError:  # faces that overlap themselves enclose what no body has
+    except QueryError:  # self-intersecting faces can enclose a non-physical inertia
         return None

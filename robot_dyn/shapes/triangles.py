@@ -1,4 +1,4 @@
-"""Triangles: equal corners merged, and creased normals: smooth where faces meet at less than 35°, otherwise flat."""
+"""Triangles with equal corners merged and creased normals: smooth where faces meet at under 35°, otherwise flat."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any, final
 import numpy as np
 from numpy import ndarray
 
-CREASE = np.cos(np.deg2rad(35.0))  # faces that meet at a larger angle keep an edge between them
-_CROWD = 256  # with more faces at one vertex it is drawn flat: the cost of comparing pairs is quadratic
+CREASE = np.cos(np.deg2rad(35.0))  # faces that meet at a larger angle have a visible edge
+_CROWD = 256  # vertices with more faces are drawn flat: comparing pairs is quadratic
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles in the frame of their piece, counter-clockwise seen from outside.
+    """Triangles in the frame of their part, counter-clockwise seen from outside.
 
     Attributes:
         vertices: (k, 3) float32, in [m].
@@ -43,9 +43,9 @@ class Mesh:
 def welded(
     corners: ndarray, normals: ndarray | None = None, uv: ndarray | None = None, colors: ndarray | None = None
 ) -> Mesh | None:
-    """Return triangles given by their corners, equal ones merged; None if each is a line, a point or not finite.
+    """Return triangles with equal corners merged; None if none has a finite area.
 
-    Normals that are missing, not finite or against the triangles are computed, smooth up to `CREASE`.
+    Missing or implausible normals are computed, smooth up to `CREASE`.
 
     Args:
         corners: (m, 3, 3), in [m].
@@ -64,8 +64,8 @@ def welded(
         columns = [None if array is None else np.asarray(array)[good] for array in columns]
     corners, area, normals, uv, colors = columns
     face_normals = np.divide(area, np.linalg.norm(area, axis=1, keepdims=True), out=area)
-    given = _sane(normals, face_normals)
-    smooth: Any = (_creased(corners, face_normals) if given is None else given).astype("f4")
+    stated = _plausible(normals, face_normals)
+    smooth: Any = (_creased(corners, face_normals) if stated is None else stated).astype("f4")
     parts = [corners, np.rint(127 * smooth) + np.float32(0)]
     parts += [] if uv is None else [np.asarray(uv).astype("f4") + np.float32(0)]
     parts += [] if colors is None else [np.asarray(colors).astype("f4")]
@@ -75,7 +75,7 @@ def welded(
 
 
 def _distinct(rows: ndarray) -> tuple[ndarray, ndarray]:
-    """Index of the first of each kind of row of float32, in order; and for each row the number of its kind."""
+    """Return the index of the first of each distinct row of float32, in order, and the kind of each row."""
     from trimesh.grouping import unique_ordered
 
     bits = np.ascontiguousarray(rows).view(f"V{4 * rows.shape[1]}").ravel()
@@ -83,10 +83,10 @@ def _distinct(rows: ndarray) -> tuple[ndarray, ndarray]:
     return first, kind
 
 
-def _sane(normals: ndarray | None, face_normals: ndarray) -> ndarray | None:
-    """Unit normals, if they are finite, not zero, nearly all outward, and not just those of the flat triangles.
+def _plausible(normals: ndarray | None, face_normals: ndarray) -> ndarray | None:
+    """Return unit normals, or None if they are not finite, point inward, or merely repeat the flat triangles.
 
-    Many exporters write the flat ones where the surface is round: to crease them halves the file and looks right.
+    Many exporters write flat normals for round surfaces: computing them halves the file and looks right.
     """
     if normals is None:
         return None
@@ -99,7 +99,7 @@ def _sane(normals: ndarray | None, face_normals: ndarray) -> ndarray | None:
 
 
 def _creased(corners: ndarray, face_normals: ndarray) -> ndarray:
-    """Normal of each corner, (m, 3, 3): of all faces at its vertex within `CREASE` of its own, weighted by angle.
+    """Return corner normals (m, 3, 3), averaged over faces within `CREASE` of the corner's own, weighted by angle.
 
     Source: Thürmer and Wüthrich, Computing vertex normals from polygonal facets, 1998.
     """

@@ -1,4 +1,4 @@
-"""Winding numbers of closed surfaces: how often one goes around a point, 1 inside, 0 outside, −1 if it is inside out.
+"""Winding numbers of closed surfaces: 1 at points inside, 0 outside, −1 inside a surface that is inside out.
 
     w(p) = (1/4π) Σ Ω(p),   tan(Ω/2) = a·(b × c) / (abc + (a·b) c + (b·c) a + (c·a) b)
 
@@ -11,16 +11,16 @@ from __future__ import annotations
 import numpy as np
 from numpy import ndarray
 
-_BLOCK = 2**17  # of points times triangles at a time
-_INSET = 1e-4  # of the size of a part: layers that are thinner are not seen
+_BLOCK = 2**17  # points × triangles per block
+_INSET = 1e-4  # relative to the size of a part: thinner layers are not detected
 
 
 def winding(points: ndarray, corners: ndarray) -> ndarray:
-    """Return the winding numbers of a surface at points, (k,); near an integer where it is closed.
+    """Return the winding numbers of a surface at points, (k,); near integers for a closed surface.
 
     Args:
         points: (k, 3), in [m], not on the surface.
-        corners: Of its triangles, (m, 3, 3), in [m], counter-clockwise seen from outside.
+        corners: Corners of the triangles, (m, 3, 3), in [m], counter-clockwise seen from outside.
     """
     blocks = np.array_split(points, 1 + len(points) * len(corners) // _BLOCK)
     return np.concatenate([_of_block(block, corners) for block in blocks])
@@ -39,18 +39,20 @@ def _of_block(points: ndarray, corners: ndarray) -> ndarray:
 def just_inside(corners: ndarray, count: int) -> ndarray:
     """Return points just inside a closed surface, spread evenly over it, (k, 3) with k ≤ count.
 
-    Where the body is thinner than the distance from its surface, there are none.
+    Points are dropped where the body is thinner than their distance from the surface.
 
     Args:
-        corners: Of its triangles, (m, 3, 3), in [m], counter-clockwise seen from outside.
-        count: The number of points that are tried.
+        corners: Corners of the triangles, (m, 3, 3), in [m], counter-clockwise seen from outside.
+        count: Number of candidate points.
     """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(normals, axis=1)
     share = np.cumsum(twice) / twice.sum()
     at = (np.arange(count) + 0.5) / count
     chosen = np.minimum(np.searchsorted(share, at), len(corners) - 1)
-    u, v = (np.arange(1, count + 1) * x % 1 for x in (0.7548776662466927, 0.5698402909980532))  # evenly over a square
+    u, v = (
+        np.arange(1, count + 1) * x % 1 for x in (0.7548776662466927, 0.5698402909980532)
+    )  # a low-discrepancy sequence in a square
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     p, q, r = np.moveaxis(corners[chosen], 1, 0)
     points = p + u[:, None] * (q - p) + v[:, None] * (r - p)

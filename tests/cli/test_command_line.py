@@ -59,7 +59,7 @@ def test_list_prints_every_name():
 @pytest.mark.parametrize(
     ("file", "message"),
     [
-        ("package://legs/leg.urdf", r"no file for package://legs/leg\.urdf; tried in .*"),
+        ("package://legs/leg.urdf", r"no file for package://legs/leg\.urdf; searched .*"),
         (__file__, r".*test_command_line\.py: is not well-formed XML: .*"),
     ],
 )

@@ -57,6 +57,6 @@ def test_masses_give_inertias_from_shapes_and_are_told() -> None:
 
 
 def test_what_is_left_out_of_mjcf_is_told() -> None:
-    assert "tendon 'cable': tendons are not taken; left out" in run("info", "rig.xml", "--without", "tendon").stdout
+    assert "tendon 'cable': tendons are not supported; left out" in run("info", "rig.xml", "--without", "tendon").stdout
     done = run("show", "rig.xml", "--without", "tendon, equality", "--html", "rig.html")
     assert done.returncode == 0 and "left out" in done.stderr

@@ -39,7 +39,7 @@ def test_the_implementations_agree_on(name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(REFUSED))
 def test_a_refused_robot_says_why(name: str) -> None:
-    with pytest.raises(DescriptionError, match=r"no joint moves|not defined|holds no <link>"):
+    with pytest.raises(DescriptionError, match=r"no joint moves|not defined|has no <link>"):
         rd.load(name)
 
 

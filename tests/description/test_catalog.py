@@ -19,7 +19,7 @@ REFUSED = {
     "alex_psyonic_hands": "mimics 'index_q1', which is not defined",
     "hector": "no joint moves",
     "iris_simple": "no joint moves",
-    "ur3_empty": "holds no <link>",
+    "ur3_empty": "has no <link>",
 }
 
 
@@ -74,7 +74,7 @@ def test_unknown_name_is_answered_with_the_nearest(wrong: str, near: str):
 
 @pytest.mark.parametrize("wrong", ["nowhere/arm.urdf", "arm.urdf", "/nowhere/arm"])
 def test_missing_file_is_named_with_the_place_that_was_looked_in(wrong: str, package: Path):
-    with pytest.raises(CatalogError, match=rf"no file {wrong}; looked for /.*arm"):
+    with pytest.raises(CatalogError, match=rf"no file {wrong}; check the path /.*arm"):
         rd.load(wrong)
 
 

@@ -129,7 +129,7 @@ def test_another_order_of_joints_is_said() -> None:
     for name in ("b", "a"):
         joint = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), name)
         model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
-    with pytest.warns(ModelWarning, match="in another order than in the model: a, b; arrange"):
+    with pytest.warns(ModelWarning, match="the joint order differs from the model's: a, b; arrange"):
         robot = rd.Robot.from_pinocchio(model)
     assert robot.joint_names == ("a", "b")
 
@@ -154,9 +154,9 @@ WRONG = {
     "has control characters": lambda: refused(name="a\x1b[2J"),
     "gravity: has an angular part": lambda: refused(more=bent_gravity),
     "no joint moves|holds no": pin.Model,
-    "takes a pinocchio.Model, got Robot": lambda: rd.load("pendulum"),
-    "takes a pinocchio.Model, got NoneType": lambda: None,
-    "takes a pinocchio.Model, got Data": lambda: pin.Model().createData(),
+    "needs a pinocchio.Model, got Robot": lambda: rd.load("pendulum"),
+    "needs a pinocchio.Model, got NoneType": lambda: None,
+    "needs a pinocchio.Model, got Data": lambda: pin.Model().createData(),
 }
 
 
@@ -168,7 +168,7 @@ def test_what_a_urdf_cannot_state_is_refused_by_name(why: str) -> None:
 
 @pytest.mark.parametrize("wrong", [pin.Model(), "ur5", None, b"<robot/>"])
 def test_what_is_no_description_makes_no_robot(wrong: object) -> None:
-    with pytest.raises(DescriptionError, match=r"made of a Description, got .*; use rd\.load, Robot\.from_text"):
+    with pytest.raises(DescriptionError, match=r"must be a Description, got .*; use rd\.load, Robot\.from_text"):
         rd.Robot(wrong)  # pyright: ignore[reportArgumentType]
 
 

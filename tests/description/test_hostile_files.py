@@ -26,7 +26,7 @@ TABLE = {kind: make for topic in TOPICS for kind, make in topic.KINDS.items()}
 LONGEST_MESSAGE = 1500  # characters besides the path: what still fits a terminal
 REMEDY = re.compile(
     r"\b(give|needs|write|correct|remove|rename|keep|add|make|join|expand|exchange|check|split"
-    r"|known|nearest|looked for|only)\b"
+    r"|known|nearest|only)\b"
 )
 OF_THE_PARSER = re.compile(r"(?<=well-formed XML: line ).*(?=; correct the file)")  # other words in other versions
 

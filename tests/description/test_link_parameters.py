@@ -111,9 +111,12 @@ def test_other_masses_are_kept_in_run_files(tmp_path) -> None:
             {"masses": {"left_lowr": 1.0}},
             "no link 'left_lowr' with a mass in the file; nearest: left_lower",
         ),
-        ({"masses": 2.0}, "masses must give values by link name"),
-        ({"inertias": {LINK: np.diag([1.0, 1.0, 3.0])}}, "no body has it, its inertia breaks the triangle inequality"),
-        ({"inertias": {LINK: np.diag([1.0, -1.0, 1.0])}}, "no body has it, its inertia is indefinite"),
+        ({"masses": 2.0}, "masses must map link names to values"),
+        (
+            {"inertias": {LINK: np.diag([1.0, 1.0, 3.0])}},
+            "is not physical: its inertia breaks the triangle inequality",
+        ),
+        ({"inertias": {LINK: np.diag([1.0, -1.0, 1.0])}}, "is not physical: its inertia is indefinite"),
         ({"inertias": {LINK: INERTIA + np.triu(INERTIA)}}, "must be symmetric"),
         ({"inertias": {LINK: 1.0}}, r"shape \(3, 3\)"),
     ],
@@ -128,7 +131,7 @@ def test_numbers_that_no_link_has_are_refused(change, message: str) -> None:
     [
         ({f"{LINK}.mass": [1.0, 0.0]}, "left_lower.mass must be positive"),
         ({"left_lowr.mass": [1.0]}, "no 'left_lowr.mass'; nearest: left_lower.mass"),
-        ({f"{LINK}.inertia": [np.diag([1.0, 1.0, 3.0])]}, "no body has it"),
+        ({f"{LINK}.inertia": [np.diag([1.0, 1.0, 3.0])]}, "is not physical"),
         ({f"{LINK}.inertia": [1.0]}, "left_lower.inertia"),
     ],
 )

@@ -123,7 +123,7 @@ def test_the_frames_of_bodies_are_those_of_mujoco(tmp_path: Path) -> None:
 
 def test_ranges_friction_and_limits_of_actuators_are_those_of_the_file(tmp_path: Path) -> None:
     """A motor by its control range and gear, a servo by its force range; one that is not symmetric has none."""
-    with pytest.warns(ModelWarning, match="'slide'.* -1 to 3, not the same in both directions; no effort limit"):
+    with pytest.warns(ModelWarning, match="'slide'.* -1 to 3, different in the two directions; no effort limit"):
         robot = rd.load(written(tmp_path, ARM))
     assert np.array_equal(robot.lower, [-1.5, -np.inf, -0.1, -np.inf])
     assert np.array_equal(robot.upper, [2, np.inf, 0.3, np.inf])
@@ -203,10 +203,10 @@ def test_errors_name_the_file_and_the_remedy(tmp_path: Path, monkeypatch: pytest
     with pytest.raises(DescriptionError, match=r"arm\.xml: MuJoCo refuses it: .*capsul"):
         rd.load(path)
     for wrong in ("tendon", {"tendons"}, 3):
-        with pytest.raises(DescriptionError, match="without must be some of tendon, equality, free, ball"):
+        with pytest.raises(DescriptionError, match="without must be a set of tendon, equality, free, ball"):
             rd.load(written(tmp_path, ARM), without=wrong)  # pyright: ignore[reportArgumentType]
     (tmp_path / "arm.urdf").write_text(URDF, encoding="utf-8")
-    with pytest.raises(DescriptionError, match="is for files of MJCF"):
+    with pytest.raises(DescriptionError, match="applies to MJCF files only"):
         rd.load(tmp_path / "arm.urdf", without={"tendon"})
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"robot-dyn\[mjcf\]"):

@@ -69,7 +69,7 @@ def test_what_is_on_disk_is_loaded_with_the_arguments_of_its_xacro_file(
         ("robot_descriptions:ur10e_descripton", "nearest: ur10e_description"),
         ("robot_descriptions:", "has no ''"),
         ("robot_descriptions:os", "has no 'os'"),
-        ("ur5", "download=True is for names"),
+        ("ur5", "download=True needs a name"),
     ],
 )
 def test_other_names_are_refused(name: str, said: str, cache: Path) -> None:

@@ -57,7 +57,7 @@ def test_expanded_file_has_the_dynamics_of_the_file_written_out(arm: Path) -> No
 def test_file_that_only_defines_macros_is_told_from_a_robot_without_name(tmp_path: Path) -> None:
     file = tmp_path / "macros.xacro"
     file.write_text(f'<robot {NAMESPACE}><xacro:macro name="base"><link name="base"/></xacro:macro></robot>')
-    with pytest.raises(DescriptionError, match="add one link at least, or give the file that calls the macros of this"):
+    with pytest.raises(DescriptionError, match="add at least one link, or give the file that calls the macros of this"):
         rd.load(file, xacro={})
 
 
@@ -91,7 +91,7 @@ def test_arguments_are_texts_numbers_or_booleans_by_name(wrong: object, arm: Pat
 
 
 BODIES = {
-    '<xacro:include filename="$(find nowhere)/a.xacro"/>': "no package 'nowhere'; tried in .*; name the folder that",
+    '<xacro:include filename="$(find nowhere)/a.xacro"/>': "no package 'nowhere'; searched .*; add the folder that",
     '<xacro:include filename="nowhere.xacro"/>': "No such file",
     '<link name="${lenght}"/>': "name 'lenght' is not defined",
     '<link name="$(arg side)"/>': r"Undefined substitution argument side .*; give it a value: xacro=\{'side': …\}",
@@ -124,7 +124,7 @@ def test_a_document_type_survives_no_expansion(tmp_path: Path) -> None:
 def test_expansion_is_limited_in_time_and_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (file := tmp_path / "arm.xacro").write_text(f'<robot name="a" {NAMESPACE}><link name="${{9**9**9**9}}"/></robot>')
     monkeypatch.setattr(xacro, "SECONDS", 1)
-    with pytest.raises(DescriptionError, match="take more than 1 s"):
+    with pytest.raises(DescriptionError, match="takes over 1 s"):
         rd.load(file, xacro={})
     file.write_text(f'<robot name="a" {NAMESPACE}><link name="${{len(\'x\' * 10**10)}}"/></robot>')
     monkeypatch.undo()

@@ -41,7 +41,7 @@ def unit_mass(t, q, v):
         (lambda: PENDULUM.bias(0.0, np.zeros((2, 1)), np.zeros((3, 1))), "batch axes of v"),
         (lambda: PENDULUM.inverse_dynamics(np.zeros(2), ZERO, ZERO, np.zeros((3, 1))), "batch axes of a"),
         (lambda: generalized_force(lambda t, q: [q], 2), r"position 0 must have shape \(3, 1\)"),
-        (lambda: generalized_force(lambda t, q: [], 2), "one particle at least"),
+        (lambda: generalized_force(lambda t, q: [], 2), "at least one particle"),
         (lambda: generalized_force(lambda t, q: q[7], 2), "cannot be evaluated"),
         (lambda: generalized_force(lambda t, q: [q], 3)(0.0, np.zeros(3), np.zeros((2, 3))), "forces must have shape"),
         (lambda: lagrangian_of_particles([1.0, 2.0], lambda t, q: [q], 3), "2 masses but 1 positions"),

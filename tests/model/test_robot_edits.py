@@ -95,17 +95,17 @@ def test_payload_is_a_link_fastened_by_a_fixed_joint(tmp_path: Path):
 @pytest.mark.parametrize(
     ("edit", "said"),
     [
-        ({"lock": {"elbow": 0.1}}, "lock: no joint 'elbow' that moves freely; nearest: elbow_joint"),
+        ({"lock": {"elbow": 0.1}}, "lock: no free joint 'elbow'; nearest: elbow_joint"),
         ({"lock": {"elbow_joint": "open"}}, "lock of 'elbow_joint'"),
         ({"lock": {"elbow_joint": np.nan}}, "lock of 'elbow_joint' must be finite"),
         ({"lock": {"elbow_joint": [1, 2]}}, "lock of 'elbow_joint'"),
-        ({"lock": {7: 0.1}}, "lock: no joint 7"),
+        ({"lock": {7: 0.1}}, "lock: no free joint 7"),
         ({"lock": 0.5}, "lock"),
         ({"lock": ["elbow_joint"]}, "lock"),
         ({"armature": -0.1}, "armature of 'shoulder_pan_joint' must not be negative"),
         ({"armature": [0.1, 0.2]}, r"armature must be one number or of shape \(6,\)"),
         ({"armature": "big"}, "armature"),
-        ({"armature": {"wrist_4_joint": 0.1}}, "armature: no joint 'wrist_4_joint' .*nearest: wrist_"),
+        ({"armature": {"wrist_4_joint": 0.1}}, "armature: no free joint 'wrist_4_joint'.*nearest: wrist_"),
         ({"gravity": (0, -9.8)}, r"gravity must have shape \(3,\)"),
         ({"gravity": (0, 0, np.inf)}, "gravity must be finite"),
         ({"gravity": "down"}, "gravity must be real numbers"),
@@ -140,5 +140,5 @@ def test_payload_without_meaning_is_refused(values: dict[str, Any], said: str):
 def test_some_joint_must_stay_free():
     for name in ("ur5", "panda"):
         robot = rd.load(name)
-        with pytest.raises(EditError, match="no joint is left to move"):
+        with pytest.raises(EditError, match="all joints are locked"):
             robot.with_(lock=dict.fromkeys(robot.joint_names, 0.1))

@@ -113,7 +113,7 @@ def test_what_a_urdf_cannot_state_is_told_and_stands_in_a_comment(tmp_path: Path
     robot = rd.load("ur5").with_(armature=0.1, gravity=(0.0, 0.0, -1.62))
     with pytest.warns(ModelWarning, match="armature is not in the URDF.*gravity is not in the URDF"):
         path = robot.to_urdf(tmp_path / "arm.urdf")
-    assert path.read_text(encoding="utf-8").count("which has no place for it") == 2
+    assert path.read_text(encoding="utf-8").count("which cannot express it") == 2
 
 
 def test_the_file_that_was_read_is_not_replaced(tmp_path: Path) -> None:

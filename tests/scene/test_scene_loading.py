@@ -65,7 +65,7 @@ def test_what_is_left_out_of_mjcf_is_told_by_run_file_batch_and_explanation(tmp_
     run = rd.simulate(setup)
     again = rd.load_run(rd.save_run(run, tmp_path / "run.npz"))
     for text in (run.summary, again.summary, rd.rollouts(setup, q0=Q[None]).summary, repr(rd.explain(path))):
-        assert "tendon 'cable': tendons are not taken; left out" in text
+        assert "tendon 'cable': tendons are not supported; left out" in text
     with pytest.raises(SceneError, match=r"tendon 'cable'.*without=\{'tendon'\}"):
         rd.read_scene(scene(tmp_path, "rig.xml", ""))
 

@@ -226,9 +226,9 @@ def test_the_corrected_file_of_the_doctor_is_the_robot_that_is_loaded(tmp_path: 
         ({"mass": {"link1": float("nan")}}, "mass of link 'link1' must be"),
         ({"mass": {"link2": 2.0}}, "link 'link2' has 3.1 kg in its file"),
         ({"mass": {"base": 2.0}}, "link 'link1' moves with joint 'joint1' and has no mass"),
-        ({"mass": 3.0}, "mass must give masses by link"),
+        ({"mass": 3.0}, "mass must map links to masses"),
         ({"total_mass": 0.0}, "total_mass must be positive"),
-        ({"total_mass": 3.0}, "leaves nothing: 3.1 kg are known"),
+        ({"total_mass": 3.0}, "leaves nothing to share: 3.1 kg are stated"),
         ({"density": -1.0}, "density must be positive"),
         ({"total_mass": 9.0, "density": 900.0}, "contradict each other"),
     ],
@@ -262,7 +262,7 @@ def test_a_base_whose_shape_cannot_be_read_keeps_no_arm_out(tmp_path: Path) -> N
     assert light.total_mass == pytest.approx(14.0)
     assert heavy.total_mass == pytest.approx(18.0)
     (said,) = (each for each in heavy.findings if "'base'" in each)
-    assert "nor a share of the total mass, so that the other links are too heavy" in said
+    assert "and no share of the total mass, so the other links are too heavy" in said
     assert "missing.stl" in said
     assert "mass={'base': …}" in said
     (said,) = (each for each in light.findings if "'base'" in each)
@@ -287,7 +287,7 @@ def test_a_shape_of_length_0_has_no_volume(tmp_path: Path) -> None:
 
 def test_masses_are_refused_where_nothing_is_estimated(tmp_path: Path) -> None:
     path = arm(tmp_path, BOX)
-    with pytest.raises(rd.RobotDynError, match=r"are for inertia='from_shapes'"):
+    with pytest.raises(rd.RobotDynError, match=r"need inertia='from_shapes'"):
         rd.load(path, total_mass=3.0)
     with pytest.raises(rd.RobotDynError, match=r"no inertia 'from_shape'; .*from_shapes"):
         rd.load(path, inertia="from_shape", total_mass=3.0)

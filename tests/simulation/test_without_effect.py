@@ -74,7 +74,7 @@ def test_an_edit_of_none_is_refused(name: str) -> None:
 
 
 def test_folders_of_packages_that_are_none_are_refused(tmp_path) -> None:
-    with pytest.raises(CatalogError, match=r"package_dirs must be several folders, such as \['/opt/arms'\]"):
+    with pytest.raises(CatalogError, match=r"package_dirs must be a list of folders, for example \['/opt/arms'\]"):
         rd.load("ur5", package_dirs="/opt/arms")
     with pytest.raises(CatalogError, match=r"package_dirs: there is no folder .*/arm; correct it"):
         rd.load("ur5", package_dirs=[tmp_path, tmp_path / "arm"])

@@ -56,7 +56,7 @@ def test_what_the_reader_of_a_format_does_not_take_is_noted_and_does_not_reach_s
     compressed = {"KHR_draco_mesh_compression": {"bufferView": 0}}
     primitive = {"attributes": {"POSITION": 0}, "indices": 1, "extensions": compressed}
     (tmp_path / "a.gltf").write_text(json.dumps(gltf() | {"meshes": [{"primitives": [primitive]}]}))
-    assert "its reader says: " in drawn(urdf(mesh_visual("a.gltf")), tmp_path).notes[0]
+    assert "its reader reports: " in drawn(urdf(mesh_visual("a.gltf")), tmp_path).notes[0]
     assert capfd.readouterr() == ("", "")
 
 
@@ -206,7 +206,7 @@ UNREAD = {
 def test_gltf_that_would_be_drawn_wrong_is_replaced_and_told(what: str, tmp_path: Path) -> None:
     (tmp_path / "a.gltf").write_text(json.dumps(gltf() | UNREAD[what]))
     here = drawn(urdf(mesh_visual("a.gltf")), tmp_path)
-    assert f"has {what}, which are not read; export it without them" in here.notes[0]
+    assert f"has {what}, which are not supported; export it without them" in here.notes[0]
 
 
 @pytest.mark.parametrize(
@@ -217,7 +217,7 @@ def test_gltf_reads_no_buffer_that_is_not_beside_or_below_it(uri: str, tmp_path:
     (tmp_path / "meshes" / "parts").mkdir(parents=True)
     (tmp_path / "meshes" / "a.gltf").write_text(json.dumps(gltf(uri.format(folder=tmp_path))))
     here = drawn(urdf(mesh_visual("meshes/a.gltf")), tmp_path)
-    assert "is not beside the mesh, nor below it" in here.notes[0]
+    assert "is not in the folder of the mesh or below it" in here.notes[0]
 
 
 def test_gltf_may_not_open_more_than_the_limit_in_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -230,7 +230,7 @@ def test_gltf_may_not_open_more_than_the_limit_in_all(tmp_path: Path, monkeypatc
         (tmp_path / f"{name}.bin").write_bytes(CORNERS.tobytes() + FACES.tobytes() + b" " * 3000)
     monkeypatch.setattr(mesh_files, "MAX_BYTES", 10_000)
     here = drawn(urdf(mesh_visual("a.gltf")), tmp_path)
-    assert "is one file too many" in here.notes[0]
+    assert "makes the total exceed" in here.notes[0]
 
 
 # --- Collada

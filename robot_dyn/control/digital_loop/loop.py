@@ -22,7 +22,7 @@ import numpy as np
 
 from robot_dyn.control.controller import Controller, Nested, check_joints, check_sampled, nested
 from robot_dyn.control.digital_loop.block import Block
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import ControlError, shown
 from robot_dyn.foundations.threshold import smooth
@@ -132,7 +132,7 @@ class Loop(Controller):
         return self.controller.task_frame
 
     @property
-    def saturation(self) -> Array:
+    def saturation(self) -> Scalar:
         return self.controller.saturation
 
     @property

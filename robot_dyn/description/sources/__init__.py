@@ -1,4 +1,4 @@
-"""Descriptions that other packages make or keep, read on request alone.
+"""Descriptions from other packages, read only on request.
 
 mjcf, mjcf_model, mjcf_actuators, mjcf_shapes  MJCF as MuJoCo compiles it, as a URDF
 xacro                                          the URDF that a file of macros expands to

@@ -1,12 +1,12 @@
 """MJCF, the format of MuJoCo: compiled by MuJoCo itself, and written as a URDF of hinges and slides.
 
-A body with joints 1 … k of anchors p_i and axes a_i, in its own axes, stands in its parent at
+A body with joints 1 … k, with anchors p_i and axes a_i in body axes, has the placement in its parent
 
-    T_body · Π_i Tr(p_i) exp(â_i (q_i − q0_i)) Tr(−p_i)        a hinge; a slide is Tr(a_i (q_i − q0_i))
+    T_body · Π_i Tr(p_i) exp(â_i (q_i − q0_i)) Tr(−p_i)        for a hinge; a slide is Tr(a_i (q_i − q0_i))
 
-so several joints of a body become links without mass between them. Defaults and `inertiafromgeom` are those of the
-compiler. Damping, dry friction, ranges and limits of actuators stand in the URDF as in any other, armature and gravity
-are edits, shapes are <visual> elements; contacts, actuators, sensors and springs are left out.
+so several joints of one body are separated by massless links. The compiler resolves defaults and `inertiafromgeom`.
+The URDF contains damping, dry friction, ranges and actuator limits; armature and gravity become edits, shapes become
+<visual> elements. Contacts, actuators, sensors and springs are left out.
 
 Source: MuJoCo documentation, Computation.
 """
@@ -26,7 +26,7 @@ from robot_dyn.description.couplings import Mimic, resolve
 from robot_dyn.description.description import content
 from robot_dyn.description.edits import Changes
 from robot_dyn.description.sources.mjcf_actuators import Actuators
-from robot_dyn.description.sources.mjcf_model import Compiled, compiled
+from robot_dyn.description.sources.mjcf_model import Compiled, compile_model
 from robot_dyn.description.sources.mjcf_shapes import Shapes
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.arithmetic import FLOAT64
@@ -34,7 +34,7 @@ from robot_dyn.foundations.errors import DescriptionError, shorten, shown
 from robot_dyn.foundations.spatial import rotation, rpy_of
 
 SUFFIXES = (".xml", ".mjcf")
-_START = 2**16  # bytes, in which a file says what it is
+_START = 2**16  # bytes searched for the root element
 LEAVABLE = ("tendon", "equality", "free", "ball")
 _EQUALITIES = ("connect", "weld", "joint", "tendon", "flex", "flexvert", "flexstrain", "distance")
 
@@ -42,13 +42,13 @@ _EQUALITIES = ("connect", "weld", "joint", "tendon", "flex", "flexvert", "flexst
 @final
 @dataclass(frozen=True)
 class Mjcf:
-    """What a file of MJCF says.
+    """Contents of an MJCF file.
 
     Attributes:
-        urdf: As a URDF.
-        armature: By joint, in [kg m²] or [kg]; that of a follower at the joint that it follows.
+        urdf: The model as a URDF.
+        armature: Armature by joint, in [kg m²] or [kg]; that of a mimic joint is added to the joint it follows.
         gravity: Acceleration of free fall, in [m/s²].
-        findings: What was left out.
+        findings: Notes on left-out elements.
     """
 
     urdf: bytes
@@ -57,49 +57,49 @@ class Mjcf:
     findings: tuple[str, ...]
 
     def edits(self, joint_names: Iterable[str]) -> Changes:
-        """The edits of a robot with these joints."""
+        """Return the edits of a robot with these joints."""
         armature = {name: value for name, value in self.armature.items() if name in joint_names and value}
         return Changes(armature=armature, gravity=self.gravity)
 
 
 def is_mjcf(path: Path) -> bool:
-    """Whether a file is MJCF, by its suffix and its root."""
+    """Return True if a file has a suffix and a root element of MJCF."""
     return path.suffix.lower() in SUFFIXES and b"<mujoco" in content(path)[:_START]
 
 
 def leavable(without: Iterable[str]) -> frozenset[str]:
-    """What is to be left out, checked.
+    """Return the kinds of elements to leave out, as a checked set.
 
     Raises:
         DescriptionError: If it is not several of `LEAVABLE`.
     """
-    if not isinstance(without, set | frozenset | tuple | list) or not all(each in LEAVABLE for each in without):
-        raise DescriptionError(f"without must be some of {', '.join(LEAVABLE)}, as a set, got {shown(without)}")
+    if not isinstance(without, set | frozenset | tuple | list) or not all(kind in LEAVABLE for kind in without):
+        raise DescriptionError(f"without must be a set of {', '.join(LEAVABLE)}, got {shown(without)}")
     return frozenset(without)
 
 
 def read(path: Path, without: frozenset[str] = frozenset()) -> Mjcf:
-    """A file of MJCF as a URDF and edits.
+    """Read an MJCF file as a URDF with edits.
 
     Raises:
         MissingExtraError: If MuJoCo is not installed.
-        DescriptionError: If MuJoCo refuses the file, or it has tendons, equalities other than of two joints and degree
-            1, or free or ball joints, that `without` does not name.
+        DescriptionError: If MuJoCo refuses the file; or if it has tendons, free or ball joints, or equalities other
+            than linear ones between two joints, and `without` does not list them.
     """
-    return _Reader(compiled(path), without).read()
+    return _Reader(compile_model(path), without).read()
 
 
 @dataclass
 class _Reader:
     """Writes the URDF of one compiled model."""
 
-    of: Compiled
+    compiled: Compiled
     without: frozenset[str]
     mimics: dict[str, Mimic] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.mujoco, self.model, self.source = self.of.mujoco, self.of.model, str(self.of.path)
-        self.findings, self.shapes = [*self.of.warnings], Shapes(self.of)
+        self.mujoco, self.model, self.source = self.compiled.mujoco, self.compiled.model, str(self.compiled.path)
+        self.findings, self.shapes = [*self.compiled.warnings], Shapes(self.compiled)
 
     def read(self) -> Mjcf:
         self.refuse_tendons()
@@ -110,20 +110,18 @@ class _Reader:
         for body in range(1, self.model.nbody):
             self.write_body(out, body)
         for kind, number in Counter(self.shapes.left_out).items():
-            self.findings.append(
-                f"geoms of kind {kind}, of which there are {number}, are not drawn: URDF has no such shape"
-            )
-        gravity = (0.0,) * 3 if self.of.disabled("gravity") else tuple(map(float, self.model.opt.gravity))
+            self.findings.append(f"{number} geoms of kind {kind} are not drawn, because URDF has no such shape")
+        gravity = (0.0,) * 3 if self.compiled.disabled("gravity") else tuple(map(float, self.model.opt.gravity))
         return Mjcf(etree.tostring(out), self.at_joints("armature", 2), gravity, tuple(self.findings))
 
-    def leave(self, what: str, where: str, why: str) -> None:
-        """A finding if this is to be left out; otherwise a refusal."""
-        if what not in self.without:
-            raise DescriptionError(f"{self.source}: {where}: {why}; remove it, or leave it out: without={{{what!r}}}")
+    def leave(self, kind: str, where: str, why: str) -> None:
+        """Add a finding if `without` lists this kind of element; raise DescriptionError otherwise."""
+        if kind not in self.without:
+            raise DescriptionError(f"{self.source}: {where}: {why}; remove it, or load with without={{{kind!r}}}")
         self.findings.append(f"{where}: {why}; left out")
 
     def new(self, name: str) -> str:
-        """A name of what MuJoCo does not name, that no body or joint has."""
+        """Return a name that no body or joint has, for an element without a counterpart in MuJoCo."""
         taken = {*map(self.body, range(self.model.nbody)), *map(self.joint, range(self.model.njnt))}
         while name in taken:
             name += "_"
@@ -134,10 +132,10 @@ class _Reader:
         return names[: names.index(b"\0")].decode(errors="replace").strip() or "mjcf"
 
     def body(self, index: int) -> str:
-        return self.of.name("body", index)
+        return self.compiled.name("body", index)
 
     def joint(self, index: int) -> str:
-        return self.of.name("joint", index)
+        return self.compiled.name("joint", index)
 
     def moves(self, joint: int) -> bool:
         return self.kind(joint) in ("hinge", "slide")
@@ -146,10 +144,10 @@ class _Reader:
         return self.mujoco.mjtJoint(int(self.model.jnt_type[joint])).name.removeprefix("mjJNT_").lower()
 
     def dof(self, what: str, joint: int) -> float:
-        """Armature, damping or dry friction of a joint, with those of its actuators."""
+        """Return the armature, damping or dry friction of a joint, including its actuators."""
         of_joint = float(getattr(self.model, f"dof_{what}")[self.model.jnt_dofadr[joint]])
         off = {"damping": ("passive", "damper"), "frictionloss": ("constraint", "frictionloss")}.get(what, ())
-        return of_joint * (not self.of.disabled(*off)) + self.actuators.added(what, joint)
+        return of_joint * (not self.compiled.disabled(*off)) + self.actuators.added(what, joint)
 
     @property
     def actuators(self) -> Actuators:
@@ -159,7 +157,7 @@ class _Reader:
         return float(self.model.qpos0[self.model.jnt_qposadr[joint]])
 
     def at_joints(self, what: str, power: int) -> dict[str, float]:
-        """Values by joint, those of followers times |ratio|ᵖ at the joint that they follow: by virtual work."""
+        """Return values by joint; those of mimic joints count |ratio|ᵖ at the joint they follow, by virtual work."""
         total: dict[str, float] = {}
         for j in filter(self.moves, range(self.model.njnt)):
             source, ratio, _ = resolve(self.joint(j), self.mimics, FLOAT64)
@@ -168,21 +166,21 @@ class _Reader:
 
     def refuse_tendons(self) -> None:
         for index in range(self.model.ntendon):
-            name = self.of.name("tendon", index)
-            self.leave("tendon", f"tendon {name!r}", "tendons are not taken")
+            name = self.compiled.name("tendon", index)
+            self.leave("tendon", f"tendon {name!r}", "tendons are not supported")
 
     def equalities(self) -> None:
-        """Two joints in proportion become a mimic joint; any other equality is refused, or left out."""
+        """Turn a linear equality of two joints into a mimic joint; refuse or leave out any other."""
         model = self.model
         for index in range(model.neq):
             kind, (one, other) = int(model.eq_type[index]), (int(model.eq_obj1id[index]), int(model.eq_obj2id[index]))
-            name = self.of.name("equality", index)
+            name = self.compiled.name("equality", index)
             a0, a1, *higher = model.eq_data[index][:5].tolist()
-            if not model.eq_active0[index] or self.of.disabled("equality", "constraint"):
+            if not model.eq_active0[index] or self.compiled.disabled("equality", "constraint"):
                 self.findings.append(f"equality {name!r}: is not active; left out")
             elif kind == int(self.mujoco.mjtEq.mjEQ_JOINT) and other >= 0 and a1 and not any(higher):
                 if self.joint(one) in self.mimics:
-                    self.leave("equality", f"equality {name!r}", f"joint {self.joint(one)!r} follows another already")
+                    self.leave("equality", f"equality {name!r}", f"joint {self.joint(one)!r} already follows another")
                     continue
                 offset = a0 + self.reference(one) - a1 * self.reference(other)
                 self.mimics[self.joint(one)] = Mimic(self.joint(other), repr(a1), repr(offset))
@@ -191,28 +189,26 @@ class _Reader:
                 self.leave("equality", f"equality {name!r}", f"an equality of {what} that is not q₁ = a₀ + a₁ q₂")
 
     def note_the_rest(self) -> None:
-        """What acts in MuJoCo and is not of a robot: effects state it."""
+        """Add findings for physics that MuJoCo models and a URDF cannot state; effects can."""
         model = self.model
         springs = [self.joint(j) for j in range(model.njnt) if model.jnt_stiffness[j].any()]
         if springs:
             listed = shorten(", ".join(springs), 200)
-            self.findings.append(f"joints {listed}: have springs, which are left out; add them as effects")
-        if getattr(model, "dof_dampingpoly", np.zeros(1)).any():  # of MuJoCo 4
-            self.findings.append("damping that is not linear is left out; add it as an effect")
+            self.findings.append(f"joints {listed}: their springs are left out; add them as effects")
+        if getattr(model, "dof_dampingpoly", np.zeros(1)).any():  # from MuJoCo 4 on
+            self.findings.append("nonlinear damping is left out; add it as an effect")
         for what in filter(self.actuators.not_at_joints, ("armature", "damping")):
             self.findings.append(f"{what} of actuators that do not act at a joint is left out")
         if model.opt.density or model.opt.viscosity:
-            self.findings.append(
-                "forces of the medium, of its density and viscosity, are left out; add them as effects"
-            )
+            self.findings.append("forces of the medium (density, viscosity) are left out; add them as effects")
         if model.body_gravcomp.any():
-            self.findings.append("gravity compensation of bodies is left out; add it by a controller")
+            self.findings.append("gravity compensation of bodies is left out; add it in a controller")
 
     def write_body(self, out: Any, body: int) -> None:
-        """The joints of a body, and its link, whose frame is that of the body in MuJoCo."""
+        """Write the joints of a body and its link, whose frame is the body's frame in MuJoCo."""
         model, name = self.model, self.body(body)
         R, p, parent = (
-            self.of.rotation(model.body_quat[body]),
+            self.compiled.rotation(model.body_quat[body]),
             model.body_pos[body],
             self.body(model.body_parentid[body]),
         )
@@ -252,16 +248,16 @@ class _Reader:
             mimic = self.mimics[name]
             etree.SubElement(joint, "mimic", joint=mimic.source, multiplier=mimic.multiplier, offset=mimic.offset)
             return
-        damping, friction = (self.at_joints(*each)[name] for each in (("damping", 2), ("frictionloss", 1)))
+        damping, friction = (self.at_joints(*term)[name] for term in (("damping", 2), ("frictionloss", 1)))
         etree.SubElement(joint, "dynamics", damping=repr(damping), friction=repr(friction))
 
     def effort(self, j: int) -> str:
-        """The largest force of the actuators of a joint, if it is limited and the same in both directions."""
+        """Return the largest force of a joint's actuators, if limited and equal in both directions."""
         limits = self.actuators.range(j)
         if limits is not None and limits[0] != -limits[1]:
             self.findings.append(
-                f"joint {self.joint(j)!r}: its actuators exert {limits[0]:g} to {limits[1]:g}, not the same in both"
-                " directions; no effort limit is taken"
+                f"joint {self.joint(j)!r}: its actuators exert {limits[0]:g} to {limits[1]:g}, different in the two"
+                " directions; no effort limit is set"
             )
             limits = None
         return UNBOUNDED if limits is None else repr(limits[1])
@@ -273,8 +269,8 @@ class _Reader:
         etree.SubElement(joint, "child", link=child)
 
     def inertial(self, link: Any, body: int) -> None:
-        model, R = self.model, self.of.rotation(self.model.body_iquat[body])
-        with np.errstate(all="ignore"):  # what is infinite is refused when the text is read
+        model, R = self.model, self.compiled.rotation(self.model.body_iquat[body])
+        with np.errstate(all="ignore"):  # the URDF reader refuses infinite values
             inertia = R * model.body_inertia[body] @ R.T
         element = etree.SubElement(link, "inertial")
         etree.SubElement(element, "origin", xyz=_words(model.body_ipos[body]), rpy="0 0 0")

@@ -1,6 +1,8 @@
-"""What the actuators of a MJCF file add to its joints: limits of their force, and armature and damping times gear².
+"""Contributions of the actuators of an MJCF file to its joints: force limits, and armature and damping times gear².
 
-τ_joint = gear · force;  servos and other control laws are of a controller, and are left out
+    τ_joint = gear · force
+
+Servos and other control laws belong to a controller and are left out.
 """
 
 from __future__ import annotations
@@ -14,10 +16,10 @@ import numpy as np
 @final
 @dataclass(frozen=True)
 class Actuators:
-    """The actuators of a compiled model.
+    """Actuators of a compiled model.
 
     Attributes:
-        mujoco: The module.
+        mujoco: The module `mujoco`.
         model: The `MjModel`.
     """
 
@@ -25,28 +27,28 @@ class Actuators:
     model: Any
 
     def at(self, joint: int) -> list[int]:
-        """Those that act at a joint."""
+        """Return the actuators that act at a joint."""
         model, kinds = self.model, self.mujoco.mjtTrn
         types = (int(kinds.mjTRN_JOINT), int(kinds.mjTRN_JOINTINPARENT))
         return [
             a for a in range(model.nu) if model.actuator_trntype[a] in types and model.actuator_trnid[a, 0] == joint
         ]
 
-    def stated(self, what: str) -> np.ndarray:
-        """Armature, damping or another number of each, which MuJoCo has from version 4 on."""
-        return getattr(self.model, f"actuator_{what}", np.zeros(self.model.nu))
+    def stated(self, quantity: str) -> np.ndarray:
+        """Return armature, damping or another value of each actuator; zeros before MuJoCo 4."""
+        return getattr(self.model, f"actuator_{quantity}", np.zeros(self.model.nu))
 
-    def added(self, what: str, joint: int) -> float:
-        """Their armature or damping at a joint: Σ gear² of each."""
-        return sum(float(self.model.actuator_gear[a, 0]) ** 2 * float(self.stated(what)[a]) for a in self.at(joint))
+    def added(self, quantity: str, joint: int) -> float:
+        """Return the actuators' armature or damping at a joint, Σ gear² · value."""
+        return sum(float(self.model.actuator_gear[a, 0]) ** 2 * float(self.stated(quantity)[a]) for a in self.at(joint))
 
-    def not_at_joints(self, what: str) -> bool:
-        """Whether one that acts at a tendon, a site or a body has armature or damping."""
+    def not_at_joints(self, quantity: str) -> bool:
+        """Return True if an actuator of a tendon, a site or a body has armature or damping."""
         others = {*range(self.model.nu)}.difference(*map(self.at, range(self.model.njnt)))
-        return any(bool(self.stated(what)[a]) for a in others)
+        return any(bool(self.stated(quantity)[a]) for a in others)
 
     def range(self, joint: int) -> tuple[float, float] | None:
-        """The least and the greatest torque or force at a joint; None if it has no limit."""
+        """Return the least and greatest torque or force at a joint; None if unlimited."""
         model, ranges = self.model, []
         if model.jnt_actfrclimited[joint]:
             ranges.append(tuple(map(float, model.jnt_actfrcrange[joint])))
@@ -56,7 +58,7 @@ class Actuators:
         return (max(low for low, _ in ranges), min(high for _, high in ranges)) if ranges else None
 
     def _range(self, actuator: int) -> tuple[float, float] | None:
-        """That of one: its force range, or of a motor its control range; None if it has no limit."""
+        """Return an actuator's force range, or the control range of a motor; None if unlimited."""
         model, gear = self.model, float(self.model.actuator_gear[actuator, 0])
         motor = model.actuator_biastype[actuator] == int(self.mujoco.mjtBias.mjBIAS_NONE)
         motor = motor and model.actuator_dyntype[actuator] == int(self.mujoco.mjtDyn.mjDYN_NONE)

@@ -1,4 +1,4 @@
-"""A file of MJCF as MuJoCo compiles it, and what MuJoCo warns of."""
+"""An MJCF file compiled by MuJoCo, with MuJoCo's warnings."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from robot_dyn.foundations.extras import needs
 @final
 @dataclass(frozen=True, eq=False)
 class Compiled:
-    """A compiled file.
+    """A compiled MJCF file.
 
     Attributes:
-        mujoco: The module.
+        mujoco: The module `mujoco`.
         model: The `MjModel`.
         path: The file.
-        references: `refpos` and `refquat` of each mesh by name, which the model does not keep.
-        warnings: What MuJoCo warns of, in sentences.
+        references: `refpos` and `refquat` of each mesh by name, which the model does not store.
+        warnings: Warnings of MuJoCo, as sentences.
     """
 
     mujoco: Any
@@ -34,44 +34,44 @@ class Compiled:
     warnings: tuple[str, ...]
 
     def name(self, kind: str, index: int) -> str:
-        """The name of a body, joint, mesh …; body_3 if it has none."""
+        """Return the name of a body, joint, mesh …; for example body_3 if it has none."""
         kinds = getattr(self.mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
         return (self.mujoco.mj_id2name(self.model, kinds, index) or "").strip() or f"{kind}_{index}"
 
     def disabled(self, *flags: str) -> bool:
-        """Whether one of these flags of `<option>` is "disable", as far as this version of MuJoCo has it."""
+        """Return True if `<option>` disables one of these flags, where this version of MuJoCo has the flag."""
         bits = (int(getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)) for flag in flags)
         return any(int(self.model.opt.disableflags) & bit for bit in bits)
 
     def rotation(self, quaternion: Any) -> np.ndarray:
-        """The matrix (3, 3) of a quaternion (w, x, y, z)."""
+        """Return the matrix (3, 3) of a quaternion (w, x, y, z)."""
         R = np.zeros(9)
         self.mujoco.mju_quat2Mat(R, quaternion / np.linalg.norm(quaternion))
         return R.reshape(3, 3)
 
 
-def compiled(path: Path) -> Compiled:
-    """The model of a file.
+def compile_model(path: Path) -> Compiled:
+    """Compile an MJCF file.
 
     Raises:
         MissingExtraError: If MuJoCo is not installed.
         DescriptionError: If MuJoCo refuses the file.
     """
     mujoco: Any = needs("mujoco", extra="mjcf")
-    with _heard(mujoco) as heard:
+    with _warnings(mujoco) as warnings:
         try:
             model = mujoco.MjModel.from_xml_path(str(path))
             meshes = mujoco.MjSpec.from_file(str(path)).meshes if model.nmesh else ()
         except Exception as error:  # ValueError of the compiler, and those of its readers of meshes
             raise DescriptionError(f"{path}: MuJoCo refuses it: {shorten(' '.join(str(error).split()), 300)}") from None
-    references = {each.name or Path(each.file).stem: (each.refpos.copy(), each.refquat.copy()) for each in meshes}
-    sentences = (f"MuJoCo warns: {shorten(' '.join(each.split()), 300)}" for each in dict.fromkeys(heard))
+    references = {mesh.name or Path(mesh.file).stem: (mesh.refpos.copy(), mesh.refquat.copy()) for mesh in meshes}
+    sentences = (f"MuJoCo warns: {shorten(' '.join(text.split()), 300)}" for text in dict.fromkeys(warnings))
     return Compiled(mujoco, model, path, references, tuple(sentences))
 
 
 @contextmanager
-def _heard(mujoco: Any) -> Iterator[list[str]]:
-    """Warnings of MuJoCo, which otherwise go to a file MUJOCO_LOG.TXT in the current directory."""
+def _warnings(mujoco: Any) -> Iterator[list[str]]:
+    """Collect the warnings of MuJoCo, which would otherwise go to MUJOCO_LOG.TXT in the working directory."""
     warnings: list[str] = []
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(warnings.append)

@@ -1,7 +1,7 @@
-"""Robots of the package robot_descriptions, by names such as robot_descriptions:ur10e_description.
+"""Robots of the package robot_descriptions, with names such as robot_descriptions:ur10e_description.
 
-The package keeps its files in a cache, ~/.cache/robot_descriptions, and downloads what is not there as soon as a
-description is imported. Here it is imported only if its files are there, or on request.
+The package caches its files in ~/.cache/robot_descriptions and downloads missing ones as soon as a description is
+imported. Here a description is imported only if its files exist, or on request.
 """
 
 from __future__ import annotations
@@ -27,32 +27,32 @@ class Described:
     """A description on disk.
 
     Attributes:
-        path: Its URDF or xacro file.
-        package_dirs: Where its packages are.
-        arguments: Of its xacro file; None for a URDF.
+        path: URDF or xacro file.
+        package_dirs: Folders that contain its packages.
+        arguments: Arguments of the xacro file; None for a URDF.
     """
 
     path: Path
     package_dirs: tuple[Path, ...]
     arguments: Mapping[str, Any] | None
 
-    def expansion(self, given: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
-        """Arguments of xacro: its own, unless others are given; None for a URDF if none are given."""
-        return given if self.arguments is None else {**self.arguments, **(given or {})}
+    def expansion(self, arguments: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
+        """Return the xacro arguments, those of the user over the description's own; None for a URDF without any."""
+        return arguments if self.arguments is None else {**self.arguments, **(arguments or {})}
 
 
 def find(name: str, download: bool) -> Described:
-    """The files of a name.
+    """Return the files of a description.
 
     Raises:
         MissingExtraError: If the package is not installed.
-        CatalogError: If it has no such description, or one of MJCF alone; if it is not on disk and not to be
-            downloaded; if the download fails.
+        CatalogError: If there is no such description, it is MJCF only, it is not on disk and `download` is False, or
+            the download fails.
     """
     description = name.removeprefix(PREFIX)
-    known = needs("robot_descriptions", extra="robots").DESCRIPTIONS
-    if description not in known:
-        raise CatalogError(f"robot_descriptions has no {shorten(description)!r}; {nearest(description, known)}")
+    descriptions = needs("robot_descriptions", extra="robots").DESCRIPTIONS
+    if description not in descriptions:
+        raise CatalogError(f"robot_descriptions has no {shorten(description)!r}; {nearest(description, descriptions)}")
     if not download and not _on_disk(description):
         raise CatalogError(
             f"{name}: is not on disk; run python -m robot_descriptions pull {description}, or load it with"
@@ -64,20 +64,20 @@ def find(name: str, download: bool) -> Described:
         raise CatalogError(f"{name}: cannot be downloaded ({shorten(error, 200)}); try again") from None
     path = getattr(module, "URDF_PATH", None) or getattr(module, "XACRO_PATH", None)
     if path is None:
-        raise CatalogError(f"{name}: is MJCF, not URDF; take the description of a URDF")
-    folders = dict.fromkeys(Path(each) for each in (module.PACKAGE_PATH, module.REPOSITORY_PATH))
+        raise CatalogError(f"{name}: is MJCF, not URDF; choose a description that is a URDF")
+    folders = dict.fromkeys(Path(folder) for folder in (module.PACKAGE_PATH, module.REPOSITORY_PATH))
     around = dict.fromkeys((*folders, *(folder.parent for folder in folders)))
     arguments = getattr(module, "XACRO_ARGS", {}) if getattr(module, "URDF_PATH", None) is None else None
     return Described(Path(path), tuple(around), arguments)
 
 
 def _on_disk(description: str) -> bool:
-    """Whether the commit that the package names is checked out in its cache, so that no import downloads anything."""
+    """Return True if the required commit is checked out in the package's cache: then no import downloads anything."""
     git = needs("git", extra="robots")
-    known = needs("robot_descriptions._repositories", extra="robots").REPOSITORIES
+    repositories = needs("robot_descriptions._repositories", extra="robots").REPOSITORIES
     commit = os.environ.get("ROBOT_DESCRIPTION_COMMIT")
     cache = Path(os.environ.get("ROBOT_DESCRIPTIONS_CACHE", "~/.cache/robot_descriptions")).expanduser()
-    for repository in map(known.get, _repositories(description)):
+    for repository in map(repositories.get, _repositories(description)):
         if repository is None:
             return False
         inside = (
@@ -93,15 +93,16 @@ def _on_disk(description: str) -> bool:
 
 
 def _repositories(description: str) -> list[str]:
-    """The repositories that a description asks for, by the source of its module: importing it would download them."""
+    """Return the repositories that a description requires, read from its source: an import would download them."""
     spec = find_spec(f"robot_descriptions.{description}")
     if spec is None or spec.origin is None:
-        return [""]  # of another version of the package: not known to be on disk
-    calls = (each for each in ast.walk(ast.parse(Path(spec.origin).read_text("utf-8"))) if isinstance(each, ast.Call))
-    named = [
+        return [""]  # another version of the package: treated as not on disk
+    nodes = ast.walk(ast.parse(Path(spec.origin).read_text("utf-8")))
+    calls = (node for node in nodes if isinstance(node, ast.Call))
+    names = [
         call.args[0].value
         for call in calls
         if isinstance(call.func, ast.Name) and "clone_to_cache" in call.func.id and call.args
         if isinstance(call.args[0], ast.Constant)
     ]
-    return [str(each) for each in named] or [""]
+    return [str(name) for name in names] or [""]

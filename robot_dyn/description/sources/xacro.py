@@ -1,8 +1,8 @@
-"""Expansion of xacro macros, by the reference implementation, the package xacro.
+"""Expansion of xacro macros by the reference implementation, the package xacro.
 
-xacro evaluates expressions of the file as Python, with a filter that stops mistakes and not an attacker: **a xacro file
-is a program**. It is expanded only on request, in a separate process with limits of time and memory,
-since xacro keeps its state in its module and writes to stderr. The result is read as any other file.
+xacro evaluates expressions of the file as Python; its filter stops mistakes, not attackers: **a xacro file is a
+program**. It is expanded only on request, in a separate process with limits on time and memory, because xacro keeps
+state in its module and writes to stderr. The result is read like any other file.
 """
 
 from __future__ import annotations
@@ -34,20 +34,20 @@ answer()
 
 
 def expand(path: Path, arguments: Mapping[str, Any], package_dirs: Iterable[str | Path]) -> tuple[bytes, list[str]]:
-    """The URDF that a xacro file expands to, and the warnings of xacro.
+    """Expand a xacro file; return the URDF and the warnings of xacro.
 
     Args:
         path: The file.
         arguments: Values of its `<xacro:arg>` elements by name: texts, numbers or booleans.
-        package_dirs: Where `$(find package)` searches first, see `packages`.
+        package_dirs: Folders that `$(find package)` searches first, see `packages`.
 
     Raises:
-        DescriptionError: If xacro is not installed, refuses the file, takes too long, or knows no such argument.
+        DescriptionError: If xacro is not installed, fails, takes too long, or has no such argument.
     """
     if find_spec("xacro") is None:
         raise DescriptionError(f"{path}: to expand it, the package xacro is needed; pip install robot-dyn[xacro]")
     if not isinstance(arguments, Mapping):
-        raise DescriptionError(f"xacro must be a mapping of names to values, such as {{}}, got {shown(arguments)}")
+        raise DescriptionError(f"xacro must be a mapping of names to values, for example {{}}, got {shown(arguments)}")
     order = {
         "path": str(path),
         "arguments": {str(name): _text(str(name), value) for name, value in arguments.items()},
@@ -59,7 +59,7 @@ def expand(path: Path, arguments: Mapping[str, Any], package_dirs: Iterable[str 
             command, input=json.dumps(order), capture_output=True, encoding="utf-8", errors="replace", timeout=SECONDS
         )
     except subprocess.TimeoutExpired:
-        raise DescriptionError(f"{path}: its macros take more than {SECONDS} s; simplify them") from None
+        raise DescriptionError(f"{path}: expanding its macros takes over {SECONDS} s; simplify them") from None
     warnings = [line.removeprefix("warning: ") for line in child.stderr.splitlines() if line.startswith("warning: ")]
     try:
         result = json.loads(child.stdout)
@@ -74,19 +74,19 @@ def expand(path: Path, arguments: Mapping[str, Any], package_dirs: Iterable[str 
 
 
 def _text(name: str, value: Any) -> str:
-    """A value as xacro reads it."""
+    """Return a value in the form that xacro reads."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str | int | float | Path):
         return str(value)
-    raise DescriptionError(f"xacro: {name!r} must be a text, a number or a boolean, got {shown(value)}")
+    raise DescriptionError(f"xacro: {name!r} must be a string, a number or a boolean, got {shown(value)}")
 
 
 class _Arguments(dict[str, str]):
-    """Arguments that note which names the file declares or uses."""
+    """Arguments that record which names the file declares or uses."""
 
-    def __init__(self, given: Mapping[str, str]) -> None:
-        super().__init__(given)
+    def __init__(self, arguments: Mapping[str, str]) -> None:
+        super().__init__(arguments)
         self.used: set[str] = set()
 
     def __contains__(self, name: object) -> bool:
@@ -99,9 +99,9 @@ class _Arguments(dict[str, str]):
 
 
 def answer() -> None:
-    """The work of the child: an order on stdin, the URDF or an error on stdout."""
+    """Run the child process: read an order from stdin, write the URDF or an error to stdout."""
     order = json.load(sys.stdin)
-    with suppress(ImportError, OSError, ValueError):  # no such limits on this system
+    with suppress(ImportError, OSError, ValueError):  # this system has no such limits
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
@@ -113,7 +113,7 @@ def answer() -> None:
     try:
         document: Any = xacro.process_file(str(path), mappings=arguments)
         text = document.toxml()
-    except Exception as error:  # xacro and the expressions of the file raise anything
+    except Exception as error:  # xacro and the file's expressions can raise anything
         file = (xacro.filestack or [path])[-1]
         why, remedy = _why(error)
         print(json.dumps({"error": f"{why} (in {file})", "remedy": remedy}))
@@ -123,7 +123,7 @@ def answer() -> None:
 
 
 def _why(error: BaseException) -> tuple[str, str]:
-    """What xacro says and the remedy; what `_serve_packages` says, where that is the cause."""
+    """Return the error of xacro, or of `_serve_packages` if that is its cause, and the remedy."""
     cause = error
     while isinstance(cause := getattr(cause, "exc", None), BaseException):
         if isinstance(cause, RobotDynError):
@@ -136,7 +136,7 @@ def _why(error: BaseException) -> tuple[str, str]:
 
 
 def _serve_packages(path: Path, package_dirs: list[str]) -> None:
-    """Answer xacro where it asks ROS 2 for the folder of a package."""
+    """Provide the ROS 2 module in which xacro looks up the folder of a package."""
     module = ModuleType("ament_index_python.packages")
     module.get_package_share_directory = lambda name: str(catalog.package(name, path, package_dirs))  # pyright: ignore[reportAttributeAccessIssue]
     sys.modules |= {"ament_index_python": ModuleType("ament_index_python"), module.__name__: module}

@@ -3,8 +3,8 @@
     𝓜ᴬ = 𝓜 + Σ Adᵀ (𝓜ᴬ − U Uᵀ / d) Ad,   U = 𝓜ᴬ ξ,   d = ξᵀ U,   u_i = τ_i − ξᵀ Fᴬ
     a_i = (u_i − U_iᵀ A') / d_i  with  A' = Ad⁻¹ A_λ + c_i,   A_0 = −g
 
-c_i is the acceleration that the rates alone give the body, `carried` from a parent at rest; as A, it is that of the
-frame's origin, (p̈, α), with fewer products than Featherstone's spatial one. [Featherstone 2008, §7.3]
+c_i is the acceleration due to the rates alone, `carried` from a parent at rest. Like A, it is the acceleration (p̈, α)
+of the frame's origin, which needs fewer products than Featherstone's spatial acceleration. [Featherstone 2008, §7.3]
 """
 
 from __future__ import annotations
@@ -18,21 +18,24 @@ from robot_dyn.lagrange.recursions.propagation import carried, twists, wrench
 
 
 def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
-    """Acceleration a = M⁻¹ (τ − C v − N), shape (..., n).
+    """Return the acceleration a = M⁻¹ (τ − C v − N), shape (..., n).
 
     Args:
-        linkage: Its joints must not be coupled; `Lagrangian.forward_dynamics` takes those that are.
+        linkage: Bodies without coupled joints; for these use `Lagrangian.forward_dynamics`.
         q: Positions, (..., n), numbers of the linkage's arithmetic.
         v: Velocities, (..., n).
         tau: Torques, (..., n).
 
     Raises:
         QueryError: If joints are coupled.
-        SingularError: If a joint carries no inertia; UndecidedError if rounding hides whether it does.
+        SingularError: If a joint carries no inertia.
+        UndecidedError: If rounding makes this undecidable.
     """
     if linkage.couplings.S.shape[0] != linkage.couplings.S.shape[1]:
-        raise QueryError("the articulated-body algorithm takes no coupled joints; use Lagrangian.forward_dynamics")
-    S = linkage.couplings.S  # at most an exchange of joints
+        raise QueryError(
+            "the articulated-body algorithm does not support coupled joints; use Lagrangian.forward_dynamics"
+        )
+    S = linkage.couplings.S  # a permutation of joints
     X = linkage.steps(q)
     batch = np.broadcast_shapes(q.shape[:-1], v.shape[:-1], tau.shape[:-1])
     v, tau = linkage.couplings.velocity(v), tau @ S.T
@@ -48,18 +51,18 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
             raise UndecidedError(body.joint, "at this q", rounding(d[i]))
         u[i] = tau[..., i, None] - force[i][..., None, :] @ body.screw
         if body.parent != BASE:
-            left = symmetric(inertia[i] - U[i][..., :, None] * (U[i] / d[i])[..., None, :])
-            pushed = force[i] + apply(left, bias[i]) + U[i] * (u[i] / d[i])
-            inertia[body.parent] = inertia[body.parent] + X[i].inertia(left)
+            remaining = symmetric(inertia[i] - U[i][..., :, None] * (U[i] / d[i])[..., None, :])
+            pushed = force[i] + apply(remaining, bias[i]) + U[i] * (u[i] / d[i])
+            inertia[body.parent] = inertia[body.parent] + X[i].inertia(remaining)
             force[body.parent] = force[body.parent] + X[i].wrench(pushed)
 
     A: list[Array] = []
     a = np.zeros((*batch, len(linkage.bodies)), dtype=linkage.gravity.dtype)
     free_fall = np.concatenate([-linkage.gravity, np.zeros_like(linkage.gravity)])
     for i, body in enumerate(linkage.bodies):
-        given = X[i].twist(free_fall if body.parent == BASE else A[body.parent]) + bias[i]
-        joint = (u[i] - apply(U[i][..., None, :], given)) / d[i]
-        A.append(given + joint * body.screw)
+        inherited = X[i].twist(free_fall if body.parent == BASE else A[body.parent]) + bias[i]
+        joint = (u[i] - apply(U[i][..., None, :], inherited)) / d[i]
+        A.append(inherited + joint * body.screw)
         a[..., i] = joint[..., 0]
     return a @ S
 
@@ -67,7 +70,7 @@ def articulated_body(linkage: Linkage, q: Array, v: Array, tau: Array) -> Array:
 def _outward(
     linkage: Linkage, X: list[Step], v: Array, batch: tuple[int, ...]
 ) -> tuple[list[Array], list[Array], list[Array]]:
-    """For each body c, its acceleration by the rates alone, 𝓜, and the wrench that keeps ω; base to tips."""
+    """Return for each body, base to tips: acceleration by rates alone, 𝓜, and the wrench that keeps ω."""
     zero = np.zeros((*batch, 6), dtype=linkage.gravity.dtype)
     V, bias, inertia, force = twists(linkage, X, v), [], [], []
     for i, body in enumerate(linkage.bodies):

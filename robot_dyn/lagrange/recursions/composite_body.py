@@ -1,4 +1,4 @@
-"""The mass matrix in O(n · depth): the composite-rigid-body algorithm in body coordinates, for any arithmetic.
+"""The mass matrix in O(n · depth): the composite-rigid-body algorithm in body coordinates and any arithmetic.
 
     𝓜ᶜ_i = 𝓜_i + Σ Ad⁻ᵀ 𝓜ᶜ_child Ad⁻¹,   M_ij = ξ_jᵀ (Ad⁻ᵀ … 𝓜ᶜ_i ξ_i) for j before i
 
@@ -14,7 +14,7 @@ from robot_dyn.lagrange.linkage import BASE, Linkage
 
 
 def composite_body(linkage: Linkage, q: Array) -> Array:
-    """Mass matrix M at one configuration, (n, n).
+    """Return the mass matrix M at one configuration, (n, n).
 
     Args:
         linkage: The bodies; joints may be coupled.

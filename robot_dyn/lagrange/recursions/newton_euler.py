@@ -15,14 +15,14 @@ from robot_dyn.lagrange.recursions.propagation import accelerations, twists, wre
 
 
 def newton_euler(linkage: Linkage, q: Array, v: Array, a: Array, *, gravity: bool = True) -> Array:
-    """Torque τ = M a + C v + N at one state, (n,); without gravity τ = M a + C v.
+    """Return the torque τ = M a + C v + N at one state, (n,); without gravity τ = M a + C v.
 
     Args:
         linkage: The bodies; joints may be coupled.
         q: Positions, (n,), numbers of the linkage's arithmetic.
         v: Velocities, (n,).
         a: Accelerations, (n,).
-        gravity: Whether it acts.
+        gravity: Include gravity.
     """
     X, v, a = linkage.steps(q), linkage.couplings.velocity(v), linkage.couplings.velocity(a)
     zero = np.zeros_like(linkage.gravity)

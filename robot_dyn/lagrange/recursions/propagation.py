@@ -3,9 +3,9 @@
     V_i = Ad⁻¹ V_λ + ξ_i v_i,   V = (ṗ, ω) of the origin of the body's frame, in its axes
     α_i = Rᵀ α_λ + ω_i × z_i v_i + z_i a_i,   p̈_i = Rᵀ (p̈_λ + (α̂_λ + ω̂_λ²) p)
 
-with z_i the axis of a joint that turns; along one that slides, 2 ω_i × z_i v_i + z_i a_i goes into p̈_i in place of α_i.
-Accelerations A = (p̈, α) are those of the origin, not spatial ones: linear velocities do not occur in them, which saves
-their products. [Luh, Walker, Paul 1980; Craig 2005, §5.6 and §6.5]
+with z_i the axis of a revolute joint. For a prismatic joint, 2 ω_i × z_i v_i + z_i a_i is added to p̈_i instead of α_i.
+Accelerations A = (p̈, α) are those of the origin, not spatial ones: they do not depend on linear velocities, which
+saves products. [Luh, Walker, Paul 1980; Craig 2005, §5.6 and §6.5]
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from robot_dyn.lagrange.linkage import BASE, Body, Linkage, Step
 
 
 def twists(linkage: Linkage, steps: list[Step], v: Array) -> list[Array]:
-    """V of each body, (..., 6), from the rates of all joints, v (..., N)."""
+    """Return V of each body, (..., 6), from the rates of all joints, v (..., N)."""
     V: list[Array] = []
     for i, body in enumerate(linkage.bodies):
         relative = v[..., i, None] * body.screw
@@ -27,7 +27,7 @@ def twists(linkage: Linkage, steps: list[Step], v: Array) -> list[Array]:
 
 
 def accelerations(linkage: Linkage, steps: list[Step], V: list[Array], v: Array, a: Array, base: Array) -> list[Array]:
-    """A of each body, (..., 6), from `twists`, the rates v and a (..., N) of all joints and A of the base, (6,)."""
+    """Return A of each body, (..., 6), from `twists`, rates v and a (..., N) of all joints and A of the base, (6,)."""
     A: list[Array] = []
     for i, body in enumerate(linkage.bodies):
         before, twist = (base, 0 * base) if body.parent == BASE else (A[body.parent], V[body.parent])
@@ -36,7 +36,7 @@ def accelerations(linkage: Linkage, steps: list[Step], V: list[Array], v: Array,
 
 
 def carried(body: Body, step: Step, A: Array, omega: Array, v: Array) -> Array:
-    """A (..., 6) of a body at constant rate v (..., 1) of its joint, from the parent's A (..., 6) and ω (..., 3)."""
+    """Return A (..., 6) of a body at constant joint rate v (..., 1), from the parent's A (..., 6) and ω (..., 3)."""
     origin = step.turned(A[..., :3] + apply(_spread(omega, A[..., 3:]), step.origin))
     alpha = step.turned(A[..., 3:])
     product = apply(hat(step.turned(omega)), v * body.axis)
@@ -44,7 +44,7 @@ def carried(body: Body, step: Step, A: Array, omega: Array, v: Array) -> Array:
 
 
 def wrench(inertia: Array, A: Array, omega: Array) -> Array:
-    """What moves a body of 𝓜 (6, 6) so: m p̈ + U m c and m c × p̈ + I α + ω × I ω about the frame's origin, (..., 6)."""
+    """Return m p̈ + U m c and m c × p̈ + I α + ω × I ω about the frame's origin, (..., 6), of a body with 𝓜 (6, 6)."""
     mc, mass, moment, inertia = first_moment(inertia), inertia[0, 0], inertia[3:, :3], inertia[3:, 3:]
     F = mass * A[..., :3] + apply(_spread(omega, A[..., 3:]), mc)
     turning = apply(inertia, A[..., 3:]) + apply(hat(omega), apply(inertia, omega))
@@ -52,5 +52,5 @@ def wrench(inertia: Array, A: Array, omega: Array) -> Array:
 
 
 def _spread(omega: Array, alpha: Array) -> Array:
-    """U = α̂ + ω̂²: a point r of the body is accelerated by U r against its origin."""
+    """Return U = α̂ + ω̂²: a point r of the body has the acceleration U r relative to its origin."""
     return hat(alpha) + hat(omega) @ hat(omega)

@@ -1,4 +1,4 @@
-"""The regressor by recursion: Newton and Euler's equations of bodies with one unit parameter each.
+"""The regressor by recursion: Newton–Euler equations of bodies with one unit parameter each.
 
     Y_jk = ξ_jᵀ Ad⁻ᵀ … wrench(E_k, A_i, ω_i)   for joint j on the path to body i,   0 otherwise
 
@@ -16,10 +16,10 @@ from robot_dyn.lagrange.recursions.propagation import accelerations, twists, wre
 
 
 def regressor(linkage: Linkage, q: Array, v: Array, a: Array) -> Array:
-    """Y at one state, (n, 10 N), so that τ = Y θ + armature · a; bodies in the order of the linkage's parameters.
+    """Return Y at one state, (n, 10 N), with τ = Y θ + armature · a; bodies in the order of the linkage's parameters.
 
     Args:
-        linkage: The bodies; their inertias do not matter, their frames do. Joints may be coupled.
+        linkage: The bodies; only their frames are used. Joints may be coupled.
         q: Positions, (n,), numbers of the linkage's arithmetic.
         v: Velocities, (n,).
         a: Accelerations, (n,).

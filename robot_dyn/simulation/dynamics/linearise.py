@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.effects.effect import Bound, numbered
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.plant import Plant, in_mode
 from robot_dyn.effects.set_valued import Mode, SetValued
 from robot_dyn.foundations.answer import Answer, Block, Table
-from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.validate import numbers, one_state
 from robot_dyn.foundations.values import Value, read_only
@@ -84,7 +84,13 @@ class Linearisation(Answer, Value):
 
 
 def linearise(
-    plant: Plant | Dynamics, q: Array, v: Array = None, u: Array = None, *, z: Array = None, t: float = 0.0
+    plant: Plant | Dynamics,
+    q: ArrayLike,
+    v: ArrayLike | None = None,
+    u: ArrayLike | None = None,
+    *,
+    z: ArrayLike | None = None,
+    t: float = 0.0,
 ) -> Linearisation:
     """Compute A and B of d/dt δx = A δx + B δu about one state, x = (q, v, z).
 

@@ -118,7 +118,7 @@ def excess_rate(method: Any, J: Array, n: int) -> Callable[[float], float]:
 
     T, Z = cast(tuple[Array, Array], schur(J, "complex"))
     rates, made = T.diagonal(), step_map(method, J, n)
-    allowed = _GROWS * np.maximum(0.0, rates.real) + _AMPLIFIES * np.abs(rates).max()
+    allowed = _GROWS * np.maximum(0.0, np.real(rates)) + _AMPLIFIES * np.abs(rates).max()
     of_each = _acts_on_each(method, J, n)
 
     def excess(h: float) -> float:
@@ -198,7 +198,7 @@ def lengths(rates: Array, rings: Array, least: float = _LEAST) -> list[float]:
     h, last, made = least / fastest, _FARTHEST / float(told.min()), []
     while h < last:
         made.append(h)
-        goes_on = np.abs(rings.imag)[-rings.real * h < _DECAYED] if len(made) < _MOST else np.zeros(0)
+        goes_on = np.abs(np.imag(rings))[-np.real(rings) * h < _DECAYED] if len(made) < _MOST else np.zeros(0)
         step = 1 / (_SCAN[2] * goes_on.max()) if goes_on.any() else inf
         h = min(h * 10 ** (1 / _SCAN[int(h * fastest > _SMOOTH)]), h + step)
     return made

@@ -20,7 +20,7 @@ from robot_dyn.effects.effect import Bound, Conservative, Stateful, numbered
 from robot_dyn.effects.equation_of_motion import EquationOfMotion
 from robot_dyn.effects.plant import Plant, carrying, in_mode
 from robot_dyn.effects.set_valued import Mode
-from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.foundations.arithmetic import Array, Scalar
 from robot_dyn.foundations.errors import RobotDynError, call
 from robot_dyn.foundations.values import Caching
 from robot_dyn.queries.dynamics import acceleration
@@ -235,7 +235,7 @@ class StateEquation(Caching):
         result[W:] = self._powers(v, u, torques, of_effects, a)
         return result, u
 
-    def _powers(self, v: Array, u: Array, torques: list[Array], z: Array, a: Array) -> list[Array]:
+    def _powers(self, v: Array, u: Array, torques: list[Array], z: Array, a: Array) -> list[Scalar]:
         """Of each source; those that work at once have none."""
         powers = self.equation_of_motion.powers(v, u, torques, z, a)
         return powers + [0.0] * (len(self.sources) - len(powers))
@@ -297,11 +297,11 @@ class StateEquation(Caching):
         demands = self.demands(t, q, v, z, held, self.limited)
         return np.array([*np.ravel(demands), *self.switching(t, q, v)], dtype=float)
 
-    def energies(self, t: Array, q: Array, v: Array) -> tuple[Array, Array]:
+    def energies(self, t: Scalar, q: Array, v: Array) -> tuple[Array, Array]:
         """Kinetic energy, and the potential of gravity and of all conservative effects, of samples (m, n)."""
         return self.equation_of_motion.energies(t, q, v)
 
-    def powers(self, t: float, q: Array, v: Array, z: Array, u: Array) -> list[float]:
+    def powers(self, t: float, q: Array, v: Array, z: Array, u: Array) -> list[Scalar]:
         """Power of the control and of the effects that work, in the order of `sources`."""
         equation = self.equation_of_motion
         own = z[self.state_size :]

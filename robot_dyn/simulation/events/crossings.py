@@ -93,7 +93,7 @@ def nears(t: float, y: Array, p: Array, run_parameters: Array, switches: Switche
     E, found = len(switches.exact), switches.user_defined > 0
     evaluate(switches.functions, t, y, p, run_parameters, switches.then)
     for e in range(E, len(switches.rows) - switches.user_defined):
-        i = switches.rows[e]
+        i: int = switches.rows[e]
         x0, x1, change = switches.before[i], switches.then[i, 0], switches.change[i]
         found = found or function_nears(x0, x1, change, switches.levels[e], switches.sides[e])
     for i in range(len(switches.then)):

@@ -73,4 +73,5 @@ def remember_time(log: EventLog, t: float) -> None:
 def may_chatter(log: EventLog, t: float) -> bool:
     """Whether the latest events, with one at t, came in next to no time."""
     last = len(log.latest)
-    return log.total[0] + 1 >= last and t - log.latest[(log.total[0] + 1) % last] <= log.brief
+    oldest: int = (log.total[0] + 1) % last
+    return log.total[0] + 1 >= last and t - log.latest[oldest] <= log.brief

@@ -149,7 +149,8 @@ def accumulates(of: Holding, t: float) -> bool:
     most = len(of.changes)
     of.changes[of.changed[0] % most] = t
     of.changed[0] += 1
-    return of.changed[0] >= most and t - of.changes[of.changed[0] % most] <= of.brief
+    oldest: int = of.changed[0] % most
+    return of.changed[0] >= most and t - of.changes[oldest] <= of.brief
 
 
 def guards(of: Holding, y: Array, switches: Switches) -> None:

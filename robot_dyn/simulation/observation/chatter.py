@@ -40,7 +40,7 @@ class Chatter(NamedTuple):
         t: Time of the latest tick, (1,), in [s].
         ticks: Number of ticks, (1,).
         u: Actuation at the latest three ticks, tick k at index k mod 3, (3, n, W); nan until there are three.
-        count: Reversals in a row so far, (n, W).
+        reversals: Reversals in a row so far, (n, W).
         streak: Start, duration and amplitude of the current row, (3, n, W).
         going: Number of runs with a current row, (n,).
         episodes: Start, duration and amplitude of the reported episodes, (3, n, W); amplitude 0 where there is none.
@@ -49,7 +49,7 @@ class Chatter(NamedTuple):
     t: Array
     ticks: Array
     u: Array
-    count: Array
+    reversals: Array
     streak: Array
     going: Array
     episodes: Array
@@ -72,7 +72,7 @@ def tick(of: Chatter, t: float, u: Array, low: Array, high: Array) -> None:
         if of.going[j] > 0 or turns(before[j], middle[j], now[j]):
             for b in range(u.shape[1]):
                 change, next_change = middle[j, b] - before[j, b], now[j, b] - middle[j, b]
-                if change * next_change < 0.0 or of.count[j, b] > 0:
+                if change * next_change < 0.0 or of.reversals[j, b] > 0:
                     count(of, j, b, t, change, next_change, low[:, b], high[:, b])
     of.t[0] = t
     of.ticks[0] = k + 1
@@ -95,30 +95,30 @@ def count(
         largest = max(largest, high[i], -low[i])
     least = max(_PART * max(high[j], -low[j]), _LEAST * largest)
     if change * next_change < -(least**2):
-        if of.count[j, b] == 0:
+        if of.reversals[j, b] == 0:
             of.going[j] += 1
             of.streak[0, j, b], of.streak[2, j, b] = of.t[0], 0.0
-        of.count[j, b] += 1
+        of.reversals[j, b] += 1
         of.streak[1, j, b] = t - of.streak[0, j, b]
         of.streak[2, j, b] = max(of.streak[2, j, b], abs(change) / 2, abs(next_change) / 2)
-    elif of.count[j, b] > 0:
+    elif of.reversals[j, b] > 0:
         close(of, j, b)
 
 
 def close(of: Chatter, j: int, b: int) -> None:
     """End a row of reversals, which is an episode if it is long enough."""
-    if of.count[j, b] >= _REVERSALS:
+    if of.reversals[j, b] >= _REVERSALS:
         duration, amplitude, known = of.streak[1, j, b], of.streak[2, j, b], of.episodes[2, j, b]
         if amplitude > _OTHER * known:
             of.episodes[0, j, b], of.episodes[1, j, b], of.episodes[2, j, b] = of.streak[0, j, b], duration, amplitude
         elif amplitude > known / _OTHER:
             of.episodes[1, j, b] += duration
             of.episodes[2, j, b] = max(known, amplitude)
-    of.count[j, b] = 0
+    of.reversals[j, b] = 0
     of.going[j] -= 1
 
 
 def close_all(of: Chatter) -> None:
     """End all current rows after the last tick."""
-    for j, b in np.argwhere(of.count > 0) if of.ticks[0] else ():
+    for j, b in np.argwhere(of.reversals > 0) if of.ticks[0] else ():
         close(of, j, b)

@@ -107,7 +107,7 @@ def event_loop(
         last = len(table.counts) - 1
         run_parameters, y, after = runs.run_parameters, runs.y, runs.after
         while now[Now.SEGMENT] <= last:
-            s = now[Now.SEGMENT]
+            s: int = now[Now.SEGMENT]
             start, p = table.starts[s], table.parameters[s]
             if table.payload_events[s] == 1:
                 return Ended.PAYLOAD

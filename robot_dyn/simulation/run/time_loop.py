@@ -41,7 +41,7 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
             if rules.apart > 0 and rules.held == 0:
                 show_actuation(functions, runs, records.observation, 0.0, table.parameters[0], False)
         while now[Now.SEGMENT] <= last:
-            s = now[Now.SEGMENT]
+            s: int = now[Now.SEGMENT]
             start, h, p = table.starts[s], table.lengths[s], table.parameters[s]
             if table.payload_events[s] == 1:
                 return Ended.PAYLOAD

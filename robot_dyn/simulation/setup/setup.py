@@ -14,7 +14,7 @@ import numpy as np
 from robot_dyn.control.controller import ControlLaw, Controller
 from robot_dyn.effects.explanation import Explanation, explanation
 from robot_dyn.effects.plant import Plant
-from robot_dyn.foundations.arithmetic import Array, Ball
+from robot_dyn.foundations.arithmetic import Ball
 from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.foundations.validate import LEAST_EXACT, choice, duration, instance, integer, one_state, truth
 from robot_dyn.foundations.values import Caching, Value
@@ -66,8 +66,8 @@ class Setup(Value, Caching):
     """
 
     plant: Plant
-    q0: Array
-    v0: Array = None
+    q0: Any  # array-like; arrays once built
+    v0: Any = None
     duration_s: float = 1.0
     controller: Any = None
     integrator: Any = "auto"

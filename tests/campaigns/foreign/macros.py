@@ -6,7 +6,7 @@ from tests.campaigns.foreign.files import ARM, XACRO, Foreign, arm, inside
 
 LEFT = ("left out", "expand")
 MACRO = '<xacro:macro name="leg" params="side"><link name="leg"/><joint name="hip" type="floating"/></xacro:macro>'
-COMPUTED = ("holds xacro macros", "expand")
+COMPUTED = ("contains xacro macros", "expand")
 
 
 def with_namespace(text: str) -> str:

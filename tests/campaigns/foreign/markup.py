@@ -7,8 +7,8 @@ import codecs
 from tests.campaigns.foreign.files import ARM, Foreign, inside
 
 V1 = '<?xml version="1.0"?>'
-LATE = (("<?xml …?> does not stand first", "remove what is before"),)
-PREFIXES = ("prefixes that are not declared", "left out")
+LATE = (("<?xml …?> is not at the start", "remove what precedes it"),)
+PREFIXES = ("undeclared prefixes", "left out")
 NOT_XML = ("is not well-formed XML: ", "correct the file")
 SENSOR = '<sensor:camera name="eye"><sensor:image width="640"/></sensor:camera>'
 OUTSIDE = '<gazebo><include xmlns="urn:x"><joint name="elbow"/></include></gazebo>'

@@ -26,7 +26,7 @@ def check_effects(plant: Plant) -> None:
             why = "comes and goes: give the arm with the payload, arm.with_(payload=…)"
         elif any(0 < each < np.inf for each in effect.switches) or (
             isinstance(effect, Force)
-            and not np.array_equal(*(Plant(plant.dynamics, [effect]).torque(t, q, v) for t in _TIMES))
+            and np.diff([Plant(plant.dynamics, [effect]).torque(t, q, v) for t in _TIMES], axis=0).any()
         ):
             why = "depends on the time"
         elif isinstance(effect, Bound) and not isinstance(effect, EffortLimit):
