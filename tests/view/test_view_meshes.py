@@ -134,7 +134,7 @@ def test_instances_of_instances_are_counted_before_they_are_drawn(tmp_path: Path
     [
         ('<visual><origin xyz="0 nan 0"/><geometry><sphere radius="1"/></geometry></visual>', "at the origin"),
         ('<visual><origin rpy="1 2"/><geometry><sphere radius="1"/></geometry></visual>', "at the origin"),
-        ('<visual><geometry><sphere radius="-1"/></geometry></visual>', "not positive"),
+        ('<visual><geometry><sphere radius="-1"/></geometry></visual>', "below 1e-09 m"),
         ('<visual><geometry><sphere radius="1e-30"/></geometry></visual>', "below 1e-09 m"),
         ('<visual><geometry><box size="1 2"/></geometry></visual>', "3 finite numbers"),
         ('<visual><geometry><torus radius="1"/></geometry></visual>', "not a shape of URDF"),
