@@ -207,7 +207,7 @@ def test_a_second_call_computes_nothing_that_depends_on_the_setup_alone(name: st
     found = calls(lambda: rd.simulate(setup))
     alone = {
         "_chosen", "structure", "parameters", "levels", "_plan", "cuts", "undeclared", "is_value", "Switching.at",
-        "StateEquation.energies", "rules_of", "observations_of",
+        "StateEquation.energies", "loop_config", "observations_of",
     }  # fmt: skip
     late = {
         "remarks", "ledger", "origin", "Observer.close", "tracking_of", "settings_of", "acting", "wrenches",
