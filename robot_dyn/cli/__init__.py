@@ -60,12 +60,12 @@ def _run() -> Any:
     import warnings
 
     from robot_dyn.cli.application import program
-    from robot_dyn.cli.terminal import failed, finish, open_streams, to_stderr
+    from robot_dyn.cli.terminal import failed, finish, logged_to_stderr, open_streams, to_stderr
     from robot_dyn.foundations.errors import RobotDynError, RobotDynWarning
 
     run = program()
     open_streams()
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), logged_to_stderr():
         warnings.simplefilter("always", RobotDynWarning)
         warnings.showwarning = lambda message, *_, **__: to_stderr(f"robot-dyn: warning: {message}")
         try:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -130,6 +132,29 @@ def to_stderr(text: str) -> None:
         print(line if len(line) <= _MOST else line[: _MOST - 1] + "…", file=sys.stderr, flush=True)
     except OSError:
         _drop(sys.stderr)
+
+
+class _ToStderr(logging.Handler):
+    """A handler that writes each message as one line to standard error."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        to_stderr(f"robot-dyn: {record.getMessage()}")
+
+
+@contextmanager
+def logged_to_stderr() -> Iterator[None]:
+    """Write what the library logs, such as long waits, to standard error during a block."""
+    log, handler = logging.getLogger("robot_dyn"), _ToStderr()
+    level, propagates = log.level, log.propagate
+    log.setLevel(logging.INFO)
+    log.addHandler(handler)
+    log.propagate = False  # a user-defined part may configure the root logger, which would print it twice
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(level)
+        log.propagate = propagates
 
 
 def finish() -> None:

@@ -19,7 +19,7 @@ from robot_dyn.codegen.self_check import STATES, SelfCheck
 from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.codegen.trace.trace import Traced
-from robot_dyn.codegen.waiting import announced
+from robot_dyn.codegen.waiting import log_if_slow
 from robot_dyn.foundations.arithmetic import Float
 from robot_dyn.foundations.errors import QueryError, RobotDynWarning
 from robot_dyn.foundations.validate import converted, shaped, times
@@ -105,7 +105,7 @@ class Engine:
         """Whether a quantity is small enough to be compiled; a SizeWarning if not."""
         if self.singular and self.quantities[quantity].solves:
             return False
-        with announced(f"tracing {quantity} of {self.self_check.dynamics.name}"):
+        with log_if_slow(f"tracing {quantity} of {self.self_check.dynamics.name}"):
             trace = self.traces[quantity]
         if (count := trace.counts[trace.formulation]) <= LARGEST_KERNEL:
             return True
@@ -245,7 +245,7 @@ class Engine:
 
         It reports one Status, or one for each state.
         """
-        with announced(f"compiling {quantity} of {self.self_check.dynamics.name}, once for these equations"):
+        with log_if_slow(f"compiling {quantity} of {self.self_check.dynamics.name}, once for these equations"):
             self._compare(quantity, run)
 
     def _compare(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:

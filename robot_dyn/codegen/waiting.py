@@ -1,15 +1,19 @@
-"""What a user notices of a compile: time, a line on stderr while it lasts, and Ctrl-C, which waits until it ends."""
+"""Long waits: reported by logging, timed, and with Ctrl-C delayed until they end.
+
+The logger is "robot_dyn", the level INFO. A script that does not configure logging prints nothing.
+"""
 
 from __future__ import annotations
 
+import logging
 import signal
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Timer
 
-_IN_TERMINAL_S, _IN_NOTEBOOK_S = 1.0, 2.0  # what is kept in a notebook's output should be worth a line
+LOG = logging.getLogger("robot_dyn")
+PATIENCE_S = 2.0  # a shorter wait is not reported
 
 
 class _Compiling(threading.local):
@@ -22,28 +26,18 @@ COMPILING = _Compiling()
 
 
 @contextmanager
-def announced(what: str) -> Iterator[None]:
-    """Print what a block does if it takes long where a person watches: 1 s in a terminal, 2 s in a notebook."""
-    after = _patience_s()
-    if after is None:
+def log_if_slow(what: str) -> Iterator[None]:
+    """Log what a block does, once it has taken longer than `PATIENCE_S`."""
+    if not LOG.isEnabledFor(logging.INFO):
         yield
         return
-    timer = Timer(after, lambda: print(f"robot_dyn: {what}", file=sys.stderr, flush=True))
+    timer = Timer(PATIENCE_S, LOG.info, ("%s", what))
     timer.daemon = True
     timer.start()
     try:
         yield
     finally:
         timer.cancel()
-
-
-def _patience_s() -> float | None:
-    """Time after which a line is printed; None where stderr is neither a terminal nor the output of a notebook."""
-    if sys.stderr is None:
-        return None
-    if sys.stderr.isatty():
-        return _IN_TERMINAL_S
-    return _IN_NOTEBOOK_S if "ipykernel" in sys.modules else None
 
 
 @contextmanager

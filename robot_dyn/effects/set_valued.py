@@ -103,14 +103,15 @@ def settled(
     intervals = [each.at_rest(q) for each in effects]
     least, most = (sum((each[k] for each in intervals), start=zero) for k in (0, 1))
     slides = sum((each.sliding(zero) for each in effects), start=zero)
-    a, held, direction, let_go = np.zeros((4, n))
+    (held, direction), room = np.zeros((2, n)), settling(n)
+    room.least[:], room.most[:] = least, most
     for i, way in (forced or {}).items():
-        let_go[i] = way
+        room.forced[i] = way
     with np.errstate(all="ignore"):
-        solved = settle(M, load, least, most, slides, v, let_go, a, held, direction, settling(n))
+        solved = settle(M, load, slides, v, held, direction, room)
     if not solved:
         raise not_found(M, load)
-    return a, Mode(held, direction)
+    return room.a, Mode(held, direction)
 
 
 def in_a_step(effects: Sequence[SetValued], q: Array, v: Array) -> tuple[Array, Array, Array, list[Array]]:

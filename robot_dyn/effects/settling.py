@@ -20,9 +20,12 @@ _ROUNDING = 1e-12  # of the accelerations that add up
 
 
 class Settling(NamedTuple):
-    """Work arrays of `settle` for n joints.
+    """Arrays of `settle` for n joints.
 
     Attributes:
+        least, most: Bounds of the torque on a joint at rest, (n,).
+        forced: Direction of joints at rest that break away, else 0, (n,); `settle` adds all that do.
+        a: Output: the acceleration, (n,).
         p, f, lower, upper, place: Of the convex problem, (n,).
         rests: 1 for each joint that may stay at rest, (n,).
         friction: Friction that holds it there, (n,).
@@ -31,6 +34,10 @@ class Settling(NamedTuple):
         L: For the active set, (n + 1, n); wider for n = 1, since machine code has a type for arrays of one column.
     """
 
+    least: Array
+    most: Array
+    forced: Array
+    a: Array
     p: Array
     f: Array
     lower: Array
@@ -44,29 +51,25 @@ class Settling(NamedTuple):
 
 
 def settling(n: int) -> Settling:
-    """Return work arrays for n joints."""
-    return Settling._make([*np.zeros((9, n)), np.zeros((n + 1, max(n, 2)))])
+    """Return arrays for n joints."""
+    return Settling._make([*np.zeros((13, n)), np.zeros((n + 1, max(n, 2)))])
 
 
 def settle(
-    M: Array, load: Array, least: Array, most: Array, slides: Array, v: Array, forced: Array, a: Array, held: Array,
-    direction: Array, room: Settling,
+    M: Array, load: Array, sliding: Array, v: Array, held: Array, direction: Array, room: Settling
 ) -> bool:  # fmt: skip
-    """Write the acceleration, 0 for joints that stay at rest, and the mode; return whether they were found.
+    """Write the acceleration, 0 for joints that stay at rest, and the mode; return False if there is no solution.
 
     Args:
         M: Mass matrix, (n, n).
         load: All torques but those on joints at rest, less C v and ∂V/∂q, (n,).
-        least: Least torque on a joint at rest, (n,).
-        most: Greatest, (n,).
-        slides: Friction where sliding begins, (n,).
+        sliding: Friction where sliding begins, (n,).
         v: Velocity, (n,).
-        forced: The direction of joints at rest that are known to break away, (n,); all that do are added.
-        a: Output: the acceleration, (n,).
         held: Output: 1 for each joint that is held, (n,).
         direction: Output: 1 or −1 for each joint that slides or is about to, (n,).
-        room: Work arrays.
+        room: Bounds of the torques at rest, and joints that break away; the acceleration is written into it.
     """
+    least, most, forced, a = room.least, room.most, room.forced, room.a
     for i in range(len(v)):
         rests = v[i] == 0.0 and (least[i] < 0.0 or most[i] > 0.0)
         held_by = most[i] if most[i] < np.inf else -least[i]
@@ -75,11 +78,11 @@ def settle(
         room.upper[i] = 0.0 if rests and least[i] == -np.inf else np.inf
     while True:  # each joint breaks away and is restored at most once
         for i in range(len(v)):
-            room.p[i] = load[i] - slides[i] * forced[i]
+            room.p[i] = load[i] - sliding[i] * forced[i]
             room.f[i] = room.friction[i] if forced[i] == 0.0 else 0.0
         if not least_value(M, room, a):
             return False
-        if not taken_back(M, load, forced, a, room) and not broken_away(M, slides, forced, a, room):
+        if not taken_back(M, load, forced, a, room) and not broken_away(M, sliding, forced, a, room):
             break
     for i in range(len(v)):
         way = np.sign(v[i]) if v[i] != 0.0 else np.sign(a[i]) * room.rests[i]

@@ -36,12 +36,15 @@ class Value:
 
 
 class Caching:
-    """An immutable value that caches what functions compute from it."""
+    """An immutable value that caches what functions compute from it; copies and pickles have an empty cache."""
 
     @cached_property
     def cache(self) -> dict[Any, Any]:
-        """What was computed, by the functions."""
+        """Computed values, by the functions that computed them."""
         return {}
+
+    def __getstate__(self) -> Any:
+        return {name: x for name, x in vars(self).items() if name != "cache"}
 
 
 def cached(

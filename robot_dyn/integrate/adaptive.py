@@ -21,7 +21,7 @@ from robot_dyn.integrate import dop853
 from robot_dyn.integrate.controlled_steps import Status, Steps
 from robot_dyn.integrate.integrator import System
 from robot_dyn.integrate.rosenbrock import ROSENBROCK_5
-from robot_dyn.integrate.step_control import ControlledStepper, control_of
+from robot_dyn.integrate.step_control import ControlledStepper, initial_control
 
 EXPLICIT, STIFF, AUTO = "DOP853", "Rosenbrock", "auto"
 ADAPTIVE = (EXPLICIT, STIFF, AUTO)
@@ -173,7 +173,7 @@ class Adaptive:
         function("stop", stop, "(t, y)")
         m = len(y0)
         stepper = STEPPERS[self.method](m, m, m)
-        control = control_of(stepper, self.rtol, self.atol, self.max_step_s)
+        control = initial_control(stepper.error_order, self.rtol, self.atol, self.max_step_s)
         return Steps(stepper, control, system, stop, t0, y0, t1)
 
 

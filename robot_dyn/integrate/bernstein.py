@@ -11,12 +11,12 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 
-NONE = 2.0  # in place of a root
+NONE = 2.0  # instead of a root
 _NARROW = 1e-13  # of a step
 _DEEP = 64  # more halvings are of no use in floats
 
 
-def room(degree: int) -> np.ndarray:
+def work_array(degree: int) -> np.ndarray:
     """Return the work array of `first_below`."""
     return np.zeros((_DEEP, degree + 3))
 
@@ -50,7 +50,7 @@ def rate_coefficients(F: Array, e: int, h: float, b: Array) -> None:
 
 
 def value(b: Array, theta: float) -> float:
-    """The polynomial at θ."""
+    """Return the value of a polynomial at θ."""
     total, power, d = 0.0, 1.0, len(b) - 1
     for j in range(d + 1):  # b_j C(d, j) θʲ (1 − θ)^(d−j)
         total += b[j] * power * (1 - theta) ** (d - j)
@@ -64,7 +64,7 @@ def first_below(b: Array, slack: float, stack: Array) -> float:
     Args:
         b: Its coefficients, (d + 1,).
         slack: Rounding of the coefficients: none above −slack counts as below.
-        stack: As of `room`.
+        stack: See `work_array`.
     """
     d, depth = len(b) - 1, 1
     stack[0, 0], stack[0, 1] = 0.0, 1.0

@@ -10,11 +10,12 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import OverflowedError, RobotDynError, is_mistake
-from robot_dyn.integrate.integrator import RightSide, System
+from robot_dyn.foundations.values import copied
+from robot_dyn.integrate.integrator import RightSide, States, System
 from robot_dyn.integrate.primitives import between
-from robot_dyn.integrate.step_control import At, Choice, ControlledStepper, chosen_step, first_step
+from robot_dyn.integrate.step_control import Choice, ControlledStepper, StepControl, chosen_step, first_step
 
-_NONE = np.zeros(0)  # no parameters, and no mesh
+_NO_PARAMETERS = np.zeros(0)
 Stop = Callable[[float, Array], float]
 
 
@@ -43,14 +44,19 @@ class Steps:
     """
 
     def __init__(
-        self, stepper: ControlledStepper, control: Array, system: System, stop: Stop | None,
-        t0: float, y0: Array, t1: float,
-    ) -> None:  # fmt: skip
+        self,
+        stepper: ControlledStepper,
+        control: StepControl,
+        system: System,
+        stop: Stop | None,
+        t0: float,
+        y0: Array,
+        t1: float,
+    ) -> None:
         self.t, self.y, self.evaluations = t0, y0, 0
         self.status, self.message = Status.FINISHED, ""
-        self._stepper, self._start, self._end, self._stop = stepper, control, t1, stop
+        self._stepper, self._first_control, self._end, self._stop = stepper, control, t1, stop
         self._choose = chosen_step(stepper.step, stepper.error)
-        self._after, self._lost = np.empty((len(y0), 1)), np.zeros(1, np.int64)
         counted = System(self._counted(system.rate), system.n, system.widths, system.exact)
 
         def rate(t: Any, x: Array, p: Any, run_parameters: Any, out: Array) -> None:
@@ -72,21 +78,23 @@ class Steps:
         return counted
 
     def __iter__(self) -> Iterator[tuple[float, Array, Any]]:
-        of, t, now = self._stepper, self.t, self.y[:, None].copy()
-        self._control = self._start.copy()  # a second iteration begins with a first step, too
+        stepper, t, y = self._stepper, self.t, self.y[:, None].copy()
+        self._control = copied(self._first_control)  # a second iteration begins with a first step, too
+        failed = np.zeros(1, np.int64)
+        x = States(y=y, after=np.empty_like(y), p=_NO_PARAMETERS, run_parameters=_NO_PARAMETERS, failed=failed)
         try:
             with np.errstate(all="ignore"):
-                of.begin(self._f, of.coefficients, t, now, _NONE, _NONE, of.work)
+                stepper.begin(self._f, stepper.coefficients, stepper.work, t, x)
             while t != self._end:
                 with np.errstate(all="ignore"):  # overflow in a trial step shortens it, or ends the run with a status
-                    if not np.isfinite(of.work.K[0]).all():
+                    if not np.isfinite(stepper.work.K[0]).all():
                         raise _NotFiniteError
-                    piece = self._step(t, now)
+                    piece = self._step(t, x)
                     if piece is None:
                         self._failed("the step became smaller than the spacing of floats")
                         return
-                    t = float(self._control[At.END])
-                    stopped = self._take(piece, t, now[:, 0])
+                    t = float(self._control.end[0])
+                    stopped = self._take(piece, t, y[:, 0])
                 yield self.t, self.y, piece
                 if stopped:
                     self.status, self.message = Status.STOPPED, f"stopped at t = {self.t}"
@@ -100,25 +108,25 @@ class Steps:
         else:
             self.message = f"finished at t = {self.t}"
 
-    def _step(self, t: float, now: Array) -> _Between | None:
-        """Advance `now`, (m, 1), by a step from t, and return its polynomial; None if every step is too small."""
-        of, control, after, end = self._stepper, self._control, self._after, self._end
-        if control[At.NEXT] == 0:
-            first_step(self._f, t, end, now, _NONE, _NONE, after, of.work, control)
-        here = self._f, of.coefficients, t
-        _, choice = self._choose(*here, end, now, _NONE, _NONE, after, of.work, self._lost, control, _NONE)
+    def _step(self, t: float, x: States) -> _Between | None:
+        """Advance x.y by a step from t, and return its polynomial; None if every step is too small."""
+        stepper, control, end = self._stepper, self._control, self._end
+        coefficients, work = stepper.coefficients, stepper.work
+        if control.next_h[0] == 0:
+            first_step(self._f, work, control, t, end, x)
+        _, choice = self._choose(self._f, coefficients, work, control, t, end, x)
         if choice != Choice.TAKEN:
             return None
-        h = control[At.TAKEN]
-        of.accept(*here, h, now, _NONE, _NONE, after, of.work)
-        of.dense(*here, h, now, _NONE, _NONE, after, of.work)
-        piece = _Between(t, h, now.copy(), of.work.F.copy())
-        now[...] = after
-        of.work.K[0] = of.work.last
+        h = control.h[0]
+        stepper.accept(self._f, coefficients, work, t, h, x)
+        stepper.dense(self._f, coefficients, work, t, h, x)
+        piece = _Between(t, h, x.y.copy(), work.F.copy())
+        x.y[...] = x.after
+        work.K[0] = work.last
         return piece
 
-    def _failed(self, what: str) -> None:
-        where = f"{what} at t = {self.t}, max |y| = {np.abs(self.y).max():.3g}"
+    def _failed(self, reason: str) -> None:
+        where = f"{reason} at t = {self.t}, max |y| = {np.abs(self.y).max():.3g}"
         self.status, self.message = Status.FAILED, f"{where}: y grows without bound, or tolerances are too tight"
 
     def _take(self, piece: _Between, t: float, y: Array) -> bool:
@@ -153,6 +161,6 @@ class _Between:
     def __call__(self, t: Any) -> Array:
         theta = (np.asarray(t) - self.t) / self.h
         out = np.empty((len(self.y), theta.size))
-        for i, each in enumerate(theta.flat):
-            between(self.y, self.F, each, out[:, i : i + 1])
+        for i, fraction in enumerate(theta.flat):
+            between(self.y, self.F, fraction, out[:, i : i + 1])
         return out[:, 0] if theta.ndim == 0 else out

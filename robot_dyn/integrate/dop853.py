@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.integrate.integrator import RightSide, States
 from robot_dyn.integrate.primitives import combination, copy, evaluate, norm, subtract
 from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end, rate_at_start
 
@@ -29,7 +30,14 @@ _STAGES, _EXTENDED, _DEGREE, _ERROR_ORDER = 12, 16, 7, 8
 
 
 class Coefficients(NamedTuple):
-    """A, b, c of all 16 stages; weights of errors, of dense output and of the rate at the end; for differences."""
+    """Coefficients for differences of the stages.
+
+    Attributes:
+        a, b, c: Of all 16 stages, (16, 16), (12,) and (16,).
+        e3, e5: Weights of the error estimates, (12,).
+        d: Weights of the dense output, (4, 16).
+        end: Weights that select the rate at the end, (13,).
+    """
 
     a: Array
     b: Array
@@ -46,7 +54,7 @@ class Work(NamedTuple):
     Attributes:
         K: k₁, and k_j − k₁ of the others, (16, r, 1).
         last: The rate at its end, (r, 1).
-        F: Dense output, (7, m, 1), as of `between`.
+        F: Dense output, (7, m, 1), see `between`.
         error: (2, k, 1), of the first entries of y, whose error is bounded.
         zero: (m, 1).
     """
@@ -76,7 +84,7 @@ def coefficients() -> Coefficients:
     a[_STAGES, 1:_STAGES] = b[1:]
     end = np.zeros(_STAGES + 1)
     end[[0, _STAGES]] = 1.0
-    return Coefficients(a, b, c, e3, e5, d, end)
+    return Coefficients(a=a, b=b, c=c, e3=e3, e5=e5, d=d, end=end)
 
 
 def table() -> Any:
@@ -99,36 +107,43 @@ def table() -> Any:
 def stepper(m: int, rows: int, bounded: int) -> ControlledStepper:
     """Return the method for one state of m entries, rates of `rows`, and errors of the first `bounded` entries."""
     work = Work(
-        np.zeros((_EXTENDED, rows, 1)), np.zeros((rows, 1)), np.zeros((_DEGREE, m, 1)),
-        np.zeros((2, bounded, 1)), np.zeros((m, 1)),
-    )  # fmt: skip
-    return ControlledStepper(rate_at_start, step, error, rate_at_end, dense, coefficients(), work, _ERROR_ORDER)
+        K=np.zeros((_EXTENDED, rows, 1)),
+        last=np.zeros((rows, 1)),
+        F=np.zeros((_DEGREE, m, 1)),
+        error=np.zeros((2, bounded, 1)),
+        zero=np.zeros((m, 1)),
+    )
+    return ControlledStepper(
+        begin=rate_at_start,
+        step=step,
+        error=error,
+        accept=rate_at_end,
+        dense=dense,
+        coefficients=coefficients(),
+        work=work,
+        error_order=_ERROR_ORDER,
+    )
 
 
-def stage(
-    f: Any, c: Coefficients, i: int, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, x: Array, work: Work
-) -> None:
-    """Stage i, its state in x."""
-    combination(x, y, h, c.a[i], work.K, i)
-    evaluate(f.rate, t + c.c[i] * h, x, p, run_parameters, work.K[i])
+def stage(f: RightSide, c: Coefficients, work: Work, t: Any, h: Any, x: States, i: int, state: Array) -> None:
+    """Compute stage i, with its state in an array (m, 1)."""
+    combination(state, x.y, h, c.a[i], work.K, i)
+    evaluate(f.rate, t + c.c[i] * h, state, x.p, x.run_parameters, work.K[i])
     subtract(work.K[i], work.K[0])
 
 
-def step(
-    f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work,
-    lost: Array,
-) -> int:  # fmt: skip
-    """A trial; see `ControlledStepper`."""
-    lost[0] = 0
+def step(f: RightSide, c: Coefficients, work: Work, t: Any, h: Any, x: States) -> int:
+    """Take a trial step; see `ControlledStepper`."""
+    x.failed[0] = 0
     for i in range(1, _STAGES):
-        stage(f, c, i, t, h, y, p, run_parameters, after, work)
-    combination(after, y, h, c.b, work.K, _STAGES)
+        stage(f, c, work, t, h, x, i, x.after)
+    combination(x.after, x.y, h, c.b, work.K, _STAGES)
     return _STAGES - 1
 
 
-def error(c: Coefficients, h: Any, y: Array, after: Array, work: Work, rtol: float, atol: float) -> float:
-    """The norm of its error; see `ControlledStepper`."""
-    fifth, third = work.error[0], work.error[1]
+def error(c: Coefficients, work: Work, h: Any, x: States, rtol: float, atol: float) -> float:
+    """Return the norm of the error of a trial step; see `ControlledStepper`."""
+    y, after, fifth, third = x.y, x.after, work.error[0], work.error[1]
     k = len(fifth)
     combination(fifth, work.zero[:k], 1.0, c.e5, work.K, _STAGES)
     combination(third, work.zero[:k], 1.0, c.e3, work.K, _STAGES)
@@ -138,17 +153,15 @@ def error(c: Coefficients, h: Any, y: Array, after: Array, work: Work, rtol: flo
     return abs(h) * large * large / np.sqrt(large * large + 0.01 * small * small)
 
 
-def dense(
-    f: Any, c: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work
-) -> int:
-    """The dense output, from three further stages; see `ControlledStepper`."""
+def dense(f: RightSide, c: Coefficients, work: Work, t: Any, h: Any, x: States) -> int:
+    """Compute the dense output, from three further stages; see `ControlledStepper`."""
     F = work.F
     copy(work.K[_STAGES], work.last)
     subtract(work.K[_STAGES], work.K[0])
     for i in range(_STAGES + 1, _EXTENDED):
-        stage(f, c, i, t, h, y, p, run_parameters, F[0], work)
-    copy(F[0], after)
-    subtract(F[0], y)
+        stage(f, c, work, t, h, x, i, F[0])
+    copy(F[0], x.after)
+    subtract(F[0], x.y)
     combination(F[1], work.zero, h, c.b, work.K, 1)
     subtract(F[1], F[0])
     combination(F[2], F[0], -h, c.end, work.K, _STAGES + 1)

@@ -16,7 +16,7 @@ from robot_dyn.foundations.arithmetic import Arithmetic, Array
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.dop853 import table
-from robot_dyn.integrate.integrator import PlainMethod, RightSide, Stepper
+from robot_dyn.integrate.integrator import PlainMethod, RightSide, States, Stepper
 from robot_dyn.integrate.primitives import combination, evaluate
 from robot_dyn.integrate.tableau import ButcherTableau, Coefficients
 
@@ -27,17 +27,14 @@ class Stages(NamedTuple):
     K: Array
 
 
-def explicit_step(
-    f: RightSide, tableau: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array,
-    work: Stages, lost: Array,
-) -> int:  # fmt: skip
-    """A step of an explicit Runge–Kutta method; arguments as of `Stepper`."""
+def explicit_step(f: RightSide, tableau: Coefficients, work: Stages, t: Any, h: Any, x: States) -> int:
+    """Take a step of an explicit Runge–Kutta method; see `Stepper` for the arguments."""
     K, s = work.K, len(tableau.c)
-    evaluate(f.rate, t, y, p, run_parameters, K[0])
+    evaluate(f.rate, t, x.y, x.p, x.run_parameters, K[0])
     for i in range(1, s):
-        combination(after, y, h, tableau.a[i], K, i)
-        evaluate(f.rate, t + tableau.c[i] * h, after, p, run_parameters, K[i])
-    combination(after, y, h, tableau.b, K, s)
+        combination(x.after, x.y, h, tableau.a[i], K, i)
+        evaluate(f.rate, t + tableau.c[i] * h, x.after, x.p, x.run_parameters, K[i])
+    combination(x.after, x.y, h, tableau.b, K, s)
     return s
 
 
@@ -77,13 +74,10 @@ class Start(NamedTuple):
     b: Array
 
 
-def semi_implicit_step(
-    f: RightSide, start: Start, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Stages,
-    lost: Array,
-) -> int:  # fmt: skip
-    """A step of semi-implicit Euler; arguments as of `Stepper`."""
-    n = start.n
-    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
+def semi_implicit_step(f: RightSide, start: Start, work: Stages, t: Any, h: Any, x: States) -> int:
+    """Take a step of semi-implicit Euler; see `Stepper` for the arguments."""
+    n, y, after = start.n, x.y, x.after
+    evaluate(f.rate, t, y, x.p, x.run_parameters, work.K[0])
     combination(after, y, h, start.b, work.K, 1)
     combination(after[:n], y[:n], h, start.b, after[n : 2 * n].reshape((1, n, y.shape[1])), 1)
     return 1

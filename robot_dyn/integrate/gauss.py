@@ -24,6 +24,7 @@ from robot_dyn.integrate.integrator import (
     IntegrationError,
     PlainMethod,
     RightSide,
+    States,
     Stepper,
     System,
     arithmetic_like,
@@ -66,7 +67,7 @@ _TABLEAUS = {
 
 
 class Increments(NamedTuple):
-    """The increments Z_i = h k_i of a step, (s, m, W), during their iteration; see `settle`."""
+    """The increments Z_i = h k_i of a step, (s, m, W), and the arrays of their iteration; see `settle`."""
 
     K: Array
     Z: Array
@@ -77,25 +78,22 @@ class Increments(NamedTuple):
     epsilon: float
 
 
-def gauss_step(
-    f: RightSide, tableau: Coefficients, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array,
-    work: Increments, lost: Array,
-) -> int:  # fmt: skip
-    """A step of a Gauss method; arguments as of `Stepper`."""
-    Z, m, s = work.Z, len(y), len(tableau.c)
+def gauss_step(f: RightSide, tableau: Coefficients, work: Increments, t: Any, h: Any, x: States) -> int:
+    """Take a step of a Gauss method; see `Stepper` for the arguments."""
+    y, after, Z, m, s = x.y, x.after, work.Z, len(x.y), len(tableau.c)
     Z[...] = tableau.zero
     work.least[...], work.stale[...], work.state[...] = np.inf, 0, GOING
     rounds, going = 0, 1
     while going > 0 and rounds < MOST_ITERATIONS:
         for i in range(s):
             combination(after, y, tableau.one, tableau.a[i], Z, s)
-            evaluate(f.rate, t + tableau.c[i] * h, after, p, run_parameters, work.K[0])
+            evaluate(f.rate, t + tableau.c[i] * h, after, x.p, x.run_parameters, work.K[0])
             np.multiply(work.K[0, :m], h, work.new[i])
         going = settle(Z, work.new, y, work.least, work.stale, work.state, work.epsilon)
         rounds += 1
     combination(after, y, tableau.one, tableau.b, Z, s)
-    for run in range(len(lost)):
-        lost[run] = work.state[run] != SETTLED
+    for run in range(len(x.failed)):
+        x.failed[run] = work.state[run] != SETTLED
     return s * rounds
 
 
@@ -136,16 +134,17 @@ class Gauss(PlainMethod):
         s = len(self.tableau.b)
         K, Z, new = (aligned(shape, kind.dtype) for shape in ((1, rows, runs), (s, m, runs), (s, m, runs)))
         stale, state = np.empty(runs, np.int64), np.empty(runs, np.int64)
-        work = Increments(K, Z, new, np.empty((m, runs)), stale, state, float(unit_roundoff(K)))
+        least, epsilon = np.empty((m, runs)), float(unit_roundoff(K))
+        work = Increments(K=K, Z=Z, new=new, least=least, stale=stale, state=state, epsilon=epsilon)
         return Stepper(gauss_step, self.tableau.arrays(kind), work)
 
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # an iteration that diverges is reported
-                after, lost, work = self.stepped(system, t, y, h)
+                after, failed, work = self.stepped(system, t, y, h)
         except OverflowedError:
             raise self.not_found(t, h) from None
-        if lost.any():
+        if failed.any():
             raise self.not_found(t, h)
         return after if y.dtype != object else self._enclosed(system, t, y, h, work.Z)
 

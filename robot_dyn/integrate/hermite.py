@@ -15,13 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import FLOAT64, Array
-from robot_dyn.integrate.integrator import Integrator
+from robot_dyn.integrate.integrator import Integrator, RightSide, States
 from robot_dyn.integrate.primitives import combination, copy, subtract
 from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end, rate_at_start
 
 
 class Numbers(NamedTuple):
-    """The coefficients of the method, and the weights that select the rate at the start, or at the end."""
+    """The coefficients of the method, and the weights that select the rate at the start or at the end."""
 
     method: Any
     one: Array
@@ -35,7 +35,7 @@ class Work(NamedTuple):
         method: Arrays of the method.
         K: The rate at the start, and one at the end, (2, r, 1).
         last: The rate at the end, (r, 1).
-        F: Dense output, (3, m, 1), as of `between`.
+        F: Dense output, (3, m, 1), see `between`.
         error: Empty, (0, m, 1).
         zero: (m, 1).
     """
@@ -51,43 +51,50 @@ class Work(NamedTuple):
 def stepper(method: Integrator, m: int, n: int, rows: int, widths: Array | None) -> ControlledStepper:
     """Return a method of fixed step for one state of m entries, n of them positions, and rates of `rows`."""
     inner = method.stepper(FLOAT64, m, n, rows, 1, widths)
-    K, last, F = np.zeros((2, rows, 1)), np.zeros((rows, 1)), np.zeros((3, m, 1))
-    work = Work(inner.work, K, last, F, np.zeros((0, m, 1)), np.zeros((m, 1)))
-    step = (_known_step if method.plain else step_of)(inner.step)
+    work = Work(
+        method=inner.work,
+        K=np.zeros((2, rows, 1)),
+        last=np.zeros((rows, 1)),
+        F=np.zeros((3, m, 1)),
+        error=np.zeros((0, m, 1)),
+        zero=np.zeros((m, 1)),
+    )
     return ControlledStepper(
-        rate_at_start, step, error, rate_at_end, dense, Numbers(inner.coefficients, *np.eye(2)), work, 1
+        begin=rate_at_start,
+        step=(_cached_step if method.plain else step_of)(inner.step),
+        error=no_error,
+        accept=rate_at_end,
+        dense=dense,
+        coefficients=Numbers(inner.coefficients, *np.eye(2)),
+        work=work,
+        error_order=1,
     )
 
 
 def step_of(inner: Callable[..., int]) -> Callable[..., int]:
-    """Return the step of a method, with its coefficients and arrays inside these."""
+    """Return the step of a method whose coefficients and arrays are fields of `Numbers` and `Work`."""
 
-    def step(
-        f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work,
-        lost: Array,
-    ) -> int:  # fmt: skip
-        lost[0] = 0
-        return inner(f, c.method, t, h, y, p, run_parameters, after, work.method, lost)
+    def step(f: RightSide, c: Numbers, work: Work, t: Any, h: Any, x: States) -> int:
+        x.failed[0] = 0
+        return inner(f, c.method, work.method, t, h, x)
 
     return step
 
 
-_known_step = cache(step_of)  # machine code is built once for each function
+_cached_step = cache(step_of)  # machine code is built once for each function
 
 
-def error(c: Numbers, h: Any, y: Array, after: Array, work: Work, rtol: float, atol: float) -> float:
-    """No error is known."""
+def no_error(c: Numbers, work: Work, h: Any, x: States, rtol: float, atol: float) -> float:
+    """Return 0: a method of fixed step has no error estimate."""
     return 0.0
 
 
-def dense(
-    f: Any, c: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work
-) -> int:
-    """The cubic."""
+def dense(f: RightSide, c: Numbers, work: Work, t: Any, h: Any, x: States) -> int:
+    """Compute the cubic."""
     F = work.F
     copy(work.K[1], work.last)
-    copy(F[0], after)
-    subtract(F[0], y)
+    copy(F[0], x.after)
+    subtract(F[0], x.y)
     combination(F[1], work.zero, h, c.one, work.K, 1)
     subtract(F[1], F[0])
     combination(F[2], F[0], -h, c.end, work.K, 2)

@@ -85,15 +85,32 @@ class RightSide(NamedTuple):
     behind: Any = 0
 
 
+class States(NamedTuple):
+    """W runs in a step, and the numbers that their equation depends on.
+
+    Attributes:
+        y: State at the start of the step, (m, W).
+        after: State at its end, (m, W); the step writes it.
+        p: Numbers that all runs share, (P,).
+        run_parameters: Numbers of each run, (O, W).
+        failed: 1 for each run whose stages the step did not find, else 0, (W,); the step writes it.
+    """
+
+    y: Array
+    after: Array
+    p: Array
+    run_parameters: Array
+    failed: Array
+
+
 class Stepper(NamedTuple):
     """A method prepared for a time loop, for states (m, W).
 
     Attributes:
-        step: The plain function (f, coefficients, t, h, y, p, s, after, work, lost) → evaluations. It writes
-            y(t + h) into `after`, and 1 into `lost` (W,) where stages are not found; f has the functions of a
-            `RightSide`, p and s (run_parameters) are as of `evaluate`.
-        coefficients: Its numbers.
-        work: Its arrays; work.K[-1], (r, W), is the latest rate.
+        step: The plain function (f, coefficients, work, t, h, x) → evaluations. It writes y(t + h) into x.after; f has
+            the functions of a `RightSide`, x the arrays of `States`.
+        coefficients: Numbers of the method.
+        work: Arrays of the method; work.K[-1], (r, W), is the latest rate.
     """
 
     step: Callable[..., int]
@@ -165,29 +182,26 @@ class Integrator(ABC):
         """
         K, J = np.empty((1, rows, 1), kind.dtype), np.empty((m + 1, m, 1), kind.dtype)
 
-        def step(
-            f: RightSide, _: Any, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Latest,
-            lost: Array,
-        ) -> int:  # fmt: skip
+        def step(f: RightSide, _: Any, work: Latest, t: Any, h: Any, x: States) -> int:
             evaluations = 0
 
-            def one(t: Any, x: Array) -> Array:
+            def rate_of_one(t: Any, y: Array) -> Array:
                 nonlocal evaluations
                 evaluations += 1
-                evaluate(f.rate, t, x[:, None], p, run_parameters, K[0])
+                evaluate(f.rate, t, y[:, None], x.p, x.run_parameters, K[0])
                 return K[0, :m, 0].copy()
 
-            def rate(t: Any, x: Array) -> Array:
-                return (
-                    one(t, x) if x.ndim == 1 else np.array([one(t, each) for each in x.reshape(-1, m)]).reshape(x.shape)
-                )
+            def rate(t: Any, y: Array) -> Array:
+                if y.ndim == 1:
+                    return rate_of_one(t, y)
+                return np.array([rate_of_one(t, row) for row in y.reshape(-1, m)]).reshape(y.shape)
 
-            def derivatives(t: Any, x: Array) -> Array:
-                evaluate(f.jacobian, t, x[:, None], p, run_parameters, J)
+            def derivatives(t: Any, y: Array) -> Array:
+                evaluate(f.jacobian, t, y[:, None], x.p, x.run_parameters, J)
                 return J[:, :, 0].copy()
 
             exact = derivatives if self.needs_jacobian else None
-            after[:, 0] = self.step(System(rate, n, widths, exact), t, y[:, 0].copy(), h)
+            x.after[:, 0] = self.step(System(rate, n, widths, exact), t, x.y[:, 0].copy(), h)
             return evaluations
 
         return Stepper(step, None, Latest(K))
@@ -204,17 +218,17 @@ class PlainMethod(Integrator):
     ) -> Stepper: ...
 
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
-        after, lost, _ = self.stepped(system, t, y, h)
-        if lost.any():
+        after, failed, _ = self.stepped(system, t, y, h)
+        if failed.any():
             raise self.not_found(t, h)
         return after
 
     def stepped(self, system: System, t: Any, y: Array, h: Any) -> tuple[Array, Array, Any]:
-        """Return a step, whether its stages were lost, (B,), and the arrays of the stepper."""
+        """Return a step, 1 for each run whose stages were not found, (B,), and the arrays of the stepper."""
         m, kind = y.shape[-1], arithmetic_like(y)
-        x, h = y.reshape(-1, m).T, kind.number(h)
-        step, coefficients, work = self.stepper(kind, m, system.n, m, x.shape[1])
-        after, lost = np.empty_like(x), np.zeros(x.shape[1], np.int64)
+        start, h = y.reshape(-1, m).T, kind.number(h)
+        step, coefficients, work = self.stepper(kind, m, system.n, m, start.shape[1])
+        after, failed = np.empty_like(start), np.zeros(start.shape[1], np.int64)
 
         def rate(t: Any, x: Array, p: Any, run_parameters: Any, out: Array) -> None:
             out[...] = system.rate(t, x.T.reshape(y.shape)).reshape(-1, m).T
@@ -223,8 +237,9 @@ class PlainMethod(Integrator):
             derivatives = system.derivatives(t, x.T.reshape(y.shape), t + h)
             out[...] = np.moveaxis(derivatives.reshape(m + 1, -1, m), 1, 2)
 
-        step(RightSide(rate, jacobian), coefficients, t, h, x, None, None, after, work, lost)
-        return after.T.reshape(y.shape), lost, work
+        x = States(y=start, after=after, p=None, run_parameters=None, failed=failed)
+        step(RightSide(rate, jacobian), coefficients, work, t, h, x)
+        return after.T.reshape(y.shape), failed, work
 
     def not_found(self, t: Any, h: Any) -> IntegrationError:
         """The error of a step whose stages are not found."""

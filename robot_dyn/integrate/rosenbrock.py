@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import FLOAT64, Arithmetic, Array
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.values import aligned
-from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, Stepper
+from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, States, Stepper
 from robot_dyn.integrate.primitives import combination, copy, evaluate, factor, norm, solve, subtract
 from robot_dyn.integrate.rosenbrock_table import RODAS5P, Numbers, RosenbrockTable
 from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end
@@ -32,9 +32,9 @@ class Linear(NamedTuple):
         U: u_i, (s, m, W).
         J: ∂f/∂y_j for each j, then ∂f/∂t, (m + 1, m, W).
         A, rows: Factors of 1 − h γ J, (m, m, W), and the rows that they exchange, (m, W).
-        known, zero: A right-hand side, and 0, (m, W).
-        at, y: Time and state of J, (1,) and (m, W).
-        F: Dense output of one run, (4, m, W), as of `between`.
+        rhs, zero: Right-hand side of a linear system, and 0, (m, W).
+        t_J, y_J: Time and state of J, (1,) and (m, W).
+        F: Dense output of one run, (4, m, W), see `between`.
         error: Local error of the entries whose error is bounded, (1, k, W).
     """
 
@@ -44,82 +44,71 @@ class Linear(NamedTuple):
     J: Array
     A: Array
     rows: Array
-    known: Array
+    rhs: Array
     zero: Array
-    at: Array
-    y: Array
+    t_J: Array
+    y_J: Array
     F: Array
     error: Array
 
 
-def begin(f: RightSide, table: Numbers, t: Any, y: Array, p: Array, run_parameters: Array, work: Linear) -> int:
-    """Evaluate what depends on t and y alone: f and its derivatives."""
-    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
-    differentiate(f, t, y, p, run_parameters, work)
+def begin(f: RightSide, table: Numbers, work: Linear, t: Any, x: States) -> int:
+    """Evaluate f and its derivatives, which depend on t and y alone."""
+    evaluate(f.rate, t, x.y, x.p, x.run_parameters, work.K[0])
+    differentiate(f, work, t, x)
     return 1
 
 
-def differentiate(f: RightSide, t: Any, y: Array, p: Array, run_parameters: Array, work: Linear) -> None:
+def differentiate(f: RightSide, work: Linear, t: Any, x: States) -> None:
     """Evaluate the derivatives at t and y."""
-    evaluate(f.jacobian, t, y, p, run_parameters, work.J)
-    work.at[0] = t
-    copy(work.y, y)
+    evaluate(f.jacobian, t, x.y, x.p, x.run_parameters, work.J)
+    work.t_J[0] = t
+    copy(work.y_J, x.y)
 
 
-def stages(
-    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Linear,
-    lost: Array,
-) -> int:  # fmt: skip
-    """Write the step, from these derivatives."""
-    K, U, h_gamma = work.K, work.U, h * table.gamma
-    factor(work.A, work.J, h_gamma, work.rows, lost)
+def stages(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States) -> int:
+    """Take the step, from these derivatives."""
+    K, U, h_gamma, y, after = work.K, work.U, h * table.gamma, x.y, x.after
+    factor(work.A, work.J, h_gamma, work.rows, x.failed)
     combination(K[1][: len(y)], work.zero, h, table.last, work.J, len(work.J))
     for i in range(len(table.m)):
         if i > 0:
             combination(after, y, table.one, table.a[i], U, i)
-            evaluate(f.rate, t + table.alpha[i] * h, after, p, run_parameters, K[2])
-        combination(work.known, work.zero, h_gamma, table.f[i], K, 3 if i > 0 else 2)
-        combination(U[i], work.known, table.gamma, table.c[i], U, i)
+            evaluate(f.rate, t + table.alpha[i] * h, after, x.p, x.run_parameters, K[2])
+        combination(work.rhs, work.zero, h_gamma, table.f[i], K, 3 if i > 0 else 2)
+        combination(U[i], work.rhs, table.gamma, table.c[i], U, i)
         solve(work.A, work.rows, U[i])
     combination(after, y, table.one, table.m, U, len(table.m))
     return len(table.m) - 1
 
 
-def rosenbrock_step(
-    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Linear,
-    lost: Array,
-) -> int:  # fmt: skip
-    """A step of a Rosenbrock method; arguments as of `Stepper`."""
-    first = begin(f, table, t, y, p, run_parameters, work)
-    return first + stages(f, table, t, h, y, p, run_parameters, after, work, lost)
+def rosenbrock_step(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States) -> int:
+    """Take a step of a Rosenbrock method; see `Stepper` for the arguments."""
+    first = begin(f, table, work, t, x)
+    return first + stages(f, table, work, t, h, x)
 
 
-def trial(
-    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Linear,
-    lost: Array,
-) -> int:  # fmt: skip
-    """Write a trial step, with the derivatives of `begin` where t and y are the same; see `ControlledStepper`."""
-    known = work.at[0] == t
-    for e in range(len(y)):
-        known &= work.y[e, 0] == y[e, 0]
-    if not known:
-        differentiate(f, t, y, p, run_parameters, work)
-    return stages(f, table, t, h, y, p, run_parameters, after, work, lost)
+def trial(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States) -> int:
+    """Take a trial step, with the derivatives of `begin` where t and y are the same; see `ControlledStepper`."""
+    is_current = work.t_J[0] == t
+    for e in range(len(x.y)):
+        is_current &= work.y_J[e, 0] == x.y[e, 0]
+    if not is_current:
+        differentiate(f, work, t, x)
+    return stages(f, table, work, t, h, x)
 
 
-def error(table: Numbers, h: Any, y: Array, after: Array, work: Linear, rtol: float, atol: float) -> float:
+def error(table: Numbers, work: Linear, h: Any, x: States, rtol: float, atol: float) -> float:
     """Return the norm of the last u_i, which the method of lower order lacks; see `ControlledStepper`."""
     k = work.error.shape[1]
-    return norm(work.U[len(work.U) - 1][:k], y[:k], after[:k], rtol, atol)
+    return norm(work.U[len(work.U) - 1][:k], x.y[:k], x.after[:k], rtol, atol)
 
 
-def dense(
-    f: RightSide, table: Numbers, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Linear
-) -> int:
-    """The polynomial between; see `ControlledStepper`."""
+def dense(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States) -> int:
+    """Compute the dense output; see `ControlledStepper`."""
     F = work.F
-    copy(F[0], after)
-    subtract(F[0], y)
+    copy(F[0], x.after)
+    subtract(F[0], x.y)
     for i in range(len(table.dense)):
         combination(F[i + 1], work.zero, table.one, table.dense[i], work.U, len(work.U))
     return 0
@@ -156,17 +145,37 @@ class Rosenbrock(PlainMethod):
         return Stepper(rosenbrock_step, self.table.numbers(kind, m), self._work(kind, m, rows, runs, m))
 
     def controlled(self, m: int, rows: int, bounded: int) -> ControlledStepper:
-        """Return the method with control of its error, as `dop853.stepper`."""
-        table, work = self.table.numbers(FLOAT64, m), self._work(FLOAT64, m, rows, 1, bounded)
-        return ControlledStepper(begin, trial, error, rate_at_end, dense, table, work, self.order)
+        """Return the method with control of its error, for the arguments of `dop853.stepper`."""
+        return ControlledStepper(
+            begin=begin,
+            step=trial,
+            error=error,
+            accept=rate_at_end,
+            dense=dense,
+            coefficients=self.table.numbers(FLOAT64, m),
+            work=self._work(FLOAT64, m, rows, 1, bounded),
+            error_order=self.order,
+        )
 
     def _work(self, kind: Arithmetic, m: int, rows: int, runs: int, bounded: int) -> Linear:
         s, dtype = len(self.table.m), kind.dtype
         shapes = (3, rows), (s, m), (m + 1, m), (m, m), (4, m), (1, bounded)
         K, U, J, A, F, error = (aligned((*shape, runs), dtype) for shape in shapes)
-        known, zero, y = aligned((3, m, runs), dtype)
-        exchanged = np.zeros((m, runs), np.int64)
-        return Linear(K, K[2], U, J, A, exchanged, known, zero, np.full(1, np.nan), y, F, error)
+        rhs, zero, y = aligned((3, m, runs), dtype)
+        return Linear(
+            K=K,
+            last=K[2],
+            U=U,
+            J=J,
+            A=A,
+            rows=np.zeros((m, runs), np.int64),
+            rhs=rhs,
+            zero=zero,
+            t_J=np.full(1, np.nan),
+            y_J=y,
+            F=F,
+            error=error,
+        )
 
     def not_found(self, t: Any, h: Any) -> IntegrationError:
         return IntegrationError(

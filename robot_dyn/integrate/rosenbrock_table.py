@@ -23,7 +23,7 @@ class Numbers(NamedTuple):
         m: Weights, (s,).
         alpha: α_i, (s,).
         f: Weights of f at the start, of h ∂f/∂t, and of the latest f, for each stage, (s, 3).
-        dense: Weights of the polynomial between, (3, s), as of `between`.
+        dense: Weights of the dense output, (3, s), see `between`.
         gamma, one: γ and 1.
         last: The weights that select ∂f/∂t of the m + 1 derivatives, (m + 1,).
     """
@@ -73,7 +73,8 @@ class RosenbrockTable:
         h0, h1, h2 = np.array(self.dense)
         dense = np.stack([h0, h1 + h2, -h2]).astype(dtype)
         last = np.eye(size + 1, dtype=dtype)[-1]
-        return Numbers(a, c, m, alpha, f, dense, kind.number(self.gamma), kind.number(1), last)
+        gamma, one = kind.number(self.gamma), kind.number(1)
+        return Numbers(a=a, c=c, m=m, alpha=alpha, f=f, dense=dense, gamma=gamma, one=one, last=last)
 
 
 _FIFTH = (-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946)

@@ -10,19 +10,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.integrate.integrator import RightSide, States
 from robot_dyn.integrate.primitives import combination, evaluate, norm, subtract
 
-_BETA_ORDER = 0.2  # β times the order of the error: the part that the error before has in the next step
+_BETA_ORDER = 0.2  # β times the order of the error: the weight of the previous error in the next step
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 10.0  # of a new step
-_CUT = 0.1  # of a step whose error is not a number
+_NOT_FINITE = 0.1  # factor of a step whose error is not a number
 _STRETCH = 1.01  # to avoid a sliver of a step before the end
 _SPACINGS = 4  # of floats at t: the least step
-_ONE = np.ones(1)
+_ONE, _NO_MESH = np.ones(1), np.zeros(0)
 
 
 class Choice(IntEnum):
@@ -32,37 +34,48 @@ class Choice(IntEnum):
     TOO_SMALL = 1  # only steps within rounding of t have an error within the tolerance
 
 
-class _Entries(NamedTuple):
-    """Entries of `control`, where the choice of steps is."""
+class StepControl(NamedTuple):
+    """The state of step control: arrays of length 1, then constants.
 
-    NEXT: int = 0  # length of the next step, not negative; 0 before the first
-    TAKEN: int = 1  # the step that was taken, with its sign
-    END: int = 2  # the time where it ends
-    ERROR: int = 3  # ‖e₋‖
-    RTOL: int = 4
-    ATOL: int = 5
-    LONGEST: int = 6
-    EXPONENT: int = 7  # 1 over the order of ‖e‖ in h
-    REJECTED: int = 8  # steps, in all
-    MESH: int = 9  # the next time of a mesh
+    Attributes:
+        next_h: Length of the next step, not negative; 0 before the first.
+        h: The latest step, with its sign.
+        end: Time at which it ends.
+        error: ‖e₋‖.
+        rejected: Number of rejected steps.
+        mesh_index: Index of the next time of the mesh.
+        mesh: Times at which steps end, (k,), which error control may divide further; (0,) for none.
+        rtol, atol: Tolerances, both 0 for steps that only the mesh determines.
+        longest: Longest step.
+        exponent: 1 over the order of ‖e‖ in h.
+    """
 
-
-At = _Entries()
+    next_h: Array
+    h: Array
+    end: Array
+    error: Array
+    rejected: Array
+    mesh_index: Array
+    mesh: Array
+    rtol: float
+    atol: float
+    longest: float
+    exponent: float
 
 
 class ControlledStepper(NamedTuple):
     """A method prepared for steps of controlled error, for one state (m, 1).
 
-    Functions are plain; f is the state equation (f.rate, f.jacobian), p and s, run_parameters, are as of `evaluate`.
+    Functions are plain; f has the functions of a `RightSide`, c are the coefficients, x the arrays of `States`.
 
     Attributes:
-        begin: (f, c, t, y, p, s, work) → evaluations. What depends on (t, y) alone: work.K[0], (r, 1), is the rate.
-        step: (f, c, t, h, y, p, s, after, work, lost) → evaluations. A trial: writes y(t + h) into `after`.
-        error: (c, h, y, after, work, rtol, atol) → ‖e‖.
-        accept: (f, c, t, h, y, p, s, after, work) → evaluations. work.last, (r, 1), is the rate at its end.
-        dense: (f, c, t, h, y, p, s, after, work) → evaluations. work.F, (d, m, 1), as of `between`.
-        coefficients: Its numbers, c.
-        work: Its arrays; work.error, (…, k, 1), of the first entries of y, whose error is bounded.
+        begin: (f, c, work, t, x) → evaluations. Terms that depend on (t, y) alone: work.K[0], (r, 1), is the rate.
+        step: (f, c, work, t, h, x) → evaluations. A trial: writes y(t + h) into x.after.
+        error: (c, work, h, x, rtol, atol) → ‖e‖.
+        accept: (f, c, work, t, h, x) → evaluations. work.last, (r, 1), is the rate at the end of the step.
+        dense: (f, c, work, t, h, x) → evaluations. work.F, (d, m, 1), is the polynomial of `between`.
+        coefficients: Numbers of the method, c.
+        work: Arrays of the method; work.error, (…, k, 1), of the first entries of y, whose error is bounded.
         error_order: Order of ‖e‖ in h.
     """
 
@@ -76,118 +89,138 @@ class ControlledStepper(NamedTuple):
     error_order: int
 
 
-def rate_at_start(f: Any, c: Any, t: Any, y: Array, p: Array, run_parameters: Array, work: Any) -> int:
+def rate_at_start(f: RightSide, c: Any, work: Any, t: Any, x: States) -> int:
     """Write the rate into work.K[0]: the `begin` of a method that needs nothing else."""
-    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
+    evaluate(f.rate, t, x.y, x.p, x.run_parameters, work.K[0])
     return 1
 
 
-def rate_at_end(
-    f: Any, c: Any, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Any
-) -> int:
+def rate_at_end(f: RightSide, c: Any, work: Any, t: Any, h: Any, x: States) -> int:
     """Write the rate at the end of a step into work.last: the `accept` of every method here."""
-    evaluate(f.rate, t + h, after, p, run_parameters, work.last)
+    evaluate(f.rate, t + h, x.after, x.p, x.run_parameters, work.last)
     return 1
 
 
-def control_of(stepper: ControlledStepper, rtol: float, atol: float, longest: float) -> np.ndarray:
-    """Return the choice of steps before the first one."""
-    control = np.zeros(len(At))
-    control[At.ERROR], control[At.RTOL], control[At.ATOL] = 1e-4, rtol, atol
-    control[At.LONGEST], control[At.EXPONENT] = longest, 1 / stepper.error_order
-    return control
+def initial_control(
+    error_order: int, rtol: float = 0.0, atol: float = 0.0, longest: float = inf, mesh: np.ndarray = _NO_MESH
+) -> StepControl:
+    """Return the state of step control before the first step; see `StepControl` for the arguments."""
+    return StepControl(
+        next_h=np.zeros(1),
+        h=np.zeros(1),
+        end=np.zeros(1),
+        error=np.full(1, 1e-4),
+        rejected=np.zeros(1, np.int64),
+        mesh_index=np.zeros(1, np.int64),
+        mesh=mesh,
+        rtol=float(rtol),
+        atol=float(atol),
+        longest=float(longest),
+        exponent=1 / error_order,
+    )
 
 
-def first_step(
-    f: Any, t: float, end: float, y: Array, p: Array, run_parameters: Array, after: Array, work: Any, control: Array
-) -> int:
+def first_step(f: Any, work: Any, control: StepControl, t: float, end: float, x: Any) -> int:
     """Write the length of the first step, from the rate at its start and after a short Euler step; 1 evaluation.
+
+    f has the functions of a `RightSide`, x the arrays of `States`.
 
     [Hairer, Nørsett, Wanner 1993, II.4]
     """
-    k, rtol, atol = work.error.shape[1], control[At.RTOL], control[At.ATOL]
-    x, rate = y[:k], work.K[0][:k]
-    size, slope = norm(x, x, x, rtol, atol), norm(rate, x, x, rtol, atol)
-    known = size >= 1e-5 and 1e-5 <= slope < np.inf  # inf where an entry is 0 and atol is (nearly) 0
-    h = 0.01 * size / slope if known else 1e-6
-    h = min(h, abs(end - t), control[At.LONGEST])
+    k, rtol, atol = work.error.shape[1], control.rtol, control.atol
+    y, rate = x.y[:k], work.K[0][:k]
+    size, slope = norm(y, y, y, rtol, atol), norm(rate, y, y, rtol, atol)
+    is_usable = size >= 1e-5 and 1e-5 <= slope < np.inf  # inf where an entry is 0 and atol is (nearly) 0
+    h = 0.01 * size / slope if is_usable else 1e-6
+    h = min(h, abs(end - t), control.longest)
     signed = h if end >= t else -h
-    combination(after, y, signed, _ONE, work.K, 1)
-    evaluate(f.rate, t + signed, after, p, run_parameters, work.last)
+    combination(x.after, x.y, signed, _ONE, work.K, 1)
+    evaluate(f.rate, t + signed, x.after, x.p, x.run_parameters, work.last)
     subtract(work.last, work.K[0])
-    steepest = max(slope, norm(work.last[:k], x, x, rtol, atol) / h)
-    other = (0.01 / steepest) ** control[At.EXPONENT] if 1e-15 < steepest < np.inf else max(1e-6, 1e-3 * h)
-    control[At.NEXT] = min(100 * h, other)
+    steepest = max(slope, norm(work.last[:k], y, y, rtol, atol) / h)
+    other = (0.01 / steepest) ** control.exponent if 1e-15 < steepest < np.inf else max(1e-6, 1e-3 * h)
+    control.next_h[0] = min(100 * h, other)
     return 1
 
 
-def following(mesh: Array, control: Array, t: float, end: float) -> float:
-    """Return the first time of a mesh after t, or the end."""
-    k = int(control[At.MESH])
+def next_of_mesh(control: StepControl, t: float, end: float) -> float:
+    """Return the first time of the mesh after t, or the end."""
+    k, mesh = control.mesh_index[0], control.mesh
     while k < len(mesh) and mesh[k] <= t:
         k += 1
-    control[At.MESH] = k
+    control.mesh_index[0] = k
     return min(mesh[k], end) if k < len(mesh) else end
 
 
-def finite(x: Array) -> bool:
-    """Whether all numbers of (m, 1) are finite."""
+def is_finite(x: Array) -> bool:
+    """Return True if all numbers of an array (m, 1) are finite."""
     total = 0.0
     for e in range(len(x)):
         total += abs(x[e, 0])
     return total < np.inf
 
 
-def shortened(h: float, e: float, control: Array) -> float:
+def controls_error(control: StepControl) -> bool:
+    """Return True if the error determines the steps, not the mesh alone."""
+    return control.rtol + control.atol > 0.0
+
+
+def shortened(control: StepControl, h: float, e: float) -> float:
     """Return the length of the step after one of length h that is rejected with the error e."""
-    control[At.REJECTED] += 1
-    return abs(h) * (max(_LEAST, _SAFETY * e ** -control[At.EXPONENT]) if e < np.inf else _CUT)
+    control.rejected[0] += 1
+    return abs(h) * (max(_LEAST, _SAFETY * e**-control.exponent) if e < np.inf else _NOT_FINITE)
+
+
+def adapt(control: StepControl, h: float, e: float, reaches_end: bool, rejected: bool) -> None:
+    """Write the length of the step after one of length h that is accepted with the error e: the PI controller.
+
+    A step that the end of a segment shortens does not reflect the error; `control.next_h` is the length it would have
+    had.
+    """
+    alpha = control.exponent
+    beta = _BETA_ORDER * alpha
+    factor = _MOST
+    if e > 0.0:
+        factor = min(_MOST, max(_LEAST, _SAFETY * e ** (0.75 * beta - alpha) * control.error[0] ** beta))
+    next_h = h * (min(1.0, factor) if rejected else factor)
+    control.next_h[0] = max(next_h, control.next_h[0]) if reaches_end and not rejected else next_h
+    control.error[0] = max(e, 1e-4)
 
 
 def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callable[..., tuple[int, int]]:
-    """Return the function that chooses a step, for a method's `step` and `error`.
+    """Return the function that chooses and takes a step, for a method's `step` and `error`.
 
-    choose(f, c, t, end, y, p, s, after, work, lost, control, mesh) → evaluations, Choice. Steps end at the times of
-    the mesh (k,), if there are any, and before them where the error asks for it: not where both tolerances are 0.
+    choose(f, c, work, control, t, end, x) → evaluations, Choice. Steps end at the times of the mesh, and before them
+    where the error requires it.
     """
 
     def choose(
-        f: Any, c: Any, t: float, end: float, y: Array, p: Array, run_parameters: Array, after: Array, work: Any,
-        lost: Array, control: Array, mesh: Array,
-    ) -> tuple[int, int]:  # fmt: skip
-        end = following(mesh, control, t, end)
-        if control[At.RTOL] + control[At.ATOL] == 0.0:
-            control[At.END], control[At.TAKEN] = end, end - t
-            h = end - t
-            evaluations = step(f, c, t, h, y, p, run_parameters, after, work, lost)
-            return evaluations, Choice.TAKEN if lost[0] == 0 and finite(after) else Choice.TOO_SMALL
+        f: RightSide, c: Any, work: Any, control: StepControl, t: float, end: float, x: States
+    ) -> tuple[int, int]:
+        end = next_of_mesh(control, t, end)
+        if not controls_error(control):
+            control.h[0], control.end[0] = end - t, end
+            evaluations = step(f, c, work, t, end - t, x)
+            return evaluations, Choice.TAKEN if x.failed[0] == 0 and is_finite(x.after) else Choice.TOO_SMALL
         left, evaluations, rejected = abs(end - t), 0, False
-        desired = min(control[At.NEXT], control[At.LONGEST])
+        control.next_h[0] = min(control.next_h[0], control.longest)
         least = _SPACINGS * (np.nextafter(abs(t), np.inf) - abs(t))
         while True:
-            reaches = desired * _STRETCH >= left
-            h = left if reaches else desired
-            if h < least and not reaches:
+            reaches_end = control.next_h[0] * _STRETCH >= left
+            h = left if reaches_end else control.next_h[0]
+            if h < least and not reaches_end:
                 return evaluations, Choice.TOO_SMALL
             signed = h if end >= t else -h
-            evaluations += step(f, c, t, signed, y, p, run_parameters, after, work, lost)
-            e = error(c, signed, y, after, work, control[At.RTOL], control[At.ATOL]) if lost[0] == 0 else np.inf
+            evaluations += step(f, c, work, t, signed, x)
+            e = error(c, work, signed, x, control.rtol, control.atol) if x.failed[0] == 0 else np.inf
             if e <= 1.0:
                 break
             rejected = True
-            desired = shortened(h, e, control)
-            if desired < least:
+            control.next_h[0] = shortened(control, h, e)
+            if control.next_h[0] < least:
                 return evaluations, Choice.TOO_SMALL
-        alpha = control[At.EXPONENT]
-        beta = _BETA_ORDER * alpha
-        factor = _MOST
-        if e > 0.0:
-            factor = min(_MOST, max(_LEAST, _SAFETY * e ** (0.75 * beta - alpha) * control[At.ERROR] ** beta))
-        next_h = h * (min(1.0, factor) if rejected else factor)
-        # a step that the end of a segment shortens does not reflect the error
-        control[At.NEXT] = max(next_h, desired) if reaches and not rejected else next_h
-        control[At.ERROR] = max(e, 1e-4)
-        control[At.TAKEN], control[At.END] = signed, end if reaches else t + signed
+        adapt(control, h, e, reaches_end, rejected)
+        control.h[0], control.end[0] = signed, end if reaches_end else t + signed
         return evaluations, Choice.TAKEN
 
     return choose

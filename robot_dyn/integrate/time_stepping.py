@@ -18,15 +18,15 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Arithmetic, Array
 from robot_dyn.foundations.convex import active_set
-from robot_dyn.integrate.integrator import PlainMethod, RightSide, Stepper, System, arithmetic_like
+from robot_dyn.integrate.integrator import PlainMethod, RightSide, States, Stepper, System, arithmetic_like
 from robot_dyn.integrate.primitives import copy, evaluate
 
 
 class Problem(NamedTuple):
-    """First rows of the numbers of a convex problem of n joints in an array: after v⁺, its places, and `changed`.
+    """First rows of the numbers of a convex problem of n joints in an array; v⁺ and its places come before them.
 
     Attributes:
-        changed: How many places have changed.
+        changed: Number of places that changed.
         M: The upper triangle of the mass matrix, by rows.
         p: M v and the known impulses, (n,).
         f: Greatest impulses of friction, (n,).
@@ -49,7 +49,8 @@ def problem_rows(n: int) -> Problem:
     """Return the rows of the problem of n joints."""
     M = 2 * n + 1
     p = M + n * (n + 1) // 2
-    return Problem(2 * n, M, p, *(p + k * n for k in range(1, 6)))
+    f, lower, upper, u, rest = (p + k * n for k in range(1, 6))
+    return Problem(changed=2 * n, M=M, p=p, f=f, lower=lower, upper=upper, u=u, rest=rest)
 
 
 class Work(NamedTuple):
@@ -58,9 +59,9 @@ class Work(NamedTuple):
     Attributes:
         K: v and u of the latest step, where a rate has them, (1, r, W).
         y: The state, the step, and the places of v⁺ after the step before, (m + 1 + n, W).
-        out: y⁺, then rows as of `Problem`, (m + R, W).
+        out: y⁺, then the rows of `Problem`, (m + R, W).
         again: y⁺ of runs that are solved alone, (m, W).
-        M, one, room: For the problem of one run, (n, n), (6, n) and (n + 1, n).
+        M, problem, L: Arrays for the problem of one run, (n, n), (6, n) and (n + 1, n).
     """
 
     K: Array
@@ -68,28 +69,25 @@ class Work(NamedTuple):
     out: Array
     again: Array
     M: Array
-    one: Array
-    room: Array
+    problem: Array
+    L: Array
 
 
-def time_step(
-    f: RightSide, rows: Problem, t: Any, h: Any, y: Array, p: Array, run_parameters: Array, after: Array, work: Work,
-    lost: Array,
-) -> int:  # fmt: skip
-    """Write a step; arguments as of `Stepper`. The solution starts from the places of the previous step."""
-    n, m, out = len(work.M), len(y), work.out
+def time_step(f: RightSide, rows: Problem, work: Work, t: Any, h: Any, x: States) -> int:
+    """Take a step; see `Stepper` for the arguments. The solution starts from the places of the previous step."""
+    n, m, out, y, after = len(work.M), len(x.y), work.out, x.y, x.after
     copy(work.y[:m], y)
     for b in range(y.shape[1]):
-        work.y[m, b], lost[b] = h, 0
-    evaluate(f.step, t + h / 2, work.y, p, run_parameters, out)
+        work.y[m, b], x.failed[b] = h, 0
+    evaluate(f.step, t + h / 2, work.y, x.p, x.run_parameters, out)
     copy(after, out[:m])
     alone = False
     for b in range(y.shape[1]):
         if out[m + rows.changed, b] > 0.0:
             alone = True
-            lost[b] = 0 if solved_alone(rows, work, out[m:], b) else 1
+            x.failed[b] = 0 if solved_alone(rows, work, out[m:], b) else 1
     if alone:
-        evaluate(f.behind, t, work.y[: m + 1], p, out[m:], work.again)
+        evaluate(f.behind, t, work.y[: m + 1], x.p, out[m:], work.again)
         for b in range(y.shape[1]):
             if out[m + rows.changed, b] > 0.0:
                 for e in range(m):
@@ -101,20 +99,28 @@ def time_step(
     return 1
 
 
-def solved_alone(rows: Problem, work: Work, known: Array, b: int) -> bool:
-    """Solve the problem of run b by the active set, where Newton's method cycles; return whether it was found."""
-    n, k, one = len(work.M), rows.M, work.one
+def solved_alone(rows: Problem, work: Work, out: Array, b: int) -> bool:
+    """Solve the problem of run b by the active set, where Newton's method cycles; return False if it has no solution.
+
+    Args:
+        rows: Rows of the problem in `out`.
+        work: Arrays of the step.
+        out: v⁺ and its places, which are written, and the problem.
+        b: The run.
+    """
+    n, k, problem = len(work.M), rows.M, work.problem
     for i in range(n):
         for j in range(i, n):
-            work.M[i, j] = work.M[j, i] = known[k, b]
+            work.M[i, j] = work.M[j, i] = out[k, b]
             k += 1
     for i in range(n):
         for row in range(4):
-            one[row, i] = known[rows.p + row * n + i, b]
-    found = active_set(work.M, one[0], one[1], one[2], one[3], one[4], one[5], work.room)
+            problem[row, i] = out[rows.p + row * n + i, b]
+    v, place = problem[4], problem[5]
+    solved = active_set(work.M, problem[0], problem[1], problem[2], problem[3], v, place, work.L)
     for i in range(n):
-        known[i, b], known[n + i, b] = one[4, i], one[5, i]
-    return found
+        out[i, b], out[n + i, b] = v[i], place[i]
+    return solved
 
 
 @final
@@ -136,9 +142,16 @@ class TimeStepping(PlainMethod):
         self, kind: Arithmetic, m: int, n: int, rows: int, runs: int = 1, widths: Array | None = None
     ) -> Stepper:
         places, most = problem_rows(n), (m - 2 * n) * (n + 1)
-        arrays = (np.zeros((size, runs)) for size in (m + 1 + n, m + places.rest + most, m))
-        room = (np.empty(shape) for shape in ((n, n), (6, n), (n + 1, n)))
-        return Stepper(time_step, places, Work(np.zeros((1, rows, runs)), *arrays, *room))
+        work = Work(
+            K=np.zeros((1, rows, runs)),
+            y=np.zeros((m + 1 + n, runs)),
+            out=np.zeros((m + places.rest + most, runs)),
+            again=np.zeros((m, runs)),
+            M=np.empty((n, n)),
+            problem=np.empty((6, n)),
+            L=np.empty((n + 1, n)),
+        )
+        return Stepper(time_step, places, work)
 
     def step(self, system: System, t: Any, y: Array, h: Any) -> Array:
         n, h = system.n, arithmetic_like(y).number(h)

@@ -35,7 +35,7 @@ from robot_dyn.foundations.errors import (
     announce,
 )
 from robot_dyn.foundations.validate import function, instance, is_moderate, is_plain, is_state
-from robot_dyn.foundations.values import OnFirstUse
+from robot_dyn.foundations.values import Caching, OnFirstUse
 from robot_dyn.model.calls import Scratch
 from robot_dyn.model.conditioning import LEAST_DIGITS
 from robot_dyn.model.coriolis import Coriolis
@@ -60,7 +60,7 @@ AnswerCheck = Callable[["Robot", str, tuple[ArrayLike, ...], ArrayLike], None]
 
 @final
 @dataclass(frozen=True)
-class Robot(Dynamics[ndarray], Parametrised):
+class Robot(Dynamics[ndarray], Parametrised, Caching):
     """A robot: its description and edits. Immutable; can be shared between threads and pickled.
 
     Attributes:

@@ -1,52 +1,30 @@
-"""Nothing is compiled for long without a word to who watches."""
+"""Long waits are logged, to "robot_dyn" at INFO; the command line prints them, and a script does not."""
 
 from __future__ import annotations
 
-import io
+import logging
+import subprocess
 import sys
 from collections.abc import Callable
-from threading import Event
-from typing import ClassVar
+from pathlib import Path
+from typing import Any, ClassVar
 
 import pytest
 
 import robot_dyn as rd
 from robot_dyn.codegen import INSTEAD, MachineFunction, waiting
-from robot_dyn.codegen.waiting import announced
+from robot_dyn.codegen.waiting import log_if_slow
 from robot_dyn.simulation.engine.choice import choose
-
-
-class Screen(io.StringIO):
-    """A terminal, or a file."""
-
-    def __init__(self, watched: bool) -> None:
-        super().__init__()
-        self.watched, self.said = watched, Event()
-
-    def isatty(self) -> bool:
-        return self.watched
-
-    def flush(self) -> None:
-        self.said.set()
-
-
-@pytest.mark.parametrize("watched", [True, False])
-def test_a_wait_is_told_where_a_person_watches(watched: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    screen = Screen(watched)
-    monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(waiting, "_IN_TERMINAL_S", 0.0)
-    with announced("thinking"):
-        assert screen.said.wait(30.0 if watched else 0.05) is watched
-    assert screen.getvalue() == "robot_dyn: thinking\n" * watched
+from tests.command import MAIN, spawn
 
 
 class Clock:
-    """In place of a timer: what is started, and whether it was cancelled."""
+    """A timer that ends when a test says so: the clocks that were started, and whether each was cancelled."""
 
     started: ClassVar[list[Clock]] = []
 
-    def __init__(self, after: float, say: Callable[[], object]) -> None:
-        self.say, self.cancelled = say, False
+    def __init__(self, after: float, function: Callable[..., object], args: tuple[Any, ...]) -> None:
+        self.after, self.ring, self.cancelled = after, lambda: function(*args), False
 
     def start(self) -> None:
         Clock.started.append(self)
@@ -56,27 +34,79 @@ class Clock:
 
 
 @pytest.fixture
-def clocks(monkeypatch: pytest.MonkeyPatch) -> list[Clock]:
+def clocks(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> list[Clock]:
     Clock.started = []
+    caplog.set_level(logging.INFO, "robot_dyn")
     monkeypatch.setattr(waiting, "Timer", Clock)
-    monkeypatch.setattr(waiting, "_patience_s", lambda: 1.0)
     return Clock.started
 
 
-def test_nothing_is_told_after_the_end_of_what_is_done(clocks: list[Clock]) -> None:
-    with announced("thinking"):
+def ring(clocks: list[Clock], caplog: pytest.LogCaptureFixture) -> list[str]:
+    """What is logged once all clocks have rung."""
+    for clock in clocks:
+        assert 0.0 < clock.after <= 2.0
+        clock.ring()
+    assert {(each.name, each.levelno) for each in caplog.records} == {("robot_dyn", logging.INFO)}
+    return [each.getMessage() for each in caplog.records]
+
+
+def test_a_wait_is_logged_while_it_lasts(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, "robot_dyn")
+    monkeypatch.setattr(waiting, "PATIENCE_S", 1e-3)
+    with log_if_slow("thinking 100 %"):
+        for _ in range(1000):
+            if caplog.records:
+                break
+            waiting.threading.Event().wait(0.01)
+    assert [each.getMessage() for each in caplog.records] == ["thinking 100 %"]
+
+
+def test_nothing_is_logged_after_the_end_of_a_wait(clocks: list[Clock]) -> None:
+    with log_if_slow("thinking"):
         assert not clocks[0].cancelled
-    with pytest.raises(ZeroDivisionError), announced("thinking"):
+    with pytest.raises(ZeroDivisionError), log_if_slow("thinking"):
         print(1 / 0)
     assert [each.cancelled for each in clocks] == [True, True]
+
+
+def test_no_timer_runs_where_the_log_is_off(clocks: list[Clock], caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.WARNING, "robot_dyn")
+    with log_if_slow("thinking"):
+        assert not clocks
+
+
+SLOW = """import time
+from robot_dyn.codegen import waiting
+from robot_dyn.codegen.loops.call import MachineFunction
+waiting.PATIENCE_S, compiled = 0.01, MachineFunction._compiled
+MachineFunction._compiled = lambda *args: (time.sleep(0.5), compiled(*args))[1]
+"""
+RUN = "import robot_dyn as rd; rd.simulate(rd.load('planar_2r'), [0.4, -0.7], duration_s=0.1, engine='compiled')"
+SCENE = 'robot = "planar_2r"\nduration_s = 0.1\nengine = "compiled"\n[start]\nq = 0.3\n'
+
+
+def test_a_script_that_does_not_configure_logging_prints_nothing() -> None:
+    done = subprocess.run([sys.executable, "-c", SLOW + RUN], capture_output=True, text=True, timeout=60, check=True)
+    assert (done.stdout, done.stderr) == ("", "")
+    configured = "import logging\nlogging.basicConfig(level=logging.INFO)\n" + SLOW + RUN
+    done = subprocess.run([sys.executable, "-c", configured], capture_output=True, text=True, timeout=60, check=True)
+    assert "INFO:robot_dyn:compiling the time loop of" in done.stderr
+
+
+def test_the_command_line_prints_waits_to_stderr(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE)
+    done = spawn("simulate", tmp_path / "scene.toml", code=SLOW + MAIN)
+    lines = done.stderr.decode().splitlines()
+    assert done.returncode == 0, lines
+    assert [line for line in lines if line.startswith("robot-dyn: compiling the time loop of")]
 
 
 def doubled(x: float) -> float:
     return x + x
 
 
-def test_machine_code_of_a_run_and_of_a_loop_is_told_and_what_is_there_is_not(
-    clocks: list[Clock], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+def test_machine_code_of_a_run_and_of_a_loop_is_logged_and_what_is_there_is_not(
+    clocks: list[Clock], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A run that is worth compiling, asked for twice; and any function."""
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
@@ -86,39 +116,22 @@ def test_machine_code_of_a_run_and_of_a_loop_is_told_and_what_is_there_is_not(
     loop = MachineFunction(doubled, INSTEAD, lambda: None, "a function")
     for _ in range(2):
         assert loop.calls()(2.0) == 4.0
-    for clock in clocks:
-        clock.say()
-    assert capsys.readouterr().err.splitlines() == [
-        "robot_dyn: compiling the equations of this run, once for its structure",
-        "robot_dyn: compiling a function, once for this version",
+    assert ring(clocks, caplog) == [
+        "compiling the equations of this run, once for its structure",
+        "compiling a function, once for this version",
     ]
 
 
-def test_machine_code_of_a_robot_and_of_a_batch_is_told(
-    clocks: list[Clock], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+def test_machine_code_of_a_robot_and_of_a_batch_is_logged(
+    clocks: list[Clock], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     robot = rd.load("planar_2r").with_(mass_scale=1.017)
     rd.Compiled(robot).M([0.4, -0.7])
-    for clock in clocks:
-        clock.say()
-    assert capsys.readouterr().err.splitlines() == [
-        "robot_dyn: tracing M of planar_2r",
-        "robot_dyn: compiling M of planar_2r, once for these equations",
+    assert ring(clocks, caplog) == [
+        "tracing M of planar_2r",
+        "compiling M of planar_2r, once for these equations",
     ]
     clocks.clear()
     rd.rollouts(robot, [[0.4, -0.7], [0.1, 0.2]], duration_s=0.01, integrator="rk4", step_s=1e-3)
-    for clock in clocks:
-        clock.say()
-    assert "robot_dyn: compiling the equations of this run, once for its structure" in capsys.readouterr().err
-
-
-def test_a_notebook_waits_longer_for_a_line_than_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is printed in a notebook is kept with it; a pipe and a missing stderr get nothing."""
-    for screen, ipython, after in ((True, False, 1.0), (False, True, 2.0), (False, False, None), (None, True, None)):
-        monkeypatch.setattr(sys, "stderr", None if screen is None else Screen(screen))
-        with monkeypatch.context() as modules:
-            modules.delitem(sys.modules, "ipykernel", raising=False)
-            if ipython:
-                modules.setitem(sys.modules, "ipykernel", sys)
-            assert waiting._patience_s() == after
+    assert "compiling the equations of this run, once for its structure" in ring(clocks, caplog)

@@ -16,7 +16,7 @@ from robot_dyn.codegen.llvm.vectors import F64
 from robot_dyn.foundations import FLOAT64
 from robot_dyn.foundations.values import LINE, aligned
 from robot_dyn.simulation import StateEquation
-from robot_dyn.simulation.dynamics.loop_state import runs_of
+from robot_dyn.simulation.dynamics.loop_state import lanes_of
 from robot_dyn.simulation.observation.guard_levels import guard_levels
 from robot_dyn.simulation.observation.observation import observations_of
 
@@ -44,7 +44,7 @@ def test_what_each_step_touches_begins_at_cache_lines(method: str) -> None:
     equation = StateEquation(rd.Plant(robot, [rd.effects.ViscousFriction([0.5] * 2)]), None)
     m, n, kept = equation.size, robot.n, []
     for _ in range(8):
-        runs = runs_of(equation, np.ones((m, W)), np.zeros((1, W)), 0, np.arange(W))
+        runs = lanes_of(equation, np.ones((m, W)), np.zeros((1, W)), 0, np.zeros(2), np.arange(W))
         K = rd.integrate.method(method).stepper(FLOAT64, m, n, m | 1, W).work.K
         kept += [runs.y, runs.after, K]
     start = np.random.default_rng(3).normal(size=(3 * n, 3 * W))

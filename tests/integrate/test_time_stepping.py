@@ -8,6 +8,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.foundations import QueryError
 from robot_dyn.integrate import RightSide, TimeStepping
+from robot_dyn.integrate.integrator import States
 from robot_dyn.integrate.primitives import copy
 from robot_dyn.integrate.time_stepping import problem_rows
 from tests.campaigns.estimates.scenes import arms
@@ -212,7 +213,8 @@ def test_a_step_solves_problems_that_newtons_method_does_not() -> None:
         copy(out[:n], found[:n])
 
     functions = RightSide(None, 0, gave_up, told)
-    stepper.step(functions, rows, 0.0, 1e-3, y, np.zeros(0), np.zeros((0, runs)), after, stepper.work, lost)
+    x = States(y=y, after=after, p=np.zeros(0), run_parameters=np.zeros((0, runs)), failed=lost)
+    stepper.step(functions, rows, stepper.work, 0.0, 1e-3, x)
     assert (lost == 0).all()
     for b, each in enumerate(given):
         M, p, f, *_ = each

@@ -259,8 +259,8 @@ def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(met
 
         return interrupted
 
-    monkeypatch.setattr(FixedStep, "_loop", on_second(FixedStep._loop))
-    monkeypatch.setattr(EventRun, "_loop", on_second(EventRun._loop))
+    monkeypatch.setattr(FixedStep, "_run", on_second(FixedStep._run))
+    monkeypatch.setattr(EventRun, "_run", on_second(EventRun._run))
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, integrator=method, engine="interpreted")
     assert len(ran) == 2
     assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.2)
@@ -280,7 +280,7 @@ def test_an_interrupt_before_the_first_step_leaves_the_start(engine: str, period
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(FixedStep, "_loop", interrupted)
+    monkeypatch.setattr(FixedStep, "_run", interrupted)
     run = rd.simulate(setup)
     assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.0)
     np.testing.assert_array_equal(run.t, [0.0])

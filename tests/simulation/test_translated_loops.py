@@ -19,12 +19,12 @@ from robot_dyn.integrate import FIXED_STEP, PlainMethod, Stepper, method
 from robot_dyn.integrate.adaptive import ADAPTIVE
 from robot_dyn.integrate.primitives import evaluate
 from robot_dyn.simulation import StateEquation, machine_code, observation_of, segment_table
-from robot_dyn.simulation.dynamics.loop_state import Ended, Now, rules_of, runs_of
+from robot_dyn.simulation.dynamics.loop_state import Ended, lanes_of, loop_config, start_position
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.observation.guard_levels import guard_levels
 from robot_dyn.simulation.run.fixed_step import samples_at_most
 from robot_dyn.simulation.run.make_run import make_run
-from robot_dyn.simulation.run.recording import records_of
+from robot_dyn.simulation.run.recording import Loop, records_of
 from robot_dyn.simulation.run.time_loop import time_loop
 from tests.campaigns.estimates.scenes import arms
 from tests.long import long
@@ -66,7 +66,7 @@ def both(setup: Setup) -> tuple[Any, Any]:
     code: Any = choose(setup)
     runs = [make_run(setup, each) for each in (code, replace(code, machine_loop=None))]
     for each in runs:
-        room = each.runs._replace(y=0, run_parameters=0, alive=0, scale=0, energy=0, keys=0), each.stepper.work
+        room = each.lanes._replace(y=0, p=0, run_parameters=0, alive=0, scale=0, energy=0, keys=0), each.stepper.work
         for _, x in numbers(room):  # what is not written yet
             x[...] = 0
         each.record()
@@ -88,12 +88,12 @@ def test_a_fixed_step_gives_the_same_bits(name: str, sampled: bool) -> None:
     effects = SMOOTH if of.canonical or of.nonsmooth else [*SMOOTH, BODY]
     ours, theirs = both(setup(effects, name, step_s=0.002, **more))
     assert ours.time == theirs.time == 0.6
-    assert_same_bits((ours.runs, ours.stepper.work), (theirs.runs, theirs.stepper.work))
-    rows = int(ours.now[Now.ROW])
-    names = ["t", "y"] if of.nonsmooth else ["t", "y", "made"]  # its rates at samples are found afterwards
+    assert_same_bits((ours.lanes, ours.stepper.work), (theirs.lanes, theirs.stepper.work))
+    rows = int(ours.position.sample_row[0])
+    names = ["t", "y"] if of.nonsmooth else ["t", "y", "sampled"]  # its rates at samples are found afterwards
     for mine, other in ((getattr(each.records, name) for each in (ours, theirs)) for name in names):
         assert_same_bits(mine[:rows], other[:rows])
-    shared = int(ours.now[Now.SHARED])
+    shared = int(ours.position.shared_row[0])
     for i in (4, 5, 6):  # of states shared with companions
         assert_same_bits(ours.records[i][:shared], theirs.records[i][:shared])
 
@@ -119,13 +119,14 @@ def test_a_run_with_events_gives_the_same_bits(name: str, what: list[Any], contr
     duration = 3.0 if what is BOUNDED else 1.0
     ours, theirs = both(setup(what, name, duration_s=duration, controller=controller, events=events))
     assert ours.events == theirs.events and len(ours.events) > 3
-    assert_same_bits((ours.runs, ours.stepper.work, ours.control), (theirs.runs, theirs.stepper.work, theirs.control))
-    assert_same_bits(ours.switches._replace(functions=0), theirs.switches._replace(functions=0))
-    rows = int(ours.now[Now.ROW])
+    arrays = ((each.lanes, each.stepper.work, each.control, each.position) for each in (ours, theirs))
+    assert_same_bits(*arrays, (".3.budget",))  # machine code has a larger one
+    assert_same_bits(ours.event_table._replace(functions=0), theirs.event_table._replace(functions=0))
+    rows = int(ours.position.sample_row[0])
     assert_same_bits(*(tuple(x[:rows] for x in each.records[1:4]) for each in (ours, theirs)))
     if what is not BOUNDED:
         assert sum("strikes" in each.name for each in ours.events) > 2
-        modes = (each.switching.modes.holding for each in (ours, theirs))
+        modes = (each.switching.contacts.mode for each in (ours, theirs))
         assert_same_bits(*modes, (".log.rows",))  # since the last return
 
 
@@ -172,12 +173,15 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.control
     starts = np.stack([equation.start(q, v) for q, v in rng.normal(size=(W, 2, 2))]).T
     starts[n, 5] = 1e200  # overflows at once
     of_levels = guard_levels(made.plant.dynamics, made.plant.effects, made.controller, W)
-    rules = rules_of(equation, False, 1e100, apart=0 if equation.sampled else 3)
+    times = {"sample_period": 0.02, "sample_slack": 1e-12}
+    config = loop_config(equation, False, largest=1e100, apart=0 if equation.sampled else 3, **times)
     results = []
     for interpreted in (False, True):
-        runs = runs_of(equation, starts, code.run_parameters({}), n + 2, np.arange(W))
+        lanes = lanes_of(equation, starts, code.run_parameters({}), n + 2, plan.parameters[0], np.arange(W))
         stepper = of.stepper(FLOAT64, m, n, m, W)
-        for _, x in numbers((stepper.work, runs.made, runs.command, runs.u, runs.energies, runs.size)):
+        for _, x in numbers(
+            (stepper.work, lanes.sampled, lanes.command, lanes.u, lanes.energies, lanes.size, lanes.after)
+        ):
             x[...] = 0
         rows = samples_at_most(made, plan.counts)
         records = records_of(
@@ -186,18 +190,15 @@ def test_lanes_in_lock_step_give_the_same_bits(name: str, controller: rd.control
             observation_of(np.vstack([starts[: 2 * n], np.full((n, W), np.nan)]), of_levels),
         )  # fmt: skip
         records.t[...] = 0
-        now, clock = np.zeros(len(Now), np.int64), np.array([0.0, 0.02, 1e-12])
-        now[Now.BUDGET] = 10**6
+        loop = Loop(plan, lanes, records, config, start_position())
+        loop.position.budget[0] = 10**6
         advance: Any = time_loop(stepper.step) if interpreted else code.machine_loop.calls()
         functions = code.in_python if interpreted else code.code.addresses
         with np.errstate(all="ignore"):
-            ended = advance(
-                functions, plan, runs, records, rules, stepper.coefficients, stepper.work, now, clock,
-                np.zeros(1, np.int64),
-            )  # fmt: skip
+            ended = advance(functions, stepper.coefficients, stepper.work, loop, np.zeros(1, np.int64))
         assert ended == Ended.DONE
-        results.append((runs, records, now, clock, stepper.work))
-    assert results[0][0].why[5] != 0
+        results.append((lanes, records, loop.position, stepper.work))
+    assert results[0][0].reason[5] != 0
     assert_same_bits(results[0], results[1])
 
 
@@ -215,33 +216,34 @@ class Work(NamedTuple):
     K: np.ndarray
 
 
-def heun(f, c, t, h, y, p, run_parameters, after, work, lost):
+def heun(f, c, work, t, h, x):
     """A step of the subset, over entries."""
-    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
+    y, after = x.y, x.after
+    evaluate(f.rate, t, y, x.p, x.run_parameters, work.K[0])
     for e in range(len(y)):
         for b in range(y.shape[1]):
             after[e, b] = y[e, b] + h * work.K[0, e, b]
-    evaluate(f.rate, t + h, after, p, run_parameters, work.K[1])
+    evaluate(f.rate, t + h, after, x.p, x.run_parameters, work.K[1])
     for e in range(len(y)):
         for b in range(y.shape[1]):
             after[e, b] = y[e, b] + c.half * h * (work.K[0, e, b] + work.K[1, e, b])
     return 2
 
 
-def heun_by_arrays(f, c, t, h, y, p, run_parameters, after, work, lost):
+def heun_by_arrays(f, c, work, t, h, x):
     """The same as NumPy has it, which is outside the subset."""
-    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
-    after[...] = y + h * work.K[0, : len(y)]
-    evaluate(f.rate, t + h, after, p, run_parameters, work.K[1])
-    after[...] = y + (work.K[0, : len(y)] + work.K[1, : len(y)]) * (c.half * h)
+    evaluate(f.rate, t, x.y, x.p, x.run_parameters, work.K[0])
+    x.after[...] = x.y + h * work.K[0, : len(x.y)]
+    evaluate(f.rate, t + h, x.after, x.p, x.run_parameters, work.K[1])
+    x.after[...] = x.y + (work.K[0, : len(x.y)] + work.K[1, : len(x.y)]) * (c.half * h)
     return 2
 
 
-def heun_that_errs(f, c, t, h, y, p, run_parameters, after, work, lost):
+def heun_that_errs(f, c, work, t, h, x):
     """It takes one entry too many."""
-    evaluate(f.rate, t, y, p, run_parameters, work.K[0])
-    for e in range(len(y) + 1):
-        after[e, 0] = y[e, 0] + h * work.K[0, e, 0]
+    evaluate(f.rate, t, x.y, x.p, x.run_parameters, work.K[0])
+    for e in range(len(x.y) + 1):
+        x.after[e, 0] = x.y[e, 0] + h * work.K[0, e, 0]
     return 1
 
 

@@ -207,7 +207,7 @@ def test_a_second_call_computes_nothing_that_depends_on_the_setup_alone(name: st
     found = calls(lambda: rd.simulate(setup))
     alone = {
         "_chosen", "structure", "parameters", "levels", "_plan", "cuts", "undeclared", "is_value", "Switching.at",
-        "StateEquation.energies", "rules_of", "observations_of",
+        "StateEquation.energies", "loop_config", "observations_of",
     }  # fmt: skip
     late = {
         "remarks", "ledger", "origin", "Observer.close", "tracking_of", "settings_of", "acting", "wrenches",
@@ -354,3 +354,64 @@ def test_an_attribute_that_is_no_field_is_none_of_an_unread_run() -> None:
     with pytest.raises(AttributeError, match=r"Trajectory.*remark_s"):
         run.remark_s  # noqa: B018 # pyright: ignore
     assert not hasattr(run, "_source_of") and "remarks" not in vars(run)
+
+
+def built_by(call: Callable[[], object], monkeypatch: pytest.MonkeyPatch) -> int:
+    """The number of setups that a call builds and checks."""
+    count, check = [0], rd.Setup.__post_init__
+
+    def counted(self: rd.Setup) -> None:
+        count[0] += 1
+        check(self)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(rd.Setup, "__post_init__", counted)
+        call()
+    return count[0]
+
+
+@pytest.mark.parametrize("what", [ARM, rd.Plant(ARM, [rd.effects.ViscousFriction(0.3)])], ids=["robot", "plant"])
+def test_a_call_with_equal_arguments_builds_no_setup(what: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    controller = rd.control.PD(PLAN, 60.0, 6.0)
+
+    def call(q0: Any = (0.3, -0.4), **more: Any) -> None:
+        more = {"duration_s": 0.02, "controller": controller, "engine": "interpreted", "about": {"a": "b"}} | more
+        rd.simulate(what, list(q0), np.array(V), **more)
+
+    call()
+    assert built_by(call, monkeypatch) == 0
+    others: list[dict[str, Any]] = [
+        {"q0": (0.3, -0.3)}, {"duration_s": 0.03}, {"about": {"a": "c"}}, {"q0": (-0.0, 0.0)}, {"q0": (0.0, 0.0)},
+        {"controller": replace(controller, kp=61.0)}, {"controller": None}, {"estimate_error": False},
+    ]  # fmt: skip
+    assert [built_by(lambda other=other: call(**other), monkeypatch) for other in others] == [1] * len(others)
+
+
+def test_a_start_changed_in_place_is_another_start() -> None:
+    plant, start = rd.Plant(ARM), Q.copy()
+    first = rd.simulate(plant, start, duration_s=0.02)
+    start += 0.1
+    second = rd.simulate(plant, start, duration_s=0.02)
+    assert first.q[0].tolist() == Q.tolist() and second.q[0].tolist() == start.tolist()
+
+
+def test_setups_of_parts_that_may_change_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A user-defined controller or event may answer differently in each call."""
+    event = rd.Event(lambda t, q, v: float(q[0] - 9.0), name="level")
+    controllers: list[Any] = [lambda t, q, v: -q, Driven()]
+    for more in (*({"controller": controller} for controller in controllers), {"events": [event]}):
+        plant = rd.Plant(ARM)
+
+        def call(plant: rd.Plant = plant, more: dict[str, Any] = more) -> object:
+            return rd.simulate(plant, Q, duration_s=0.02, engine="interpreted", **more)
+
+        call()
+        assert built_by(call, monkeypatch) == 1
+
+
+def test_copies_and_pickles_of_a_plant_carry_no_setup() -> None:
+    plant = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3)])
+    rd.simulate(plant, Q, duration_s=0.02)
+    assert plant.cache
+    for other in (copy(plant), deepcopy(plant), pickle.loads(pickle.dumps(plant)), pickle.loads(pickle.dumps(ARM))):
+        assert not other.cache

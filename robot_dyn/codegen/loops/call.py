@@ -20,7 +20,7 @@ from robot_dyn.codegen.loops.kinds import Kind, Number, Static, TupleKind, unpac
 from robot_dyn.codegen.loops.packing import Packed, pack
 from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.store.keys import digest, sources_of_the_translator
-from robot_dyn.codegen.waiting import COMPILING, announced, interrupts_later
+from robot_dyn.codegen.waiting import COMPILING, interrupts_later, log_if_slow
 from robot_dyn.foundations.errors import MachineCodeError
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
@@ -95,7 +95,7 @@ class MachineFunction:
         began, known = perf_counter(), tuple(kinds)
         with self._lock, interrupts_later():
             if known not in self._known:
-                with announced(f"compiling {self.about}, once for this version"):
+                with log_if_slow(f"compiling {self.about}, once for this version"):
                     self._known[known] = self._compiled(known)
             self._known[place] = self._known[known]
         COMPILING.seconds += perf_counter() - began

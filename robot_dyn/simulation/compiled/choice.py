@@ -10,7 +10,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Any
 
-from robot_dyn.codegen.waiting import announced
+from robot_dyn.codegen.waiting import log_if_slow
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.values import cached
 from robot_dyn.simulation.compiled.cache import (
@@ -89,13 +89,13 @@ def for_run(engine: Engine, batch: Setup, setup: Setup) -> Engine:
 
 
 def checked(setup: Setup, build: Callable[[], MachineCode]) -> MachineCode:
-    """Return the machine code that `build` returns, after its self-check, which compiles it; announce it if slow.
+    """Return the machine code that `build` returns, after its self-check, which compiles it; log a long wait.
 
     Raises:
         TraceError: If a part cannot be compiled; names it.
         MachineError: If the machine code does not agree with the interpreted engine.
     """
-    with announced("compiling the equations of this run, once for its structure"):
+    with log_if_slow("compiling the equations of this run, once for its structure"):
         code = build()
         check(code, setup)
     return code

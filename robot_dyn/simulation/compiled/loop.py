@@ -19,7 +19,7 @@ from robot_dyn.codegen.store.cache import default_store
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
-from robot_dyn.integrate.integrator import PlainMethod
+from robot_dyn.integrate.integrator import PlainMethod, States
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import detecting
@@ -73,14 +73,17 @@ def _refusal(method: PlainMethod, equation: StateEquation, lanes: int) -> Subset
     stepper = method.stepper(FLOAT64, m, n, m + n, lanes)
     if (stepper.step.__module__ or "").startswith("robot_dyn."):
         return None
-    y, run_parameters, lost = np.zeros((m, lanes)), np.zeros((1, lanes)), np.zeros(lanes, np.int64)
+    x = States(
+        y=np.zeros((m, lanes)),
+        after=np.zeros((m, lanes)),
+        p=np.zeros(2),
+        run_parameters=np.zeros((1, lanes)),
+        failed=np.zeros(lanes, np.int64),
+    )
     step = MachineFunction(stepper.step, INSTEAD, lambda: None, "")
     functions = Functions(*[0] * len(Functions._fields))
     try:
-        step.check(
-            functions, stepper.coefficients, 0.0, 1.0, y, np.zeros(2), run_parameters, np.zeros((m, lanes)),
-            stepper.work, lost,
-        )  # fmt: skip
+        step.check(functions, stepper.coefficients, stepper.work, 0.0, 1.0, x)
     except SubsetError as error:
         return error
     return None

@@ -26,7 +26,7 @@ from robot_dyn.foundations.convex import PASSES
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.engine import Advance, Evaluated, Watched
-from robot_dyn.simulation.events.holding import Places
+from robot_dyn.simulation.events.contact_mode import Places
 
 if TYPE_CHECKING:
     from robot_dyn.codegen.loops.call import MachineFunction

@@ -1,8 +1,9 @@
-"""Data of a time loop: functions of the state equation, arrays of runs, rules, and the reasons for its return."""
+"""Data of a time loop: functions of the state equation, lanes, settings, and the position of the loop."""
 
 from __future__ import annotations
 
 from enum import IntEnum
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,55 +17,84 @@ _FIRST = np.zeros(1, np.int64)
 
 
 class Ended(IntEnum):
-    """Why the loop returned."""
+    """The reason for which a time loop returned."""
 
     DONE = 0
     PAUSED = 1  # its budget of steps is spent
     NEEDS_REVIEW = 2  # the next step needs a check; y is the state before it
     TICK = 3  # the torque of the controller is not finite
     GAINS = 4  # energy may grow without a source; y is the state after the step
-    TOO_SMALL = 5  # no step large enough to change t in floating point meets the tolerance
+    TOO_SMALL = 5  # no step large enough to change t in floating point is within the tolerance
     NOT_FINITE = 6  # the rate at y is not finite
     FAST = 7  # a joint moves without bound; y is the state after the step
     EVENT = 8  # an event; y is the state at the event
     PAYLOAD = 9  # a payload is picked up or dropped; y is the state before it
     CHANGED = 10  # the mode, and with it the side of a threshold, has changed; y is the state after it
     ACCUMULATED = 11  # mode changes accumulate in a very short time
-    UNSETTLED = 12  # the state and the mode after an event were not found
+    UNSETTLED = 12  # no state and mode after an event satisfy the laws
 
 
-class Why(IntEnum):
-    """Why a run in lock step ended."""
+class LaneEnd(IntEnum):
+    """The reason for which a run in lock step ended."""
 
-    GOES_ON = 0
-    OVERFLOWED = 1
-    GAINED = 2
-    NOT_FOUND = 3  # the stages of a step were not found
-
-
-class _Entries(NamedTuple):
-    """Entries of `now`, the position of the loop."""
-
-    SEGMENT: int = 0
-    STEP: int = 1  # within the segment
-    ROW: int = 2  # next row of the samples
-    STEPS: int = 3  # steps done in total
-    SEEN: int = 4  # states shared with companions in total
-    SHARED: int = 5  # next row of the shared states
-    BUDGET: int = 6  # steps to do before the loop returns
-    EVALUATIONS: int = 7  # evaluations of the rate in total
-    COLUMN: int = 8  # next column of the observer's data
-    DUE: int = 9  # period of the next sample, where steps do not end at samples
-    MET: int = 10  # the same for the next shared state
-    WALKED: int = 11  # next row of the ends of steps
-    EVENT: int = 12  # the switching function that has changed sign
+    RUNNING = 0
+    OVERFLOW = 1
+    ENERGY_GAIN = 2
+    NO_STAGES = 3  # the stages of a step were not found
 
 
-Now = _Entries()
+class Phase(IntEnum):
+    """The phase of the event loop within a segment."""
+
+    TICK = 0  # at the start of the segment, before the tick of the controller
+    RESTART = 1  # after the tick, or after an event: the method starts again
+    STEPS = 2
+
+
+class Position(NamedTuple):
+    """The position of a time loop, each an array of length 1; rows and columns are the next ones to write.
+
+    Attributes:
+        segment: Index of the segment.
+        step: Number of steps done in the segment, of a loop of fixed steps.
+        phase: See `Phase`; of a loop with events.
+        steps, evaluations: Number of steps and of evaluations of the rate so far.
+        budget: Number of steps before the loop returns.
+        sample_row, shared_row, step_row: Rows of samples, of shared states and of ends of steps.
+        column: Column of the observer's data.
+        shareable: Number of states that might be shared, of a loop of fixed steps.
+        sample, share: Number of the next period of samples, and of shared states, of a loop with events.
+        event: Index of the switching function that changed sign last.
+        time: Time reached, in [s], of a loop with events.
+        sample_time: Time of the next sample, in [s], of a loop of fixed steps; inf for none.
+    """
+
+    segment: Array
+    step: Array
+    phase: Array
+    steps: Array
+    evaluations: Array
+    budget: Array
+    sample_row: Array
+    shared_row: Array
+    step_row: Array
+    column: Array
+    shareable: Array
+    sample: Array
+    share: Array
+    event: Array
+    time: Array
+    sample_time: Array
+
+
+def start_position(sample_time: float = 0.0) -> Position:
+    """Return the position at the start of a run, with the time of its first sample."""
+    position = Position._make(np.zeros((len(Position._fields), 1), np.int64))
+    return position._replace(time=np.zeros(1), sample_time=np.full(1, sample_time))
 
 
 class Functions(NamedTuple):
-    """Functions of the state equation, from `evaluate`, called by steps and the time loop.
+    """Functions of the state equation for `evaluate`, called by steps and time loops.
 
     Attributes:
         rate: y'; for a single run also u.
@@ -90,41 +120,46 @@ class Functions(NamedTuple):
     bodies: Any = 0
 
 
-class Runs(NamedTuple):
-    """W runs: states (m, W), run parameters (O, W) and the status of each run (W,); the rest is workspace.
+class Lanes(NamedTuple):
+    """W runs in lock step, or one; a step takes them as its `States`.
 
     Attributes:
-        y, run_parameters: State and parameters of each run; the values that a sampled controller holds come first.
-        after, made, command, u, energies, size, lost: y⁺, a sample, a tick, the actuation, K and V, Σ |y⁺|, and
-            whether stages were not found.
-        alive, why, ended: 1 while the run continues; the reason and the time of its end.
-        last: State at the end of each run, (m, W).
-        energy, scale: E(0), and 1 + |K(0)| + |V(0)|.
-        peak: Largest K at the energy checks.
+        y, after: State, and state at the end of a step, (m, W).
+        p: Numbers of the segment, (P,).
+        run_parameters: Parameters of each run, (O, W); the torques that a sampled controller holds come first.
+        failed: 1 where the stages of a step were not found, (W,).
+        inner: State within a step, (m, W).
+        sampled, command, u, energies, size: Workspace for a sample, a tick, the actuation, K and V, and Σ |y⁺|.
+        alive: 1 while the run continues, (W,).
+        reason, end_time, end_state: Why, when and in which state the run ended, (W,), (W,) and (m, W); see `LaneEnd`.
+        energy, scale: E(0), and 1 + |K(0)| + |V(0)|, (W,).
+        peak: Largest K at the energy checks, (W,).
         keys: Seed and number of each run, which determine its noise, (2, W), as uint64.
     """
 
     y: Array
-    run_parameters: Array
     after: Array
-    made: Array
+    p: Array
+    run_parameters: Array
+    failed: Array
+    inner: Array
+    sampled: Array
     command: Array
     u: Array
     energies: Array
     size: Array
-    lost: Array
     alive: Array
-    why: Array
-    ended: Array
-    last: Array
+    reason: Array
+    end_time: Array
+    end_state: Array
     energy: Array
     scale: Array
     peak: Array
     keys: Array
 
 
-class Rules(NamedTuple):
-    """Settings of the time loop.
+class LoopConfig(NamedTuple):
+    """Settings of a time loop.
 
     Attributes:
         n, works: Number of joints, and number of works at the end of y.
@@ -132,12 +167,17 @@ class Rules(NamedTuple):
         held: Number of torques in the zero-order hold of a sampled controller; 0 otherwise.
         instants, acting: Ticks per controller period, and the index of the one at which the torque changes.
         deviates: Number of trailing controller states that are redrawn before each tick.
-        canonical: Whether y has momenta in place of velocities.
-        alone: Whether the driver, not the loop, checks what may end a run.
+        canonical: True if y has momenta instead of velocities.
+        alone: True if Python checks what may end a run; False for runs in lock step.
         largest: Σ |y| beyond which a step is doubtful, or a run in lock step ends.
-        every, thin: Steps between shared states, 0 for none; and number of shared states per state kept.
+        every, thin: Steps between states that may be shared, 0 for none; and how many of these to one that is stored.
         base: Column of the first run in the records.
         apart: Steps between observations of u in lock step; 0 if u is held between ticks.
+        sample_period, sample_slack: Time between samples, and by how much one may be early, in [s].
+        share_period: Time between shared states, of a loop with events, in [s]; inf for none.
+        samples_nodes, samples_steps: True for a sample at the start of each segment, and at the end of each step.
+        duration: End of the run, in [s].
+        restarts: True if the first step after an event is chosen again.
     """
 
     n: int
@@ -149,55 +189,87 @@ class Rules(NamedTuple):
     deviates: int
     canonical: bool
     alone: bool
-    largest: float
-    every: int
-    thin: int
-    base: int
-    apart: int
+    largest: float = inf
+    every: int = 0
+    thin: int = 1
+    base: int = 0
+    apart: int = 0
+    sample_period: float = 0.0
+    sample_slack: float = 0.0
+    share_period: float = inf
+    samples_nodes: bool = False
+    samples_steps: bool = False
+    duration: float = 0.0
+    restarts: bool = False
 
 
-def rules_of(
-    equation: StateEquation, alone: bool, largest: float, every: int = 0, thin: int = 1, base: int = 0, apart: int = 0
-) -> Rules:
-    """The rules of a loop over a state equation."""
+def loop_config(equation: StateEquation, alone: bool, **settings: Any) -> LoopConfig:
+    """Return the settings of a loop over a state equation; `settings` are fields of `LoopConfig` with a default."""
     n, controller = equation.plant.dynamics.n, equation.controller
-    ticks = (1, 0, 0)
-    if controller is not None:
-        ticks = len(controller.instants), controller.acting_instant, controller.deviates
-    return Rules(
-        n, len(equation.sources), equation.state_size, n if equation.sampled else 0, *ticks,
-        equation.canonical, alone, largest, every, thin, base, apart,
-    )  # fmt: skip
+    return LoopConfig(
+        n=n,
+        works=len(equation.sources),
+        states=equation.state_size,
+        held=n if equation.sampled else 0,
+        instants=1 if controller is None else len(controller.instants),
+        acting=0 if controller is None else controller.acting_instant,
+        deviates=0 if controller is None else controller.deviates,
+        canonical=equation.canonical,
+        alone=alone,
+        **settings,
+    )
 
 
-def runs_of(
-    equation: StateEquation, y: np.ndarray, run_parameters: np.ndarray, made: int, numbers: np.ndarray = _FIRST
-) -> Runs:
-    """Runs with states y (m, W), run parameters (O, W), and `numbers` (W,), their positions in a batch."""
-    m, W = y.shape
-    held, states = equation.plant.dynamics.n if equation.sampled else 0, equation.state_size
+def lanes_of(
+    equation: StateEquation,
+    y: np.ndarray,
+    run_parameters: np.ndarray,
+    sampled: int,
+    p: np.ndarray,
+    numbers: np.ndarray = _FIRST,
+) -> Lanes:
+    """Return the lanes of runs at their start.
+
+    Args:
+        equation: The state equation.
+        y: States, (m, W).
+        run_parameters: Parameters, (O, W).
+        sampled: Entries of a sample.
+        p: Numbers of the first segment, (P,).
+        numbers: Positions of the runs in a batch, (W,).
+    """
+    (m, W), n = y.shape, equation.plant.dynamics.n
     seed, run = (0, 0) if equation.controller is None else equation.controller.noise_key
-    keys = np.array([np.full(W, seed, np.uint64), np.uint64(run) + numbers.astype(np.uint64)])
     start, after = aligned((2, m, W))
     start[...] = y
-    return Runs(
-        start, np.array(run_parameters, order="C"), after, np.empty((made, W)),
-        np.empty((held + states, W)), np.empty((equation.plant.dynamics.n, W)), np.empty((2, W)), np.empty(W),
-        np.zeros(W, np.int64), np.ones(W, np.int64), np.zeros(W, np.int64), np.zeros(W), np.zeros((m, W)),
-        np.zeros(W), np.ones(W), np.zeros(W), keys,
-    )  # fmt: skip
+    return Lanes(
+        y=start,
+        after=after,
+        p=np.array(p),
+        run_parameters=np.array(run_parameters, order="C"),
+        failed=np.zeros(W, np.int64),
+        inner=np.zeros((m, W)),
+        sampled=np.empty((sampled, W)),
+        command=np.empty((n * equation.sampled + equation.state_size, W)),
+        u=np.empty((n, W)),
+        energies=np.empty((2, W)),
+        size=np.empty(W),
+        alive=np.ones(W, np.int64),
+        reason=np.zeros(W, np.int64),
+        end_time=np.zeros(W),
+        end_state=np.zeros((m, W)),
+        energy=np.zeros(W),
+        scale=np.ones(W),
+        peak=np.zeros(W),
+        keys=np.array([np.full(W, seed, np.uint64), np.uint64(run) + numbers.astype(np.uint64)]),
+    )
 
 
-def erase_ended(x: Array, runs: Runs) -> None:
+def erase_ended(x: Array, lanes: Lanes) -> None:
     """Write nan into x (r, W) for the runs that have ended."""
-    if below(runs.why, 1):
+    if below(lanes.reason, 1):
         return
-    for b in range(len(runs.alive)):
-        if runs.alive[b] == 0:
-            erase(x, b)
-
-
-def erase(x: Array, b: int) -> None:
-    """Write nan over the numbers of a run."""
-    for e in range(len(x)):
-        x[e, b] = np.nan
+    for b in range(len(lanes.alive)):
+        if lanes.alive[b] == 0:
+            for e in range(len(x)):
+                x[e, b] = np.nan

@@ -12,7 +12,7 @@ import numpy as np
 
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.events.holding import Places
+from robot_dyn.simulation.events.contact_mode import Places
 from robot_dyn.simulation.setup.setup import Setup
 
 Advance = Callable[..., int]

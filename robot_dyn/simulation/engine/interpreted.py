@@ -19,7 +19,7 @@ from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.moreau_jean import behind, stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.engine import Advance, Evaluated, Watched
-from robot_dyn.simulation.events.holding import Places
+from robot_dyn.simulation.events.contact_mode import Places
 from robot_dyn.simulation.setup.setup import Setup
 
 

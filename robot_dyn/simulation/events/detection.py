@@ -1,8 +1,8 @@
-"""Whether a switching function may pass its level within a step: for one run, and for W runs in lock step.
+"""Switching functions that may pass their levels within a step: for one run, and for W runs in lock step.
 
-That a coordinate of y does not is seen by Hermite's polynomial through values and rates at both ends of the step: in
-Bernstein's form its coefficients enclose it. Any other function is judged by its latest changes. [Shampine, Thompson
-2000] In lock step there is no dense output to look closer with: a run that may pass a level is made again by itself.
+A coordinate of y is enclosed by Hermite's polynomial through values and rates at both ends of the step, in Bernstein's
+form. Any other function is judged by its latest changes. [Shampine, Thompson 2000] Steps in lock step have no dense
+output to locate an event with: a run that may pass a level is repeated by itself.
 """
 
 from __future__ import annotations
@@ -14,26 +14,28 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
+from robot_dyn.integrate.integrator import States
 from robot_dyn.integrate.primitives import copy, evaluate
+from robot_dyn.simulation.dynamics.loop_state import Functions
 
-FASTEST = 1e6  # [rad/s] or [m/s]: a method that cuts its steps would follow an exploding state without end
-_ROOM = 4.0  # times the change of a limited actuation in a step, or in the one before
+FASTEST = 1e6  # [rad/s] or [m/s]: error control would follow an exploding state without end
+_MARGIN = 4.0  # times the change of a limited actuation in a step, or in the one before
 _STEADY = 0.5  # of a rate: a smaller change of it within a step does not turn it
 
 
-class LockStep(NamedTuple):
+class LaneEvents(NamedTuple):
     """The switching functions of W runs in lock step: E coordinates of y, then functions of the actuation, K in all.
 
     Attributes:
         rows: Entry of y, and then of the values of the functions, (K,).
         coordinates: E.
-        positions: Number of positions, which y' has the accelerations of; 0 where y has momenta.
-        levels: The level of each run, (K, W); inf where it has none.
+        positions: Number of positions, whose accelerations y' contains; 0 if y has momenta.
+        levels: The level of each run, (K, W); inf if it has none.
         sides: 1 above its level, −1 below; 0 before the first step, (K, W).
         rate, next_rate: y' at the start and at the end of a step, (m, W).
-        values, next_values: Those of the F functions there, (F, W).
-        change: By how much they changed in the step before, (F, W).
-        until: Start of the first step in which a run may pass a level; inf where it passes none, (W,), in [s].
+        values, next_values: Values of the F functions there, (F, W).
+        change: Their change in the step before, (F, W).
+        until: Start of the first step in which a run may pass a level; inf if it passes none, (W,), in [s].
         left: Number of runs that have passed none, (1,).
     """
 
@@ -51,28 +53,46 @@ class LockStep(NamedTuple):
     left: Array
 
 
-class Detecting(NamedTuple):
-    """The arrays of a step in lock step, those of the method among them, K its rates; and the switching functions."""
+class DetectingWork(NamedTuple):
+    """The arrays of a step in lock step: those of the method, with K its rates; and the switching functions."""
 
     method: Any
     K: Array
-    switches: LockStep
+    events: LaneEvents
 
 
-def lock_step(
-    rows: Array, coordinates: int, levels: Array, of_rate: int, functions: int, positions: int
-) -> LockStep:  # fmt: skip
-    """The switching functions of runs at their start, with `of_rate` rows of a rate; W is that of the levels (K, W)."""
-    W = levels.shape[1]
-    rates, values = (np.zeros((k, W)) for k in (of_rate if coordinates else 0, functions))
-    return LockStep(
-        rows, coordinates, positions, np.array(levels, order="C"), np.zeros(levels.shape), rates, rates.copy(), values,
-        values.copy(), values.copy(), np.full(W, np.inf), np.array([W]),
-    )  # fmt: skip
+def lane_events(
+    rows: Array, coordinates: int, levels: Array, rate_rows: int, functions: int, positions: int
+) -> LaneEvents:
+    """Return the switching functions of runs at their start; see `LaneEvents`.
+
+    Args:
+        rows: Entries of y and of the functions, (K,).
+        coordinates: Number of coordinates.
+        levels: Levels, (K, W).
+        rate_rows: Rows of a rate.
+        functions: Number of functions.
+        positions: Number of positions.
+    """
+    W, rate, values = levels.shape[1], (rate_rows if coordinates else 0, levels.shape[1]), (functions, levels.shape[1])
+    return LaneEvents(
+        rows=rows,
+        coordinates=coordinates,
+        positions=positions,
+        levels=np.array(levels, order="C"),
+        sides=np.zeros(levels.shape),
+        rate=np.zeros(rate),
+        next_rate=np.zeros(rate),
+        values=np.zeros(values),
+        next_values=np.zeros(values),
+        change=np.zeros(values),
+        until=np.full(W, np.inf),
+        left=np.array([W]),
+    )
 
 
 def enclosure(x0: float, x1: float, d0: float, d1: float, h: float) -> tuple[float, float]:
-    """Bounds of the cubic through two values and rates."""
+    """Return bounds of the cubic through two values and rates."""
     a, b = x0 + h * d0 / 3, x1 - h * d1 / 3
     return min(x0, x1, a, b), max(x0, x1, a, b)
 
@@ -80,30 +100,30 @@ def enclosure(x0: float, x1: float, d0: float, d1: float, h: float) -> tuple[flo
 def enclosure_of_position(
     x0: float, x1: float, d0: float, d1: float, a0: float, a1: float, h: float
 ) -> tuple[float, float]:
-    """Bounds of the polynomial of degree 5 through two positions, velocities and accelerations."""
+    """Return bounds of the polynomial of degree 5 through two positions, velocities and accelerations."""
     a, b = x0 + h * d0 / 5, x1 - h * d1 / 5
     c, d = x0 + 2 * h * d0 / 5 + h * h * a0 / 20, x1 - 2 * h * d1 / 5 + h * h * a1 / 20
     return min(x0, x1, a, b, c, d), max(x0, x1, a, b, c, d)
 
 
 def coordinate_nears(low: float, high: float, level: float, side: float) -> bool:
-    """Whether a coordinate within these bounds may pass its level; as much room again is left on both sides."""
-    room = high - low
+    """Return True if a coordinate within these bounds may pass its level, with their distance as a margin."""
+    margin = high - low
     if side > 0:
-        return not low - room > level
-    return not high + room < level
+        return not low - margin > level
+    return not high + margin < level
 
 
 def function_nears(x0: float, x1: float, change: float, level: float, side: float) -> bool:
-    """Whether a function may pass its level in a step from x0 to x1; `change` is that of the step before."""
-    room = _ROOM * max(abs(x1 - x0), change)
-    return not min(side * (x0 - level), side * (x1 - level)) > room
+    """Return True if a function may pass its level in a step from x0 to x1; it changed by `change` in the last one."""
+    margin = _MARGIN * max(abs(x1 - x0), change)
+    return not min(side * (x0 - level), side * (x1 - level)) > margin
 
 
 def leaves(x0: float, d0: float, d1: float, low: float, high: float, level: float, side: float) -> bool:
-    """Whether a coordinate that starts on its side, or on the level, only moves away from it, at a steady rate.
+    """Return True if a coordinate that starts on its side, or on the level, only moves away, at a steady rate.
 
-    So do the stages of the step: they see the formula of that side alone.
+    Then the stages of the step evaluate the formula of that side alone.
     """
     on_side = side * (x0 - level) >= 0.0 and (low if side > 0 else high) == x0
     return on_side and side * d0 > 0.0 and abs(d1 - d0) <= _STEADY * abs(d0)
@@ -111,87 +131,77 @@ def leaves(x0: float, d0: float, d1: float, low: float, high: float, level: floa
 
 @cache
 def detecting(step: Callable[..., int]) -> Callable[..., int]:
-    """The step of a method in lock step, which also marks the runs that may pass a level in it, or move without bound.
+    """Return the step of a method in lock step that also marks the runs that may pass a level, or move without bound.
 
-    Once all are marked, no step is made.
+    Once all are marked, no step is taken.
     """
 
-    def detecting_step(
-        f: Any,
-        c: Any,
-        t: float,
-        h: float,
-        y: Array,
-        p: Array,
-        run_parameters: Array,
-        after: Array,
-        work: Detecting,
-        lost: Array,
-    ) -> int:
-        of = work.switches
-        if of.left[0] == 0:
-            copy(after, y)
+    def detecting_step(f: Functions, c: Any, work: DetectingWork, t: float, h: float, x: States) -> int:
+        events = work.events
+        if events.left[0] == 0:
+            copy(x.after, x.y)
             return 0
-        if t <= p[0]:  # the first step of a segment: the controller may have acted
-            start(f, t, y, p, run_parameters, of)
-        evaluations = step(f, c, t, h, y, p, run_parameters, after, work.method, lost)
-        return evaluations + detect(f, t, h, y, p, run_parameters, after, of)
+        if t <= x.p[0]:  # the first step of a segment: the controller may have acted
+            start(f, events, t, x)
+        evaluations = step(f, c, work.method, t, h, x)
+        return evaluations + detect(f, events, t, h, x)
 
     return detecting_step
 
 
-def start(f: Any, t: float, y: Array, p: Array, run_parameters: Array, of: LockStep) -> None:
-    """Rates and values at the start of a segment, and the sides at that of the run."""
-    E = of.coordinates
+def start(f: Functions, events: LaneEvents, t: float, x: States) -> None:
+    """Evaluate rates and functions at the start of a segment, and the sides at the start of the run."""
+    E = events.coordinates
     if E > 0:
-        evaluate(f.rate, t, y, p, run_parameters, of.rate)
-    if len(of.values) > 0:
-        evaluate(f.events, t, y, p, run_parameters, of.values)
-    for e in range(len(of.rows)):
-        row = of.rows[e]
-        for b in range(len(of.until)):
-            if of.sides[e, b] == 0.0:
-                x = y[row, b] if e < E else of.values[row, b]
-                of.sides[e, b] = np.sign(x - of.levels[e, b])
-                if x == of.levels[e, b] and e < E:  # on the level itself, where it is going
-                    of.sides[e, b] = np.sign(of.rate[row, b])
+        evaluate(f.rate, t, x.y, x.p, x.run_parameters, events.rate)
+    if len(events.values) > 0:
+        evaluate(f.events, t, x.y, x.p, x.run_parameters, events.values)
+    for e in range(len(events.rows)):
+        row = events.rows[e]
+        for b in range(len(events.until)):
+            if events.sides[e, b] == 0.0:
+                value = x.y[row, b] if e < E else events.values[row, b]
+                events.sides[e, b] = np.sign(value - events.levels[e, b])
+                if value == events.levels[e, b] and e < E:  # on the level itself, the direction of motion counts
+                    events.sides[e, b] = np.sign(events.rate[row, b])
 
 
-def detect(f: Any, t: float, h: float, y: Array, p: Array, run_parameters: Array, after: Array, of: LockStep) -> int:
-    """Mark the runs that may pass a level in the step from y to y⁺, or move without bound; evaluations."""
-    E, n = of.coordinates, of.positions
+def detect(f: Functions, events: LaneEvents, t: float, h: float, x: States) -> int:
+    """Mark the runs that may pass a level in the step from y to y⁺, or move without bound; return evaluations."""
+    E, n, y, after = events.coordinates, events.positions, x.y, x.after
+    d0, d1, x0, x1 = events.rate, events.next_rate, events.values, events.next_values
     if E > 0:
-        evaluate(f.rate, t + h, after, p, run_parameters, of.next_rate)
-    if len(of.values) > 0:
-        evaluate(f.events, t + h, after, p, run_parameters, of.next_values)
-    for e in range(len(of.rows)):
-        row = of.rows[e]
-        for b in range(len(of.until)):
-            level, side = of.levels[e, b], of.sides[e, b]
+        evaluate(f.rate, t + h, after, x.p, x.run_parameters, d1)
+    if len(x0) > 0:
+        evaluate(f.events, t + h, after, x.p, x.run_parameters, x1)
+    for e in range(len(events.rows)):
+        row = events.rows[e]
+        for b in range(len(events.until)):
+            level, side = events.levels[e, b], events.sides[e, b]
             if e < E:
-                x0, x1, d0, d1 = y[row, b], after[row, b], of.rate[row, b], of.next_rate[row, b]
+                a, c, v, w = y[row, b], after[row, b], d0[row, b], d1[row, b]
                 if row < n:
-                    low, high = enclosure_of_position(x0, x1, d0, d1, of.rate[n + row, b], of.next_rate[n + row, b], h)
+                    low, high = enclosure_of_position(a, c, v, w, d0[n + row, b], d1[n + row, b], h)
                 else:
-                    low, high = enclosure(x0, x1, d0, d1, h)
-                if coordinate_nears(low, high, level, side) and not leaves(x0, d0, d1, low, high, level, side):
-                    mark(of, b, t)
-            elif function_nears(of.values[row, b], of.next_values[row, b], of.change[row, b], level, side):
-                mark(of, b, t)
+                    low, high = enclosure(a, c, v, w, h)
+                if coordinate_nears(low, high, level, side) and not leaves(a, v, w, low, high, level, side):
+                    mark(events, b, t)
+            elif function_nears(x0[row, b], x1[row, b], events.change[row, b], level, side):
+                mark(events, b, t)
     for e in range(n, 2 * n):
-        for b in range(len(of.until)):
+        for b in range(len(events.until)):
             if not abs(after[e, b]) < FASTEST:
-                mark(of, b, t)
-    for i in range(len(of.values)):
-        for b in range(len(of.until)):
-            of.change[i, b] = abs(of.next_values[i, b] - of.values[i, b])
-    copy(of.rate, of.next_rate)
-    copy(of.values, of.next_values)
+                mark(events, b, t)
+    for i in range(len(x0)):
+        for b in range(len(events.until)):
+            events.change[i, b] = abs(x1[i, b] - x0[i, b])
+    copy(d0, d1)
+    copy(x0, x1)
     return 1 if E > 0 else 0
 
 
-def mark(of: LockStep, b: int, t: float) -> None:
-    """The run is to be made again: it may pass a level in the step from t."""
-    if of.until[b] == np.inf:
-        of.until[b] = t
-        of.left[0] -= 1
+def mark(events: LaneEvents, b: int, t: float) -> None:
+    """Mark a run that is to be repeated: it may pass a level in the step from t."""
+    if events.until[b] == np.inf:
+        events.until[b] = t
+        events.left[0] -= 1

@@ -1,11 +1,11 @@
-"""The end of a mode: what ends it, and the state and the mode behind it; plain functions of arrays, for the loop.
+"""The end of a contact mode: the state and the mode after it; plain functions of arrays, for the loop.
 
     impact        v⁺ = argmin ½ |v⁺ − v|²_M over v⁺ᵢ ≥ −eᵢ vᵢ at each stop that is struck or touched
-    acceleration  that of least constraint, of the joints at rest; one that broke away moves the way it was let go
+    acceleration  of least constraint, for the joints at rest; one that broke away moves in the direction of the force
 
-A joint that slides stops where v = 0, one that is held breaks away where the reaction λ leaves its interval.
+A joint that slides stops where v = 0; one that is held breaks away where the reaction λ leaves its interval.
 
-Guards are the switching functions of a mode, in a table of so many for each coordinate, of which some are active:
+Guards are the switching functions of a mode, the same number for each coordinate; some of them are active:
 
     λ ≥ least   λ ≤ most   where it is held;   v   where it slides;   q ≥ lower   q ≤ upper   of each effect with stops
 
@@ -14,110 +14,131 @@ Guards are the switching functions of a mode, in a table of so many for each coo
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from robot_dyn.effects.settling import settle
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy
-from robot_dyn.simulation.dynamics.loop_state import Ended, Runs
-from robot_dyn.simulation.events.crossings import ROUNDING, Switches, same_sides
-from robot_dyn.simulation.events.event_log import What, note
-from robot_dyn.simulation.events.holding import Holding, Laws, bodies, intervals, move_motors, snap, touched, write_mode
+from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Lanes
+from robot_dyn.simulation.events.contact_mode import (
+    ContactLaws,
+    ContactMode,
+    move_motors,
+    reaction_bounds,
+    snap,
+    touched,
+    write_bodies,
+    write_mode,
+)
+from robot_dyn.simulation.events.event_log import EventKind, log_event
+from robot_dyn.simulation.events.event_table import ROUNDING, EventTable, same_sides
 from robot_dyn.simulation.events.impacts import strike
 
-REACTIONS = 2  # guards of a coordinate of which it is the reaction, the first ones; then its velocity, then its stops
+REACTIONS = 2  # guards of the reaction of a coordinate, the first ones; then of its velocity, then of its stops
 _STILL = 1e-14  # [rad/s] or [m/s]: joints this slow stop together with the one that stops
 
 
-def end_mode(
-    f: Any, t: float, runs: Runs, p: Array, switches: Switches, of: Holding, guard: int
-) -> int:  # fmt: skip
-    """Go on in another mode, in y, run parameters and guards; DONE, or why the loop is to return.
+def end_mode(f: Functions, t: float, lanes: Lanes, table: EventTable, mode: ContactMode, guard: int) -> int:
+    """Change the mode at the event of a guard, in y, run parameters and guards.
 
     Args:
-        f: The functions of the state equation.
+        f: Functions of the state equation.
         t: Time, in [s].
-        runs: The run.
-        p: Numbers of the segment.
-        switches: The switching functions.
-        of: The mode.
+        lanes: The run.
+        table: The switching functions.
+        mode: The contact mode.
         guard: Number of the guard that has passed its level.
+
+    Returns:
+        `Ended.DONE`, or the reason for which the loop returns.
     """
-    if not change(f, t, runs.y, p, runs.run_parameters, of, guard):
+    if not change_mode(f, t, lanes, mode, guard):
         return Ended.UNSETTLED
-    write_mode(of, runs.run_parameters)
-    if accumulates(of, t):
+    write_mode(mode, lanes.run_parameters)
+    if accumulates(mode, t):
         return Ended.ACCUMULATED
-    guards(of, runs.y, switches)
-    if not same_sides(t, runs.y, p, runs.run_parameters, switches):
+    write_guards(mode, lanes.y, table)
+    if not same_sides(table, lanes, t):
         return Ended.CHANGED
-    return Ended.DONE if of.log.filled[0] <= of.log.room else Ended.PAUSED
+    return Ended.DONE if mode.log.count[0] <= mode.log.limit else Ended.PAUSED
 
 
-def without_modes(
-    f: Any, t: float, runs: Runs, p: Array, switches: Switches, of: Holding, guard: int
-) -> int:  # fmt: skip
-    """In place of `end_mode` where nothing holds joints."""
+def without_modes(f: Functions, t: float, lanes: Lanes, table: EventTable, mode: ContactMode, guard: int) -> int:
+    """Return `Ended.DONE`: the `end_mode` of an equation in which nothing holds joints."""
     return Ended.DONE
 
 
-def at_once(laws: Laws) -> int:
-    """What may happen in one event, at most."""
+def rows_of_event(laws: ContactLaws) -> int:
+    """Return the largest number of log rows of one event."""
     return len(laws.rows) * (len(laws.lower) + 1)
 
 
-def width(laws: Laws) -> int:
-    """Number of guards of a coordinate."""
+def guard_count(laws: ContactLaws) -> int:
+    """Return the number of guards of a coordinate."""
     return REACTIONS + 1 + 2 * len(laws.lower)
 
 
-def change(f: Any, t: float, y: Array, p: Array, run_parameters: Array, of: Holding, guard: int) -> bool:
-    """The state behind an event, in a mode of its own from there on; whether it was found.
+def change_mode(f: Functions, t: float, lanes: Lanes, mode: ContactMode, guard: int) -> bool:
+    """Compute the state after an event, and the mode that follows.
 
-    `guard` is −1 where another event than the end of the mode changes the state.
+    Args:
+        f: Functions of the state equation.
+        t: Time, in [s].
+        lanes: The run.
+        mode: The contact mode.
+        guard: Number of the guard that has passed its level; −1 for a jump of the state by another cause.
+
+    Returns:
+        False if a convex problem has no solution.
     """
-    laws, room, n, N = of.laws, of.room, of.laws.n, len(of.laws.rows)
-    copy(of.run_parameters[: of.held_actuation], run_parameters[: of.held_actuation])
-    snap(laws, y, 0, n)
-    for i in range(n):
-        room.struck[i] = 0.0
-        if abs(y[n + i, 0]) <= _STILL and laws.rubs[i]:
-            y[n + i, 0] = 0.0
-    for i in range(N):
-        room.forced[i], room.was_held[i], room.was_direction[i] = 0.0, of.held[i], of.direction[i]
-    way = pass_level(laws, y, guard) if guard >= 0 else 0.0
-    snap(laws, y, n, N)
-    for i in range(N):
-        y[laws.impulses[i], 0] = 0.0
+    laws, work, settling, y, i = mode.laws, mode.work, mode.work.settling, lanes.y, guard // guard_count(mode.laws)
+    copy(mode.run_parameters[: mode.held_actuation], lanes.run_parameters[: mode.held_actuation])
+    forced = begin_event(mode, y, guard)
     for s in range(len(laws.lower)):
-        if not strike(f, t, y, p, of, s):
+        if not strike(f, t, y, lanes.p, mode, s):
             return False
-    for i in range(N):
-        room.forced[i] = 0.0
-    i = guard // width(laws)
-    if way != 0.0 and y[laws.speeds[i], 0] == 0.0:  # an impact may have thrown it back
-        room.forced[i] = way
-    bodies(f, t, y, p, of)
-    intervals(laws, y, room.least, room.most)
-    for i in range(N):
-        room.v[i] = y[laws.speeds[i], 0]
-    if not settle(
-        room.whole, room.load, room.least, room.most, laws.sliding, room.v, room.forced, room.a, of.held, of.direction,
-        room.settling,
-    ):  # fmt: skip
+    for k in range(len(laws.rows)):
+        settling.forced[k] = 0.0
+    if forced != 0.0 and y[laws.speeds[i], 0] == 0.0:  # an impact may have thrown it back
+        settling.forced[i] = forced
+    write_bodies(f, t, y, lanes.p, mode)
+    reaction_bounds(mode, y)
+    for k in range(len(laws.rows)):
+        work.v[k] = y[laws.speeds[k], 0]
+    if not settle(work.M_all, work.load, laws.sliding, work.v, mode.held, mode.direction, settling):
         return False
-    move_motors(of, y)
-    for i in range(N):
-        if room.struck[laws.joints[i]] == 0.0:
-            note_change(of, t, y, i)
+    move_motors(mode, y)
+    for k in range(len(laws.rows)):
+        if work.struck[laws.joints[k]] == 0.0:
+            log_change(mode, t, y, k)
     return True
 
 
-def pass_level(laws: Laws, y: Array, guard: int) -> float:
-    """Let what ends the mode lie on its level, in y; the direction in which a joint breaks away, 0 for no reaction."""
-    i, k = guard // width(laws), guard % width(laws)
+def begin_event(mode: ContactMode, y: Array, guard: int) -> float:
+    """Store the mode before the event, and move coordinates exactly to their stops, levels and to rest, in y.
+
+    Returns:
+        The direction in which the joint of the guard breaks away; 0 if it does not.
+    """
+    laws, work, n, N = mode.laws, mode.work, mode.laws.n, len(mode.laws.rows)
+    snap(laws, y, 0, n)
+    for i in range(n):
+        work.struck[i] = 0.0
+        if abs(y[n + i, 0]) <= _STILL and laws.has_friction[i]:
+            y[n + i, 0] = 0.0
+    for i in range(N):
+        work.settling.forced[i] = 0.0
+        work.previous_held[i], work.previous_direction[i] = mode.held[i], mode.direction[i]
+    direction = move_to_level(laws, y, guard) if guard >= 0 else 0.0
+    snap(laws, y, n, N)
+    for i in range(N):
+        y[laws.impulses[i], 0] = 0.0
+    return direction
+
+
+def move_to_level(laws: ContactLaws, y: Array, guard: int) -> float:
+    """Move the coordinate of a guard exactly to its level, in y; return the direction of a breakaway, else 0."""
+    i, k = guard // guard_count(laws), guard % guard_count(laws)
     if k < REACTIONS:
         return 1.0 if k == 0 else -1.0
     if k == REACTIONS:
@@ -128,66 +149,66 @@ def pass_level(laws: Laws, y: Array, guard: int) -> float:
     return 0.0
 
 
-def note_change(of: Holding, t: float, y: Array, i: int) -> None:
-    """Keep what the change of the mode is for a coordinate, if it is any."""
-    laws, room, side = of.laws, of.room, 0.0
+def log_change(mode: ContactMode, t: float, y: Array, i: int) -> None:
+    """Log the change of the mode of a coordinate, if there is one."""
+    laws, log, side = mode.laws, mode.log, 0.0
     for s in range(len(laws.lower)):
         if side == 0.0:
             side = touched(laws, s, y, i)
-    was, held, before, direction = room.was_held[i], of.held[i], room.was_direction[i], of.direction[i]
-    if held != 0.0 and was == 0.0:
-        note(of.log, t, y, i, What.RESTS if side != 0.0 else What.STICKS, side, 0.0)
-    elif was != 0.0 and held == 0.0:
+    was_held, held = mode.work.previous_held[i] != 0.0, mode.held[i] != 0.0
+    before, direction = mode.work.previous_direction[i], mode.direction[i]
+    if held and not was_held:
+        log_event(log, t, y, i, EventKind.RESTS if side != 0.0 else EventKind.STICKS, side, 0.0)
+    elif was_held and not held:
         leaves = side == -direction and side != 0.0
-        note(of.log, t, y, i, What.LEAVES if leaves else What.SLIDES, side, direction)
-    elif before * direction < 0.0 and y[laws.speeds[i], 0] == 0.0 and laws.rubs[i]:
-        note(of.log, t, y, i, What.REVERSES, side, direction)
+        log_event(log, t, y, i, EventKind.LEAVES if leaves else EventKind.SLIDES, side, direction)
+    elif before * direction < 0.0 and y[laws.speeds[i], 0] == 0.0 and laws.has_friction[i]:
+        log_event(log, t, y, i, EventKind.REVERSES, side, direction)
 
 
-def accumulates(of: Holding, t: float) -> bool:
-    """Keep the time of a change of the mode; whether the latest ones came in next to no time."""
-    most = len(of.changes)
-    of.changes[of.changed[0] % most] = t
-    of.changed[0] += 1
-    oldest: int = of.changed[0] % most
-    return of.changed[0] >= most and t - of.changes[oldest] <= of.brief
+def accumulates(mode: ContactMode, t: float) -> bool:
+    """Store the time of a change of the mode; return True if the latest changes lie within a very short time."""
+    most = len(mode.changes)
+    mode.changes[mode.change_count[0] % most] = t
+    mode.change_count[0] += 1
+    return mode.change_count[0] >= most and t - mode.changes[mode.change_count[0] % most] <= mode.brief
 
 
-def guards(of: Holding, y: Array, switches: Switches) -> None:
-    """Write the guards of the mode at a state."""
-    laws, least, most, e = of.laws, of.room.least, of.room.most, switches.thresholds
-    intervals(laws, y, least, most)
+def write_guards(mode: ContactMode, y: Array, table: EventTable) -> None:
+    """Write the guards of the mode at a state into the table."""
+    laws, bounds, e = mode.laws, mode.work.settling, table.thresholds
+    reaction_bounds(mode, y)
     for i in range(len(laws.rows)):
-        x, v, held = y[laws.rows[i], 0], y[laws.speeds[i], 0], of.held[i] != 0.0
-        watch(switches, e, held, least[i], 1.0)
-        watch(switches, e + 1, held, most[i], -1.0)
-        slides = not held and of.direction[i] != 0.0 and (laws.rubs[i] or v == 0.0)
-        watch(switches, e + REACTIONS, slides, 0.0, of.direction[i])
+        x, v, held = y[laws.rows[i], 0], y[laws.speeds[i], 0], mode.held[i] != 0.0
+        write_guard(table, e, held, bounds.least[i], 1.0)
+        write_guard(table, e + 1, held, bounds.most[i], -1.0)
+        slides = not held and mode.direction[i] != 0.0 and (laws.has_friction[i] or v == 0.0)
+        write_guard(table, e + REACTIONS, slides, 0.0, mode.direction[i])
         e += REACTIONS + 1
         for s in range(len(laws.lower)):
-            free = not held and (s == 0 or i < laws.n)  # ends of gaps are in each
+            is_free = not held and (s == 0 or i < laws.n)  # each effect has the ends of gaps
             for side in range(2):
                 level = laws.lower[s, i] if side == 0 else laws.upper[s, i]
-                leaves = x == level and v == 0.0  # then its velocity is watched until it turns
-                watch(switches, e, free and not leaves, level, 1.0 if side == 0 else -1.0)
+                leaves = x == level and v == 0.0  # then the guard of its velocity is active until it turns
+                write_guard(table, e, is_free and not leaves, level, 1.0 if side == 0 else -1.0)
                 e += 1
 
 
-def watch(switches: Switches, e: int, active: bool, level: float, side: float) -> None:
-    """Let a guard be active, if its level is one that can be passed."""
-    switches.active[e] = active and abs(level) < np.inf
-    if switches.active[e]:
-        switches.levels[e], switches.sides[e] = level, side
-        switches.exact[e] = switches.slack[e] = ROUNDING * max(1.0, abs(level))
+def write_guard(table: EventTable, e: int, active: bool, level: float, side: float) -> None:
+    """Write whether a guard is active; one without a finite level is not."""
+    table.active[e] = active and abs(level) < np.inf
+    if table.active[e]:
+        table.levels[e], table.sides[e] = level, side
+        table.rounding[e] = table.slack[e] = ROUNDING * max(1.0, abs(level))
 
 
-def start(of: Holding, y: Array) -> None:
-    """The mode at the start: all that may be held is, until the reactions are known."""
-    laws, room = of.laws, of.room
-    intervals(laws, y, room.least, room.most)
+def start_mode(mode: ContactMode, y: Array) -> None:
+    """Write the mode at the start: all coordinates that may be held are, until the reactions are computed."""
+    laws, work = mode.laws, mode.work
+    reaction_bounds(mode, y)
     for i in range(len(laws.rows)):
-        v = y[laws.speeds[i], 0]
-        of.held[i] = 1.0 if v == 0.0 and (room.least[i] < 0.0 or room.most[i] > 0.0) else 0.0
-        of.direction[i] = np.sign(v)
-    copy(room.y, y)
-    move_motors(of, room.y)
+        v, can_hold = y[laws.speeds[i], 0], work.settling.least[i] < 0.0 or work.settling.most[i] > 0.0
+        mode.held[i] = 1.0 if v == 0.0 and can_hold else 0.0
+        mode.direction[i] = np.sign(v)
+    copy(work.y, y)
+    move_motors(mode, work.y)

@@ -1,4 +1,4 @@
-"""Where a state equation switches: thresholds of its parts, user-defined events, and the equation on either side."""
+"""The switching functions of a state equation: thresholds of its parts, user-defined events; the equation between."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from robot_dyn.effects.plant import Plant, in_mode
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.threshold import Threshold
-from robot_dyn.integrate.bernstein import room
+from robot_dyn.integrate.bernstein import work_array
 from robot_dyn.simulation.dynamics.event import Occurrence
 from robot_dyn.simulation.dynamics.state_equation import CONTROLLER, StateEquation
-from robot_dyn.simulation.events.crossings import LOOKS, ROUNDING, Switches
-from robot_dyn.simulation.events.mode_change import guards
-from robot_dyn.simulation.events.modes import Modes
+from robot_dyn.simulation.events.contacts import Contacts
+from robot_dyn.simulation.events.event_table import ROUNDING, SCANS, EventTable
+from robot_dyn.simulation.events.mode_change import write_guards
 
 _MOST = 256  # equations that are cached, each of the sides of all thresholds
 Quantity = tuple[int, bool]  # a joint, and whether it is its actuation that passes a level
@@ -29,67 +29,76 @@ class Switching:
 
     Args:
         equation: The state equation, of parts that switch by themselves, and with user-defined events.
-        dropped: What is no longer looked at: there the parts switch by themselves.
-        modes: What is held; None where nothing may hold a joint.
+        dropped: Quantities whose thresholds are ignored: there the parts switch by themselves.
+        contacts: The joints that may be held; None if nothing may hold a joint.
 
     Attributes:
-        thresholds: Those of coordinates, each once, and then those of the actuation, part by part.
-        guards: Number of the guards of the modes: these switching functions come between the two.
+        thresholds: Thresholds of coordinates, each once, and then those of the actuation, part by part.
+        guards: Number of guards of the contact mode, which come between the two.
     """
 
     def __init__(
-        self, equation: StateEquation, dropped: frozenset[Quantity] = frozenset(), modes: Modes | None = None
+        self, equation: StateEquation, dropped: frozenset[Quantity] = frozenset(), contacts: Contacts | None = None
     ) -> None:
         self.equation, self.events, self.dropped = equation, equation.events, dropped
         self._n = n = equation.plant.dynamics.n
         parts = {k: effect.thresholds(n) for k, effect in enumerate(equation.plant.effects)}
         if equation.controller is not None and not equation.sampled:
             parts[CONTROLLER] = equation.controller.thresholds()
-        self._of = {k: tuple(each for each in of if self._looked_for(k, each)) for k, of in parts.items()}
+        self._of_part = {k: tuple(x for x in of if self._is_active(k, x)) for k, of in parts.items()}
         coordinates = dict.fromkeys(
-            (k if each.own else None, each) for k, of in self._of.items() for each in of if not each.of_actuation
+            (k if x.own else None, x) for k, of in self._of_part.items() for x in of if not x.of_actuation
         )
-        actuation = [(k, each) for k in equation.limited for each in self._of[k] if each.of_actuation]
+        actuation = [(k, x) for k in equation.limited for x in self._of_part[k] if x.of_actuation]
         self.coordinates = len(coordinates)
-        self.thresholds: tuple[Threshold, ...] = tuple(each for _, each in (*coordinates, *actuation))
+        self.thresholds: tuple[Threshold, ...] = tuple(x for _, x in (*coordinates, *actuation))
         self._parts: tuple[int | None, ...] = tuple(k for k, _ in (*coordinates, *actuation))
-        self.modes, self.guards = modes, 0 if modes is None else len(modes.guards[0])
-        self._known: dict[bytes, StateEquation] = {}
+        self.contacts, self.guards = contacts, 0 if contacts is None else len(contacts.guards[0])
+        self._equations: dict[bytes, StateEquation] = {}
 
     @property
     def quantities(self) -> frozenset[Quantity]:
-        """All that pass a threshold."""
-        return frozenset((each.joint, each.of_actuation) for each in self.thresholds)
+        """All quantities that have a threshold."""
+        return frozenset((threshold.joint, threshold.of_actuation) for threshold in self.thresholds)
 
-    def _looked_for(self, part: int, each: Threshold) -> bool:
-        if (each.joint, each.of_actuation) in self.dropped:  # the formulas of a joint hang together
+    def _is_active(self, part: int, threshold: Threshold) -> bool:
+        if (threshold.joint, threshold.of_actuation) in self.dropped:  # the formulas of a joint depend on each other
             return False
-        if each.of_actuation:
+        if threshold.of_actuation:
             return part in self.equation.limited
-        return not (each.of_velocity and self.equation.canonical)
+        return not (threshold.of_velocity and self.equation.canonical)
 
     @property
     def rows(self) -> np.ndarray:
-        """What passes each of the thresholds: entries of y, and then of what reaches the limited parts."""
+        """The row of each threshold: an entry of y, or of the actuation of the limited parts."""
         place: dict[int | None, int] = {k: self._n * i for i, k in enumerate(self.equation.limited)}
-        each = list(zip(self._parts, self.thresholds, strict=True))
-        coordinates = [self._row(*one) for one in each[: self.coordinates]]
-        return np.array([*coordinates, *(place[k] + one.joint for k, one in each[self.coordinates :])], np.int64)
+        pairs = list(zip(self._parts, self.thresholds, strict=True))
+        coordinates = [self._row(part, threshold) for part, threshold in pairs[: self.coordinates]]
+        actuation = [place[part] + threshold.joint for part, threshold in pairs[self.coordinates :]]
+        return np.array([*coordinates, *actuation], np.int64)
 
     @property
     def levels(self) -> np.ndarray:
         """The levels of the thresholds."""
-        return np.array([each.level for each in self.thresholds])
+        return np.array([threshold.level for threshold in self.thresholds])
 
-    def at(self, t: float, y: np.ndarray, degree: int, functions: object, held: Array | None) -> Switches:
-        """The switching functions, on their sides of a state y at t and of the mode, for dense output of a degree."""
+    def at(self, t: float, y: np.ndarray, degree: int, functions: object, held: Array | None) -> EventTable:
+        """Return the table of switching functions, on their sides of a state and of the contact mode.
+
+        Args:
+            t: Time, in [s].
+            y: State, (m,).
+            degree: Degree of the dense output.
+            functions: The function that writes the values of the functions.
+            held: The actuation in zero-order hold; None if the controller acts continuously.
+        """
         n, E, G = self._n, self.coordinates, len(self.events)
-        of_guards, reactions = (np.zeros(0), np.zeros(0)) if self.modes is None else self.modes.guards
-        K = len(of_guards)
+        guard_rows, is_reaction = (np.zeros(0), np.zeros(0)) if self.contacts is None else self.contacts.guards
+        K = len(guard_rows)
         rows, actuation = np.split(self.rows, [E])
         levels = self.levels
         distances = y[rows] - levels[:E]
-        moving = self._moving(t, y, held, rows, distances)  # on the level itself, where it is going
+        moving = self._moving(t, y, held, rows, distances)  # on the level itself, the direction of motion counts
         sides = np.where(distances + (distances == 0) * moving > 0, 1.0, -1.0)
         for i in np.flatnonzero((distances == 0) & (moving == 0)):  # a stop is touched, and not passed
             sides[i] = 1.0 if self.thresholds[i].falling == "touched" else -1.0
@@ -98,36 +107,49 @@ class Switching:
         distances = values[actuation] - levels[E:]
         # at distance 0 a limit is reached
         sides = np.concatenate([sides, np.where(distances == 0, -np.sign(levels[E:]), np.sign(distances))])
-        sides = np.append(sides, np.sign(values[first:]))  # 0 where y is a root: the next step tells
-        rows = np.concatenate([rows, of_guards, actuation, first + np.arange(G)]).astype(np.int64)
+        sides = np.append(sides, np.sign(values[first:]))  # 0 where y is a root: the next step decides
+        rows = np.concatenate([rows, guard_rows, actuation, first + np.arange(G)]).astype(np.int64)
         levels = np.insert(np.append(levels, np.zeros(G)), E, np.zeros(K))
         sides = np.insert(sides, E, np.ones(K))
-        exact = ROUNDING * np.maximum(1.0, np.abs(levels[: E + K]))
-        slack = np.maximum(exact, [each.slack for each in self.thresholds[:E]] + [0.0] * K)
-        rates, active = np.append(np.zeros(E, bool), reactions > 0), np.arange(E + K) < E
-        zeroed = np.zeros(0, np.int64) if self.modes is None else self.modes.holding.laws.impulses
-        switches = Switches(
-            rows, levels, sides, rates, active, E, K, zeroed, functions, G, np.zeros((len(values), 1)), values,
-            np.zeros(len(values)), exact, slack, np.zeros(degree + 1), room(degree),
-            np.zeros((len(rows) - E - K, LOOKS)),
-        )  # fmt: skip
-        if self.modes is not None:
-            guards(self.modes.holding, y[:, None].copy(), switches)
-        return switches
+        rounding = ROUNDING * np.maximum(1.0, np.abs(levels[: E + K]))
+        slack = np.maximum(rounding, [threshold.slack for threshold in self.thresholds[:E]] + [0.0] * K)
+        table = EventTable(
+            rows=rows,
+            levels=levels,
+            sides=sides,
+            is_rate=np.append(np.zeros(E, bool), is_reaction > 0),
+            active=np.arange(E + K) < E,
+            thresholds=E,
+            guards=K,
+            zeroed=np.zeros(0, np.int64) if self.contacts is None else self.contacts.mode.laws.impulses,
+            functions=functions,
+            user_defined=G,
+            values=np.zeros((len(values), 1)),
+            previous=values,
+            change=np.zeros(len(values)),
+            rounding=rounding,
+            slack=slack,
+            coefficients=np.zeros(degree + 1),
+            stack=work_array(degree),
+            scanned=np.zeros((len(rows) - E - K, SCANS)),
+        )
+        if self.contacts is not None:
+            write_guards(self.contacts.mode, y[:, None].copy(), table)
+        return table
 
-    def _row(self, part: int | None, each: Threshold) -> int:
-        """The entry of y that passes a threshold."""
-        if each.state is None or part is None:
-            return each.joint + self._n * each.of_velocity
+    def _row(self, part: int | None, threshold: Threshold) -> int:
+        """Return the entry of y that passes a threshold."""
+        if threshold.state is None or part is None:
+            return threshold.joint + self._n * threshold.of_velocity
         if part not in self.equation.equation_of_motion.states:
-            raise EffectError(f"{each.name}: is a threshold of a state, and what declares it has none")
+            raise EffectError(f"{threshold.name}: is a threshold of a state, and what declares it has none")
         first = 2 * self._n + self.equation.state_size
-        return first + self.equation.equation_of_motion.states[part].start + each.state
+        return first + self.equation.equation_of_motion.states[part].start + threshold.state
 
     def _moving(
         self, t: float, y: np.ndarray, held: Array | None, rows: np.ndarray, distances: np.ndarray
     ) -> np.ndarray:  # fmt: skip
-        """The rates of those entries of y; of a velocity where one lies on its level."""
+        """Return the rates of these entries of y; exact ones if a velocity lies on its level, else of positions."""
         n = self._n
         if not (distances[rows >= n] == 0).any():
             return y[np.where(rows < n, rows + n, rows)]
@@ -136,14 +158,15 @@ class Switching:
         return self.equation.rate(t, y, held)[0][rows]
 
     def on(self, sides: np.ndarray) -> StateEquation:
-        """The state equation with each threshold on its side, in the mode that is known; smooth there."""
-        mode, sides = None if self.modes is None else self.modes.mode, self.of_thresholds(sides)
+        """Return the state equation with each threshold on its side, in the contact mode; it is smooth there."""
+        mode, sides = None if self.contacts is None else self.contacts.mode_of_effects, self.of_thresholds(sides)
         key = sides.tobytes() + (b"" if mode is None else np.concatenate([x for x in mode if x is not None]).tobytes())
-        if key not in self._known:
-            of: dict[tuple[int | None, Threshold], int] = {
-                (part, each): int(side) for part, each, side in zip(self._parts, self.thresholds, sides, strict=False)
+        if key not in self._equations:
+            side_of: dict[tuple[int | None, Threshold], int] = {
+                (part, threshold): int(side)
+                for part, threshold, side in zip(self._parts, self.thresholds, sides, strict=False)
             }
-            at = {k: {each: of[k if each.own else None, each] for each in mine} for k, mine in self._of.items()}
+            at = {k: {x: side_of[k if x.own else None, x] for x in of} for k, of in self._of_part.items()}
             equation, n = self.equation, self._n
             effects: list[Effect] = [
                 effect.on_side(n, at[k]) if at[k] else effect for k, effect in enumerate(equation.plant.effects)
@@ -153,27 +176,27 @@ class Switching:
                 controller = controller.on_side(at[CONTROLLER])
             plant = plant if mode is None else in_mode(plant, mode)
             on_sides = replace(equation, plant=plant, controller=controller)
-            if len(self._known) >= _MOST:
+            if len(self._equations) >= _MOST:
                 return on_sides
-            self._known[key] = on_sides
-        return self._known[key]
+            self._equations[key] = on_sides
+        return self._equations[key]
 
     def number(self, index: int) -> int:
-        """The number of a switching function among thresholds and user-defined events."""
+        """Return the number of a switching function among thresholds and user-defined events."""
         return index - (self.guards if index >= self.coordinates else 0)
 
     def of_thresholds(self, sides: np.ndarray) -> np.ndarray:
-        """The sides of the thresholds, (T,), of those of all switching functions."""
+        """Return the sides of the thresholds, (T,), from the sides of all switching functions."""
         E = self.coordinates
         return np.concatenate([sides[:E], sides[E + self.guards :][: len(self.thresholds) - E]])
 
     def occurrence(self, index: int, t: float, y: np.ndarray, side: float) -> Occurrence:
-        """The event of the threshold, or of the user-defined event, of this number; its sign is now `side`."""
+        """Return the event of a threshold, or of a user-defined event, by number; its sign is now `side`."""
         q, v, joint = *self.equation.state(y)[:2], ""
         if index < len(self.thresholds):
-            each = self.thresholds[index]
-            joint = self.equation.plant.dynamics.joint_names[each.joint]
-            name = f"{each.name} of {joint} {each.rising if side > 0 else each.falling}"
+            threshold = self.thresholds[index]
+            joint = self.equation.plant.dynamics.joint_names[threshold.joint]
+            name = f"{threshold.name} of {joint} {threshold.rising if side > 0 else threshold.falling}"
         else:
             name = self.events[index - len(self.thresholds)].name
         return Occurrence(t, name, int(side), tuple(q.tolist()), tuple(v.tolist()), joint)

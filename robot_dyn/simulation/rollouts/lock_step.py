@@ -19,9 +19,9 @@ from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.model.right_angles import robot_of
 from robot_dyn.simulation.compiled.machine_code import MachineCode
-from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Why, rules_of, runs_of
+from robot_dyn.simulation.dynamics.loop_state import Ended, LaneEnd, lanes_of, loop_config, start_position
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.events.detection import Detecting
+from robot_dyn.simulation.events.detection import DetectingWork
 from robot_dyn.simulation.observation.observation import observations_of, observed
 from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.rollouts.batch import Batch, Record, Single
@@ -30,7 +30,7 @@ from robot_dyn.simulation.rollouts.pool import in_threads
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
 from robot_dyn.simulation.run.fixed_step import samples_at_most
 from robot_dyn.simulation.run.outcome import Outcome, Reason
-from robot_dyn.simulation.run.recording import records_of
+from robot_dyn.simulation.run.recording import Loop, records_of
 from robot_dyn.simulation.run.watch import LARGEST, step_and_period
 from robot_dyn.simulation.setup.schedule import ON_STEP
 from robot_dyn.simulation.setup.segment_table import segment_table
@@ -38,9 +38,9 @@ from robot_dyn.simulation.setup.setup import Setup
 
 LANES = 64  # runs in a tile: with 8, 16 or 32 a step of RK4 took 1.5, 1.1 and 1.05 times as long
 _REASONS = {
-    Why.OVERFLOWED: Reason.STATE_OVERFLOWS,
-    Why.GAINED: Reason.ENERGY_WITHOUT_SOURCE,
-    Why.NOT_FOUND: Reason.STAGES_NOT_FOUND,
+    LaneEnd.OVERFLOW: Reason.STATE_OVERFLOWS,
+    LaneEnd.ENERGY_GAIN: Reason.ENERGY_WITHOUT_SOURCE,
+    LaneEnd.NO_STAGES: Reason.STAGES_NOT_FOUND,
 }
 _INSTANTS = 200  # at least, or every step, at which an actuation that changes between ticks is observed
 
@@ -83,7 +83,7 @@ class Tiles:
         self.unfinished = np.ones(tiles, dtype=bool)
         self.why, self.last = np.zeros(width, np.int64), np.zeros((equation.size, width))
         self.ended, self.until = np.full(width, setup.duration_s), np.full(width, np.inf)
-        self.clocks = np.tile([0.0, setup.record_period_s, ON_STEP * setup.nominal_step_s], (tiles, 1))
+        self.positions = [start_position() for _ in range(tiles)]
         self.evaluations, self.stop = np.zeros(tiles, np.int64), np.zeros(1, np.int64)
 
     def run(self, threads: int, on_progress: Callable[[float], object] | None = None) -> Record:
@@ -105,7 +105,8 @@ class Tiles:
     def _reached(self) -> float:
         """Return the mean time reached, in [s], of the runs that are not to be repeated."""
         end, left = self.setup.duration_s, np.isinf(self.until).reshape(-1, LANES).mean(axis=1)
-        return float((left * np.where(self.unfinished, np.minimum(self.clocks[:, 0], end), end)).mean())
+        next_samples = np.array([position.sample_time[0] for position in self.positions])
+        return float((left * np.where(self.unfinished, np.minimum(next_samples, end), end)).mean())
 
     def _repeated(self, threads: int, report: Callable[[float], object]) -> dict[int, Single | None]:
         """Repeat the runs that may have passed a threshold, or diverged, with cuts; None where Ctrl-C came first."""
@@ -125,37 +126,51 @@ class Tiles:
         numbers = self.numbers[lanes]
         run_parameters = self.code.run_parameters({name: x[numbers] for name, x in self.batch.sweep.items()})
         noise, more = self.batch.number_of(numbers), self.out_extras.shape[1]
-        runs = runs_of(equation, self.y[numbers].T, run_parameters, more, noise)
+        runs = lanes_of(equation, self.y[numbers].T, run_parameters, more, self.table.parameters[0], noise)
         method = cast(PlainMethod, self.setup.integrator)
         assert self.code.machine_loop is not None
         advance = self.code.machine_loop.calls()
         rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
         stepper = method.stepper(FLOAT64, equation.size, n, rows, LANES)
-        functions, now = self.code.code.addresses, np.zeros(len(Now), dtype=np.int64)
-        now[Now.BUDGET] = np.iinfo(np.int64).max
-        none = np.empty((0, equation.size))
+        position, none = self.positions[tile], np.empty((0, equation.size))
+        position.budget[0] = np.iinfo(np.int64).max
         records = records_of(
-            self.rows, self.out_y, self.out_extras, none, none, np.empty((1 + 3 * n, 0)), self.observations[tile]
+            rows=self.rows,
+            y=self.out_y,
+            sampled=self.out_extras,
+            shared=none,
+            step_log=none,
+            columns=np.empty((1 + 3 * n, 0)),
+            observation=self.observations[tile],
         )
-        rules = rules_of(equation, False, LARGEST, base=lanes.start, apart=self.apart)
+        config = loop_config(
+            equation,
+            alone=False,
+            largest=LARGEST,
+            base=lanes.start,
+            apart=self.apart,
+            sample_period=float(self.setup.record_period_s or 0.0),
+            sample_slack=ON_STEP * self.setup.nominal_step_s,
+        )
         work = stepper.work
         if self.thresholds is not None:
             positions = 0 if equation.canonical else n
-            switches = self.thresholds.lanes(numbers, equation.size, positions)
-            self.until[lanes] = switches.until
-            work = Detecting(work, work.K, switches._replace(until=self.until[lanes]))
-        ended = advance(
-            functions, self.table, runs, records, rules, stepper.coefficients, work, now, self.clocks[tile], self.stop
-        )
-        self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, now[Now.EVALUATIONS]
-        self.t[tile] = records.t[: now[Now.ROW]]
-        self.why[lanes], self.last[:, lanes] = runs.why, runs.last
-        self.ended[lanes] = np.where(runs.why > 0, runs.ended, self.setup.duration_s)
+            events = self.thresholds.lanes(numbers, equation.size, positions)
+            self.until[lanes] = events.until
+            work = DetectingWork(work, work.K, events._replace(until=self.until[lanes]))
+        loop = Loop(self.table, runs, records, config, position)
+        ended = advance(self.code.code.addresses, stepper.coefficients, work, loop, self.stop)
+        self.unfinished[tile], self.evaluations[tile] = ended != Ended.DONE, position.evaluations[0]
+        rows = int(position.sample_row[0])
+        self.t[tile] = records.t[:rows]
+        self.why[lanes], self.last[:, lanes] = runs.reason, runs.end_state
+        self.ended[lanes] = np.where(runs.reason > 0, runs.end_time, self.setup.duration_s)
         if ended != Ended.DONE:
-            reached = self.table.starts[now[Now.SEGMENT]] + now[Now.STEP] * self.table.lengths[now[Now.SEGMENT]]
-            self.ended[lanes] = np.where(runs.why > 0, runs.ended, reached)
+            s = int(position.segment[0])
+            reached = self.table.starts[s] + position.step[0] * self.table.lengths[s]
+            self.ended[lanes] = np.where(runs.reason > 0, runs.end_time, reached)
             for array in (self.out_y, self.out_extras):
-                array[int(now[Now.ROW]) :, :, lanes] = np.nan
+                array[rows:, :, lanes] = np.nan
 
     def _record(self, repeated: dict[int, Single | None], began: float) -> Record:
         """Return the record of lock step, with repeated runs in place of those that passed a threshold."""
@@ -166,7 +181,7 @@ class Tiles:
             outcomes[run] = Outcome(Reason.INTERRUPTED, float(ended[run]))
         for run in np.flatnonzero(why).tolist():
             fastest = self.code.compiled_form.fastest_joint(self.last[:, run])
-            outcomes[run] = Outcome(_REASONS[Why(why[run])], float(ended[run]), fastest, step_and_period(setup))
+            outcomes[run] = Outcome(_REASONS[LaneEnd(why[run])], float(ended[run]), fastest, step_and_period(setup))
         columns, sizes = dict[str, np.ndarray](), self.batch.sizes
         for array, names in ((self.out_y, self.states), (self.out_extras, self.batch.extras)):
             by_run = np.moveaxis(array[: len(t), :, :B], -1, 0)

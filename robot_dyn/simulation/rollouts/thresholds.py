@@ -15,7 +15,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.threshold import smooth
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.events.detection import LockStep, lock_step
+from robot_dyn.simulation.events.detection import LaneEvents, lane_events
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.setup.schedule import MOST_CUT
 from robot_dyn.simulation.setup.setup import Setup
@@ -27,7 +27,7 @@ class Thresholds:
     """The thresholds of B runs, K of each.
 
     Attributes:
-        rows, coordinates: As of `LockStep`.
+        rows, coordinates: See `LaneEvents`.
         levels: Of each run, inf where it has none, (K, B).
         functions: Number of the functions of the actuation.
         others: Runs in which other parts have thresholds than in the compiled equation, (B,).
@@ -50,12 +50,12 @@ class Thresholds:
         """The thresholds of some of the runs."""
         return replace(self, levels=self.levels[:, runs], others=self.others[runs])
 
-    def lanes(self, runs: np.ndarray, rows: int, positions: int) -> LockStep:
+    def lanes(self, runs: np.ndarray, rows: int, positions: int) -> LaneEvents:
         """The switching functions of some of the runs at their start: of rates of so many rows, and `positions`."""
-        switches = lock_step(self.rows, self.coordinates, self.levels[:, runs], rows, self.functions, positions)
-        switches.until[self.others[runs]] = 0.0
-        switches.left[0] -= self.others[runs].sum()
-        return switches
+        events = lane_events(self.rows, self.coordinates, self.levels[:, runs], rows, self.functions, positions)
+        events.until[self.others[runs]] = 0.0
+        events.left[0] -= self.others[runs].sum()
+        return events
 
 
 def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thresholds | None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from math import inf
 from time import perf_counter
 from typing import ClassVar
 
@@ -16,13 +15,13 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.values import cached
 from robot_dyn.simulation.dynamics.event import Occurrence
-from robot_dyn.simulation.dynamics.loop_state import Ended, Now, Rules, rules_of, runs_of
+from robot_dyn.simulation.dynamics.loop_state import Ended, LoopConfig, lanes_of, loop_config, start_position
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.observation.observation import NOTHING
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.run.outcome import GivesUp, Outcome, Reason, Stiff
-from robot_dyn.simulation.run.recording import Path, Recording, Records, records_of
+from robot_dyn.simulation.run.recording import Loop, Path, Recording, Records, records_of
 from robot_dyn.simulation.run.watch import DivergedError, Watch
 from robot_dyn.simulation.setup.segment_table import SegmentTable
 from robot_dyn.simulation.setup.setup import Setup
@@ -43,16 +42,16 @@ class Driver(ABC):
 
     Attributes:
         setup, equation: What is run, with what it carries now.
-        functions, table, runs, records, rules: What the loop takes.
+        functions, table, lanes, config, position: What the loop takes; see `Loop`.
+        loop: All of it with the records, but for the functions.
         in_python: The same functions as Python calls them.
-        now: Where it is; see `loop_state.Now`.
         stop: Its first entry ends the run at its next step where it is not 0, as Ctrl-C does.
         events: What happened.
         first: Steps of machine code before its speed is known.
     """
 
     first: ClassVar[int]
-    records: Records
+    loop: Loop
 
     def __init__(
         self, watch: Watch, payloads: PayloadEvents, engine: Engine, table: SegmentTable,
@@ -61,22 +60,34 @@ class Driver(ABC):
         self.watch, self.payloads, self.engine, self.table = watch, payloads, engine, table
         self.setup, self.equation = watch.setup, watch.equation
         self.on_progress, self.observer = on_progress, observer
-        self.rules = cached(self.setup, _rules)
-        n, m = self.rules.n, self.equation.size
+        self.config = cached(self.setup, _config)
+        n, m = self.config.n, self.equation.size
         self.start = self.equation.start(self.setup.q0, self.setup.v0)
         self.functions, self.in_python, parameters, _ = engine.evaluated(self.equation, watch)
-        run_parameters = np.concatenate([np.full(self.rules.held, np.nan), parameters])[:, None]
-        self.runs = runs_of(self.equation, self.start[:, None], run_parameters, m + n + 2)
-        self.runs.energy[0], self.runs.scale[0] = watch.energy, watch.scale
+        run_parameters = np.concatenate([np.full(self.config.held, np.nan), parameters])[:, None]
+        self.lanes = lanes_of(self.equation, self.start[:, None], run_parameters, m + n + 2, table.parameters[0])
+        self.lanes.energy[0], self.lanes.scale[0] = watch.energy, watch.scale
         self.events: list[Occurrence] = []
-        self.now, self.stop = np.zeros(len(Now), np.int64), np.zeros(1, np.int64)
+        self.position, self.stop = start_position(), np.zeros(1, np.int64)
 
-    def _records(self, samples: int, shared: int, steps: int) -> Records:
-        """Room for so many samples, shared states and ends of steps."""
-        n, m, observer = self.rules.n, self.equation.size, self.observer
-        shown = (np.empty((1 + 3 * n, 0)), NOTHING) if observer is None else (observer.columns, observer.observation)
-        made = np.empty((samples, m, 1)), np.empty((samples, m + n + 2, 1))
-        return records_of(np.arange(m), *made, np.empty((shared, m)), np.empty((steps, m)), *shown)
+    def _loop_of(self, samples: int, shared: int, steps: int) -> Loop:
+        """The data of the loop, with records for so many samples, shared states and ends of steps."""
+        n, m, observer = self.config.n, self.equation.size, self.observer
+        records = records_of(
+            rows=np.arange(m),
+            y=np.empty((samples, m, 1)),
+            sampled=np.empty((samples, m + n + 2, 1)),
+            shared=np.empty((shared, m)),
+            step_log=np.empty((steps, m)),
+            columns=np.empty((1 + 3 * n, 0)) if observer is None else observer.columns,
+            observation=NOTHING if observer is None else observer.observation,
+        )
+        return Loop(self.table, self.lanes, records, self.config, self.position)
+
+    @property
+    def records(self) -> Records:
+        """What the loop records."""
+        return self.loop.records
 
     @property
     @abstractmethod
@@ -86,18 +97,18 @@ class Driver(ABC):
     @property
     def y(self) -> np.ndarray:
         """The state reached."""
-        return self.runs.y[:, 0].copy()
+        return self.lanes.y[:, 0].copy()
 
     @property
     def held(self) -> Array | None:
         """The actuation in zero-order hold; None of a controller that acts continuously."""
-        return self.runs.run_parameters[: self.rules.held, 0] if self.rules.held else None
+        return self.lanes.run_parameters[: self.config.held, 0] if self.config.held else None
 
     def run(self) -> Recording | GivesUp:
         """Run to the end, however the run ends; or why another run is to replace it."""
         try:
             with np.errstate(all="ignore"):  # what overflows ends the run
-                ended = self._loop()
+                ended = self._run()
         except DivergedError as end:
             ended = end.outcome
         except KeyboardInterrupt:
@@ -130,7 +141,7 @@ class Driver(ABC):
         """Why another method is to make the run, if one is."""
         return None
 
-    def _loop(self) -> Outcome | GivesUp:
+    def _run(self) -> Outcome | GivesUp:
         """Advance to the end of the run, or until it gives up."""
         most = self.engine.most_steps
         budget, reported = int(min(self.first, most)), -1.0
@@ -161,12 +172,12 @@ class Driver(ABC):
         while True:
             if (replaced := self._replaced()) is not None:
                 return replaced
-            self.now[Now.BUDGET] = steps = self._room(budget)
+            self.position.budget[0] = steps = self._room(budget)
             if observer is not None:
-                self.now[Now.COLUMN] = observer.filled
+                self.position.column[0] = observer.filled
             ended = self._advance()
             if observer is not None:
-                observer.filled = int(self.now[Now.COLUMN])
+                observer.filled = int(self.position.column[0])
                 observer.look()
             budget -= steps
             if ended is not Ended.PAUSED or budget <= 0:
@@ -174,34 +185,42 @@ class Driver(ABC):
 
     def _tick(self) -> None:
         """Do a tick by the interpreted equation."""
-        s = int(self.now[Now.SEGMENT])
-        self.runs.y[:, 0], held = self.watch.tick(float(self.table.starts[s]), self.y)
-        self.runs.run_parameters[: self.rules.held, 0] = held
+        s = int(self.position.segment[0])
+        self.lanes.y[:, 0], held = self.watch.tick(float(self.table.starts[s]), self.y)
+        self.lanes.run_parameters[: self.config.held, 0] = held
         self.table.ticks[s] = 0
 
     def _change_payload(self) -> list[Occurrence]:
         """Go on with what is carried from the start of a segment on; what happened."""
-        s = int(self.now[Now.SEGMENT])
-        self.runs.y[:, 0], happened = self.payloads.over(float(self.table.starts[s]), self.y)
+        s = int(self.position.segment[0])
+        self.lanes.y[:, 0], happened = self.payloads.over(float(self.table.starts[s]), self.y)
         self.equation = self.watch.equation = self.payloads.equation
-        self.functions, self.in_python, self.runs.run_parameters[self.rules.held :, 0], _ = self.engine.evaluated(
+        self.functions, self.in_python, self.lanes.run_parameters[self.config.held :, 0], _ = self.engine.evaluated(
             self.equation, self.watch
         )
         self.table.payload_events[s] = 0
         return happened
 
     def _recording(self, outcome: Outcome) -> Recording:
-        records, rows = self.records, int(self.now[Now.ROW])
+        records, rows = self.records, int(self.position.sample_row[0])
         if not rows and len(records.t):  # interrupted, or without a tick, before the first sample
-            records.t[0], records.y[0, :, 0], records.made[0], rows = 0.0, self.start, np.nan, 1
+            records.t[0], records.y[0, :, 0], records.sampled[0], rows = 0.0, self.start, np.nan, 1
         shared, step_log, ends = self._paths()
         return Recording(
-            outcome, records.t[:rows], records.y[:rows, :, 0], records.made[:rows, :, 0], shared, step_log,
-            int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]), tuple(self.events),
-            ends,
-        )  # fmt: skip
+            outcome=outcome,
+            t=records.t[:rows],
+            y=records.y[:rows, :, 0],
+            made=records.sampled[:rows, :, 0],
+            shared=shared,
+            step_log=step_log,
+            steps=int(self.position.steps[0]),
+            evaluations=int(self.position.evaluations[0]),
+            kinetic_peak=float(self.lanes.peak[0]),
+            events=tuple(self.events),
+            ends=ends,
+        )
 
 
-def _rules(setup: Setup) -> Rules:
-    """The rules of the loop of a run by itself, which shares no states."""
-    return rules_of(setup.equation, True, inf)
+def _config(setup: Setup) -> LoopConfig:
+    """The settings of the loop of a run by itself, which shares no states."""
+    return loop_config(setup.equation, True)

@@ -1,11 +1,18 @@
-"""The time loop of a run whose steps are chosen, or cut at events: samples lie between the ends of steps.
+"""The time loop of a run whose steps are chosen by error control, or end at events; samples lie between their ends.
 
-Plain functions of arrays, for one run, as of `time_loop`. The dense output of a step brackets a root of a switching
-function g; the step is then repeated, up to where g vanishes after it, which keeps the order of the method:
+    for each segment:
+        begin_segment                         tick of the controller, sample
+        while t < end of the segment:
+            restart                           at its start, and after each event: rate, first step
+            take_step                         y⁺ = step(t, y, h), ‖e‖ ≤ 1
+            locate_event                      does the dense output bracket a root of a switching function g?
+            step_to_event                     if so, the step again, with g(step(t, y, θ h)) = 0
+            record_step, finish_step          samples within the step; t, y = t + h, y⁺
+            handle_event                      change of the mode, or of the formulas; else check_step
 
-    g(step(t, y, θ h)) = 0
-
-[Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.6; Shampine, Thompson 2000]
+Repeating the step, instead of the dense output, keeps the order of the method. Plain functions of arrays, see
+`time_loop`. [Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, II.6; Shampine,
+Thompson 2000]
 """
 
 from __future__ import annotations
@@ -18,248 +25,277 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.bernstein import NONE
 from robot_dyn.integrate.primitives import between, copy
-from robot_dyn.integrate.step_control import At, chosen_step, finite, first_step, shortened
-from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, Runs
-from robot_dyn.simulation.events.crossings import (
-    Switches,
-    approaches,
-    correction,
-    nears,
-    remember,
-    settle_sides,
+from robot_dyn.integrate.step_control import (
+    Choice,
+    StepControl,
+    chosen_step,
+    controls_error,
+    first_step,
+    is_finite,
+    shortened,
 )
+from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Phase
+from robot_dyn.simulation.events.contact_mode import ContactMode
 from robot_dyn.simulation.events.detection import FASTEST
+from robot_dyn.simulation.events.event_table import (
+    EventTable,
+    coordinate_approaches,
+    coordinates,
+    correction,
+    function_approaches,
+    settle_sides,
+    start_table,
+)
 from robot_dyn.simulation.events.first_event import first_event
-from robot_dyn.simulation.events.holding import Holding
-from robot_dyn.simulation.events.sides import Sides, goes_on
-from robot_dyn.simulation.run.recording import Records, log_step, sample, share, show
-from robot_dyn.simulation.run.time_loop import act, acts, conserve
-from robot_dyn.simulation.setup.segment_table import SegmentTable
+from robot_dyn.simulation.events.regions import Regions, pass_threshold
+from robot_dyn.simulation.run.recording import Loop, log_step, observe_step, sample, share
+from robot_dyn.simulation.run.time_loop import act, changes_torque, conserves_energy, count_step
 
 _EARLY = 1e-9  # of a period: a sample at the end of a segment belongs to the next one
-_ROOTS = 6  # repetitions of a step for an event, at most
-_SHORT = 1e-8  # of a step: over so little of it y is a straight line, to rounding
-_WATCHED = 8  # steps between looks at the energy
+_ROOTS = 6  # repetitions of a step for an event
+_SHORT = 1e-8  # of a step: over such a part of it y is a straight line, to rounding
+_WATCHED = 8  # steps between energy checks
 
 
-class Times(NamedTuple):
-    """Times as numbers.
+class Events(NamedTuple):
+    """The events of a run: switching functions, parameters between thresholds, and the contact mode."""
 
-    Attributes:
-        reached: The time reached, (1,), in [s].
-        period, compared: Periods of samples and of shared states, in [s]; inf for none.
-        nodes, every: Whether there is a sample at the start of every segment, and at the end of every step, too.
-        end: Of the run.
-        mesh: Where steps end, (k,), if they are to do so at given times; error control makes more of them.
-    """
-
-    reached: Array
-    period: float
-    compared: float
-    nodes: bool
-    every: bool
-    end: float
-    mesh: Array
+    table: EventTable
+    regions: Regions
+    mode: ContactMode
 
 
 def event_loop(
-    begin: Callable[..., int], step: Callable[..., int], error: Callable[..., float], accept: Callable[..., int],
-    dense: Callable[..., int], end_mode: Callable[..., int],
-) -> Callable[..., int]:  # fmt: skip
-    """The time loop of the functions of a method, see `ControlledStepper`, and of the end of a mode, as of `end_mode`.
+    begin: Callable[..., int],
+    step: Callable[..., int],
+    error: Callable[..., float],
+    accept: Callable[..., int],
+    dense: Callable[..., int],
+    end_mode: Callable[..., int],
+) -> Callable[..., int]:
+    """Return the time loop of the functions of a method, see `ControlledStepper`, and of an `end_mode`.
 
-    advance(functions, plan, runs, records, times, rules, coefficients, work, switches, sides, holding, now, control,
-    stop) → Ended, with `control` as of `control_of`; `stop[0]` other than 0 ends it.
+    advance(functions, coefficients, work, loop, events, control, stop) → Ended; `stop[0]` other than 0 ends it after
+    its current step.
     """
     choose = chosen_step(step, error)
 
-    def cut(
-        f: Functions, c: Any, t: float, whole: float, theta: float, p: Array, runs: Runs, work: Any,
-        switches: Switches, event: int, control: Array,
-    ) -> tuple[int, float, float, float]:  # fmt: skip
-        """The step repeated, up to where a switching function vanishes after it, but for the last bit of its length.
-
-        Its evaluations, its length, that bit, over which y is a straight line, and its error as of `error`: it may pass
-        slowly through what the whole step leapt over, as friction near v = 0.
-        """
-        h, evaluations, y, after, e = theta * whole, 0, runs.y, runs.after, 0.0
-        for k in range(_ROOTS):
-            if abs(h) <= np.spacing(abs(t)):  # immediately, as right behind another event
-                copy(after, y)
-                copy(work.last, work.K[0])
-                return evaluations, 0.0, 0.0, 0.0
-            evaluations += step(f, c, t, h, y, p, runs.run_parameters, after, work, runs.lost)
-            if control[At.RTOL] + control[At.ATOL] > 0.0:  # 0 for steps of a fixed length
-                e = error(c, h, y, after, work, control[At.RTOL], control[At.ATOL])
-            evaluations += accept(f, c, t, h, y, p, runs.run_parameters, after, work)
-            shift = correction(f, t, h, whole, y, p, runs, work, switches, event)
-            if not abs(shift) > _SHORT * h:
-                return evaluations, h, shift, e
-            if k == _ROOTS - 1 or (abs(shift) > h and event >= len(switches.exact)):
-                break  # a function that jumps, say: where it is bracketed
-            h = max(h + shift, 0.0)
-        return evaluations, h, 0.0, e
-
-    def advance(
-        f: Functions, table: SegmentTable, runs: Runs, records: Records, times: Times, rules: Rules, c: Any, work: Any,
-        switches: Switches, sides: Sides, holding: Holding, now: Array, control: Array, stop: Array,
-    ) -> int:  # fmt: skip
+    def advance(f: Functions, c: Any, work: Any, loop: Loop, events: Events, control: StepControl, stop: Array) -> int:
+        table, lanes, position = loop.table, loop.lanes, loop.position
         last = len(table.counts) - 1
-        run_parameters, y, after = runs.run_parameters, runs.y, runs.after
-        while now[Now.SEGMENT] <= last:
-            s: int = now[Now.SEGMENT]
-            start, p = table.starts[s], table.parameters[s]
+        while position.segment[0] <= last:
+            s = position.segment[0]
             if table.payload_events[s] == 1:
                 return Ended.PAYLOAD
-            if now[Now.STEP] == 0:
-                if table.ticks[s] > 0 and not act(f, runs, rules, start, table.at_ticks[s], table.ticks[s]):
-                    return Ended.TICK
-                node(f, runs, records, times, now, start, p)
-                times.reached[0] = start
-                now[Now.STEP] = 1
+            copy(lanes.p, table.parameters[s])
+            if position.phase[0] == Phase.TICK and not begin_segment(f, loop):
+                return Ended.TICK
             if s == last:
-                now[Now.SEGMENT] += 1
+                position.segment[0] += 1
                 continue
             end = table.starts[s + 1]
-            if now[Now.STEP] == 1:  # at the start of a segment, and behind an event
-                now[Now.EVALUATIONS] += begin(f, c, times.reached[0], y, p, run_parameters, work)
-                if not finite(work.K[0]):
-                    return Ended.NOT_FINITE
-                remember(times.reached[0], y, p, run_parameters, switches)
-                if control[At.NEXT] == 0.0 and control[At.RTOL] + control[At.ATOL] > 0.0:
-                    now[Now.EVALUATIONS] += first_step(
-                        f, times.reached[0], end, y, p, run_parameters, after, work, control
-                    )
-                now[Now.STEP] = 2
-            while times.reached[0] < end:
-                t = times.reached[0]
-                made, found = choose(f, c, t, end, y, p, run_parameters, after, work, runs.lost, control, times.mesh)
-                now[Now.EVALUATIONS] += made
-                if found != 0:
+            if position.phase[0] == Phase.RESTART and not restart(f, c, work, loop, events.table, control, end):
+                return Ended.NOT_FINITE
+            while position.time[0] < end and position.phase[0] == Phase.STEPS:
+                if not take_step(f, c, work, loop, control, end):
                     return Ended.TOO_SMALL
-                h, t1 = control[At.TAKEN], control[At.END]
-                now[Now.EVALUATIONS] += accept(f, c, t, h, y, p, run_parameters, after, work)
-                has_dense, event, theta, rest = False, -1, NONE, 0.0
-                if len(switches.sides) > 0:
-                    near = nears(t1, after, p, run_parameters, switches)
-                    if near or approaches(y, after, h, work.K[0], work.last, rules, switches):
-                        now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, run_parameters, after, work)
-                        event, theta = first_event(f, t, h, y, p, runs, work.F, switches)
-                        has_dense = event < 0
-                    if event >= 0:
-                        made, h, rest, e = cut(f, c, t, h, theta, p, runs, work, switches, event, control)
-                        now[Now.EVALUATIONS] += made
-                        if runs.lost[0] != 0 or not finite(after):
-                            return Ended.TOO_SMALL
-                        if e > 1.0:
-                            control[At.NEXT] = shortened(h, e, control)
-                            remember(t, y, p, run_parameters, switches)
-                            continue
-                        t1 = t + (h + rest)
-                        control[At.NEXT] = max(control[At.NEXT], abs(control[At.TAKEN]))  # the cut is no error
-                        switches.sides[event] = -switches.sides[event]
-                if h > 0.0 and is_due(times, now, t1, end):
-                    if not has_dense:
-                        now[Now.EVALUATIONS] += dense(f, c, t, h, y, p, run_parameters, after, work)
-                    inside(f, runs, records, times, now, t, h, t1, end, p, work.F)
-                copy(y, after)
+                event, theta, has_dense = locate_event(f, c, work, loop, events.table, control)
+                h, rest = control.h[0], 0.0
                 if event >= 0:
-                    arrive(y, work.last, rest, switches, event)
-                for row in switches.zeroed:
-                    y[row, 0] = 0.0
-                times.reached[0] = t1
-                copy(work.K[0], work.last)
-                if times.every and event < 0 and t1 < end:
-                    sample(f, runs, records, 0, now, t1, y, p)
-                now[Now.STEPS] += 1
-                now[Now.BUDGET] -= 1
-                log_step(records, now, t1, y)
-                show(runs, records, rules, work.last, now, t, t1, t == start and acts(rules, table.ticks[s]))
-                if event >= 0:
-                    now[Now.EVENT] = event
-                    now[Now.STEP] = 1
-                    guard = event - switches.thresholds
-                    if sides.restarts and event < len(switches.rows) - switches.user_defined:
-                        control[At.NEXT] = 0.0
-                    if 0 <= guard < switches.guards:
-                        ended = end_mode(f, t1, runs, p, switches, holding, guard)
-                        if ended != Ended.DONE:
-                            return ended
-                    elif not goes_on(t1, runs, switches, sides, holding, event, rules.held):
-                        return Ended.EVENT
-                    if now[Now.BUDGET] <= 0 or stop[0] != 0:
-                        return Ended.PAUSED
-                    break
-                settle_sides(switches)
-                if not rules.canonical and fast(y, rules.n):
-                    return Ended.FAST
-                if now[Now.STEPS] % _WATCHED == 0 and not conserve(f, runs, rules, t1, p):
-                    return Ended.GAINS
-                if now[Now.BUDGET] <= 0 or stop[0] != 0:
+                    h, rest, e = step_to_event(f, c, work, loop, events.table, control, event, theta)
+                    if lanes.failed[0] != 0 or not is_finite(lanes.after):
+                        return Ended.TOO_SMALL
+                    if e > 1.0:
+                        reject(loop, events.table, control, h, e)
+                        continue
+                    control.end[0] = position.time[0] + (h + rest)
+                    control.next_h[0] = max(control.next_h[0], abs(control.h[0]))  # not the error shortened the step
+                    events.table.sides[event] = -events.table.sides[event]
+                record_step(f, c, work, loop, control, h, end, has_dense and event < 0)
+                finish_step(f, work, loop, events.table, control, event, rest)
+                ended = handle_event(f, loop, events, control, event) if event >= 0 else check_step(f, loop, events)
+                if ended != Ended.DONE:
+                    return ended
+                if position.budget[0] <= 0 or stop[0] != 0:
                     return Ended.PAUSED
-            if now[Now.STEP] == 1:  # behind an event
-                continue
-            now[Now.SEGMENT] += 1
-            now[Now.STEP] = 0
+            if position.phase[0] == Phase.STEPS:
+                position.segment[0] += 1
+                position.phase[0] = Phase.TICK
         return Ended.DONE
+
+    def restart(
+        f: Functions, c: Any, work: Any, loop: Loop, table: EventTable, control: StepControl, end: float
+    ) -> bool:
+        """Evaluate the rate and the switching functions at t, and choose a first step. Return False without a rate."""
+        position, lanes, t = loop.position, loop.lanes, loop.position.time[0]
+        position.evaluations[0] += begin(f, c, work, t, lanes)
+        if not is_finite(work.K[0]):
+            return False
+        start_table(table, lanes, t)
+        if control.next_h[0] == 0.0 and controls_error(control):
+            position.evaluations[0] += first_step(f, work, control, t, end, lanes)
+        position.phase[0] = Phase.STEPS
+        return True
+
+    def take_step(f: Functions, c: Any, work: Any, loop: Loop, control: StepControl, end: float) -> bool:
+        """Choose and take a step, and evaluate the rate at its end. Return False if no step is small enough."""
+        position, lanes, t = loop.position, loop.lanes, loop.position.time[0]
+        evaluations, choice = choose(f, c, work, control, t, end, lanes)
+        position.evaluations[0] += evaluations
+        if choice != Choice.TAKEN:
+            return False
+        position.evaluations[0] += accept(f, c, work, t, control.h[0], lanes)
+        return True
+
+    def locate_event(
+        f: Functions, c: Any, work: Any, loop: Loop, table: EventTable, control: StepControl
+    ) -> tuple[int, float, bool]:
+        """Return the switching function that changes sign first in the step, or −1; θ; True with dense output."""
+        lanes, t, h = loop.lanes, loop.position.time[0], control.h[0]
+        if len(table.sides) == 0:
+            return -1, NONE, False
+        approaches = function_approaches(table, lanes, control.end[0])
+        if not approaches and not coordinate_approaches(table, lanes, loop.config, work, h):
+            return -1, NONE, False
+        loop.position.evaluations[0] += dense(f, c, work, t, h, lanes)
+        event, theta = first_event(table, lanes, work.F, t, h)
+        return event, theta, True
+
+    def step_to_event(
+        f: Functions, c: Any, work: Any, loop: Loop, table: EventTable, control: StepControl, event: int, theta: float
+    ) -> tuple[float, float, float]:
+        """Repeat the step up to where a switching function vanishes after it, except for the last bit of its length.
+
+        Returns:
+            Its length; the length of that bit, over which y is a straight line; and its error, because it may pass
+            slowly through what the whole step jumped over, for example friction near v = 0.
+        """
+        lanes, position, t, whole = loop.lanes, loop.position, loop.position.time[0], control.h[0]
+        h, e = theta * whole, 0.0
+        for k in range(_ROOTS):
+            if abs(h) <= np.spacing(abs(t)):  # immediately, for example right after another event
+                copy(lanes.after, lanes.y)
+                copy(work.last, work.K[0])
+                return 0.0, 0.0, 0.0
+            position.evaluations[0] += step(f, c, work, t, h, lanes)
+            if controls_error(control):
+                e = error(c, work, h, lanes, control.rtol, control.atol)
+            position.evaluations[0] += accept(f, c, work, t, h, lanes)
+            shift = correction(table, lanes, work, event, t, h, whole)
+            if not abs(shift) > _SHORT * h:
+                return h, shift, e
+            if k == _ROOTS - 1 or (abs(shift) > h and event >= coordinates(table)):
+                break  # a function that jumps: where it is bracketed
+            h = max(h + shift, 0.0)
+        return h, 0.0, e
+
+    def record_step(
+        f: Functions, c: Any, work: Any, loop: Loop, control: StepControl, h: float, end: float, has_dense: bool
+    ) -> None:
+        """Store the samples and shared states within the step."""
+        lanes, config, position, t, t1 = loop.lanes, loop.config, loop.position, loop.position.time[0], control.end[0]
+        samples = is_due(position.sample[0], config.sample_period, t1, end)
+        shares = is_due(position.share[0], config.share_period, t1, end)
+        if not (h > 0.0 and (samples or shares)):
+            return
+        if not has_dense:
+            position.evaluations[0] += dense(f, c, work, t, h, lanes)
+        while is_due(position.sample[0], config.sample_period, t1, end):
+            at = position.sample[0] * config.sample_period
+            between(lanes.y, work.F, (at - t) / h, lanes.inner)
+            sample(f, loop, at, lanes.inner, lanes.p)
+            position.sample[0] += 1
+        while is_due(position.share[0], config.share_period, t1, end):
+            at = position.share[0] * config.share_period
+            between(lanes.y, work.F, (at - t) / h, lanes.inner)
+            share(loop, at, lanes.inner)
+            position.share[0] += 1
+
+    def handle_event(f: Functions, loop: Loop, events: Events, control: StepControl, event: int) -> int:
+        """Change the mode, or the formulas, after an event; return `DONE`, or the reason for which the loop returns."""
+        table, lanes, position, guard = events.table, loop.lanes, loop.position, event - events.table.thresholds
+        t = position.time[0]
+        position.event[0], position.phase[0] = event, Phase.RESTART
+        if loop.config.restarts and event < len(table.rows) - table.user_defined:
+            control.next_h[0] = 0.0
+        if 0 <= guard < table.guards:
+            return end_mode(f, t, lanes, table, events.mode, guard)
+        if pass_threshold(events.regions, table, events.mode, lanes, loop.config.held, event, t):
+            return Ended.DONE
+        return Ended.EVENT
 
     return advance
 
 
-def arrive(y: Array, rate: Array, rest: float, switches: Switches, event: int) -> None:
-    """The last bit of a step up to an event; what passes its level there lies on it, but for rounding."""
-    for e in range(len(y)):
-        y[e, 0] += rest * rate[e, 0]
-    if event < len(switches.exact) and not switches.rates[event]:
-        row, level = switches.rows[event], switches.levels[event]
-        if abs(y[row, 0] - level) <= switches.exact[event]:
-            y[row, 0] = level
+def begin_segment(f: Functions, loop: Loop) -> bool:
+    """Do the tick and the samples at the start of a segment. Return False if the torque at the tick is not finite."""
+    table, lanes, config, position, s = loop.table, loop.lanes, loop.config, loop.position, loop.position.segment[0]
+    t, period, share_period = table.starts[s], config.sample_period, config.share_period
+    if table.ticks[s] > 0 and not act(f, loop, t, table.at_ticks[s], table.ticks[s]):
+        return False
+    is_end = t == config.duration and period < np.inf
+    if position.sample[0] * period <= t + _EARLY * period or config.samples_nodes or is_end:
+        sample(f, loop, t, lanes.y, lanes.p)
+    while position.sample[0] * period <= t + _EARLY * period and period < np.inf:
+        position.sample[0] += 1
+    if share_period < np.inf:
+        share(loop, t, lanes.y)
+        while position.share[0] * share_period <= t + _EARLY * share_period:
+            position.share[0] += 1
+    position.time[0], position.phase[0] = t, Phase.RESTART
+    return True
 
 
-def node(f: Functions, runs: Runs, records: Records, times: Times, now: Array, t: float, p: Array) -> None:
-    """A sample, if there is to be one, and a shared state, at the start of a segment or at the end of the run."""
-    due = now[Now.DUE] * times.period <= t + _EARLY * times.period
-    if due or times.nodes or (t == times.end and times.period < np.inf):
-        sample(f, runs, records, 0, now, t, runs.y, p)
-    while now[Now.DUE] * times.period <= t + _EARLY * times.period and times.period < np.inf:
-        now[Now.DUE] += 1
-    if times.compared < np.inf:
-        share(records, now, t, runs.y)
-        while now[Now.MET] * times.compared <= t + _EARLY * times.compared:
-            now[Now.MET] += 1
-
-
-def is_due(times: Times, now: Array, t: float, end: float) -> bool:
-    """Whether a sample or a shared state is due before t."""
-    return due(now[Now.DUE], times.period, t, end) or due(now[Now.MET], times.compared, t, end)
-
-
-def due(k: int, period: float, t: float, end: float) -> bool:
-    """Whether the k-th period ends at t at the latest, and before the end of the segment."""
+def is_due(k: int, period: float, t: float, end: float) -> bool:
+    """Return True if period k ends at t or before, and before the end of the segment."""
     return k * period <= t and k * period < end - _EARLY * period
 
 
-def inside(
-    f: Functions, runs: Runs, records: Records, times: Times, now: Array, t: float, h: float, t1: float, end: float,
-    p: Array, F: Array,
-) -> None:  # fmt: skip
-    """The samples and shared states within a step."""
-    x = runs.last
-    while due(now[Now.DUE], times.period, t1, end):
-        at = now[Now.DUE] * times.period
-        between(runs.y, F, (at - t) / h, x)
-        sample(f, runs, records, 0, now, at, x, p)
-        now[Now.DUE] += 1
-    while due(now[Now.MET], times.compared, t1, end):
-        at = now[Now.MET] * times.compared
-        between(runs.y, F, (at - t) / h, x)
-        share(records, now, at, x)
-        now[Now.MET] += 1
+def reject(loop: Loop, table: EventTable, control: StepControl, h: float, e: float) -> None:
+    """Reject a step of length h to an event, with the error e; a shorter one is next."""
+    control.next_h[0] = shortened(control, h, e)
+    start_table(table, loop.lanes, loop.position.time[0])
 
 
-def fast(y: Array, n: int) -> bool:
-    """Whether a joint moves without bound."""
-    most = 0.0
-    for e in range(n, 2 * n):
-        most = max(most, abs(y[e, 0]))
-    return not most < FASTEST
+def finish_step(
+    f: Functions, work: Any, loop: Loop, table: EventTable, control: StepControl, event: int, rest: float
+) -> None:
+    """Take y⁺ at the end of a step, and record it; `rest` is the length that is left to an event."""
+    lanes, config, position, s = loop.lanes, loop.config, loop.position, loop.position.segment[0]
+    y, t, t1, start = lanes.y, position.time[0], control.end[0], loop.table.starts[s]
+    copy(y, lanes.after)
+    if event >= 0:
+        arrive(table, y, work.last, event, rest)
+    for row in table.zeroed:
+        y[row, 0] = 0.0
+    position.time[0] = t1
+    copy(work.K[0], work.last)
+    if config.samples_steps and event < 0 and t1 < loop.table.starts[s + 1]:
+        sample(f, loop, t1, y, lanes.p)
+    count_step(loop)
+    log_step(loop, t1, y)
+    observe_step(loop, work.last, t, t1, t == start and changes_torque(config, loop.table.ticks[s]))
+
+
+def arrive(table: EventTable, y: Array, rate: Array, event: int, rest: float) -> None:
+    """Advance y by the last bit of a step to an event; a coordinate then lies on its level, except for rounding."""
+    for e in range(len(y)):
+        y[e, 0] += rest * rate[e, 0]
+    if event < coordinates(table) and not table.is_rate[event]:
+        row, level = table.rows[event], table.levels[event]
+        if abs(y[row, 0] - level) <= table.rounding[event]:
+            y[row, 0] = level
+
+
+def check_step(f: Functions, loop: Loop, events: Events) -> int:
+    """Check a step without an event for divergence; return `DONE`, or the reason for which the loop returns."""
+    config, position, y, fastest = loop.config, loop.position, loop.lanes.y, 0.0
+    settle_sides(events.table)
+    if not config.canonical:
+        for e in range(config.n, 2 * config.n):
+            fastest = max(fastest, abs(y[e, 0]))
+        if not fastest < FASTEST:
+            return Ended.FAST
+    if position.steps[0] % _WATCHED == 0 and not conserves_energy(f, loop, position.time[0]):
+        return Ended.GAINS
+    return Ended.DONE

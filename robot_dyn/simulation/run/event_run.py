@@ -16,20 +16,20 @@ from robot_dyn.foundations.errors import RobotDynError, is_mistake
 from robot_dyn.foundations.values import cached, copied
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
-from robot_dyn.integrate.bernstein import room
-from robot_dyn.integrate.step_control import At, ControlledStepper, control_of
-from robot_dyn.simulation.dynamics.loop_state import Ended, Now
+from robot_dyn.integrate.bernstein import work_array
+from robot_dyn.integrate.step_control import ControlledStepper, StepControl, initial_control
+from robot_dyn.simulation.dynamics.loop_state import Ended
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.engine.interpreted import interpreted, system
-from robot_dyn.simulation.events.crossings import Switches
+from robot_dyn.simulation.events.contacts import NO_CONTACT, contacts_of
 from robot_dyn.simulation.events.event_log import event_log
+from robot_dyn.simulation.events.event_table import EventTable
 from robot_dyn.simulation.events.mode_change import end_mode, without_modes
-from robot_dyn.simulation.events.modes import NOTHING_HELD, modes_of
 from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.events.switching import Switching
 from robot_dyn.simulation.observation.observer import Observer
-from robot_dyn.simulation.run.event_loop import Times, event_loop
+from robot_dyn.simulation.run.event_loop import Events, event_loop
 from robot_dyn.simulation.run.outcome import GivesUp, Outcome, Reason, Stiff, TooLong
 from robot_dyn.simulation.run.recording import MOST_SHARED, Path, sample
 from robot_dyn.simulation.run.stiffness import FIRST_LOOK, changes_over
@@ -82,66 +82,65 @@ class EventRun(SwitchedRun):
         super().__init__(watch, payloads, engine, segment_table(setup), on_progress, observer)
         self.most, self.samples, self.chooses = most, samples, chooses
         self._look = FIRST_LOOK if chooses else 0
-        self.stepper, self.control = _method(setup, equation)
+        self.stepper, self.control = _method(setup, equation, mesh)
         self.bodies, of = self.functions.bodies, self.stepper
-        modes, brief = None, _BRIEF * setup.duration_s
+        contacts, brief = None, _BRIEF * setup.duration_s
         if equation.impulses:
-            modes = modes_of(equation, self.runs.run_parameters.copy(), engine.places(), _ACCUMULATED, brief)
-            modes.start(self.start)
-        alone = thresholds and modes is None and not payloads.any
-        self.switching = cached(setup, _switching) if alone else Switching(equation, modes=modes)
+            contacts = contacts_of(equation, self.lanes.run_parameters.copy(), engine.places(), _ACCUMULATED, brief)
+            contacts.start(self.start)
+        alone = thresholds and contacts is None and not payloads.any
+        self.switching = cached(setup, _switching) if alone else Switching(equation, contacts=contacts)
         if not thresholds:
-            self.switching = Switching(equation, self.switching.quantities, modes)
-        ends_mode = without_modes if modes is None else end_mode
+            self.switching = Switching(equation, self.switching.quantities, contacts)
+        ends_mode = without_modes if contacts is None else end_mode
         self.advance = engine.loop(lambda: event_loop(of.begin, of.step, of.error, of.accept, of.dense, ends_mode))
-        self.times = _times(setup, mesh, samples)
-        states = 0 if self.times.compared == inf else _COMPARED + len(self.table.counts) + 2
-        self.records = self._records(int(most_samples(setup)) + 2 if samples else 0, states, _CHUNK)
+        self.config = self.config._replace(**_records(setup, samples), restarts=setup.integrator.needs_jacobian)
+        states = 0 if self.config.share_period == inf else _COMPARED + len(self.table.counts) + 2
+        self.loop = self._loop_of(int(most_samples(setup)) + 2 if samples else 0, states, _CHUNK)
         events, degree = self.functions.events, len(of.work.F)
         if alone and not setup.events:
-            known = copied(cached(setup, _switches))
-            self.switches = known._replace(functions=events, b=np.zeros(degree + 1), stack=room(degree))
+            table, work = copied(cached(setup, _event_table)), work_array(degree)
+            self.event_table = table._replace(functions=events, coefficients=np.zeros(degree + 1), stack=work)
         else:
-            self.switches = self.switching.at(0.0, self.start, degree, events, self.held)
-        self.log = event_log(self.rules.n, 0, brief) if modes is None else modes.holding.log
+            self.event_table = self.switching.at(0.0, self.start, degree, events, self.held)
+        self.log = event_log(self.config.n, 0, brief) if contacts is None else contacts.mode.log
         self._forget_sides()
         self._change_mode()
 
     @property
     def time(self) -> float:
         """The time reached, in [s]."""
-        return float(self.times.reached[0])
+        return float(self.position.time[0])
 
     def _room(self, budget: int) -> int:
         self._widen()
-        rest = len(self.records.step_log_t) - int(self.now[Now.WALKED]) or budget
+        rest = len(self.records.step_log_t) - int(self.position.step_row[0]) or budget
         if self._look:
-            rest = min(rest, self._look - int(self.now[Now.STEPS]))
+            rest = min(rest, self._look - int(self.position.steps[0]))
         return min(rest, super()._room(budget))
 
     def _replaced(self) -> Stiff | None:
-        if not self._look or self.now[Now.STEPS] < self._look:
+        if not self._look or self.position.steps[0] < self._look:
             return None
         self._look *= 2
-        ends = self.records.step_log_t[: int(self.now[Now.WALKED])]
-        return changes_over(self.setup, self.switching.on(self.switches.sides), ends, self.y, self.held)
+        ends = self.records.step_log_t[: int(self.position.step_row[0])]
+        return changes_over(self.setup, self.switching.on(self.event_table.sides), ends, self.y, self.held)
 
     def _widen(self) -> None:
         """Double the room for ends of steps, where it is used up."""
         records, rows = self.records, len(self.records.step_log_t)
-        if self.now[Now.WALKED] == rows:
+        if self.position.step_row[0] == rows:
             states = max(len(records.step_log), min(2 * rows, MOST_SHARED))
             t, y = np.empty(2 * rows), np.empty((states, len(self.start)))
             t[:rows], y[: len(records.step_log)] = records.step_log_t, records.step_log
-            self.records = records._replace(step_log_t=t, step_log=y)
+            self.loop = self.loop._replace(records=records._replace(step_log_t=t, step_log=y))
 
     def _advance(self) -> Ended:
-        arguments = self.functions, self.table, self.runs, self.records, self.times, self.rules
-        modes = self.switching.modes
-        holding = NOTHING_HELD if modes is None else modes.holding
-        arguments += self.stepper.coefficients, self.stepper.work, self.switches, self.sides, holding
+        contacts, stepper = self.switching.contacts, self.stepper
+        events = Events(self.event_table, self.regions, NO_CONTACT if contacts is None else contacts.mode)
+        arguments = self.functions, stepper.coefficients, stepper.work, self.loop, events, self.control, self.stop
         try:
-            return Ended(self.advance(*arguments, self.now, self.control, self.stop))
+            return Ended(self.advance(*arguments))
         except RobotDynError as error:
             if is_mistake(error):
                 raise
@@ -153,24 +152,24 @@ class EventRun(SwitchedRun):
 
     def _review_step(self) -> None:
         """A step of a method of fixed step that was not found: DivergedError, which explains it."""
-        s, t, y = int(self.now[Now.SEGMENT]), self.time, self.y
-        equation = self.switching.on(self.switches.sides)
+        s, t, y = int(self.position.segment[0]), self.time, self.y
+        equation = self.switching.on(self.event_table.sides)
         p, functions = self.table.parameters[s], interpreted(equation, self.watch)
-        right_side = system(functions, equation, p, self.runs.run_parameters[: self.rules.held])
-        h = float(self.control[At.TAKEN])
+        right_side = system(functions, equation, p, self.lanes.run_parameters[: self.config.held])
+        h = float(self.control.h[0])
         one_step(self.setup.integrator, right_side, t, y, h, self.watch)
         raise self.watch.diverged(Reason.STATE_OVERFLOWS, t, y)
 
     def _judge(self, ended: Ended) -> Outcome | GivesUp | None:
-        if self.now[Now.EVALUATIONS] > self.most:
-            return TooLong(int(self.now[Now.EVALUATIONS]))
+        if self.position.evaluations[0] > self.most:
+            return TooLong(int(self.position.evaluations[0]))
         t, y = self.time, self.y
         if not np.isfinite(t):  # of an event that was looked for in states that overflow
-            t = float(self.records.t[: int(self.now[Now.ROW])].max(initial=0.0))
+            t = float(self.records.t[: int(self.position.sample_row[0])].max(initial=0.0))
             raise DivergedError(Outcome(Reason.STATE_OVERFLOWS, t, facts={"largest": inf}))
         if t > self.past_horizon + self.setup.duration_s / _COMPARED:
             return Outcome(Reason.END, self.past_horizon)
-        self.watch.pace(t, y, int(self.now[Now.STEPS]))
+        self.watch.pace(t, y, int(self.position.steps[0]))
         largest: dict[str, float | str] = {"largest": float(np.abs(y).max())}
         if ended is Ended.EVENT:
             if (name := self._event(t, y)) is not None:
@@ -198,12 +197,12 @@ class EventRun(SwitchedRun):
 
     def _sample_end(self, t: float) -> None:
         """Record a sample where an event ends the run."""
-        row, s, records = int(self.now[Now.ROW]), int(self.now[Now.SEGMENT]), self.records
+        row, s, records = int(self.position.sample_row[0]), int(self.position.segment[0]), self.records
         if not (row and records.t[row - 1] == t):
-            sample(self.in_python, self.runs, records, 0, self.now, t, self.runs.y, self.table.parameters[s])
+            sample(self.in_python, self.loop, t, self.lanes.y, self.table.parameters[s])
 
     def _paths(self) -> tuple[Path, Path, np.ndarray]:
-        records, shared, steps = self.records, int(self.now[Now.SHARED]), int(self.now[Now.WALKED])
+        records, shared, steps = self.records, int(self.position.shared_row[0]), int(self.position.step_row[0])
         ends = records.step_log_t[:steps]
         states = np.vstack([self.start, records.step_log[: min(steps, len(records.step_log))]])
         path = Path(np.full(len(states), -1), np.append(0.0, ends)[: len(states)], states)
@@ -217,34 +216,37 @@ def _switching(setup: Setup) -> Switching:
     return Switching(setup.equation)
 
 
-def _switches(setup: Setup) -> Switches:
+def _event_table(setup: Setup) -> EventTable:
     """Its switching functions at the start, without user-defined events."""
     equation = setup.equation
     held = np.full(equation.plant.dynamics.n, np.nan) if equation.sampled else None
     return cached(setup, _switching).at(0.0, equation.start(setup.q0, setup.v0), 0, None, held)
 
 
-def _method(setup: Setup, equation: StateEquation) -> tuple[ControlledStepper, np.ndarray]:
+def _method(setup: Setup, equation: StateEquation, mesh: np.ndarray | None) -> tuple[ControlledStepper, StepControl]:
     """The stepper of the method, and the choice of its steps before the first."""
     method: Any = setup.integrator
-    n, m = equation.plant.dynamics.n, equation.size
+    n, m, ends = equation.plant.dynamics.n, equation.size, np.zeros(0) if mesh is None else mesh
     if not method.controls_error:
         stepper = hermite.stepper(method, m, n, m + n, equation.widths)
-        return stepper, control_of(stepper, 0.0, 0.0, inf)
+        return stepper, initial_control(stepper.error_order, mesh=ends)
     bounded = m - len(equation.sources)
     stepper = STEPPERS[method.method](m, m + n, bounded)
     still = equation.state_size if equation.sampled else 0  # between ticks: without them in the mean of squares
     part = np.sqrt(1 - still / bounded)
     longest = min(method.max_step_s, setup.longest_step_s)
-    return stepper, control_of(stepper, part * method.rtol, part * method.atol, longest)
+    return stepper, initial_control(stepper.error_order, part * method.rtol, part * method.atol, longest, ends)
 
 
-def _times(setup: Setup, mesh: np.ndarray | None, samples: bool) -> Times:
-    """The times of a run: those of a method of fixed step all lie on its mesh."""
+def _records(setup: Setup, samples: bool) -> dict[str, Any]:
+    """The times of samples and shared states, as fields of `LoopConfig`."""
     chosen, every = setup.integrator.controls_error, not setup.record_period_s
     period = setup.record_period_s or (setup.duration_s / _SAMPLES if chosen else inf)
     compared = setup.duration_s / _COMPARED if chosen and setup.estimate_error else inf
-    return Times(
-        np.zeros(1), period if samples else inf, compared, samples and every, samples and every and not chosen,
-        setup.duration_s, np.zeros(0) if mesh is None else mesh,
-    )  # fmt: skip
+    return {
+        "sample_period": float(period) if samples else inf,
+        "share_period": float(compared),
+        "samples_nodes": samples and every,
+        "samples_steps": samples and every and not chosen,
+        "duration": float(setup.duration_s),
+    }

@@ -16,7 +16,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import FLOAT64, Array
 from robot_dyn.foundations.errors import RobotDynError, is_mistake
 from robot_dyn.integrate.integrator import Integrator
-from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now
+from robot_dyn.simulation.dynamics.loop_state import Ended, Functions
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.engine.interpreted import interpreted, sample, system
 from robot_dyn.simulation.events.payload_events import PayloadEvents
@@ -24,7 +24,7 @@ from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.run.driver import Driver
 from robot_dyn.simulation.run.outcome import Outcome, Reason
 from robot_dyn.simulation.run.recording import MOST_SHARED, Path, Recording
-from robot_dyn.simulation.run.time_loop import WATCHED, acts, time_loop
+from robot_dyn.simulation.run.time_loop import WATCHED, changes_torque, time_loop
 from robot_dyn.simulation.run.watch import LARGEST, Watch, one_step, overflowed
 from robot_dyn.simulation.setup.schedule import ON_STEP, paced
 from robot_dyn.simulation.setup.segment_table import segment_table
@@ -53,15 +53,18 @@ class FixedStep(Driver):
         setup, equation = watch.setup, watch.equation
         table = segment_table(setup, pace)
         super().__init__(watch, payloads, engine, table, on_progress, observer)
-        self.segments, n, m = paced(setup.segments, pace), self.rules.n, equation.size
+        self.segments, n, m = paced(setup.segments, pace), self.config.n, equation.size
         self.stepper = cast(Integrator, setup.integrator).stepper(FLOAT64, m, n, m + n, 1, equation.widths)
         self.advance = engine.loop(lambda: time_loop(self.stepper.step))
         every, thin = self._shared(pace)
         largest = min(engine.doubtful, LARGEST)
-        self.rules = self.rules._replace(largest=largest, every=every, thin=thin)
+        period, slack = float(setup.record_period_s or 0.0), ON_STEP * setup.nominal_step_s
+        self.config = self.config._replace(
+            largest=largest, every=every, thin=thin, sample_period=period, sample_slack=slack
+        )
+        self.position.sample_time[0] = 0.0 if pace == 1 else inf
         rows = samples_at_most(setup, table.counts) if pace == 1 else 1
-        self.records = self._records(rows, int((-(-table.counts // every)).sum()) // thin + 2, 0)
-        self.clock = np.array([0.0 if pace == 1 else inf, setup.record_period_s, ON_STEP * setup.nominal_step_s])
+        self.loop = self._loop_of(rows, int((-(-table.counts // every)).sum()) // thin + 2, 0)
 
     def _shared(self, pace: Fraction) -> tuple[int, int]:
         """Steps between states that companions share, and how many of these to one that is stored."""
@@ -74,16 +77,15 @@ class FixedStep(Driver):
     @property
     def time(self) -> float:
         """The time reached, in [s]."""
-        s, k = min(int(self.now[Now.SEGMENT]), len(self.table.starts) - 1), int(self.now[Now.STEP])
+        s, k = min(int(self.position.segment[0]), len(self.table.starts) - 1), int(self.position.step[0])
         if k == self.table.counts[s]:
             return float(self.table.starts[min(s + 1, len(self.table.starts) - 1)])
         return float(self.table.starts[s] + k * self.table.lengths[s])
 
     def _advance(self) -> Ended:
         _, coefficients, work = self.stepper
-        arguments = self.functions, self.table, self.runs, self.records, self.rules, coefficients, work
         try:
-            return Ended(self.advance(*arguments, self.now, self.clock, self.stop))
+            return Ended(self.advance(self.functions, coefficients, work, self.loop, self.stop))
         except RobotDynError as error:  # of a step; y is the state before it
             if is_mistake(error):
                 raise
@@ -96,7 +98,7 @@ class FixedStep(Driver):
         elif ended is Ended.PAYLOAD:
             self.events += self._change_payload()
         elif ended is Ended.NEEDS_REVIEW:
-            self._step(int(self.now[Now.SEGMENT]), self.time, self.y)
+            self._step(int(self.position.segment[0]), self.time, self.y)
         elif ended is not Ended.PAUSED:
             self.watch.look(self.time, self.y)
 
@@ -106,26 +108,26 @@ class FixedStep(Driver):
         seen = None if observer is None else observer.seen
         functions, p = interpreted(self.equation, self.watch), self.table.parameters[s]
         if method.nonsmooth:
-            self.runs.y[:, 0] = y = self._jump(functions, t, h, p)
+            self.lanes.y[:, 0] = y = self._jump(functions, t, h, p)
         else:
-            right_side = system(functions, self.equation, p, self.runs.run_parameters, seen)
-            self.runs.y[:, 0] = y = one_step(method, right_side, t, y, h, self.watch)
+            right_side = system(functions, self.equation, p, self.lanes.run_parameters, seen)
+            self.lanes.y[:, 0] = y = one_step(method, right_side, t, y, h, self.watch)
         if observer is not None:
-            ticked = self.now[Now.STEP] == 0 and acts(self.rules, int(self.table.ticks[s]))
+            ticked = self.position.step[0] == 0 and changes_torque(self.config, int(self.table.ticks[s]))
             observer.step(t, t + h, y, ticked or not self.equation.sampled)
-        self.now[Now.STEP] += 1
-        self.now[Now.STEPS] += 1
-        if self.now[Now.STEPS] % WATCHED == 0:
+        self.position.step[0] += 1
+        self.position.steps[0] += 1
+        if self.position.steps[0] % WATCHED == 0:
             self.watch.look(t + h, y)
 
     def _jump(self, functions: Functions, t: float, h: float, p: Array) -> Array:
         """The state behind a step in which velocities may jump."""
-        (step, coefficients, work), runs = self.stepper, self.runs
-        arguments = functions, coefficients, t, h, runs.y, p, runs.run_parameters, runs.after, work, runs.lost
-        self.watch.answer(t, self.y, lambda: step(*arguments))
-        if runs.lost[0] or overflowed(runs.after):
+        (step, coefficients, work), lanes = self.stepper, self.lanes
+        lanes.p[:] = p
+        self.watch.answer(t, self.y, lambda: step(functions, coefficients, work, t, h, lanes))
+        if lanes.failed[0] or overflowed(lanes.after):
             raise self.watch.diverged(Reason.STATE_OVERFLOWS, t, self.y)
-        return runs.after[:, 0].copy()
+        return lanes.after[:, 0].copy()
 
     def _keys(self, places: np.ndarray) -> np.ndarray:
         """Steps of the setup before (segment, step)."""
@@ -134,7 +136,7 @@ class FixedStep(Driver):
         return first + np.rint(places[:, 1] * pace).astype(np.int64)
 
     def _paths(self) -> tuple[Path, Path, None]:
-        records, rows = self.records, int(self.now[Now.SHARED])
+        records, rows = self.records, int(self.position.shared_row[0])
         path = Path(self._keys(records.shared_place[:rows]), records.shared_t[:rows], records.shared[:rows])
         return path, path, None
 
@@ -142,10 +144,10 @@ class FixedStep(Driver):
         recording = super()._recording(outcome)
         if self.setup.integrator.nonsmooth:
             # machine code has no rates at samples: which joints rest is for the equation to find
-            m, n = self.equation.size, self.rules.n
+            m, n = self.equation.size, self.config.n
             for t, y, made in zip(recording.t, recording.y, recording.made, strict=True):
                 if np.isnan(made[:m]).all():
-                    sample(self.equation, float(t), y, made[m : m + n].copy() if self.rules.held else None, made)
+                    sample(self.equation, float(t), y, made[m : m + n].copy() if self.config.held else None, made)
         return recording
 
 

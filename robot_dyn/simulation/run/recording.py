@@ -13,9 +13,10 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import copy, evaluate
 from robot_dyn.simulation.dynamics.event import Occurrence
-from robot_dyn.simulation.dynamics.loop_state import Functions, Now, Rules, Runs, erase_ended
+from robot_dyn.simulation.dynamics.loop_state import Functions, Lanes, LoopConfig, Position, erase_ended
 from robot_dyn.simulation.observation.observation import Observation, observe
 from robot_dyn.simulation.run.outcome import Outcome
+from robot_dyn.simulation.setup.segment_table import SegmentTable
 
 MOST_SHARED = 200_000  # states of a run that are compared with those of its companions
 
@@ -69,23 +70,23 @@ class Recording:
 
 
 class Records(NamedTuple):
-    """The arrays that a loop records in.
+    """The arrays in which a loop records.
 
     Attributes:
         rows: Entries of y that samples hold, (c,).
         t: Times of samples, (R,), in [s].
-        y, made: Those entries, and what else a sample holds, (R, c, B) and (R, d, B).
+        y, sampled: Those entries, and the other contents of a sample, (R, c, B) and (R, d, B).
         shared_t, shared: States that companion runs share, (S,) and (S, m).
-        shared_place: The segment and the step at which they are, (S, 2).
+        shared_place: Their segment and step, (S, 2).
         step_log_t, step_log: The ends of steps, (K,), and the states at the first of them, (k, m).
-        columns: As of `Observer.columns`; without any, none is written.
-        observation: What was observed of the runs; without any, no step is shown.
+        columns: See `Observer.columns`; without columns, none is written.
+        observation: Extremes and levels of the runs; without rows, no step is observed.
     """
 
     rows: Array
     t: Array
     y: Array
-    made: Array
+    sampled: Array
     shared_t: Array
     shared: Array
     shared_place: Array
@@ -95,69 +96,100 @@ class Records(NamedTuple):
     observation: Observation
 
 
+class Loop(NamedTuple):
+    """The data of a time loop, without the method and the events.
+
+    Attributes:
+        table: Segments of the run.
+        lanes: States of the runs.
+        records: Arrays in which the loop records.
+        config: Settings.
+        position: Position, which moves.
+    """
+
+    table: SegmentTable
+    lanes: Lanes
+    records: Records
+    config: LoopConfig
+    position: Position
+
+
 def records_of(
-    rows: Array, y: Array, made: Array, shared: Array, step_log: Array, columns: Array, observation: Observation
+    rows: Array, y: Array, sampled: Array, shared: Array, step_log: Array, columns: Array, observation: Observation
 ) -> Records:
-    """Records in these arrays, with room for as many times."""
-    times = (np.empty(len(x)) for x in (y, shared, step_log))
-    t, shared_t, step_log_t = times
-    place = np.empty((len(shared), 2), np.int64)
-    return Records(rows, t, y, made, shared_t, shared, place, step_log_t, step_log, columns, observation)
+    """Return records in these arrays, with their times; see `Records` for the arguments."""
+    return Records(
+        rows=rows,
+        t=np.empty(len(y)),
+        y=y,
+        sampled=sampled,
+        shared_t=np.empty(len(shared)),
+        shared=shared,
+        shared_place=np.empty((len(shared), 2), np.int64),
+        step_log_t=np.empty(len(step_log)),
+        step_log=step_log,
+        columns=columns,
+        observation=observation,
+    )
 
 
-def sample(
-    functions: Functions, runs: Runs, records: Records, base: int, now: Array, t: float, y: Array, p: Array
-) -> None:
-    """Store a sample of the states y; `base` is the first of the runs in the records."""
-    row, W = now[Now.ROW], y.shape[1]
+def sample(functions: Functions, loop: Loop, t: float, y: Array, p: Array) -> None:
+    """Store a sample of the states y."""
+    lanes, records, row = loop.lanes, loop.records, loop.position.sample_row[0]
+    first, end = loop.config.base, loop.config.base + y.shape[1]
     records.t[row] = t
     for j in range(len(records.rows)):
-        copy(records.y[row, j, base : base + W], y[records.rows[j]])
-    if len(runs.made) > 0:
-        evaluate(functions.sample, t, y, p, runs.run_parameters, runs.made)
-        erase_ended(runs.made, runs)
-        copy(records.made[row, :, base : base + W], runs.made)
-    now[Now.ROW] += 1
+        copy(records.y[row, j, first:end], y[records.rows[j]])
+    if len(lanes.sampled) > 0:
+        evaluate(functions.sample, t, y, p, lanes.run_parameters, lanes.sampled)
+        erase_ended(lanes.sampled, lanes)
+        copy(records.sampled[row, :, first:end], lanes.sampled)
+    loop.position.sample_row[0] += 1
 
 
-def share(records: Records, now: Array, t: float, y: Array) -> None:
+def share(loop: Loop, t: float, y: Array) -> None:
     """Store a state for companion runs."""
-    row = now[Now.SHARED]
+    records, position = loop.records, loop.position
+    row = position.shared_row[0]
     records.shared_t[row] = t
-    records.shared_place[row, 0], records.shared_place[row, 1] = now[Now.SEGMENT], now[Now.STEP]
+    records.shared_place[row, 0], records.shared_place[row, 1] = position.segment[0], position.step[0]
     copy(records.shared[row], y[:, 0])
-    now[Now.SHARED] += 1
+    position.shared_row[0] += 1
 
 
-def log_step(records: Records, now: Array, t: float, y: Array) -> None:
-    """Store the end of a step, while there is room."""
-    row = now[Now.WALKED]
+def log_step(loop: Loop, t: float, y: Array) -> None:
+    """Store the end of a step, until the log is full."""
+    records, row = loop.records, loop.position.step_row[0]
     if row < len(records.step_log_t):
         records.step_log_t[row] = t
         if row < len(records.step_log):
             copy(records.step_log[row], y[:, 0])
-        now[Now.WALKED] += 1
+        loop.position.step_row[0] += 1
 
 
-def show(
-    runs: Runs, records: Records, rules: Rules, latest: Array, now: Array, began: float, t: float, acted: bool
-) -> None:
-    """Observe a step of a single run: y at its end, and u, or v and u, of its latest evaluation.
+def observe_step(loop: Loop, latest: Array, start: float, t: float, acted: bool) -> None:
+    """Observe a step of a single run: y at its end, and u of its latest evaluation.
 
-    For an observer it is written into a column, too, for which its driver leaves room.
+    Args:
+        loop: The loop; an observer takes a column of its records, if there are any.
+        latest: The latest rate with u, (m + n, 1); its v counts if y has momenta.
+        start: Time at the start of the step, in [s].
+        t: Time at its end, in [s].
+        acted: True if the controller acted at the start.
     """
+    records, config, y = loop.records, loop.config, loop.lanes.y
     if records.observation.low.shape[1] == 0:
         return
-    n, m = rules.n, len(runs.y)
-    q, v, u = runs.y[:n], runs.y[n : 2 * n], latest[m : m + n]
-    if rules.canonical:
+    n, m = config.n, len(y)
+    q, v, u = y[:n], y[n : 2 * n], latest[m : m + n]
+    if config.canonical:
         v = latest[:n]
-    observe(records.observation, began, t, q, v, u, acted or rules.held == 0)
+    observe(records.observation, start, t, q, v, u, acted or config.held == 0)
     if records.columns.shape[1] == 0:
         return
-    c = now[Now.COLUMN]
-    records.columns[0, c] = t
-    copy(records.columns[1 : 1 + n, c], q[:, 0])
-    copy(records.columns[1 + n : 1 + 2 * n, c], v[:, 0])
-    copy(records.columns[1 + 2 * n :, c], u[:, 0])
-    now[Now.COLUMN] += 1
+    column = loop.position.column[0]
+    records.columns[0, column] = t
+    copy(records.columns[1 : 1 + n, column], q[:, 0])
+    copy(records.columns[1 + n : 1 + 2 * n, column], v[:, 0])
+    copy(records.columns[1 + 2 * n :, column], u[:, 0])
+    loop.position.column[0] += 1

@@ -1,8 +1,9 @@
-"""The time loop: segments, ticks, samples, steps and the watch over divergence, for one run or W in lock step.
+"""The time loop of fixed steps: segments, ticks, samples, steps and checks for divergence; one run, or W in lock step.
 
-It is plain functions of arrays, called as they stand with Python functions of the state equation, or as machine code
-with addresses of them. What ends a single run is looked at by its driver, which knows the words; in lock step a run
-that has ended is nan from there on.
+    for each segment:  tick;  for each step:  share, sample, y⁺ = step(t, y), observe, check the energy
+
+Plain functions of arrays, called as they stand with Python functions of the state equation, or as machine code with
+addresses of them. What may end a single run is checked by its driver; in lock step a run that has ended is nan.
 """
 
 from __future__ import annotations
@@ -14,183 +15,212 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.primitives import below, copy, evaluate, sizes
-from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Now, Rules, Runs, Why, erase_ended
-from robot_dyn.simulation.observation.observation import Observation, observe, observe_actuation, observe_motion
+from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, LaneEnd, Lanes, LoopConfig, erase_ended
+from robot_dyn.simulation.observation.observation import observe, observe_actuation, observe_motion
 from robot_dyn.simulation.run.philox import draw
-from robot_dyn.simulation.run.recording import Records, sample, share, show
-from robot_dyn.simulation.setup.segment_table import SegmentTable
+from robot_dyn.simulation.run.recording import Loop, observe_step, sample, share
 
 WATCHED = 64  # steps between looks at the energy
-RUNAWAY = 1e3  # times all the energy there was, that may come from nowhere
+RUNAWAY = 1e3  # times all the energy at the start, which may come from nowhere
 
 
 def time_loop(step: Callable[..., int]) -> Callable[..., int]:
-    """The time loop of a step function; see `Stepper`.
+    """Return the time loop of a step function; see `Stepper`.
 
-    advance(functions, plan, runs, records, rules, coefficients, work, now, clock, stop) → Ended, with `clock` the time
-    of the next sample, the record period, and what a sample may be early by; `stop[0]` other than 0 ends it.
+    advance(functions, coefficients, work, loop, stop) → Ended; `stop[0]` other than 0 ends it after its current step.
     """
 
-    def advance(
-        functions: Functions, table: SegmentTable, runs: Runs, records: Records, rules: Rules, coefficients: Any,
-        work: Any, now: Array, clock: Array, stop: Array,
-    ) -> int:  # fmt: skip
+    def advance(functions: Functions, coefficients: Any, work: Any, loop: Loop, stop: Array) -> int:
+        table, lanes, config, position = loop.table, loop.lanes, loop.config, loop.position
         last = len(table.counts) - 1
-        if not rules.alone:
-            own_energy(functions, runs, table.parameters[0])
-            if rules.apart > 0 and rules.held == 0:
-                show_actuation(functions, runs, records.observation, 0.0, table.parameters[0], False)
-        while now[Now.SEGMENT] <= last:
-            s: int = now[Now.SEGMENT]
-            start, h, p = table.starts[s], table.lengths[s], table.parameters[s]
+        if not config.alone:
+            begin_lanes(functions, loop)
+        while position.segment[0] <= last:
+            s = position.segment[0]
+            start, h, tick = table.starts[s], table.lengths[s], table.ticks[s]
             if table.payload_events[s] == 1:
                 return Ended.PAYLOAD
-            tick, at_tick = table.ticks[s], table.at_ticks[s]
-            if now[Now.STEP] == 0 and tick > 0 and not act(functions, runs, rules, start, at_tick, tick):
+            copy(lanes.p, table.parameters[s])
+            if position.step[0] == 0 and tick > 0 and not act(functions, loop, start, table.at_ticks[s], tick):
                 return Ended.TICK
-            while now[Now.STEP] < table.counts[s]:
-                k = now[Now.STEP]
-                t = start + k * h
-                share_at_step(runs, records, rules, now, t, s == last)
-                if t >= clock[0] - clock[2] or (s == last and clock[0] < np.inf):
-                    sample(functions, runs, records, rules.base, now, t, runs.y, p)
-                    clock[0] += clock[1]
-                    if rules.apart > 0 and t > records.observation.latest[0]:
-                        show_actuation(functions, runs, records.observation, t, p, False)
+            while position.step[0] < table.counts[s]:
+                acted = position.step[0] == 0 and changes_torque(config, tick)
+                t = start + position.step[0] * h
+                record(functions, loop, t, s == last)
                 if s == last:
-                    now[Now.STEP] += 1
+                    position.step[0] += 1
                     continue
-                y, run_parameters, after, lost = runs.y, runs.run_parameters, runs.after, runs.lost
-                now[Now.EVALUATIONS] += step(functions, coefficients, t, h, y, p, run_parameters, after, work, lost)
-                if not take(runs, rules, t):
+                position.evaluations[0] += step(functions, coefficients, work, t, h, lanes)
+                if not accept(lanes, config, t):
                     return Ended.NEEDS_REVIEW
-                now[Now.STEP] += 1
-                now[Now.STEPS] += 1
-                now[Now.BUDGET] -= 1
-                latest, acted = work.K[len(work.K) - 1], k == 0 and acts(rules, tick)
-                if rules.alone:
-                    show(runs, records, rules, latest, now, t, t + h, acted)
-                else:
-                    show_lanes(functions, runs, records.observation, rules, latest, now, t, t + h, p, acted)
-                if now[Now.STEPS] % WATCHED == 0 and not conserve(functions, runs, rules, t + h, p):
+                count_step(loop)
+                position.step[0] += 1
+                observe_lanes(functions, loop, work.K[len(work.K) - 1], t, t + h, acted)
+                if position.steps[0] % WATCHED == 0 and not conserves_energy(functions, loop, t + h):
                     return Ended.GAINS
-                if now[Now.BUDGET] <= 0 or stop[0] != 0:
+                if position.budget[0] <= 0 or stop[0] != 0:
                     return Ended.PAUSED
-            now[Now.SEGMENT] += 1
-            now[Now.STEP] = 0
+            position.segment[0] += 1
+            position.step[0] = 0
         return Ended.DONE
 
     return advance
 
 
-def act(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array, number: int) -> bool:
-    """A tick: what the controller holds from now on, and its next states; whether a single run may go on."""
-    n, held, z = rules.n, rules.held, rules.states
-    if rules.deviates > 0:
-        draw(runs.y, 2 * n + z - rules.deviates, rules.deviates, runs.keys, (number - 1) // rules.instants)
-    evaluate(functions.tick, t, runs.y, p, runs.run_parameters, runs.command)
-    sizes(runs.command, runs.size)
-    if rules.alone and not runs.size[0] < np.inf:
-        return False
-    copy(runs.run_parameters[:held], runs.command[:held])
-    copy(runs.y[2 * n : 2 * n + z], runs.command[held:])
-    erase_ended(runs.run_parameters[:held], runs)
-    return True
+def begin_lanes(functions: Functions, loop: Loop) -> None:
+    """Compute the energy at the start of runs in lock step, and observe the actuation there if it is not held."""
+    lanes, config = loop.lanes, loop.config
+    copy(lanes.p, loop.table.parameters[0])
+    evaluate(functions.energy, 0.0, lanes.y, lanes.p, lanes.run_parameters, lanes.energies)
+    for b in range(len(lanes.size)):
+        K, V = lanes.energies[0, b], lanes.energies[1, b]
+        lanes.energy[b], lanes.scale[b] = K + V, 1.0 + abs(K) + abs(V)
+    if config.apart > 0 and config.held == 0:
+        observe_torque(functions, loop, 0.0, False)
 
 
-def acts(rules: Rules, tick: int) -> bool:
-    """Whether the torque of a sampled controller changes at the tick of a number; 0 is none."""
-    return tick > 0 and (tick - 1) % rules.instants == rules.acting
+def act(functions: Functions, loop: Loop, t: float, p: Array, number: int) -> bool:
+    """Apply a tick: the torque that the controller holds, and its next states.
 
+    Args:
+        functions: Functions of the state equation.
+        loop: The loop.
+        t: Time of the tick, in [s].
+        p: Numbers of the segment at that time alone.
+        number: Number of the tick, from 1.
 
-def share_at_step(runs: Runs, records: Records, rules: Rules, now: Array, t: float, last: bool) -> None:
-    """Store the state for companion runs, at each `every`-th step of a segment, and at the end."""
-    if rules.every == 0 or now[Now.STEP] % rules.every != 0:
-        return
-    if now[Now.SEEN] % rules.thin == 0 or last:
-        share(records, now, t, runs.y)
-    now[Now.SEEN] += 1
-
-
-def take(runs: Runs, rules: Rules, t: float) -> bool:
-    """Take y⁺; whether a single run may go on. In lock step, end the runs whose y⁺ is not finite, or not found."""
-    sizes(runs.after, runs.size)
-    ill = not (below(runs.size, rules.largest) and below(runs.lost, 1))
-    if ill and rules.alone:
-        return False
-    if ill:
-        for b in range(len(runs.size)):
-            if runs.alive[b] == 1 and (runs.lost[b] != 0 or not runs.size[b] < rules.largest):
-                end(runs, b, t, Why.NOT_FOUND if runs.lost[b] != 0 else Why.OVERFLOWED)
-    copy(runs.y, runs.after)
-    if ill:
-        erase_ended(runs.y, runs)
-        erase_ended(runs.run_parameters[: rules.held], runs)
-    return True
-
-
-def conserve(functions: Functions, runs: Runs, rules: Rules, t: float, p: Array) -> bool:
-    """Whether no energy came from nowhere in a single run; in lock step, end the runs where it did.
-
-    E − E(0) − Σ W beyond a thousand times all energy there was is not an error of a step: the steps are unstable.
+    Returns:
+        False if the torque of a single run is not finite; then nothing is applied.
     """
-    evaluate(functions.energy, t, runs.y, p, runs.run_parameters, runs.energies)
-    ended = False
-    for b in range(len(runs.size)):
-        runs.peak[b] = max(runs.peak[b], runs.energies[0, b])
-        came, moved = runs.energies[0, b] + runs.energies[1, b] - runs.energy[b], runs.scale[b]
-        for w in range(len(runs.y) - rules.works, len(runs.y)):
-            came -= runs.y[w, b]
-            moved += abs(runs.y[w, b])
-        if runs.alive[b] == 1 and came > RUNAWAY * moved:
-            if rules.alone:
+    lanes, config = loop.lanes, loop.config
+    n, held, z = config.n, config.held, config.states
+    if config.deviates > 0:
+        draw(lanes.y, 2 * n + z - config.deviates, config.deviates, lanes.keys, (number - 1) // config.instants)
+    evaluate(functions.tick, t, lanes.y, p, lanes.run_parameters, lanes.command)
+    sizes(lanes.command, lanes.size)
+    if config.alone and not lanes.size[0] < np.inf:
+        return False
+    copy(lanes.run_parameters[:held], lanes.command[:held])
+    copy(lanes.y[2 * n : 2 * n + z], lanes.command[held:])
+    erase_ended(lanes.run_parameters[:held], lanes)
+    return True
+
+
+def changes_torque(config: LoopConfig, tick: int) -> bool:
+    """Return True if the torque of a sampled controller changes at a tick; its number is 0 for none."""
+    return tick > 0 and (tick - 1) % config.instants == config.acting
+
+
+def record(functions: Functions, loop: Loop, t: float, at_end: bool) -> None:
+    """Store the state before a step: for companions at each `every`-th step, and as a sample where one is due."""
+    config, position, lanes = loop.config, loop.position, loop.lanes
+    if config.every > 0 and position.step[0] % config.every == 0:
+        if position.shareable[0] % config.thin == 0 or at_end:
+            share(loop, t, lanes.y)
+        position.shareable[0] += 1
+    due = position.sample_time[0]
+    if t >= due - config.sample_slack or (at_end and due < np.inf):
+        sample(functions, loop, t, lanes.y, lanes.p)
+        position.sample_time[0] += config.sample_period
+        if config.apart > 0 and t > loop.records.observation.latest[0]:
+            observe_torque(functions, loop, t, False)
+
+
+def accept(lanes: Lanes, config: LoopConfig, t: float) -> bool:
+    """Replace y by y⁺. Return False, without that, if y⁺ of a single run is doubtful.
+
+    In lock step, runs end if their y⁺ is too large or not finite, or if the stages of the step were not found.
+    """
+    sizes(lanes.after, lanes.size)
+    doubtful = not (below(lanes.size, config.largest) and below(lanes.failed, 1))
+    if doubtful and config.alone:
+        return False
+    if doubtful:
+        for b in range(len(lanes.size)):
+            if lanes.alive[b] == 1 and (lanes.failed[b] != 0 or not lanes.size[b] < config.largest):
+                end_lane(lanes, b, t, LaneEnd.NO_STAGES if lanes.failed[b] != 0 else LaneEnd.OVERFLOW)
+    copy(lanes.y, lanes.after)
+    if doubtful:
+        erase_lanes(lanes, config)
+    return True
+
+
+def count_step(loop: Loop) -> None:
+    """Count a step, which the budget allows."""
+    loop.position.steps[0] += 1
+    loop.position.budget[0] -= 1
+
+
+def conserves_energy(functions: Functions, loop: Loop, t: float) -> bool:
+    """Return False if energy grows without a source in a single run; in lock step, end the runs where it does.
+
+    E − E(0) − Σ W beyond a thousand times all the energy at the start is not an error of a step: steps are unstable.
+    """
+    lanes, config, ended = loop.lanes, loop.config, False
+    evaluate(functions.energy, t, lanes.y, lanes.p, lanes.run_parameters, lanes.energies)
+    for b in range(len(lanes.size)):
+        lanes.peak[b] = max(lanes.peak[b], lanes.energies[0, b])
+        gained, moved = lanes.energies[0, b] + lanes.energies[1, b] - lanes.energy[b], lanes.scale[b]
+        for w in range(len(lanes.y) - config.works, len(lanes.y)):
+            gained -= lanes.y[w, b]
+            moved += abs(lanes.y[w, b])
+        if lanes.alive[b] == 1 and gained > RUNAWAY * moved:
+            if config.alone:
                 return False
-            end(runs, b, t, Why.GAINED)
+            end_lane(lanes, b, t, LaneEnd.ENERGY_GAIN)
             ended = True
     if ended:
-        erase_ended(runs.y, runs)
-        erase_ended(runs.run_parameters[: rules.held], runs)
+        erase_lanes(lanes, config)
     return True
 
 
-def own_energy(functions: Functions, runs: Runs, p: Array) -> None:
-    """E(0) of each run in lock step, and its scale."""
-    evaluate(functions.energy, 0.0, runs.y, p, runs.run_parameters, runs.energies)
-    for b in range(len(runs.size)):
-        K, V = runs.energies[0, b], runs.energies[1, b]
-        runs.energy[b], runs.scale[b] = K + V, 1.0 + abs(K) + abs(V)
-
-
-def end(runs: Runs, b: int, t: float, why: int) -> None:
+def end_lane(lanes: Lanes, b: int, t: float, reason: int) -> None:
     """End a run in lock step."""
-    runs.alive[b], runs.why[b], runs.ended[b] = 0, why, t
-    copy(runs.last[:, b], runs.y[:, b])
+    lanes.alive[b], lanes.reason[b], lanes.end_time[b] = 0, reason, t
+    copy(lanes.end_state[:, b], lanes.y[:, b])
 
 
-def show_lanes(
-    functions: Functions, runs: Runs, of: Observation, rules: Rules, latest: Array, now: Array, began: float, t: float,
-    p: Array, acted: bool,
-) -> None:  # fmt: skip
-    """Observe a step of runs in lock step: q, v and what is held; or at instants the actuation, where it changes."""
-    if of.low.shape[1] == 0:
+def erase_lanes(lanes: Lanes, config: LoopConfig) -> None:
+    """Write nan over the states and torques of the runs that have ended."""
+    erase_ended(lanes.y, lanes)
+    erase_ended(lanes.run_parameters[: config.held], lanes)
+
+
+def observe_lanes(functions: Functions, loop: Loop, latest: Array, start: float, t: float, acted: bool) -> None:
+    """Observe a step: q, v and the torque in zero-order hold; in lock step at instants where it is not held.
+
+    Args:
+        functions: Functions of the state equation.
+        loop: The loop.
+        latest: The latest rate, with u for a single run.
+        start: Time at the start of the step, in [s].
+        t: Time at its end, in [s].
+        acted: True if the controller acted at the start.
+    """
+    lanes, config, observation = loop.lanes, loop.config, loop.records.observation
+    if config.alone:
+        observe_step(loop, latest, start, t, acted)
         return
-    n = rules.n
-    q, v = runs.y[:n], runs.y[n : 2 * n]
-    if rules.canonical:
+    if observation.low.shape[1] == 0:
+        return
+    n = config.n
+    q, v = lanes.y[:n], lanes.y[n : 2 * n]
+    if config.canonical:
         v = latest[:n]
-        erase_ended(v, runs)
-    if rules.apart == 0:
-        observe(of, began, t, q, v, runs.run_parameters[:n], acted)
+        erase_ended(v, lanes)
+    if config.apart == 0:
+        observe(observation, start, t, q, v, lanes.run_parameters[:n], acted)
         return
-    observe_motion(of, began, t, q, v)
-    if now[Now.STEPS] % rules.apart == 0:
-        show_actuation(functions, runs, of, t, p, acted)
+    observe_motion(observation, start, t, q, v)
+    if loop.position.steps[0] % config.apart == 0:
+        observe_torque(functions, loop, t, acted)
 
 
-def show_actuation(functions: Functions, runs: Runs, of: Observation, t: float, p: Array, acted: bool) -> None:
-    """Observe the actuation in the state reached."""
-    if of.low.shape[1] == 0:
+def observe_torque(functions: Functions, loop: Loop, t: float, acted: bool) -> None:
+    """Observe the actuation of runs in lock step in the state reached."""
+    lanes, observation = loop.lanes, loop.records.observation
+    if observation.low.shape[1] == 0:
         return
-    evaluate(functions.actuation, t, runs.y, p, runs.run_parameters, runs.u)
-    erase_ended(runs.u, runs)
-    observe_actuation(of, t, runs.u, acted)
+    evaluate(functions.actuation, t, lanes.y, lanes.p, lanes.run_parameters, lanes.u)
+    erase_ended(lanes.u, lanes)
+    observe_actuation(observation, t, lanes.u, acted)

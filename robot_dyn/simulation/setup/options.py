@@ -9,14 +9,19 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import MISSING, fields, replace
 from inspect import signature
-from typing import Any, TypedDict
+from typing import Any, NamedTuple, TypedDict
+
+import numpy as np
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import QueryError, nearest
 from robot_dyn.foundations.signatures import takes
+from robot_dyn.foundations.values import Caching, cached
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.setup.setup import Setup, no_step
+from robot_dyn.simulation.setup.setup import Setup, no_step, segments
+
+_MAX_SEGMENTS = 1000  # building more takes little of the time of their run, and keeping them takes memory
 
 
 class Options(TypedDict, total=False):
@@ -71,7 +76,50 @@ def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, 
         options = {"step_s": None, **options}  # that of the setup was given for another method
     if isinstance(what, Setup):
         return replace(what, **options)
-    plant = what if isinstance(what, Plant) else Plant(what)
+    plant = what if isinstance(what, Plant) else _plant(what)
     if "q0" not in options:
         raise QueryError(f"{caller}: give q0, the position at the start, ({plant.dynamics.n},)")
-    return Setup(plant, **options)
+    return _latest_or_new(plant, options)
+
+
+def _plant(dynamics: Dynamics) -> Plant:
+    """Return the plant of rigid bodies without effects, which a robot keeps."""
+    return cached(dynamics, Plant) if isinstance(dynamics, Caching) else Plant(dynamics)
+
+
+class _Latest(NamedTuple):
+    """The latest setup built from options: the options, which keeps objects in `content` alive, and their content."""
+
+    options: Mapping[str, Any]
+    content: Any
+    setup: Setup
+
+
+def _latest_or_new(plant: Plant, options: Mapping[str, Any]) -> Setup:
+    """Return the setup of a plant with options.
+
+    The plant keeps its latest setup, which is returned again for equal options. A setup is not kept if one of its parts
+    may change, or if it has events, whose functions may change.
+    """
+    content = _content(dict(sorted(options.items())))
+    latest = plant.cache.get(Setup)
+    if latest is not None and latest.content == content:
+        return latest.setup
+    setup = Setup(plant, **options)
+    if setup.is_value and not setup.events and segments(setup) <= _MAX_SEGMENTS:
+        plant.cache[Setup] = _Latest(options, content, setup)
+    return setup
+
+
+def _content(value: Any) -> Any:
+    """Return the types and bits of a value as a value to compare; an object of any other type by identity."""
+    kind = type(value)
+    if isinstance(value, np.ndarray | np.generic) and not value.dtype.hasobject:
+        return kind, value.dtype.str, value.shape, value.tobytes()
+    if kind in (tuple, list):
+        return kind, tuple(map(_content, value))
+    if kind is dict:
+        return tuple((_content(key), _content(entry)) for key, entry in value.items())
+    if kind in (bool, int, float, str, type(None)):
+        return kind, repr(value)  # -0.0 is another number than 0.0
+    return kind, id(value)
