@@ -19,11 +19,11 @@ from robot_dyn.codegen.self_check import STATES, SelfCheck
 from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.trace.from_casadi import program_of
 from robot_dyn.codegen.trace.trace import Traced
-from robot_dyn.codegen.waiting import log_if_slow
 from robot_dyn.foundations.arithmetic import Float
 from robot_dyn.foundations.errors import QueryError, RobotDynWarning
 from robot_dyn.foundations.validate import converted, shaped, times
 from robot_dyn.foundations.values import OnFirstUse
+from robot_dyn.foundations.waiting import log_if_slow
 from robot_dyn.queries.batch import DoubtError, answered, into
 from robot_dyn.queries.quantity import Quantity
 

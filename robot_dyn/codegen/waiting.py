@@ -1,19 +1,11 @@
-"""Long waits: reported by logging, timed, and with Ctrl-C delayed until they end.
-
-The logger is "robot_dyn", the level INFO. A script that does not configure logging prints nothing.
-"""
+"""Compiling: the time it takes, and Ctrl-C, which is delayed until its end."""
 
 from __future__ import annotations
 
-import logging
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import Timer
-
-LOG = logging.getLogger("robot_dyn")
-PATIENCE_S = 2.0  # a shorter wait is not reported
 
 
 class _Compiling(threading.local):
@@ -23,21 +15,6 @@ class _Compiling(threading.local):
 
 
 COMPILING = _Compiling()
-
-
-@contextmanager
-def log_if_slow(what: str) -> Iterator[None]:
-    """Log what a block does, once it has taken longer than `PATIENCE_S`."""
-    if not LOG.isEnabledFor(logging.INFO):
-        yield
-        return
-    timer = Timer(PATIENCE_S, LOG.info, ("%s", what))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 @contextmanager

@@ -19,20 +19,20 @@ from robot_dyn.integrate.time_stepping import TimeStepping
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.derived import Results
 from robot_dyn.simulation.diagnostics.runaway import judged, runaway
-from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.dynamics.declarations import named
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.estimate.estimate import estimate
-from robot_dyn.simulation.estimate.requested_accuracy import run_to
-from robot_dyn.simulation.observation.observer import Observer
+from robot_dyn.simulation.estimate.requested_accuracy import trials
+from robot_dyn.simulation.observation.observer import Observer, observer_of
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estimate
 from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Accumulation, Ending, Outcome, Reason, Stiff, TooLong
 from robot_dyn.simulation.run.recording import Recording
+from robot_dyn.simulation.run.run import Run
+from robot_dyn.simulation.run.runner import Runner
 from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options
 from robot_dyn.simulation.setup.setup import Setup, check_record
 
@@ -64,29 +64,54 @@ def simulate(
     """
     function("on_progress", on_progress, "the time reached")
     setup = setup_of("simulate", what, {**starts(q0, v0), **options})
-    if setup.accuracy is not None:
-        pilot = replace(setup, accuracy=None)
-        return run_to(pilot, setup.accuracy, lambda each: simulate(each, on_progress=on_progress))
+    if setup.accuracy is None:
+        return _simulated(setup, on_progress)
+    search, run = trials(replace(setup, accuracy=None), setup.accuracy), None
+    while True:
+        try:
+            trial = next(search) if run is None else search.send(run)
+        except StopIteration as end:
+            return end.value
+        run = _simulated(trial, on_progress)
+
+
+def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> Trajectory:
+    """Run a setup without a requested accuracy, and return its trajectory."""
     check_record(setup)
     began = perf_counter()
-    ran = _by_choice(setup, on_progress)
-    finished, setup = perf_counter(), ran.setup
-    record, error, spent, companions = _with_estimate(ran, on_progress)
+    ran = _recorded(setup, on_progress)
+    finished = perf_counter()
+    runner = Runner(ran.engine, on_progress, ran.recording.outcome.t)
+    recording, error = _estimated(ran, runner)
     estimated = perf_counter()
-    exact = ran.engine.exact_right_angles
-    results = Results(setup, record, ran.observer, error, dict(setup.about), exact, ran.remarks)
-    known = {"joint_names": setup.plant.dynamics.joint_names, "t": record.t, "events": record.events, "error": error}
-    known["accuracy"] = None
-    if not (setup.is_value and record.outcome.ending is Ending.FINISHED):  # nothing may be read later
-        missing = (each.name for each in fields(Trajectory) if each.name not in (*known, "statistics"))
-        known |= {name: getattr(results, name) for name in missing}
+    results = Results(
+        ran.setup, recording, ran.observer, error, dict(setup.about), ran.engine.exact_right_angles, ran.remarks
+    )
+    known: dict[str, Any] = {
+        "joint_names": setup.plant.dynamics.joint_names,
+        "t": recording.t,
+        "events": recording.events,
+        "error": error,
+        "accuracy": None,
+    }
+    if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # nothing may be read later
+        later = [field.name for field in fields(Trajectory) if field.name not in (*known, "statistics")]
+        known |= {name: getattr(results, name) for name in later}
+    method = ran.setup.integrator
     statistics = Statistics(
-        EXPLICIT if setup.integrator.name == AUTO else setup.integrator.name,
-        0.0 if setup.integrator.controls_error else record.outcome.t / max(record.steps, 1),
-        record.steps, record.evaluations, finished - ran.ready, 0.0 if error is None else estimated - finished,
-        ran.engine.label, ran.ready - began, perf_counter() - estimated, spent, companions,
-        ", ".join(named(part) for part, _ in setup.undeclared),
-    )  # fmt: skip
+        method=EXPLICIT if method.name == AUTO else method.name,
+        step_s=0.0 if method.controls_error else recording.outcome.t / max(recording.steps, 1),
+        steps=recording.steps,
+        evaluations=recording.evaluations,
+        wall_s=ran.run_s,
+        companions_s=0.0 if error is None else estimated - finished,
+        engine=ran.engine.label,
+        compile_s=finished - began - ran.run_s,
+        samples_s=perf_counter() - estimated,
+        companion_evaluations=runner.evaluations,
+        companion_runs=runner.runs,
+        user_code=", ".join(named(part) for part, _ in setup.undeclared),
+    )
     return derived(Trajectory, results, statistics=statistics, **known)
 
 
@@ -94,82 +119,71 @@ class _Ran(NamedTuple):
     """A run that has ended.
 
     Attributes:
-        setup: With the method of the run.
-        engine: What evaluated its state equation.
+        setup: The setup, with the method of the run.
+        engine: The engine of its state equation.
         observer: Its observer.
-        record: Its record.
-        ready: When it began, on the clock, put later by what it compiled.
-        remarks: On a run before it.
-        runaway: Which joint reached an implausible speed; empty if none did.
+        recording: Its recording.
+        run_s: Time of the run, without compiling, in [s].
+        remarks: Remarks on a run that it replaces.
+        runaway: The joint that reached an implausible speed, as text; empty if there is none.
     """
 
     setup: Setup
     engine: Engine
     observer: Observer
-    record: Recording
-    ready: float
+    recording: Recording
+    run_s: float
     remarks: tuple[Remark, ...]
     runaway: str
 
 
-def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _Ran:
-    """The run of a setup: begun again where another engine, or another method, turns out to be the one for it."""
-    seen, said, chooses = 0, (), setup.integrator.name == AUTO
+def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _Ran:
+    """Run a setup; restart with another engine or method if it turns out to be better suited."""
+    seen, remarks, may_replace = 0, (), setup.integrator.name == AUTO
     while True:
-        engine = choose(setup, seen)
-        ready, before, observer = perf_counter(), engine.compiling_s(), observer_of(setup)
-        run = make_run(
-            setup, engine, on_progress=on_progress, observer=observer, most=engine.most_evaluations, chooses=chooses
+        engine, observer = choose(setup, seen), observer_of(setup)
+        run = Run(
+            setup,
+            engine,
+            on_progress=on_progress,
+            observer=observer,
+            max_evaluations=engine.most_evaluations,
+            may_replace=may_replace,
         )
         match run.run():
             case TooLong(evaluations):
                 seen = evaluations
             case Stiff(remark):
-                setup, chooses, said = cached(setup, _stiff), False, (remark,)
+                setup, may_replace, remarks = cached(setup, with_stiff_method), False, (remark,)
             case Accumulation(remark):
-                setup, chooses, said = cached(setup, _nonsmooth), False, (*said, remark)
-            case record:
+                setup, may_replace, remarks = cached(setup, with_time_stepping), False, (*remarks, remark)
+            case recording:
                 observer.end()
-                far = runaway(setup, observer.fastest)
-                if far:
-                    record = replace(record, outcome=judged(setup, record, far))
-                return _Ran(setup, engine, observer, record, ready + engine.compiling_s() - before, said, far)
+                if too_fast := runaway(setup, observer.fastest):
+                    recording = replace(recording, outcome=judged(setup, recording, too_fast))
+                return _Ran(setup, engine, observer, recording, run.seconds, remarks, too_fast)
 
 
-def _stiff(setup: Setup) -> Setup:
+def with_stiff_method(setup: Setup) -> Setup:
+    """Return the setup by the stiff method with the same tolerances."""
     return replace(setup, integrator=replace(setup.integrator, method=STIFF))
 
 
-def _nonsmooth(setup: Setup) -> Setup:
+def with_time_stepping(setup: Setup) -> Setup:
+    """Return the setup by time stepping."""
     return replace(setup, integrator=TimeStepping())
 
 
-def _with_estimate(
-    ran: _Ran, on_progress: Callable[[float], object] | None
-) -> tuple[Recording, ErrorEstimate | None, int, int]:
-    """The record of a run, stopped if its estimate is; its estimated error, with evaluations and number of companions.
-
-    None where no error is estimated.
-    """
-    setup, record, spent, companions = ran.setup, ran.record, 0, 0
-    if not setup.estimate_error or record.outcome.ending is Ending.STOPPED:
-        return record, None, 0, 0
+def _estimated(ran: _Ran, runner: Runner) -> tuple[Recording, ErrorEstimate | None]:
+    """Return the recording, with another outcome if Ctrl-C stopped the estimate; and the estimated error, if any."""
+    setup, recording = ran.setup, ran.recording
+    if not setup.estimate_error or recording.outcome.ending is Ending.STOPPED:
+        return recording, None
     if ran.runaway:
-        return record, no_estimate(ran.runaway), 0, 0
-    at_the_end = None if on_progress is None else lambda _: on_progress(record.outcome.t)
-
-    def companion(pace: Any, of: Setup) -> Recording:
-        nonlocal spent, companions
-        made = make_run(of, ran.engine, pace, at_the_end, samples=False).record()
-        if made.outcome.ending is Ending.STOPPED:
-            raise KeyboardInterrupt
-        spent, companions = spent + made.evaluations, companions + 1
-        return made
-
+        return recording, no_estimate(ran.runaway)
     try:
-        error = estimate(setup, record, companion)
+        return recording, estimate(setup, recording, runner)
     except KeyboardInterrupt:
-        error = no_estimate("it was interrupted")
-        if record.outcome.ending is Ending.FINISHED:
-            record = replace(record, outcome=Outcome(Reason.INTERRUPTED_IN_ESTIMATE, record.outcome.t))
-    return record, error, spent, companions
+        if recording.outcome.ending is Ending.FINISHED:
+            recording = replace(recording, outcome=Outcome(Reason.INTERRUPTED_IN_ESTIMATE, recording.outcome.t))
+        return recording, no_estimate("it was interrupted")

@@ -83,9 +83,9 @@ def test_a_run_that_diverges_says_when_and_what_to_do(scene) -> None:
 
 
 WATCHED = """
-from robot_dyn.simulation.run.fixed_step import FixedStep
+from robot_dyn.simulation.run.fixed_steps import FixedSteps
 
-advance, calls = FixedStep._advance, []
+advance, calls = FixedSteps.advance, []
 
 def watched(self):
     calls.append(1)
@@ -93,7 +93,7 @@ def watched(self):
         tell()
     return advance(self)
 
-FixedStep._advance = watched
+FixedSteps.advance = watched
 """
 
 

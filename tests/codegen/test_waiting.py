@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,8 +13,9 @@ from typing import Any, ClassVar
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.codegen import INSTEAD, MachineFunction, waiting
-from robot_dyn.codegen.waiting import log_if_slow
+from robot_dyn.codegen import INSTEAD, MachineFunction
+from robot_dyn.foundations import waiting
+from robot_dyn.foundations.waiting import log_if_slow
 from robot_dyn.simulation.engine.choice import choose
 from tests.command import MAIN, spawn
 
@@ -57,7 +59,7 @@ def test_a_wait_is_logged_while_it_lasts(monkeypatch: pytest.MonkeyPatch, caplog
         for _ in range(1000):
             if caplog.records:
                 break
-            waiting.threading.Event().wait(0.01)
+            time.sleep(0.01)
     assert [each.getMessage() for each in caplog.records] == ["thinking 100 %"]
 
 
@@ -76,7 +78,7 @@ def test_no_timer_runs_where_the_log_is_off(clocks: list[Clock], caplog: pytest.
 
 
 SLOW = """import time
-from robot_dyn.codegen import waiting
+from robot_dyn.foundations import waiting
 from robot_dyn.codegen.loops.call import MachineFunction
 waiting.PATIENCE_S, compiled = 0.01, MachineFunction._compiled
 MachineFunction._compiled = lambda *args: (time.sleep(0.5), compiled(*args))[1]

@@ -18,7 +18,7 @@ from robot_dyn.model import completed
 from robot_dyn.simulation import MachineError, StateEquation
 from robot_dyn.simulation.compiled.self_check import check
 from robot_dyn.simulation.engine.choice import choose
-from robot_dyn.simulation.run.make_run import make_run
+from robot_dyn.simulation.run.run import Run
 from robot_dyn.simulation.run.watch import Watch
 from tests.long import long
 from tests.own_method import OwnImplicit
@@ -269,7 +269,7 @@ def test_a_run_takes_any_engine(engine: str) -> None:
     """A run reads the protocol alone, also where it restarts its functions at events."""
     plant = rd.Plant(ARM, [rd.effects.DryFriction([0.2, 0.1])])
     setup = rd.Setup(plant, Q, duration_s=0.3, engine=engine, estimate_error=False)
-    runs = [make_run(setup, each).record() for each in (choose(setup), Borrowed(choose(setup)))]
+    runs = [Run(setup, each).record() for each in (choose(setup), Borrowed(choose(setup)))]
     assert len(runs[0].events) > 0
     np.testing.assert_array_equal(runs[0].y, runs[1].y)
 

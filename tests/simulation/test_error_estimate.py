@@ -14,8 +14,9 @@ from robot_dyn.simulation import ErrorEstimate, Verdict
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.estimate.estimate import estimate
 from robot_dyn.simulation.results.error_estimate import no_estimate
-from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.recording import Path
+from robot_dyn.simulation.run.run import Run
+from robot_dyn.simulation.run.runner import Runner
 from tests.campaigns.estimates.switching import scene_of_all
 from tests.long import long
 
@@ -196,10 +197,11 @@ def test_rounding_that_the_motion_magnifies_is_in_the_estimate_of_an_adaptive_ru
 
 
 @pytest.mark.parametrize("method", [rd.integrate.method("rk4"), rd.integrate.Adaptive(rtol=1e-10)])
-def test_companions_that_end_before_their_first_shared_state_show_nothing(method) -> None:
+def test_companions_that_end_before_their_first_shared_state_show_nothing(method, monkeypatch) -> None:
     step = {} if method.controls_error else {"step_s": 5e-3}
     of = rd.Setup(rd.Plant(DOUBLE), [0.4, -0.7], [0.3, 0.5], 0.2, None, method, engine="interpreted", **step)
-    run = make_run(of, choose(of)).record()
+    run = Run(of, choose(of)).record()
     nothing = Path(run.shared.key[:0], run.shared.t[:0], run.shared.y[:0])
-    found = estimate(of, run, lambda pace, of: replace(run, shared=nothing))
+    monkeypatch.setattr(Runner, "run", lambda *_: replace(run, shared=nothing))
+    found = estimate(of, run, Runner(choose(of)))
     assert found.verdict is Verdict.NONE and found.largest == np.inf

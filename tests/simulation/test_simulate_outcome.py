@@ -13,8 +13,7 @@ from robot_dyn.control import Stateless
 from robot_dyn.effects import Conservative
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SingularError
 from robot_dyn.simulation import RemarkKind
-from robot_dyn.simulation.run.event_run import EventRun
-from robot_dyn.simulation.run.fixed_step import FixedStep
+from robot_dyn.simulation.run.run import Run
 from tests.long import long
 from tests.user_parts import Push
 
@@ -259,8 +258,7 @@ def test_an_interrupt_in_a_companion_run_ends_the_estimate_and_keeps_the_run(met
 
         return interrupted
 
-    monkeypatch.setattr(FixedStep, "_run", on_second(FixedStep._run))
-    monkeypatch.setattr(EventRun, "_run", on_second(EventRun._run))
+    monkeypatch.setattr(Run, "_to_the_end", on_second(Run._to_the_end))
     run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.2, integrator=method, engine="interpreted")
     assert len(ran) == 2
     assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.2)
@@ -280,7 +278,7 @@ def test_an_interrupt_before_the_first_step_leaves_the_start(engine: str, period
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(FixedStep, "_run", interrupted)
+    monkeypatch.setattr(Run, "_to_the_end", interrupted)
     run = rd.simulate(setup)
     assert (run.outcome.ending, run.outcome.t) == ("stopped", 0.0)
     np.testing.assert_array_equal(run.t, [0.0])

@@ -22,9 +22,9 @@ from robot_dyn.simulation import StateEquation, machine_code, observation_of, se
 from robot_dyn.simulation.dynamics.loop_state import Ended, lanes_of, loop_config, start_position
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.observation.guard_levels import guard_levels
-from robot_dyn.simulation.run.fixed_step import samples_at_most
-from robot_dyn.simulation.run.make_run import make_run
+from robot_dyn.simulation.run.fixed_steps import samples_at_most
 from robot_dyn.simulation.run.recording import Loop, records_of
+from robot_dyn.simulation.run.run import Run
 from robot_dyn.simulation.run.time_loop import time_loop
 from tests.campaigns.estimates.scenes import arms
 from tests.long import long
@@ -64,9 +64,12 @@ def assert_same_bits(ours: Any, theirs: Any, without: tuple[str, ...] = ()) -> N
 def both(setup: Setup) -> tuple[Any, Any]:
     """A run by machine code, and by Python with the same rates of machine code."""
     code: Any = choose(setup)
-    runs = [make_run(setup, each) for each in (code, replace(code, machine_loop=None))]
+    runs = [Run(setup, each) for each in (code, replace(code, machine_loop=None))]
     for each in runs:
-        room = each.lanes._replace(y=0, p=0, run_parameters=0, alive=0, scale=0, energy=0, keys=0), each.stepper.work
+        room = (
+            each.state.lanes._replace(y=0, p=0, run_parameters=0, alive=0, scale=0, energy=0, keys=0),
+            each.steps.stepper.work,
+        )
         for _, x in numbers(room):  # what is not written yet
             x[...] = 0
         each.record()
@@ -87,8 +90,9 @@ def test_a_fixed_step_gives_the_same_bits(name: str, sampled: bool) -> None:
     of = method(name)
     effects = SMOOTH if of.canonical or of.nonsmooth else [*SMOOTH, BODY]
     ours, theirs = both(setup(effects, name, step_s=0.002, **more))
-    assert ours.time == theirs.time == 0.6
-    assert_same_bits((ours.lanes, ours.stepper.work), (theirs.lanes, theirs.stepper.work))
+    assert ours.steps.time == theirs.steps.time == 0.6
+    assert_same_bits(*((run.state.lanes, run.steps.stepper.work) for run in (ours, theirs)))
+    ours, theirs = ours.state, theirs.state
     rows = int(ours.position.sample_row[0])
     names = ["t", "y"] if of.nonsmooth else ["t", "y", "sampled"]  # its rates at samples are found afterwards
     for mine, other in ((getattr(each.records, name) for each in (ours, theirs)) for name in names):
@@ -118,15 +122,19 @@ def test_a_run_with_events_gives_the_same_bits(name: str, what: list[Any], contr
     events = [rd.Event(lambda t, q, v: q[0] - 0.2, name="level"), rd.Event(lambda t, q, v: v[0] - 0.3, name="speed")]
     duration = 3.0 if what is BOUNDED else 1.0
     ours, theirs = both(setup(what, name, duration_s=duration, controller=controller, events=events))
-    assert ours.events == theirs.events and len(ours.events) > 3
-    arrays = ((each.lanes, each.stepper.work, each.control, each.position) for each in (ours, theirs))
+    states, handlers = (ours.state, theirs.state), (ours.steps.handler, theirs.steps.handler)
+    arrays = (
+        (run.state.lanes, run.steps.stepper.work, run.steps.control, run.state.position) for run in (ours, theirs)
+    )
     assert_same_bits(*arrays, (".3.budget",))  # machine code has a larger one
-    assert_same_bits(ours.event_table._replace(functions=0), theirs.event_table._replace(functions=0))
+    assert_same_bits(*(handler.event_table._replace(functions=0) for handler in handlers))
+    ours, theirs = states
+    assert ours.events == theirs.events and len(ours.events) > 3
     rows = int(ours.position.sample_row[0])
     assert_same_bits(*(tuple(x[:rows] for x in each.records[1:4]) for each in (ours, theirs)))
     if what is not BOUNDED:
         assert sum("strikes" in each.name for each in ours.events) > 2
-        modes = (each.switching.contacts.mode for each in (ours, theirs))
+        modes = (handler.switching.contacts.mode for handler in handlers)
         assert_same_bits(*modes, (".log.rows",))  # since the last return
 
 
@@ -138,7 +146,7 @@ def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
     loops = []
     for each in made:
         code: Any = choose(each)
-        make_run(each, code).record()
+        Run(each, code).record()
         loops.append((code.machine_loop, {id(entry) for entry in code.machine_loop._known.values()}))
     assert loops[0] == loops[1]
 
@@ -148,9 +156,9 @@ def test_the_end_of_a_mode_is_no_end_of_a_call_of_machine_code() -> None:
     made = setup(
         HELD, "DOP853", duration_s=6.0, controller=rd.control.PD(rd.control.hold([1.4, -1.9]), [60.0, 30.0], [0.1, 0.1])
     )
-    run, calls = make_run(made, choose(made)), []
-    inner = run.advance
-    run.advance = lambda *given: calls.append(inner(*given)) or calls[-1]
+    run, calls = Run(made, choose(made)), []
+    inner = run.steps.loop
+    run.steps.loop = lambda *given: calls.append(inner(*given)) or calls[-1]
     events = len(run.record().events)
     assert events > 100
     assert len(calls) <= 4 + events // 20

@@ -24,6 +24,9 @@ import robot_dyn as rd
 from robot_dyn import Trajectory
 from robot_dyn.simulation import Ending, RemarkKind, StateEquation
 from robot_dyn.simulation.compiled.machine_code import MachineCode
+from robot_dyn.simulation.run import event_handler
+from robot_dyn.simulation.setup.setup import CACHED
+from tests.campaigns.estimates.scenes import arms
 from tests.long import long
 
 ARM = rd.load("planar_2r")
@@ -415,3 +418,16 @@ def test_copies_and_pickles_of_a_plant_carry_no_setup() -> None:
     assert plant.cache
     for other in (copy(plant), deepcopy(plant), pickle.loads(pickle.dumps(plant)), pickle.loads(pickle.dumps(ARM))):
         assert not other.cache
+
+
+def test_what_a_setup_caches_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs of all kinds, one that the stiff method replaces and one that time stepping does, fill all of the list."""
+    monkeypatch.setattr(event_handler, "_ACCUMULATED", 12)
+    monkeypatch.setattr(event_handler, "_BRIEF", 1e-2)
+    stiff = rd.Setup(rd.Plant(ARM, [rd.effects.ViscousFriction(1e5)]), Q, duration_s=20.0, estimate_error=False)
+    bounces = rd.Setup(rd.Plant(arms()["rail"], [rd.effects.RigidStops(0.0, 2.0, 0.5)]), [0.4], duration_s=2.0)
+    names: set[str] = set()
+    for setup in (*setups().values(), replace(setups()["free swing"], engine="auto"), stiff, bounces):
+        rd.simulate(setup)
+        names |= {key.__name__ for key in setup.cache}
+    assert names == CACHED.keys()

@@ -26,13 +26,13 @@ from robot_dyn.integrate.methods import method
 from robot_dyn.model.robot import Robot
 from robot_dyn.simulation.compiled.cache import machine_code, machine_code_of_constants
 from robot_dyn.simulation.compiled.machine_code import MachineCode
+from robot_dyn.simulation.dynamics.loop_state import Ended
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.events.payload_events import PayloadEvents
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
-from robot_dyn.simulation.run.fixed_step import FixedStep
-from robot_dyn.simulation.run.outcome import Ending
-from robot_dyn.simulation.run.watch import Watch
+from robot_dyn.simulation.run.fixed_steps import FixedSteps
+from robot_dyn.simulation.run.state import RunState
+from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 
 RUNS = 4096  # side by side
@@ -131,15 +131,14 @@ def one_run(name: str, setup: Setup, translate: Callable[..., MachineCode] = mac
     made = translate(_equation(short), short.integrator)
 
     def run() -> float:
-        watch, transfers = Watch(short, made.compiled_form), PayloadEvents(made.compiled_form)
-        steps = FixedStep(watch, transfers, made, Fraction(1))
+        state = RunState(short, replace(made, equation=made.compiled_form), segment_table(short), None)
+        steps = FixedSteps(state, Fraction(1))
+        state.position.budget[0] = np.iinfo(np.int64).max
         began = process_time()
-        record = steps.record()
+        ended = steps.advance()
         spent = process_time() - began
-        if record.outcome.ending is Ending.STOPPED:
-            raise KeyboardInterrupt
-        if record.outcome.ending is not Ending.FINISHED:
-            raise RobotDynError(f"a run of {short.duration_s:g} s from the start ends early: {record.outcome.text}")
+        if ended is not Ended.DONE:
+            raise RobotDynError(f"a run of {short.duration_s:g} s from the start diverges near {steps.time:g} s")
         return spent / short.steps
 
     return Version(name, instructions(made), run)

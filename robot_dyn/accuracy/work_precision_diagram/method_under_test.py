@@ -28,8 +28,8 @@ from robot_dyn.report.time_budget import Budget
 from robot_dyn.report.timing import Repeated
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.results.samples import ledger
-from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
+from robot_dyn.simulation.run.run import Run as SingleRun
 from robot_dyn.simulation.setup.schedule import MOST_CUT
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -323,7 +323,7 @@ def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:
     Raises:
         TraceError: As in `choose`.
     """
-    run = make_run(setup, choose(setup), on_progress=limit, thresholds=events)
+    run = SingleRun(setup, choose(setup), on_progress=limit, thresholds=events)
     began = perf_counter()
     record = run.record()
     spent = perf_counter() - began

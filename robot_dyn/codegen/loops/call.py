@@ -20,8 +20,9 @@ from robot_dyn.codegen.loops.kinds import Kind, Number, Static, TupleKind, unpac
 from robot_dyn.codegen.loops.packing import Packed, pack
 from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.store.keys import digest, sources_of_the_translator
-from robot_dyn.codegen.waiting import COMPILING, interrupts_later, log_if_slow
+from robot_dyn.codegen.waiting import COMPILING, interrupts_later
 from robot_dyn.foundations.errors import MachineCodeError
+from robot_dyn.foundations.waiting import log_if_slow
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
 _LETTERS: Mapping[str, str] = {"float": "f", "int": "i", "uint": "u", "bool": "b"}

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from math import inf
 from typing import Any
 
-from robot_dyn.codegen.waiting import log_if_slow
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.values import cached
+from robot_dyn.foundations.waiting import log_if_slow
 from robot_dyn.simulation.compiled.cache import (
     existing,
     identify,
@@ -36,10 +36,11 @@ _PER_SECOND, _PER_SEGMENT = 1000, 17  # evaluations of an adaptive method: for e
 
 def choose(setup: Setup, seen: float) -> Engine:
     """Return the engine of a setup, as `engine.choice`; machine code with events is checked for each run."""
-    return cached(setup, _chosen, seen, lasts=lambda engine: isinstance(engine, MachineCode) and not setup.events)
+    return cached(setup, engine_of, seen, lasts=lambda engine: isinstance(engine, MachineCode) and not setup.events)
 
 
-def _chosen(setup: Setup, seen: float) -> Engine:
+def engine_of(setup: Setup, seen: float) -> Engine:
+    """Return the engine of a setup, without a look at those of earlier calls."""
     required = setup.engine == "compiled"
     try:
         identified = identify(setup.equation, setup.integrator)

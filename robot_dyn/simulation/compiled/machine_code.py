@@ -154,9 +154,9 @@ class MachineCode:
         plant = self.equation.plant
         return _places(self.known, plant.effects, plant.dynamics.n * self.equation.sampled)
 
-    def loop(self, plain: Callable[[], Advance]) -> Advance:
-        """Return the time loop, which stores the addresses of its arrays; the plain one if it is not compiled."""
-        return plain() if self.machine_loop is None else self.machine_loop.calls()
+    def loop(self) -> Advance | None:
+        """Return the time loop, which stores the addresses of its arrays; None if it is not compiled."""
+        return None if self.machine_loop is None else self.machine_loop.calls()
 
     def compiling_s(self) -> float:
         """Return the time that this thread has spent on loading and compiling loops; see `Engine`."""

@@ -23,9 +23,9 @@ from robot_dyn.simulation.compiled.machine_code import STEP, MachineCode, States
 from robot_dyn.simulation.dynamics.moreau_jean import stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.interpreted import Interpreted, sample
-from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.run.recording import Path, Recording
+from robot_dyn.simulation.run.run import Run
 from robot_dyn.simulation.setup.segment_table import segment_table
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -231,7 +231,7 @@ def _first_second(setup: Setup) -> Path:
         short = replace(
             setup, duration_s=span, record_period_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
         )
-        record = make_run(short, Interpreted(short.equation), samples=False, most=_MOST).run()
+        record = Run(short, Interpreted(short.equation), samples=False, max_evaluations=_MOST).run()
         if not isinstance(record, Recording):
             span /= 10
             continue

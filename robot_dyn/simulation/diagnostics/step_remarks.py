@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,14 +12,13 @@ from robot_dyn.control.digital_loop.loop import Loop
 from robot_dyn.effects.effect import Conservative, Dissipative, Stateful
 from robot_dyn.effects.friction import RegularisedCoulombFriction
 from robot_dyn.foundations.errors import RobotDynError
-from robot_dyn.foundations.values import cached, copied
 from robot_dyn.integrate.differences import by_state, rowwise
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.reference_remarks import held, jumps
 from robot_dyn.simulation.observation.chatter import Episode
-from robot_dyn.simulation.observation.guard_levels import GuardLevels, Level, guard_levels
-from robot_dyn.simulation.observation.observation import Observation, Observed, Visit, observation_of
+from robot_dyn.simulation.observation.guard_levels import Level
+from robot_dyn.simulation.observation.observation import Observed, Visit
 from robot_dyn.simulation.observation.observer import Observer
 from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.setup.setup import Setup
@@ -33,28 +31,6 @@ _ROUNDING = 1e-9  # of a quantity: a smaller range is noise
 _LAST, _LEAST = 0.1, 5  # part of a run in which creep is looked for, and samples in it
 _STEADY = 0.1  # of a velocity, by which it may change there
 _LOADED = 0.01, 0.96  # of the level of friction: less is rest, and with more a joint slides
-
-
-def observer_of(setup: Setup, of: GuardLevels | None = None) -> Observer:
-    """An observer of a run that has not begun, for its levels unless others are given."""
-    if of is not None:
-        return Observer(_observation(setup, of), of, setup.equation.canonical)
-    of, start = cached(setup, _beginning)
-    return Observer(copied(start), of, setup.equation.canonical)
-
-
-def _beginning(setup: Setup) -> tuple[GuardLevels, Observation]:
-    of = guard_levels(setup.plant.dynamics, setup.plant.effects, setup.controller)
-    return of, _observation(setup, of)
-
-
-def _observation(setup: Setup, of: GuardLevels) -> Observation:
-    """Of the start; nan for what u is not known before the first tick."""
-    equation, u = setup.equation, np.full(len(setup.q0), np.nan)
-    if not equation.sampled:
-        with suppress(RobotDynError):  # the run will report it
-            u = equation.actuation(0.0, setup.q0, setup.v0, np.zeros(equation.states), None)
-    return observation_of(np.concatenate([setup.q0, setup.v0, u])[:, None], of)
 
 
 def remarks(

@@ -1,6 +1,6 @@
 """The protocol of the engines of a run: interpreted (`interpreted.py`) and machine code (`compiled/machine_code.py`).
 
-engine = choose(setup);   run = make_run(setup, engine);   recording = run.record()
+engine = choose(setup);   run = Run(setup, engine);   recording = run.record()
 """
 
 from __future__ import annotations
@@ -108,8 +108,8 @@ class Engine(Protocol):
         """Return the places of the mode of held joints among the run parameters."""
         ...
 
-    def loop(self, plain: Callable[[], Advance]) -> Advance:
-        """Return the time loop for one run: machine code, or the plain function that `plain` returns."""
+    def loop(self) -> Advance | None:
+        """Return the time loop of one run as machine code; None if the plain functions run."""
         ...
 
     def compiling_s(self) -> float:

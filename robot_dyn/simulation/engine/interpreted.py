@@ -18,7 +18,7 @@ from robot_dyn.integrate.primitives import evaluate
 from robot_dyn.simulation.dynamics.loop_state import Functions
 from robot_dyn.simulation.dynamics.moreau_jean import behind, stepped
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.engine.engine import Advance, Evaluated, Watched
+from robot_dyn.simulation.engine.engine import Evaluated, Watched
 from robot_dyn.simulation.events.contact_mode import Places
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -50,9 +50,8 @@ class Interpreted:
         first = n * self.equation.sampled
         return Places(*(np.array([first + k * n], np.int64) for k in range(3)))  # held, direction and contact
 
-    def loop(self, plain: Callable[[], Advance]) -> Advance:
-        """Return the plain time loop."""
-        return plain()
+    def loop(self) -> None:
+        """Return None: the plain time loop runs."""
 
     def compiling_s(self) -> float:
         """Return 0: nothing is compiled."""

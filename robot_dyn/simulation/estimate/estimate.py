@@ -6,9 +6,7 @@ longer ones are not possible, or do not show the order of the method throughout.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -34,6 +32,7 @@ from robot_dyn.simulation.estimate.verdicts import (
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, Verdict, no_estimate
 from robot_dyn.simulation.results.samples import ledger
 from robot_dyn.simulation.run.recording import Path, Recording
+from robot_dyn.simulation.run.runner import Runner
 from robot_dyn.simulation.run.stiffness import damped_oscillation
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS
 from robot_dyn.simulation.setup.setup import Setup
@@ -45,16 +44,14 @@ _BLIND_TURN = np.pi  # [rad] in a step: above, shorter ones may, too
 _STEADY = 4  # order of a method above which the error of steps that events cut varies too much with their lengths
 _FAR_PUSH = 1000 * PUSH  # of what a short step adds to q, rounding may lose all until v has grown
 
-Companion = Callable[[Any, Setup], Recording]  # of a factor of the steps, or of a mesh
 
-
-def estimate(setup: Setup, run: Recording, companion: Companion) -> ErrorEstimate:
-    """The estimated error of a run.
+def estimate(setup: Setup, run: Recording, runner: Runner) -> ErrorEstimate:
+    """Return the estimated error of a run.
 
     Args:
-        setup: What was run.
-        run: What it left behind.
-        companion: Runs a setup with steps, or tolerances, multiplied by a factor.
+        setup: The setup of the run.
+        run: Its recording.
+        runner: Maker of companion runs.
     """
     equation = setup.equation
     if len(run.shared.t) < 2:
@@ -69,7 +66,7 @@ def estimate(setup: Setup, run: Recording, companion: Companion) -> ErrorEstimat
     estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.step_log, n))
     method: Any = setup.integrator
     if method.controls_error:
-        result = _by_refinement(setup, method, run, estimated, companion)
+        result = _by_refinement(setup, method, run, estimated, runner)
     else:
         damps = method.stiff and not ledger(equation, run).closes
         if damps and (motion := damped_oscillation(setup, run)):
@@ -78,13 +75,13 @@ def estimate(setup: Setup, run: Recording, companion: Companion) -> ErrorEstimat
                 f" {1 / abs(motion.eigenvalue):.0e} s, so that runs with other steps do not show it; take shorter ones"
             )
         cut = bool(run.events) and method.order > _STEADY
-        result = _by_steps(setup, method, estimated, companion, _turn(equation, run.step_log), cut)
+        result = _by_steps(setup, method, estimated, runner, _turn(equation, run.step_log), cut)
         result = _until_alike(setup, run, result)
     return _advised(setup, _looked_between(setup, run, result), why)
 
 
 def _by_steps(
-    setup: Setup, method: Integrator, estimated: Estimated, companion: Companion, turn: float, cut: bool
+    setup: Setup, method: Integrator, estimated: Estimated, runner: Runner, turn: float, cut: bool
 ) -> ErrorEstimate:
     """Return the estimate from longer steps, or from shorter ones where longer ones are lost or may agree by chance.
 
@@ -92,7 +89,7 @@ def _by_steps(
         setup: What was run.
         method: Method of fixed step.
         estimated: The run.
-        companion: See `estimate`.
+        runner: Maker of companion runs.
         turn: Largest angle by which a joint turns in a step, in [rad].
         cut: True if events cut steps of a method of high order, so that no error need grow by its order.
     """
@@ -102,22 +99,22 @@ def _by_steps(
         )
     result = no_estimate("fewer than 3 steps between ticks, switches or breaks")
     if turn < _FAR_TURN and min(each.steps for each in setup.segments) >= LEAST_STEPS:
-        longer = {pace: companion(pace, setup) for pace in COARSE}
+        longer = {pace: runner.run(setup, pace) for pace in COARSE}
         paths = {pace: recording.shared for pace, recording in longer.items()}
-        magnified = _with_rounding(estimated, companion(COARSE[1], _pushed(setup)).shared, paths[COARSE[1]])
+        magnified = _with_rounding(estimated, runner.run(_pushed(setup), COARSE[1]).shared, paths[COARSE[1]])
         crossed = min(first_crossing(setup.equation, longer[pace].step_log, float(pace))[0] for pace in COARSE)
         result = replace(magnified, kink=min(crossed, estimated.kink)).from_longer_steps(paths, method.order)
         resolved = min(result.until_s, crossed) >= estimated.path.t[-1]
         if resolved and not cut and not estimated.doubts(result, paths, method.order):
             return result
-    half = companion(FINE[0], setup).shared
+    half = runner.run(setup, FINE[0]).shared
     if result.until_s > 0 and estimated.lost_at(half) < _GAIN * result.until_s:
         return result  # chaos: no step of practical length resolves it
     magnified = estimated
     for units in (PUSH, _FAR_PUSH):
-        pushed = companion(Fraction(1), _pushed(setup, units)).shared
+        pushed = runner.run(_pushed(setup, units)).shared
         magnified = _with_rounding(magnified, pushed, estimated.path, units)
-    shorter = magnified.from_shorter_steps({FINE[0]: half, FINE[1]: companion(FINE[1], setup).shared}, method.order)
+    shorter = magnified.from_shorter_steps({FINE[0]: half, FINE[1]: runner.run(setup, FINE[1]).shared}, method.order)
     return shorter if shorter.until_s >= result.until_s else result
 
 
@@ -130,7 +127,7 @@ def _until_alike(setup: Setup, run: Recording, result: ErrorEstimate) -> ErrorEs
 
 
 def _by_refinement(
-    setup: Setup, method: Adaptive, run: Recording, estimated: Estimated, companion: Companion
+    setup: Setup, method: Adaptive, run: Recording, estimated: Estimated, runner: Runner
 ) -> ErrorEstimate:
     """From half as long steps; where something may switch unseen, from a tenth of the tolerance as well.
 
@@ -145,11 +142,11 @@ def _by_refinement(
         halves = np.setdiff1d(halves, [each.t for each in run.events], assume_unique=True)
     tight = None
     if estimated.kink < np.inf and method.rtol / 10 > LEAST_RTOL:
-        tight = companion(Fraction(1), _tolerant(setup, method, 0.1)).shared
-    halved = companion(halves, setup).shared
+        tight = runner.run(_tolerant(setup, method, 0.1)).shared
+    halved = runner.run(setup, halves).shared
     gap = differences(estimated.path, halved, estimated.n)
     if estimated.begins_as_rounding(gap, ends[min(_EARLY, len(ends) - 1)]):
-        estimated = _with_rounding(estimated, companion(halves, _pushed(setup)).shared, halved)
+        estimated = _with_rounding(estimated, runner.run(_pushed(setup), halves).shared, halved)
     return estimated.from_refinement(gap, tight)
 
 

@@ -8,7 +8,7 @@ The error of a method of order p whose step is chosen by an estimate of that ord
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Generator
 from dataclasses import replace
 from math import inf, isfinite
 from typing import NamedTuple
@@ -55,8 +55,10 @@ class AccuracyError(RobotDynError):
         self.best = best
 
 
-def run_to(setup: Setup, requested: float, run: Callable[[Setup], Trajectory]) -> Trajectory:
-    """Return a run whose estimated error is at most the requested one, or the first run that does not finish.
+def trials(setup: Setup, requested: float) -> Generator[Setup, Trajectory, Trajectory]:
+    """Generate the setups to run for a requested accuracy, each after the run of the one before is sent.
+
+    The return value is a run whose estimated error is at most the requested one, or the first run that does not finish.
 
     The target is an estimate of at most half the requested error. If no run reaches the target, the best run is
     returned, provided that its estimate is at most the requested error.
@@ -64,12 +66,11 @@ def run_to(setup: Setup, requested: float, run: Callable[[Setup], Trajectory]) -
     Args:
         setup: The setup to run.
         requested: Largest error of q at any time, over the joints, in [rad] and [m].
-        run: Function that runs a setup and estimates the error.
 
     Raises:
         AccuracyError: If the requested accuracy cannot be reached.
     """
-    simple, spent = _in_each_segment(setup, requested, run)
+    simple, spent = yield from _in_each_segment(setup, requested)
     if simple is not None:
         return simple
     least, stiff = 1.01 * LEAST_RTOL, _stiff(setup)
@@ -77,7 +78,7 @@ def run_to(setup: Setup, requested: float, run: Callable[[Setup], Trajectory]) -
     rtol = max(least, min(_LOOSEST, requested ** _LOOSE[STIFF if stiff else EXPLICIT]))
     tried: list[_Try] = []
     for k in range(_TRIES):
-        trial, more = _at(setup, method, rtol, requested, run)
+        trial, more = yield from _at(setup, method, rtol, requested)
         spent += more
         if trial.outcome.ending is not Ending.FINISHED:
             return trial
@@ -99,13 +100,13 @@ def run_to(setup: Setup, requested: float, run: Callable[[Setup], Trajectory]) -
 
 
 def _at(
-    setup: Setup, method: str, rtol: float, requested: float, run: Callable[[Setup], Trajectory]
-) -> tuple[Trajectory, int]:
-    """The run at a tolerance, by the cheaper method if stability limits explicit steps; and the evaluations spent."""
-    trial = run(replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol)))
+    setup: Setup, method: str, rtol: float, requested: float
+) -> Generator[Setup, Trajectory, tuple[Trajectory, int]]:
+    """Return the run at a tolerance, by the cheaper method if stability limits explicit steps; and the evaluations."""
+    trial = yield replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol))
     if method != AUTO or trial.statistics.method != EXPLICIT or setup.equation.sampled or not _stable_at_most(trial):
         return trial, _in_all(trial)
-    other = run(replace(setup, integrator=Adaptive(STIFF, rtol, _ATOL * rtol)))
+    other = yield replace(setup, integrator=Adaptive(STIFF, rtol, _ATOL * rtol))
     return min((trial, other), key=lambda each: _predicted(each, requested)), _in_all(trial) + _in_all(other)
 
 
@@ -117,13 +118,11 @@ class _Try(NamedTuple):
     trial: Trajectory
 
 
-def _in_each_segment(
-    setup: Setup, requested: float, run: Callable[[Setup], Trajectory]
-) -> tuple[Trajectory | None, int]:
-    """One RK4 step between ticks of sampled control, if accurate enough; and the evaluations spent."""
+def _in_each_segment(setup: Setup, requested: float) -> Generator[Setup, Trajectory, tuple[Trajectory | None, int]]:
+    """Return the run of one RK4 step between ticks of sampled control, if accurate enough; and the evaluations."""
     if not setup.equation.sampled or len(setup.segments) < _MANY:
         return None, 0
-    trial = run(replace(setup, integrator=RK4, step_s=setup.duration_s))
+    trial = yield replace(setup, integrator=RK4, step_s=setup.duration_s)
     error, spent = _resolved(trial), _in_all(trial)
     good = trial.outcome.ending is Ending.FINISHED and error <= _TRUSTED * requested
     return (_achieved(_Try(error, 0.0, trial), requested, spent) if good else None), spent

@@ -6,13 +6,17 @@ the extremes of windows of time from all of them at once.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import final
 
 import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
-from robot_dyn.simulation.observation.guard_levels import NO_LEVELS, GuardLevels
-from robot_dyn.simulation.observation.observation import Observation, Observed, observe, observed
+from robot_dyn.foundations.errors import RobotDynError
+from robot_dyn.foundations.values import cached, copied
+from robot_dyn.simulation.observation.guard_levels import NO_LEVELS, GuardLevels, guard_levels
+from robot_dyn.simulation.observation.observation import Observation, Observed, observation_of, observe, observed
+from robot_dyn.simulation.setup.setup import Setup
 
 CHUNK = 16384  # columns looked at together: with fewer, the calls of NumPy cost more than what they do
 _PAD = 8  # so that the rows of a column lie in different sets of the processor's cache
@@ -114,3 +118,26 @@ class Observer:
         self._low, self._high = np.minimum.reduceat(self._low, pairs), np.maximum.reduceat(self._high, pairs)
         self._edges = np.append(self._edges[pairs], self._edges[-1])
         self._width = min(2 * self._width, self._chunk)
+
+
+def observer_of(setup: Setup, levels: GuardLevels | None = None) -> Observer:
+    """Return the observer of a run before its first step, for the levels of the setup unless others are given."""
+    if levels is not None:
+        return Observer(_observation(setup, levels), levels, setup.equation.canonical)
+    levels, start = cached(setup, observed_start)
+    return Observer(copied(start), levels, setup.equation.canonical)
+
+
+def observed_start(setup: Setup) -> tuple[GuardLevels, Observation]:
+    """Return the levels of a setup, and the observation of its start."""
+    levels = guard_levels(setup.plant.dynamics, setup.plant.effects, setup.controller)
+    return levels, _observation(setup, levels)
+
+
+def _observation(setup: Setup, levels: GuardLevels) -> Observation:
+    """Return the observation of the start; nan for u if it is not known before the first tick."""
+    equation, u = setup.equation, np.full(len(setup.q0), np.nan)
+    if not equation.sampled:
+        with suppress(RobotDynError):  # the run will report it
+            u = equation.actuation(0.0, setup.q0, setup.v0, np.zeros(equation.states), None)
+    return observation_of(np.concatenate([setup.q0, setup.v0, u])[:, None], levels)

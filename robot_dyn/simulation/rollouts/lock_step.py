@@ -28,7 +28,7 @@ from robot_dyn.simulation.rollouts.batch import Batch, Record, Single
 from robot_dyn.simulation.rollouts.one_by_one import singles
 from robot_dyn.simulation.rollouts.pool import in_threads
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
-from robot_dyn.simulation.run.fixed_step import samples_at_most
+from robot_dyn.simulation.run.fixed_steps import samples_at_most
 from robot_dyn.simulation.run.outcome import Outcome, Reason
 from robot_dyn.simulation.run.recording import Loop, records_of
 from robot_dyn.simulation.run.watch import LARGEST, step_and_period

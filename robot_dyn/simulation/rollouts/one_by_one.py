@@ -9,17 +9,17 @@ import numpy as np
 
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.simulation.compiled.choice import choose_for_batch, for_run
-from robot_dyn.simulation.diagnostics.step_remarks import observer_of
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.observation.guard_levels import GuardLevels
 from robot_dyn.simulation.observation.observation import Observation, observation_of, observed
+from robot_dyn.simulation.observation.observer import observer_of
 from robot_dyn.simulation.results.samples import columns
 from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.rollouts.batch import Batch, Record, Single
 from robot_dyn.simulation.rollouts.pool import in_threads
-from robot_dyn.simulation.run.make_run import make_run
 from robot_dyn.simulation.run.outcome import Ending, Outcome, Reason
 from robot_dyn.simulation.run.recording import Recording
+from robot_dyn.simulation.run.run import Run
 from robot_dyn.simulation.setup.setup import Setup
 
 
@@ -47,8 +47,8 @@ def singles(
         plant, controller = batch.parts(i)
         own = with_values(setup, {"plant": plant, "controller": controller, "q0": batch.q0[i], "v0": batch.v0[i]})
         observer = observer_of(own, levels.of_runs([i]))
-        run = make_run(own, for_run(engine, setup, own), observer=observer)
-        run.stop = stop
+        run = Run(own, for_run(engine, setup, own), observer=observer)
+        run.state.stop = stop
         records[i] = _single(batch, own, run.record(), observer.observation)
 
     def report() -> None:

@@ -47,8 +47,8 @@ def overflowed(y: Array) -> bool:
         return not np.abs(y).sum() < LARGEST
 
 
-def _start(setup: Setup) -> tuple[float, float]:
-    """Kinetic and potential energy at the start."""
+def start_energies(setup: Setup) -> tuple[float, float]:
+    """Return the kinetic and the potential energy at the start, in [J]."""
     energies = PayloadEvents(setup.equation).equation.energies
     K, V = (float(x[0]) for x in energies(np.zeros(1), setup.q0[None], setup.v0[None]))
     return K, V
@@ -60,7 +60,7 @@ class Watch:
 
     def __init__(self, setup: Setup, equation: StateEquation) -> None:
         self.setup, self.equation = setup, equation
-        K, V = cached(setup, _start)
+        K, V = cached(setup, start_energies)
         self.energy, self.scale = K + V, 1.0 + abs(K) + abs(V)
         self.paced, self.looked = 0.0, 0  # time and steps at the last check of the pace
 

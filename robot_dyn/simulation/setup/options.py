@@ -113,8 +113,8 @@ def _latest_or_new(plant: Plant, options: Mapping[str, Any]) -> Setup:
 
 def _content(value: Any) -> Any:
     """Return the types and bits of a value as a value to compare; an object of any other type by identity."""
-    kind = type(value)
-    if isinstance(value, np.ndarray | np.generic) and not value.dtype.hasobject:
+    kind: Any = type(value)
+    if issubclass(kind, np.ndarray | np.generic) and not value.dtype.hasobject:
         return kind, value.dtype.str, value.shape, value.tobytes()
     if kind in (tuple, list):
         return kind, tuple(map(_content, value))

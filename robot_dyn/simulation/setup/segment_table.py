@@ -45,12 +45,13 @@ class SegmentTable(NamedTuple):
 def segment_table(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
     """The segments of a setup, with steps `pace` times as long, and its end, for one run, which changes it."""
     if pace != 1 or len(setup.segments) > _MOST_CACHED:
-        return _table(setup, pace)
-    table = cached(setup, _table)
+        return table_of(setup, pace)
+    table = cached(setup, table_of)
     return table._replace(ticks=table.ticks.copy(), payload_events=table.payload_events.copy())
 
 
-def _table(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
+def table_of(setup: Setup, pace: Fraction = Fraction(1)) -> SegmentTable:
+    """Return the segments of a setup with steps `pace` times as long."""
     segments = paced(setup.segments, pace)
     counts = np.array([each.steps for each in segments])
     starts, ends = (np.array([getattr(each, name) for each in segments]) for name in ("start", "end"))

@@ -36,11 +36,25 @@ _SEGMENT_BYTES, _SEGMENT_BYTES_PER_JOINT = 500, 100  # by estimate; the second i
 STEP_S = 1e-3  # of a method of fixed step, unless given
 _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where a part does not declare where it switches
 
+CACHED = {
+    "table_of": "its segments as arrays",
+    "single_run_config": "the settings of the loop",
+    "start_energies": "kinetic and potential energy at the start",
+    "switching_of": "its switching functions",
+    "start_table_of": "their values at the start",
+    "observed_start": "the levels to observe, and the observation of the start",
+    "speed_limits": "the largest plausible speed of each joint",
+    "engine_of": "its machine code, once checked",
+    "with_stiff_method": "the same setup by the stiff method",
+    "with_time_stepping": "the same setup by time stepping",
+}
+"""All that is cached with a setup, by the function that computes it; see `foundations.values.cached`."""
+
 
 @final
 @dataclass(frozen=True, eq=False)
 class Setup(Value, Caching):
-    """All that a run depends on; what follows from it alone is cached with it, and not copied.
+    """Everything a run depends on. Derived values are cached, see `CACHED`, and not copied.
 
     Attributes:
         plant: What moves.
