@@ -18,7 +18,7 @@ from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.bernstein import work_array
 from robot_dyn.integrate.step_control import ControlledStepper, StepControl, initial_control
-from robot_dyn.simulation.dynamics.loop_state import Ended
+from robot_dyn.simulation.dynamics.loop_state import Ended, LoopConfig, loop_config
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.engine.interpreted import interpreted, system
@@ -73,6 +73,7 @@ class EventRun(SwitchedRun):
     """
 
     first = 200
+    events_of_loop: Events | None = None
 
     def __init__(
         self, watch: Watch, payloads: PayloadEvents, engine: Engine, mesh: np.ndarray | None,
@@ -95,7 +96,7 @@ class EventRun(SwitchedRun):
             self.switching = Switching(equation, self.switching.quantities, contacts)
         ends_mode = without_modes if contacts is None else end_mode
         self.advance = engine.loop(lambda: event_loop(of.begin, of.step, of.error, of.accept, of.dense, ends_mode))
-        self.config = self.config._replace(**_records(setup, samples), restarts=setup.integrator.needs_jacobian)
+        self.config = cached(setup, _config if samples else _config_of_companion)
         states = 0 if self.config.share_period == inf else _COMPARED + len(self.table.counts) + 2
         self.loop = self._loop_of(int(most_samples(setup)) + 2 if samples else 0, states, _CHUNK)
         events, degree = self.functions.events, len(of.work.F)
@@ -138,7 +139,10 @@ class EventRun(SwitchedRun):
 
     def _advance(self) -> Ended:
         contacts, stepper = self.switching.contacts, self.stepper
-        events = Events(self.event_table, self.regions, NO_CONTACT if contacts is None else contacts.mode)
+        parts = self.event_table, self.regions, NO_CONTACT if contacts is None else contacts.mode
+        if self.events_of_loop is None or any(x is not y for x, y in zip(parts, self.events_of_loop, strict=True)):
+            self.events_of_loop = Events(*parts)  # otherwise the same object, which is not packed again
+        events = self.events_of_loop
         arguments = self.functions, stepper.coefficients, stepper.work, self.loop, events, self.control, self.stop
         try:
             return Ended(self.advance(*arguments))
@@ -239,15 +243,23 @@ def _method(setup: Setup, equation: StateEquation, mesh: np.ndarray | None) -> t
     return stepper, initial_control(stepper.error_order, part * method.rtol, part * method.atol, longest, ends)
 
 
-def _records(setup: Setup, samples: bool) -> dict[str, Any]:
-    """The times of samples and shared states, as fields of `LoopConfig`."""
+def _config(setup: Setup, samples: bool = True) -> LoopConfig:
+    """The settings of the loop, with the times of samples and of states that are compared."""
     chosen, every = setup.integrator.controls_error, not setup.record_period_s
     period = setup.record_period_s or (setup.duration_s / _SAMPLES if chosen else inf)
     compared = setup.duration_s / _COMPARED if chosen and setup.estimate_error else inf
-    return {
-        "sample_period": float(period) if samples else inf,
-        "share_period": float(compared),
-        "samples_nodes": samples and every,
-        "samples_steps": samples and every and not chosen,
-        "duration": float(setup.duration_s),
-    }
+    return loop_config(
+        setup.equation,
+        alone=True,
+        sample_period=float(period) if samples else inf,
+        share_period=float(compared),
+        samples_nodes=samples and every,
+        samples_steps=samples and every and not chosen,
+        duration=float(setup.duration_s),
+        restarts=setup.integrator.needs_jacobian,
+    )
+
+
+def _config_of_companion(setup: Setup) -> LoopConfig:
+    """The same without samples."""
+    return _config(setup, False)
