@@ -169,7 +169,6 @@ class SwitchedRun(Driver):
         """Why another method is to make the run; DivergedError if none may."""
         first = float(holding.changes[holding.changed[0] % len(holding.changes)])
         span = float(np.ptp(holding.changes))  # a step that was taken back may have noted a later one
-        what = f"{len(holding.changes)} changes of what holds joints in {span:.1e} s, the last of joint {joint!r}"
         motion = self.equation.equation_of_motion
         alone = motion.payloads or motion.drives  # which time stepping does not take
         if alone or not self.chooses:
@@ -177,9 +176,8 @@ class SwitchedRun(Driver):
             facts = {"changes": len(holding.changes), "span_s": span, "remedy": remedy}
             raise DivergedError(Outcome(Reason.EVENTS_ACCUMULATE, t, joint, facts))
         speed = float(np.abs(y[self.rules.n : 2 * self.rules.n]).max())
-        text = f"{what}, at t = {t:.6g} s"
-        remedy = f"made by time stepping with steps of {STEP_S} s, without an estimate of its error"
-        return Accumulation(Remark(RemarkKind.ACCUMULATE, joint, "v", first, t - first, t, speed, None, text, remedy))
+        facts = {"changes": len(holding.changes), "span_s": span, "step_s": STEP_S}
+        return Accumulation(Remark(RemarkKind.ACCUMULATE, joint, "v", first, t - first, t, speed, None, facts))
 
     def _renew_switches(self, t: float) -> None:
         """The switching functions of the state reached."""
