@@ -1,4 +1,4 @@
-"""Overview of a batch: remarks with counts, tracking errors, the run to look at first, and why runs diverged."""
+"""Overview of a batch: remarks with counts, tracking errors, and the run to look at first."""
 
 from __future__ import annotations
 
@@ -12,17 +12,16 @@ from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, jumps
 from robot_dyn.simulation.diagnostics.step_remarks import KINDS, Units, against, of_reference, of_steps, units_of
-from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
+from robot_dyn.simulation.diagnostics.unstable_loop import unstable
 from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.remarks import Facts, Remark, RemarkKind
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_square, tracking_of
+from robot_dyn.simulation.rollouts.reasons import states
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
-from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.simulation.setup.setup import Setup
 
 OF_REFERENCES = RemarkKind.JUMPS, RemarkKind.HELD
-_JUDGED = 8  # runs that diverged: each loop is linearised about a start of its own
 
 
 def overview(runs: RolloutsData) -> Overview:
@@ -148,12 +147,7 @@ def _in_runs(remark: Remark, worst: int, some: np.ndarray) -> Remark:
 def _linearised(runs: RolloutsData, run: int) -> Iterator[Remark]:
     """The remark on the sampled loop of one run."""
     setup = runs.setup_of(run)
-    equation = setup.equation
-    t, y = np.zeros(1), equation.start(setup.q0, setup.v0)[None]
-    if runs.q is not None and runs.v is not None and not equation.equation_of_motion.state_size:
-        t, rest = runs.t, np.zeros((len(runs.t), equation.size - 2 * len(setup.q0)))
-        y = np.hstack([runs.q[run], runs.v[run], rest])
-    for remark in unstable(setup, t, y, bool(runs.diverged[run])):
+    for remark in unstable(setup, *states(runs, setup, run), bool(runs.diverged[run])):
         yield replace(remark, runs=(run,), looked=1)
 
 
@@ -180,20 +174,3 @@ def tracking_errors(runs: RolloutsData) -> np.ndarray | None:
     if deviation is None:
         return None
     return np.array([root_mean_square(x[of]) if of.any() else np.nan for x, of in zip(deviation, known, strict=True)])
-
-
-def causes(runs: RolloutsData) -> tuple[Outcome, ...]:
-    """Return the outcome of each run; of the first that diverged with its loop as the reason, if it explains it.
-
-    Loops are linearised about the starts, which differ from run to run, as their parameters may.
-    """
-    outcomes, diverged = list(runs.outcomes), np.flatnonzero(runs.diverged)
-    controller = None if runs.setup is None else runs.setup.controller
-    if controller is None or not len(diverged):
-        return runs.outcomes
-    earliest = diverged[np.argsort(runs.ended[diverged], kind="stable")]
-    for run in list(dict.fromkeys([int(diverged[0]), *earliest.tolist()]))[:_JUDGED]:
-        setup = runs.setup_of(run)
-        remarks = unstable(setup, np.zeros(1), setup.equation.start(setup.q0, setup.v0)[None], True)
-        outcomes[run] = explained(runs.outcome(run), setup, remarks)
-    return tuple(outcomes)
