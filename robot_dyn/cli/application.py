@@ -79,7 +79,7 @@ def _options(
 def progress(items: Iterable[str], description: str) -> Iterator[str]:
     """Yield the items, with a progress bar on stderr if it is a terminal, that names the item being worked on."""
     items = list(items)
-    with bar(len(items)) as advance:
+    with bar(len(items), description) as advance:
         for done, item in enumerate(items):
             advance(done, f"{description} {escaped(item)}")
             yield item
@@ -98,6 +98,7 @@ def bar(total: float | None = None, what: str = "simulating", at_the_end: str = 
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+    from rich.table import Column
     from rich.text import Text
 
     from robot_dyn.queries.units import format_duration
@@ -107,7 +108,7 @@ def bar(total: float | None = None, what: str = "simulating", at_the_end: str = 
             left = None if task.finished else task.time_remaining
             return Text(f"{int(task.elapsed or 0)} s" if left is None else f"{format_duration(left)} left")
 
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), Time())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), Time(Column(no_wrap=True)))
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as shown:
         task = shown.add_task(what, total=total)
 

@@ -27,6 +27,7 @@ _WIDE, _HIGH, _BAR = 3.9, 1.6, 0.2  # sizes of a plot, and height of a bar, in [
 _LONGEST = 32  # letters of the name of a bar
 _LARGEST, _LEAST = 1e300, 1e-99  # on an axis, and on one of logarithms: Matplotlib computes beyond its ends
 _MOST_ROWS = 40  # of a table; a longer one scrolls
+_NARROW = 4  # columns of a table that a narrow page has room for
 # more specific than the styles of notebooks, which align all cells at the right
 _STYLE = (
     "<style>.robot-dyn{font:13px/1.45 system-ui,sans-serif;max-width:70em}"
@@ -34,7 +35,13 @@ _STYLE = (
     ".robot-dyn.robot-dyn table th,.robot-dyn.robot-dyn table td{text-align:left;padding:.12em .8em .12em 0;border:0;"
     "background:none;color:inherit;vertical-align:top}"
     ".robot-dyn.robot-dyn table th{font-weight:600;border-bottom:1px solid}"
-    ".robot-dyn.robot-dyn table .n{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}"
+    ".robot-dyn.robot-dyn table .n{text-align:right;font-variant-numeric:tabular-nums}"
+    ".robot-dyn.robot-dyn table td.n{white-space:nowrap}"
+    "@media(max-width:34em){.robot-dyn.robot-dyn table td{overflow-wrap:anywhere}"  # a wide table: a block for each row
+    ".robot-dyn.robot-dyn .w :is(table,tbody,tr){display:block}.robot-dyn.robot-dyn .w thead{display:none}"
+    ".robot-dyn.robot-dyn .w tr{padding:.2em 0;border-bottom:1px solid #80808055}"
+    ".robot-dyn.robot-dyn .w td{display:inline-block}"
+    ".robot-dyn.robot-dyn .w td::before{content:attr(data-of)' ';opacity:.7}}"
     ".robot-dyn .l{max-height:32em;overflow:auto;border-bottom:1px solid}"
     ".robot-dyn .t{font-weight:600;font-size:1.08em}"
     "div.robot-dyn pre{font:inherit;font-size:12px;white-space:pre-wrap;word-break:normal;margin:.5em 0;padding:0;"
@@ -54,15 +61,22 @@ def text(lines: str | Iterable[str]) -> str:
 
 
 def grid(heading: Sequence[str], cells: Iterable[Sequence[str]], words: Collection[str]) -> str:
-    """Return a table of texts; the columns that are not of words stand at the right."""
+    """Return a table of texts; the columns that are not of words stand at the right.
+
+    On a narrow page each row of a table of many columns is a block, whose cells have their headings.
+    """
     kinds = ["" if name in words else " class=n" for name in heading]
-    head, *body = (
-        "".join(f"<{tag}{kind}>{escape(cell)}</{tag}>" for kind, cell in zip(kinds, row, strict=True))
-        for tag, row in (("th", heading), *(("td", row) for row in cells))
-    )
-    rows = "".join(f"<tr>{row}</tr>" for row in body)
-    whole = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-    return whole if len(body) <= _MOST_ROWS else f'<div class="l" tabindex="0">{whole}</div>'
+    is_wide = len(heading) > _NARROW
+    of = [f' data-of="{escape(name)}"' if is_wide else "" for name in heading]
+    head = "".join(f"<th{kind}>{escape(name)}</th>" for kind, name in zip(kinds, heading, strict=True))
+    rows = [
+        "".join(f"<td{kind}{name}>{escape(cell)}</td>" for kind, name, cell in zip(kinds, of, row, strict=True))
+        for row in cells
+    ]
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
+    whole = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    look = " ".join(["l"] * (len(rows) > _MOST_ROWS) + ["w"] * is_wide)
+    return f'<div class="{look}"{" tabindex=0" * ("l" in look)}>{whole}</div>' if look else whole
 
 
 def side_by_side(parts: Iterable[str]) -> str:
@@ -139,6 +153,7 @@ def plot(label: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> str:
     if not any(np.isfinite(x).any() for x in columns.values()):
         return ""
     axes = _axes(f"{label} over t [s]", _HIGH)
+    axes.locator_params(axis="x", nbins=5)
     for k, x in enumerate(columns.values()):
         at = _extremes(x)
         y = np.clip(x[at], -_LARGEST, _LARGEST)
@@ -195,7 +210,11 @@ def levels(label: str, values: Mapping[str, float], limit: float) -> str:
         return ""
     axes = _axes(label, _BAR * (len(known) + 2), known)
     axes.set_xscale("log")
-    axes.plot([*known.values()], range(len(known)), "o", color=_COLOURS[0], markersize=5, gid="levels")
+    axes.plot([*known.values()], range(len(known)), "o", color=_COLOURS[0], markersize=5, clip_on=False, gid="levels")
+    shown = [*known.values()]
     if isfinite(limit) and limit > 0:
-        axes.axvline(limit, color=_COLOURS[1], linestyle="--")
+        axes.axvline(limit, color=_COLOURS[1], linestyle="--", clip_on=False)
+        shown.append(limit)
+    low, high = np.floor(np.log10(min(shown))), np.ceil(np.log10(max(shown)))  # two numbers or more can be read
+    axes.set_xlim(10.0**low, 10.0 ** max(high, low + 1))
     return inline(axes.figure, label)

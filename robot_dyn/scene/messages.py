@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from robot_dyn.foundations.errors import RobotDynError, shorten
+from robot_dyn.foundations.errors import RobotDynError, SceneError, shorten
 
 _WORDS = {
     "Input should be": "must be", "Field required": "is missing; give it", "valid tuple": "list", "valid list": "list",
@@ -28,6 +28,33 @@ def part(*path: str | int) -> Iterator[None]:
     except RobotDynError as error:
         vars(error).setdefault("part", path)
         raise
+
+
+@contextmanager
+def named_part(paths: Mapping[str, tuple[str | int, ...]], kinds: Sequence[str]) -> Iterator[None]:
+    """Note in errors the path of the first part that their message names, and put its place before the message.
+
+    Args:
+        paths: Paths by the words that stand for them in messages, such as "step_s" or "coulomb_friction".
+        kinds: Of the effects of the scene.
+
+    Raises:
+        SceneError: In place of an error whose message names a part.
+    """
+    try:
+        yield
+    except RobotDynError as error:
+        path = next((paths[word] for word in re.findall(r"\w+", str(error)) if word in paths), ())
+        if not path:
+            raise
+        start, place = str(path[0]), str(path[0])
+        if len(path) > 1:
+            start = kinds[int(path[1])]
+            place = f"effect {int(path[1]) + 1} ({start})"
+        message = re.sub("integrator='(.+?)'", r'method = "\1"', str(error).removeprefix(f"{start}: "))
+        named = SceneError(f"{place}: {message}")
+        vars(named)["part"] = path
+        raise named from None
 
 
 def validation_message(error: ValidationError, table: Mapping[str, Any], text: str) -> str:

@@ -24,13 +24,14 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.scene.control import Control
 from robot_dyn.scene.declared import callable_part
 from robot_dyn.scene.effects import ACTING, BY_KIND, EDITS, AnyEffect, DeclaredEffect, Edit, bare
-from robot_dyn.scene.messages import line, part, validation_message
+from robot_dyn.scene.messages import line, named_part, part, validation_message
 from robot_dyn.scene.references import AnyReference, Circle, Hold, Line, Sampled, ViaPoints
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Truth, one_of, per_joint, wrong_key
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
 Factories = Mapping[str, Callable[..., Effect]]
 MAX_BYTES = 2**20
+_OF_SETUP = {"integrator": "method", "controller": "control", "period_s": "control", "q0": "start", "v0": "start"}
 SCENE = FileKind("a scene", ".toml")
 
 
@@ -148,13 +149,16 @@ class Scene(Part):
             loaded = self.load.robot(file if os.path.isfile(file) else self.robot)
         robot = bare(loaded)
         acting: list[Effect] = []
+        paths: dict[str, tuple[str | int, ...]] = {}  # by the words of messages that stand for them
         for k, effect in sorted(enumerate(self.effect), key=lambda pair: not isinstance(pair[1], Edit)):  # edits first
             with part("effect", k):
                 try:
                     if isinstance(effect, Edit):
                         robot = effect.edit(robot, loaded)
                     else:
-                        acting += effect.build(robot)
+                        built = effect.build(robot)
+                        acting += built
+                        paths |= {each.name: ("effect", k) for each in built if each.name not in paths}
                 except RobotDynError as error:
                     raise SceneError(f"effect {k + 1} ({effect.kind}): {error}") from None
         with part("start"):
@@ -165,11 +169,14 @@ class Scene(Part):
         with part("control"):
             controller = None if self.control is None else self.control.build(loaded, robot, q0, reference)
         step_s = self.step_s if "step_s" in self.model_fields_set else None
-        return Setup(
-            Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),
-            step_s, self.record_period_s, self.estimate_error, about, self.engine,
-            accuracy=self.accuracy,
-        )  # fmt: skip
+        words = _OF_SETUP | {key: key for key in type(self).model_fields}
+        paths |= {word: (key,) for word, key in words.items() if key in self.model_fields_set}
+        with named_part(paths, [effect.kind for effect in self.effect]):
+            return Setup(
+                Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),
+                step_s, self.record_period_s, self.estimate_error, about, self.engine,
+                accuracy=self.accuracy,
+            )  # fmt: skip
 
     def integrator(self) -> Integrator | Adaptive:
         """Return the method by its name."""

@@ -7,11 +7,13 @@ import pty
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from robot_dyn.cli import bar, progress
-from tests.command import MAIN, said
+from robot_dyn.cli.application import program
+from tests.command import MAIN, run, said
 
 SCENE = """
 robot = "pendulum"
@@ -54,6 +56,26 @@ def test_a_run_shows_the_time_left_in_a_terminal(scene: Path) -> None:
     assert code == 0
     assert re.search(r"simulating .* left", seen) and "estimating the error" in seen
     assert "finished at t = 40 s" in seen
+
+
+def test_no_bar_says_that_it_simulates_where_nothing_is_simulated() -> None:
+    for command in ("check", "compare"):
+        code, seen = watched(command, "pendulum")
+        assert code == 0 and "pendulum" in seen and "simulating" not in seen
+
+
+def test_a_sweep_that_is_complete_has_no_pace(scene: Path, tmp_path: Path) -> None:
+    folder, vary = tmp_path / "out", "mass_scale=uniform(low=0.9, high=1.1)"
+    assert run("sweep", scene, "-o", folder, "--runs", "4", "--vary", vary).returncode == 0
+    code, seen = watched("sweep", "run", folder)
+    assert code == 0 and "4 of 4 runs" in seen and not re.search(r"[\d.]+ a second", seen)
+
+
+def test_paragraphs_of_help_are_broken_by_the_terminal_alone() -> None:
+    """A line of a docstring that ends where the terminal has room would be broken twice."""
+    commands: Any = program()
+    for name, command in commands.commands.items():
+        assert not any("\n" in each for each in command.help.split("\n\n")), name
 
 
 def test_a_pipe_gets_the_answer_alone(scene: Path) -> None:

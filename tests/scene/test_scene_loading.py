@@ -90,3 +90,30 @@ def test_explanations_of_a_scene_name_what_acts_of_its_file(tmp_path: Path) -> N
     """Armature that a file of MJCF states and a scene does not name is not simulated, and listed so."""
     answer = rd.explain(scene(tmp_path, "rig.xml", 'without = ["tendon"]'))
     assert {"armature", "gravity"} <= {*answer.absent}
+
+
+DRY = '[[effect]]\nkind = "dry_friction"\nlevel_N_m = 1.0'
+
+
+@pytest.mark.parametrize(
+    ("stated", "at", "key"),
+    [
+        ({"duration_s = 1.0": 'duration_s = 1e9\nmethod = "rk4"\nstep_s = 1e-3'}, 4, "step_s"),
+        ({"duration_s = 1.0": "duration_s = 1e18"}, 2, "duration_s"),
+        ({"duration_s = 1.0": "duration_s = 1.0\naccuracy = 1e-6\nestimate_error = false"}, 3, "accuracy"),
+        ({"gravity": "rigid_stops", "#": "lower_rad = 0.5\nupper_rad = 0.6"}, 3, "start"),
+        ({"duration_s = 1.0": 'duration_s = 1.0\nmethod = "gauss_4"', "#": DRY}, 8, "effect 2 (dry_friction)"),
+        ({"#": '[control]\nkind = "pd"\nkp = 1.0\nkd = 1.0\nperiod_s = 1e-12'}, 7, "control"),
+    ],
+)  # fmt: skip
+def test_an_error_of_the_setup_has_the_line_and_the_key_of_the_scene(
+    tmp_path: Path, stated: dict[str, str], at: int, key: str
+) -> None:
+    """Such as a run of too many steps, or a start beyond a stop, which the tables by themselves do not show."""
+    text = 'robot = "planar_2r"\nduration_s = 1.0\n[start]\nq = [0.4, 0.9]\n[[effect]]\nkind = "gravity"\n#\n'
+    for old, new in stated.items():
+        text = text.replace(old, new)
+    (path := tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError) as caught:
+        rd.read_scene(path)
+    assert str(caught.value).startswith(f"{path}: line {at}: {key}: ")

@@ -137,9 +137,12 @@ def test_a_program_that_is_no_browser_is_named_and_ended(
     program = tmp_path / "chrome"
     program.write_text(f"#!/bin/sh\n{script}\n")
     program.chmod(0o700)
+    (temporary := tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
     monkeypatch.setattr(browser, "_PATIENCE_MS", patience_ms)
     with ThreadPoolExecutor(1) as pool, pytest.raises(VideoError, match=f"{program}: .*{message}"):
         pool.submit(filmed, program).result()
+    assert not list(temporary.iterdir()) and os.environ["TMPDIR"] == str(temporary)
     with suppress(FileNotFoundError):
         assert not [each for each in Path("/proc").glob("[0-9]*") if str(program).encode() in _command(each)]
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_dyn.accuracy.work_precision_diagram.method_under_test import INTERPRETED, ToleranceLadder
-from robot_dyn.accuracy.work_precision_diagram.work_precision import WorkPrecision, program_of
+from robot_dyn.accuracy.work_precision_diagram.method_under_test import INTERPRETED, Point, ToleranceLadder
+from robot_dyn.accuracy.work_precision_diagram.work_precision import WorkPrecision, named, program_of
 from robot_dyn.report.figure import Colours, ResultError, key, legend, programs, sheet, styled
 
 if TYPE_CHECKING:
@@ -46,7 +47,8 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
     figure, colours = sheet(_WIDTH, _HEIGHT, result.sentence, caption, theme)
     grid = figure.add_gridspec(3, 2, width_ratios=(2.1, 1))
     first = [ladder for ladder in result.ladders if ladder.peer or (ladder.events and ladder.engine != INTERPRETED)]
-    first = most_precise(first if any(not ladder.peer for ladder in first) else list(result.ladders))
+    first = first if any(not ladder.peer for ladder in first) else list(result.ladders)
+    first = most_precise(first, [ladder for ladder, _ in named(result, result.usual_digits)])
     ours = [ladder for ladder in first if not ladder.peer]
     slow = [ladder for ladder in result.ladders if ladder.engine == INTERPRETED and ladder not in first]
     names = {ladder.method for ladder in first}
@@ -60,12 +62,15 @@ def draw(result: WorkPrecision, theme: str = "light") -> Figure:
         panel(grid[2, 1], slow, "time_s", "Error over time, interpreted")
     else:
         panel(grid[2, 1], ours, "steps", "Error over steps")
-    _legend(figure, first, without, colours)
+    _legend(figure, first + [x for x in slow if x.method not in names and _shown(x)], without, colours)
     return figure.figure
 
 
-def most_precise(ladders: list[ToleranceLadder]) -> list[ToleranceLadder]:
-    """Eight at most: of each program the one that reaches six digits soonest, then the next ones, in their order."""
+def most_precise(ladders: list[ToleranceLadder], always: Sequence[ToleranceLadder] = ()) -> list[ToleranceLadder]:
+    """Return eight ladders at most, and those that are always drawn, in their order.
+
+    Of each program the one that reaches six digits soonest comes first, then the next ones.
+    """
 
     def soon(ladder: ToleranceLadder) -> float:
         price = ladder.price(_SIX_DIGITS)
@@ -74,7 +79,7 @@ def most_precise(ladders: list[ToleranceLadder]) -> list[ToleranceLadder]:
     by_time = sorted(ladders, key=soon)
     soonest = {program_of(ladder): ladder for ladder in reversed(by_time)}.values()
     chosen = sorted(by_time, key=lambda ladder: ladder not in soonest)[:_MOST_METHODS]
-    return [ladder for ladder in ladders if ladder in chosen]
+    return [ladder for ladder in ladders if ladder in chosen or ladder in always]
 
 
 def _panel(
@@ -85,13 +90,14 @@ def _panel(
 
     Errors have a line at that of the reference, with the range below it shaded.
     """
-    from matplotlib.ticker import NullFormatter
+    from matplotlib.ticker import LogFormatterSciNotation, NullFormatter
 
     axes, floor = figure.add_subplot(cell), result.reference.error
     axes.set(xscale="log", yscale="log")
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=(1.5, 0.5)))  # below 1.5 powers of ten
     axes.yaxis.set_minor_formatter(NullFormatter())
-    styled(axes, colours, _LABELS[x], title, f"{_LABELS[y]} [{result.unit}]" if y == "error" else _LABELS[y])
+    labels = _LABELS | {"error": f"{_LABELS['error']} [{result.unit}]"}
+    styled(axes, colours, labels[x], title, labels[y])
     for ladder in ladders:
         _curve(axes, ladder, colours, x, y, size)
     if y == "error":
@@ -103,10 +109,15 @@ def _panel(
     return axes
 
 
+def _shown(ladder: ToleranceLadder, x: str = "time_s", y: str = "error") -> list[Point]:
+    """Return the runs of a ladder that are drawn."""
+    return [p for p in ladder.points if p.error < _MOST_ERROR and getattr(p, x) and getattr(p, y) > 0]
+
+
 def _curve(axes: Any, ladder: ToleranceLadder, colours: Colours, x: str, y: str, size: float) -> None:
     """Draw the runs of a ladder, with hollow markers for those without a believed error or a repeatable time."""
     colour, marker = _look(ladder, colours)
-    points = [p for p in ladder.points if p.error < _MOST_ERROR and getattr(p, x) and getattr(p, y) > 0]
+    points = _shown(ladder, x, y)
     places = np.array([(getattr(p, x), getattr(p, y)) for p in points]).reshape(-1, 2)
     style = "--" if ladder.peer else "-" if ladder.events else ":"
     bold = 1.9 if ladder.method in ("DOP853", "Rosenbrock") else 1.1

@@ -179,11 +179,16 @@ class WorkPrecision(Result):
         prices = [(ladder, price) for ladder in self.ladders if (price := ladder.price(error)) is not None]
         return sorted(prices, key=lambda each: each[1].value)
 
+    @property
+    def usual_digits(self) -> int:
+        """6, or as many digits as were reached."""
+        best = min((p.error for ladder in self.ladders for p in ladder.points if p.believed), default=1.0)
+        return min(_USUAL_DIGITS, floor(-log10(max(best, self.reference.error))))
+
     @reported
     def sentence(self) -> str:
         """What 6 digits cost, or as many as were reached, in a sentence."""
-        best = min((p.error for ladder in self.ladders for p in ladder.points if p.believed), default=1.0)
-        return self.sentence_of(min(_USUAL_DIGITS, floor(-log10(max(best, self.reference.error)))))
+        return self.sentence_of(self.usual_digits)
 
     def sentence_of(self, digits: int) -> str:
         """Return what so many digits cost, in a sentence.
@@ -197,22 +202,12 @@ class WorkPrecision(Result):
         digits = integer("digits", digits, most=_MOST_DIGITS)
         if not self.ladders:
             return "no method was measured: see what was left out"
-        prices = self.digits(10.0**-digits)
-        measured = [ladder for ladder, price in prices if not price.extrapolated]
-        if not measured:
-            return f"{digits} digits of q were reached by no run"
-        ours = [ladder for ladder in measured if not ladder.peer]
-        best = [measured[0], *ours[:1], *[ladder for ladder in ours if ladder.events][:1]]
-        named: dict[str, tuple[str, Price]] = {}  # of each program its best method
-        for ladder, price in prices:
-            if ladder.peer or ladder.name in _ALWAYS_NAMED or ladder in best:
-                named.setdefault(program_of(ladder) if ladder.peer else ladder.name, (ladder.name, price))
-        enough = sum(not price.extrapolated for _, price in named.values()) >= _ENOUGH
         parts = [
-            f"{name} would take {price} (extrapolated)" if price.extrapolated else f"{name} {price}"
-            for name, price in named.values()
-            if not (enough and price.extrapolated)
+            f"{ladder.name} would take {price} (extrapolated)" if price.extrapolated else f"{ladder.name} {price}"
+            for ladder, price in named(self, digits)
         ]
+        if not parts:
+            return f"{digits} digits of q were reached by no run"
         return f"{digits} digits of q over {self.reference.horizon_s:g} s: {'; '.join(parts)}"
 
 
@@ -324,6 +319,22 @@ def programs(result: WorkPrecision, error: float) -> Iterator[str]:
             yield f"  {program}: reached by no run ({'; '.join(ended)})"
     yield "  times of prepared runs, the least of runs that take turns"
     yield from (f"  left out: {what}" for what in result.left_out)
+
+
+def named(result: WorkPrecision, digits: int) -> list[tuple[ToleranceLadder, Price]]:
+    """Return the ladders that the sentence of a result names, with what the digits cost; none if none was reached."""
+    prices = result.digits(10.0**-digits)
+    measured = [ladder for ladder, price in prices if not price.extrapolated]
+    if not measured:
+        return []
+    ours = [ladder for ladder in measured if not ladder.peer]
+    best = [measured[0], *ours[:1], *[ladder for ladder in ours if ladder.events][:1]]
+    chosen: dict[str, tuple[ToleranceLadder, Price]] = {}  # of each program its best method
+    for ladder, price in prices:
+        if ladder.peer or ladder.name in _ALWAYS_NAMED or ladder in best:
+            chosen.setdefault(program_of(ladder) if ladder.peer else ladder.name, (ladder, price))
+    enough = sum(not price.extrapolated for _, price in chosen.values()) >= _ENOUGH
+    return [(ladder, price) for ladder, price in chosen.values() if not (enough and price.extrapolated)]
 
 
 def program_of(ladder: ToleranceLadder) -> str:

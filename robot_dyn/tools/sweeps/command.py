@@ -112,6 +112,7 @@ def _run(stated: Sweep, folder: str, options: dict[str, Any]) -> SweepResult:
         def on_progress(done: int, runs: int) -> None:
             first[0] = done if first[0] < 0 else first[0]
             rate = (done - first[0]) / max(perf_counter() - began, 1e-9)
-            advance(done, f"{done} of {runs} runs, {rate:.0f} a second")
+            pace = f", {rate:.3g} a second" if rate else ""  # of a folder that is complete nothing is run
+            advance(done, f"{done} of {runs} runs{pace}")
 
         return sw.run(stated, folder, on_progress=on_progress, **options)

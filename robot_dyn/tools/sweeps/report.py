@@ -16,6 +16,7 @@ KIND = FileKind("a page", ".html", b"<!doctype html>")
 _BINS, _CELLS, _MOST_CROSSES = 60, 24, 500
 _HEAD = (
     '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="color-scheme" content="light dark">'
+    '<meta name="viewport" content="width=device-width">'
     "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
     "<title>{title}</title><style>body{{margin:1.5em auto;max-width:72em;padding:0 1em}}"
     "h2{{font:600 1em system-ui,sans-serif;margin:1.6em 0 .4em}}</style></head><body>\n{body}\n</body></html>\n"

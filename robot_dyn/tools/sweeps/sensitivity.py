@@ -70,7 +70,7 @@ class Sensitivity(Answer):
         if self.pawn:
             columns["rank correlation (monotone part only)"] = [text(x) for x in self.rank_correlation]
             columns["PAWN"] = [text(x) for x in self.pawn]
-        yield Table(tuple(columns), tuple(zip(*columns.values(), strict=True)))
+        yield Table(tuple(columns), tuple(zip(*columns.values(), strict=True)), right=tuple(columns)[1:])
         if self.pawn:
             yield (
                 "PAWN: how far the distribution of the figure, given the parameter, is from that of all runs, 0 to 1;"

@@ -8,7 +8,8 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -69,7 +70,7 @@ def frames(
     try:
         with (
             temporary as folder,
-            api.sync_playwright() as driver,
+            _driver(api, folder) as driver,
             _launched(driver.chromium, program, folder, api.Error) as browser,
         ):
             width, height = size
@@ -87,6 +88,24 @@ def frames(
         first, said = str(error).splitlines()[0].partition(": ")[2], re.findall(r"\[err\] (.*)", str(error))
         told = f"it said: {shorten(said[-1])}" if said else "it must be of 2023 or later"
         raise VideoError(f"{program or 'the browser'}: {shorten(first)}; {told}") from None
+
+
+@contextmanager
+def _driver(api: Any, folder: str) -> Iterator[Any]:
+    """Start and end Playwright, with a folder for its temporary files: it leaves those of a launch that failed."""
+    names = ("TMPDIR", "TEMP", "TMP")
+    before = {name: os.environ.get(name) for name in names}
+    driver = api.sync_playwright()
+    os.environ.update(dict.fromkeys(names, folder))  # Playwright has no option for it
+    try:
+        started = driver.start()
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
+    try:
+        yield started
+    finally:
+        started.stop()
 
 
 def _launched(chromium: Any, program: Path | None, folder: str, error: type[Exception]) -> Any:

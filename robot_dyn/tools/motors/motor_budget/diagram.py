@@ -21,7 +21,7 @@ _WIDE, _ROW, _CELL, _AROUND = 13.0, 0.42, 2.3, 1.9  # [inch]
 _ACROSS, _MOST = 3, 64  # joints beside each other; that one figure shows
 _LETTERS = 24  # of the name of a joint beside bars
 _BAR = 0.27
-_SHADES = {"peak": 0.9, "continuous": 0.55, "speed": 0.25}  # of ink, of bars: colours are those of causes
+_SHADES = {"peak": 1.0, "continuous": 0.72, "speed": 0.46}  # of ink, of bars: colours are those of causes
 
 
 def draw(result: MotorBudget, theme: str = "light") -> Figure:
@@ -97,11 +97,13 @@ def _over_time(axes: Any, result: MotorBudget, i: int, joint: JointBudget, colou
     title = f"{shortened(joint.joint, _LETTERS)}: {joint.peak:.4g}{limit} {unit}"
     styled(axes, colours, "t [s]", drawable(title), f"τ [{unit}]")
     for k, torque in enumerate(split.torques.values()):
+        if not torque[rows, i].any():
+            continue
         axes.plot(split.t[rows], torque[rows, i], color=_colour(colours, k), linewidth=0.9)
     axes.plot(split.t[rows], split.tau[rows, i], color=colours["ink"], linewidth=1.5)
     row = int(np.abs(split.tau[:, i]).argmax())
     axes.plot(split.t[row], split.tau[row, i], "o", color=colours["ink"], markersize=4)
-    if joint.peak >= NEAR * joint.peak_limit:
+    if _is_near(joint):
         for side in (1, -1):
             axes.axhline(side * joint.peak_limit, color=colours["ink"], linewidth=0.9, linestyle="--")
     axes.margins(x=0.01)
@@ -113,11 +115,21 @@ def _colour(colours: Colours, k: int) -> str:
     return hues[k % len(hues)]
 
 
+def _is_near(joint: JointBudget) -> bool:
+    """Return True if the limit of the peak torque is drawn."""
+    return joint.peak >= NEAR * joint.peak_limit
+
+
 def _handles(result: MotorBudget, colours: Colours) -> list[Any]:
-    causes = result.joints[0].of_rms
+    """Return entries of the legend for what is drawn."""
+    joints = result.joints
+    acting = [name for name, torque in result.demand.split.torques.items() if torque.any()]
+    causes = [(k, name) for k, name in enumerate(joints[0].of_rms) if name in acting]
+    kinds = [kind for kind in _SHADES if any(joint.shares[kind] for joint in joints)]
+    dashed = [key("± peak torque, where it is near", colours["ink"], linestyle="--", linewidth=0.9)]
     return [
         key("τ, and its peak", colours["ink"], marker="o", markersize=4),
-        *(key(drawable(name), _colour(colours, k)) for k, name in enumerate(causes)),
-        key("± peak torque, where it is near", colours["ink"], linestyle="--", linewidth=0.9),
-        *(key(f"used of {KINDS[kind]}", colours["ink"], linewidth=5, alpha=x) for kind, x in _SHADES.items()),
+        *(key(drawable(name), _colour(colours, k)) for k, name in causes),
+        *(dashed if any(map(_is_near, joints)) else []),
+        *(key(f"used of {KINDS[kind]}", colours["ink"], linewidth=5, alpha=_SHADES[kind]) for kind in kinds),
     ]
