@@ -9,10 +9,10 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import robot_dyn as rd
-from robot_dyn.description import check
 from robot_dyn.foundations import EditError, NotFiniteError, OverflowedError, QueryError, UndecidedError
 from robot_dyn.lagrange import articulated_body
 from robot_dyn.queries import EQUATION
+from tests.chains import body, chain
 from tests.codegen.arms import compiled
 from tests.long import long
 from tests.queries import ARGUMENTS, FRAMED
@@ -113,27 +113,14 @@ def test_a_way_to_deal_with_errors_is_one_of_two(engine: Any) -> None:
         engine.M(np.ones((2, 6)), errors="ignore")
 
 
-def planar_chain(n: int) -> rd.Robot:
-    """Equal bars about parallel axes."""
-    parts = ['<link name="l0"/>']
-    for i in range(n):
-        parts.append(
-            f'<link name="l{i + 1}"><inertial><origin xyz="0.5 0 0"/><mass value="1"/>'
-            '<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.08" iyz="0" izz="0.08"/></inertial></link>'
-            f'<joint name="j{i}" type="continuous"><origin xyz="{float(i > 0)} 0 0"/><axis xyz="0 0 1"/>'
-            f'<parent link="l{i}"/><child link="l{i + 1}"/></joint>'
-        )
-    return rd.Robot(check(f'<robot name="bars">{"".join(parts)}</robot>'.encode(), "bars"))
-
-
 @pytest.mark.parametrize(
     ("n", "dtype", "rounding", "enough"),
     [(64, np.float32, "float32", np.float64), (16, rd.accuracy.Ball(20), "balls of 20 bits", rd.accuracy.Ball(300))],
     ids=["float32", "balls"],
 )
 def test_a_pivot_lost_in_rounding_accuses_no_joint(n: int, dtype: Any, rounding: str, enough: Any) -> None:
-    """Every link has inertia: what is not decided in one arithmetic is answered in a wider one."""
-    robot = planar_chain(n)
+    """Equal bars about parallel axes: what is not decided in one arithmetic is answered in a wider one."""
+    robot = rd.Robot.from_text(chain(*[body(1, "0.5 0 0", (0.01, 0.08, 0.08))] * n, at=("0 0 0", "1 0 0")))
     q, v, tau = np.random.default_rng(2).uniform(-0.01, 0.01, (3, n))
     own = rd.Lagrangian(robot, dtype)
     with pytest.raises(UndecidedError, match=f"not decided: whether joint 'j.*' .* lost in the rounding of {rounding}"):
