@@ -12,8 +12,8 @@ from flint import arb
 
 import robot_dyn as rd
 from robot_dyn import Plant
-from robot_dyn.effects import Active, Bound, Conservative, Dissipative, Effect, Force, Stateful
-from robot_dyn.foundations import EffectError, QueryError
+from robot_dyn.effects import Active, Bound, Conservative, Dissipative, Force, Stateful
+from robot_dyn.foundations import QueryError
 from robot_dyn.scene import BY_KIND
 from tests.effect_examples import EFFECTS, arguments, example
 from tests.user_parts import counted
@@ -225,24 +225,6 @@ def test_a_velocity_of_the_wrong_shape_is_refused(method: str) -> None:
         getattr(plant, method)(0.0, np.ones(2), np.ones(3), *arguments)
 
 
-@pytest.mark.parametrize(
-    ("effect", "coefficient"),
-    [
-        (rd.effects.ViscousFriction([1.0, 2.0, 3.0]), "damping"),
-        (rd.effects.RegularisedCoulombFriction(1.0, [1.0, 2.0, 3.0]), "velocity_scale"),
-        (rd.effects.Spring(1.0, [1.0, 2.0, 3.0]), "rest"),
-        (rd.effects.JointStopSpring([-1.0, -1.0, -1.0], 1.0, 1.0), "lower"),
-        (rd.effects.JointStopDamper(-1.0, [1.0, 1.0, 1.0], 1.0), "upper"),
-        (rd.effects.EffortLimit([1.0, 2.0, 3.0]), "limit"),
-        (rd.effects.ViscousFriction([1.0]), "damping"),
-    ],
-    ids=lambda each: getattr(each, "name", each),
-)
-def test_coefficients_of_another_number_of_joints_are_told_at_the_plant(effect: Effect, coefficient: str) -> None:
-    with pytest.raises(EffectError, match=f"{effect.name}: {coefficient} is of [13] joints?, the arm has 2"):
-        rd.Plant(rd.load("cart_pole"), [effect])
-
-
 def only(effect):
     return rd.Plant(ROBOT, [effect]).effects[0]
 
@@ -272,23 +254,6 @@ def test_an_effect_given_by_name_is_left_as_it_was() -> None:
     effect = rd.effects.ViscousFriction({"hinge": 0.3})
     only(effect)
     assert effect.damping == {"hinge": 0.3}
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: only(rd.effects.Spring({"slid": 1.0})), "stiffness: no joint 'slid'; nearest: slide"),
-        (lambda: only(rd.effects.ViscousFriction({"slide": -1.0})), "damping must not be negative"),
-        (lambda: only(rd.effects.EffortLimit({"slide": -1.0})), "limit must not be negative"),
-        (lambda: only(rd.effects.RegularisedCoulombFriction(1.0, {"slide": 0.0})), "velocity_scale must be positive"),
-        (lambda: only(rd.effects.JointStopSpring({"slide": 1.0}, {"slide": -1.0}, 1.0)), "lower stops must lie below"),
-        (lambda: rd.Plant(rd.Lagrangian(ROBOT), [rd.effects.ViscousFriction("urdf")]), "damping='urdf' needs a Robot"),
-        (lambda: only(rd.effects.ViscousFriction("file")), "damping must be real numbers"),
-    ],
-)
-def test_names_and_values_are_checked_when_the_joints_are_known(make, message: str) -> None:
-    with pytest.raises(EffectError, match=message):
-        make()
 
 
 def test_an_effect_has_one_name_in_python_scene_ledger_and_rollouts() -> None:

@@ -25,6 +25,7 @@ from robot_dyn.scene import (
     starter_names,
 )
 from robot_dyn.scene.manual import manual
+from tests.command import run
 from tests.effect_examples import arguments
 from tests.long import long
 
@@ -263,15 +264,13 @@ kind = "{kind}"
 JOINT = ["pd", "pid", "pd_gravity", "feed_forward", "computed_torque"]
 
 
-def built(tmp_path: Path, kind: str, gains: str):
-    path = tmp_path / "scene.toml"
-    path.write_text(GAINS.format(kind=kind, gains=gains), encoding="utf-8")
-    return rd.read_scene(path).controller
+def built(write, kind: str, gains: str):
+    return rd.read_scene(write(GAINS.format(kind=kind, gains=gains))).controller
 
 
 @pytest.mark.parametrize("kind", JOINT)
-def test_kp_and_kd_are_the_gains(tmp_path, kind: str) -> None:
-    law = built(tmp_path, kind, "kp = [30.0, 20.0]\nkd = {joint_1 = 4.0}")
+def test_kp_and_kd_are_the_gains(write, kind: str) -> None:
+    law = built(write, kind, "kp = [30.0, 20.0]\nkd = {joint_1 = 4.0}")
     np.testing.assert_array_equal(law.kp, [30.0, 20.0])
     np.testing.assert_array_equal(law.kd, [4.0, 0.0])
     if kind == "pid":
@@ -279,16 +278,102 @@ def test_kp_and_kd_are_the_gains(tmp_path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", JOINT)
-def test_frequency_and_damping_ratio_are_kp_and_kd(tmp_path, kind: str) -> None:
+def test_frequency_and_damping_ratio_are_kp_and_kd(write, kind: str) -> None:
     """ω² and 2 ζ ω, times the diagonal of M without a model in the loop."""
-    law = built(tmp_path, kind, "frequency_rad_per_s = 7.0\ndamping_ratio = 0.6")
+    law = built(write, kind, "frequency_rad_per_s = 7.0\ndamping_ratio = 0.6")
     inertia = 1.0 if kind == "computed_torque" else np.diag(rd.load("planar_2r").M([0.3, -0.4]))
     np.testing.assert_allclose(law.kp, 49.0 * inertia * np.ones(2), rtol=1e-15)
     np.testing.assert_allclose(law.kd, 8.4 * inertia * np.ones(2), rtol=1e-15)
 
 
-def test_operational_space_takes_gains_of_the_frame(tmp_path) -> None:
+def test_operational_space_takes_gains_of_the_frame(write) -> None:
     circle = 'frame = "tip"\n[reference]\nkind = "circle"\nradius_m = 0.1\nperiod_s = 1.0\nnormal = [0.0, 1.0, 0.0]'
     circle += "\nto_centre = [1.0, 0.0, 0.0]"
-    law = built(tmp_path, "operational_space", f"kp = 100.0\nkd = 20.0\n{circle}")
+    law = built(write, "operational_space", f"kp = 100.0\nkd = 20.0\n{circle}")
     assert (law.kp, law.kd, law.posture_kp) == (100.0, 20.0, 10.0)
+
+
+HEAD = """robot = "planar_2r"
+duration_s = 0.1
+method = "rk4"
+step_s = 1e-3
+estimate_error = false
+engine = "interpreted"
+[start]
+q = [0.3, -0.4]
+[[effect]]
+kind = "gravity"
+"""
+LOOP = """[control]
+kind = "pd"
+kp = 50.0
+kd = [5.0, 4.0]
+period_s = 0.004
+measurement_delay_periods = 1.0
+actuation_delay_periods = 0.4
+noise_seed = 5
+[[control.position]]
+kind = "noise"
+deviation_rad = 1e-3
+[[control.position]]
+kind = "quantisation"
+resolution_rad = {joint_1 = 1e-4, joint_2 = 2e-4}
+[[control.velocity]]
+kind = "differences"
+[[control.velocity]]
+kind = "low_pass"
+cutoff_rad_per_s = 300.0
+order = 1
+[[control.actuation]]
+kind = "low_pass"
+cutoff_rad_per_s = 400.0
+[[control.actuation]]
+kind = "quantisation"
+resolution_N_m = 0.01
+[[control.actuation]]
+kind = "rate_limit"
+rate_N_m_per_s = 2000.0
+[reference]
+kind = "hold"
+q = [0.5, 0.1]
+"""
+
+
+def by_hand() -> rd.control.Loop:
+    q = rd.control.hold([0.5, 0.1])
+    return rd.control.Loop(
+        rd.control.PD(q, 50.0, [5.0, 4.0], 0.004),
+        [rd.control.Noise(1e-3), rd.control.Quantisation([1e-4, 2e-4])],
+        [rd.control.Differences(), rd.control.LowPass(300.0, 1)],
+        [rd.control.LowPass(400.0), rd.control.Quantisation(0.01), rd.control.RateLimit(2000.0)], 1.0, 0.4, 5,
+    )  # fmt: skip
+
+
+def test_a_loop_of_a_scene_is_that_of_python(write, tmp_path: Path) -> None:
+    setup = rd.read_scene(write(HEAD + LOOP))
+    one, two = rd.simulate(setup), rd.simulate(setup, controller=by_hand())
+    np.testing.assert_array_equal(one.q, two.q)
+    np.testing.assert_array_equal(one.controller_states, two.controller_states)
+    saved = rd.load_run(rd.save_run(one, tmp_path / "run"))
+    np.testing.assert_array_equal(saved.controller_states, one.controller_states)
+
+
+def test_explain_says_what_stands_in_the_loop_and_what_it_takes(write) -> None:
+    said = run("explain", write(HEAD + LOOP)).stdout
+    for line in (
+        "u = kp (q_d − q) + kd (v_d − v)",
+        "measurement_delay_periods = 1.0  (scene)",
+        "position: quantisation, y = Δ ⌊x/Δ + ½⌋",
+        "resolution_rad = {'joint_1': 0.0001, 'joint_2': 0.0002}  (scene)",
+        "order = 2  (default)",
+        "machine code of a tick of the control: ",
+        "; pd alone takes 8",
+    ):
+        assert line in said, line
+    assert "of the control" not in said.partition("\ncontrol: ")[0]  # nothing is left out
+    said = run("explain", write(HEAD + LOOP.partition("measurement_delay")[0])).stdout
+    assert (
+        "of the control: measurement_delay, actuation_delay, noise, quantisation, low_pass, differences, rate_limit"
+        in said
+    )
+    assert "machine code of a tick of the control: 8 instructions\n" in said
