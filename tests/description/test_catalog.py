@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import warnings
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -46,18 +47,23 @@ def test_names_are_sorted_and_hold_the_well_known_and_the_own_robots():
     assert set(REFUSED) <= set(names)
 
 
+@cache
+def of_catalog(name: str) -> rd.Robot:
+    """A robot without its warnings, loaded once in a process."""
+    with warnings.catch_warnings(action="ignore", category=ModelWarning):
+        return rd.load(name)
+
+
 @pytest.mark.parametrize("name", rd.list_robots())
 def test_every_name_loads_or_says_why_not(name: str):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ModelWarning)
-        if name in REFUSED:
-            with pytest.raises(DescriptionError, match=REFUSED[name]) as refusal:
-                rd.load(name)
-            assert str(refusal.value).startswith(str(catalog.find(name)))
-        else:
-            robot = rd.load(name)
-            assert robot.n == len(robot.joint_names) > 0
-            assert robot.description.source == str(catalog.find(name))
+    if name in REFUSED:
+        with pytest.raises(DescriptionError, match=REFUSED[name]) as refusal:
+            rd.load(name)
+        assert str(refusal.value).startswith(str(catalog.find(name)))
+    else:
+        robot = of_catalog(name)
+        assert robot.n == len(robot.joint_names) > 0
+        assert robot.description.source == str(catalog.find(name))
 
 
 @pytest.mark.parametrize("name", ["human", "romeo", "massless_tip"])

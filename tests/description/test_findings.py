@@ -12,6 +12,7 @@ import robot_dyn as rd
 from robot_dyn import ModelWarning
 from robot_dyn.foundations import EffectError, SceneError
 from tests.chains import body, chain
+from tests.description.test_catalog import REFUSED, of_catalog
 from tests.hostile.kinds import BODY, LIMIT, MOMENTS, POINT, inside, joint
 from tests.hostile.kinds import arm as altered
 from tests.snapshots import assert_text
@@ -26,7 +27,6 @@ MOBILE = {
     "talos_full_v2_box", "talos_reduced", "talos_reduced_box", "talos_reduced_corrected", "tiago", "tiago_dual",
     "tiago_no_hand", "tiago_pro",
 }  # fmt: skip
-REFUSED = {"alex_psyonic_hands", "hector", "iris_simple", "ur3_empty"}
 NO_LIMITS = {"double_pendulum", "double_pendulum_continuous", "double_pendulum_simple", "iris", "romeo"}
 
 
@@ -41,9 +41,7 @@ def findings(text: str, tmp_path: Path, **changes) -> tuple[str, ...]:
 @pytest.fixture(scope="module")
 def catalog() -> dict[str, tuple[str, ...]]:
     """The findings about each robot of the catalog."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ModelWarning)
-        return {name: rd.load(name).findings for name in rd.list_robots() if name not in REFUSED}
+    return {name: of_catalog(name).findings for name in rd.list_robots() if name not in REFUSED}
 
 
 def holds(catalog: dict[str, tuple[str, ...]], words: str) -> set[str]:
