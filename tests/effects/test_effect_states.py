@@ -147,16 +147,21 @@ def test_both_engines_make_the_same_run_of_effects_with_states(method: str, peri
     np.testing.assert_allclose(equation_of_motion, ours.u - torque, atol=1e-9)
 
 
+def only_takes_energy(swing: rd.Trajectory, effect: str, moved: float) -> None:
+    """Work done on it minus what it stores never falls; without storage it would."""
+    work, stored = swing.ledger.work[effect], swing.ledger.stored[effect]
+    assert np.diff(work + stored).max() < 1e-9
+    assert np.diff(work).max() > moved
+
+
 def test_passive_bristles_only_take_energy() -> None:
-    """With σ₂ ≥ σ₁ (f_s/f_c − 1), work done on it minus what it stores never falls; without storage it would."""
+    """With σ₂ ≥ σ₁ (f_s/f_c − 1)."""
     friction = rd.effects.LuGreFriction(200.0, 0.5, 0.4, 1.0, 1.6, 0.1)
     swing = rd.simulate(
         rd.Plant(rd.load("pendulum"), [friction]), q0=[0.9], duration_s=3.0, integrator="rk4", step_s=5e-4,
         record_period_s=0.01, estimate_error=False,
     )  # fmt: skip
-    work, stored = swing.ledger.work["lugre_friction"], swing.ledger.stored["lugre_friction"]
-    assert np.diff(work + stored).max() < 1e-9
-    assert np.diff(work).max() > 1e-6
+    only_takes_energy(swing, "lugre_friction", 1e-6)
     assert swing.ledger.closure < 1e-7
 
 
@@ -256,11 +261,7 @@ def test_the_hysteresis_is_that_of_the_closed_form(exponent: float | None, engin
 
 @pytest.mark.parametrize("exponent", [2.5, *long([None])])
 def test_bristles_only_take_energy(exponent: float | None) -> None:
-    """Work done on them less what they store never falls; without storage it would."""
-    swing = dahl_run(exponent, "interpreted")
-    work, stored = swing.ledger.work["dahl_friction"], swing.ledger.stored["dahl_friction"]
-    assert np.diff(work + stored).max() < 1e-9
-    assert np.diff(work).max() > 1e-3
+    only_takes_energy(dahl_run(exponent, "interpreted"), "dahl_friction", 1e-3)
 
 
 def test_an_exponent_of_one_that_is_stated_is_the_default() -> None:
