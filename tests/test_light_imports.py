@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from tests.test_public_rooms import ROOMS
+from tests.test_tree import ROOMS
 
 CONTROL = """import pathlib, importlib, robot_dyn.control as control
 for file in pathlib.Path(control.__file__).parent.glob('*.py'):

@@ -1,4 +1,4 @@
-"""Every block of the README and every script runs, as a newcomer would run it."""
+"""Every block of the README and of the how-to pages, and every script, runs as a newcomer would run it."""
 
 from __future__ import annotations
 
@@ -24,8 +24,6 @@ from tests.long import long, stress
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
-BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
-PYTHON = [text for language, text in BLOCKS if language == "python"]
 ENVIRONMENT = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
 
 
@@ -34,29 +32,12 @@ def commands_of(page: Path) -> list[str]:
     return re.findall(r"^\$ (robot-dyn .*)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
 
 
-COMMANDS = commands_of(ROOT / "README.md")
-
-
 def run(*command: str, folder: Path = ROOT) -> str:
     done = subprocess.run(
         command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=300, check=False
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
-
-
-def test_readme_has_blocks_to_run() -> None:
-    assert len(PYTHON) >= 2
-    assert len(COMMANDS) >= 3
-
-
-def test_python_of_the_readme_prints_what_it_says(capsys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)  # where its page is written
-    assert check_prints(ROOT / "README.md", capsys) > 8
-
-
-def test_python_of_the_page_on_extending_prints_what_it_says(capsys) -> None:
-    assert check_prints(ROOT / "docs" / "developers" / "extending.md", capsys) > 8
 
 
 def test_no_block_of_the_readme_says_no_more_than_true() -> None:
@@ -90,10 +71,12 @@ def run_commands(commands: list[str], start: Callable[..., str], folder: Path) -
             (folder / file).write_text(printed, encoding="utf-8")
 
 
-@pytest.mark.parametrize("start", [with_few_samples_here, *long([in_a_process])], ids=["here", "process"])
-def test_commands_of_the_readme_run(start: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.long
+def test_commands_of_the_readme_run_in_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    run_commands(COMMANDS, start, tmp_path)
+    commands = commands_of(ROOT / "README.md")
+    assert len(commands) >= 3
+    run_commands(commands, in_a_process, tmp_path)
 
 
 IN_CHECK = {"words.py"}  # `make check` runs it
@@ -159,3 +142,54 @@ def check_prints(document: Path, capsys: pytest.CaptureFixture[str]) -> int:
             held += len(expected)
     assert held == sum(block.count("# →") for block in blocks)  # none stands where it is not looked for
     return held
+
+
+INDEX = ROOT / "docs" / "how_to" / "README.md"
+PAGES = sorted(set(INDEX.parent.glob("*.md")) - {INDEX})
+EXTRAS = {
+    "are_the_motors_big_enough.md": ("toppra",),
+    "data_for_other_tools.md": ("pandas", "xarray", "pyarrow", "mcap_ros2"),
+    "follow_a_recorded_motion.md": ("mcap_ros2",),
+    "how_fast_can_it_go.md": ("ruckig", "toppra"),
+    "sweep.md": ("pyarrow",),
+}
+
+
+IN_SHORT = {"query_an_arm", "mjcf", "follow_a_recorded_motion", "data_for_other_tools", "a_real_control_loop"}
+SHORT = [page for page in PAGES if page.stem in IN_SHORT]
+SOME = [*SHORT, *long(page for page in PAGES if page not in SHORT)]
+OF_MANY_LINES = [ROOT / "README.md", ROOT / "docs" / "developers" / "extending.md"]
+
+
+@pytest.mark.parametrize("page", [*OF_MANY_LINES, *SOME], ids=lambda page: page.stem)
+def test_blocks_run_and_print_what_the_page_says(page: Path, tmp_path: Path, monkeypatch, capsys) -> None:
+    """The Python first, whose files the commands take."""
+    for module in EXTRAS.get(page.name, ()):
+        pytest.importorskip(module)
+    monkeypatch.chdir(tmp_path)
+    assert check_prints(page, capsys) > (8 if page in OF_MANY_LINES else 0)
+    run_commands(untimed(commands_of(page)), with_few_samples_here, tmp_path)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_page_begins_with_its_question(page: Path) -> None:
+    lines = page.read_text(encoding="utf-8").splitlines()
+    assert re.fullmatch(r"\*.+[.?]\*", lines[2])
+
+
+def test_the_index_names_each_page_by_its_question() -> None:
+    rows = re.findall(r"^\| (.+) \| \[(.+)\]\((\w+\.md)\) \|$", INDEX.read_text(encoding="utf-8"), re.MULTILINE)
+    heads = {page.name: page.read_text(encoding="utf-8").splitlines() for page in PAGES}
+    assert sorted(rows) == sorted(
+        (head[2].strip("*"), head[0].removeprefix("# "), name) for name, head in heads.items()
+    )
+
+
+def test_versions_that_pages_name_are_those_of_the_lock() -> None:
+    """What a page says was tried, was; rerun-sdk is tried where it is installed, and is not locked."""
+    lock = (ROOT / "requirements-dev.lock").read_text(encoding="utf-8")
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    named = re.findall(r"\b([A-Za-z][\w-]*) (\d+\.\d+\.\d+)\b(?!\.\d)", text)
+    assert len(named) >= 5
+    stale = [f"{name} {version}" for name, version in named if f"\n{name.lower()}=={version} " not in lock]
+    assert [each for each in stale if not each.startswith("rerun-sdk ")] == []

@@ -7,7 +7,7 @@
     stress   what breaks first on an arm
 
 A tool imports names that a folder of the core lists in its `__init__.pyi`, with the exceptions in
-tests/test_imports.py. No other folder of the package imports a tool, and no tool imports another. Their commands and
+tests/test_tree.py. No other folder of the package imports a tool, and no tool imports another. Their commands and
 scene tables are entry points (`robot_dyn.commands`, `robot_dyn.scene_tables` in pyproject.toml), imported when they are
 used.
 """

@@ -15,6 +15,7 @@ from robot_dyn.accuracy.certificate.diagram import draw
 from robot_dyn.accuracy.correct_digits import QUANTITIES
 from robot_dyn.lagrange import articulated_body
 from robot_dyn.queries import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
+from tests.chains import body, chain
 from tests.long import long
 
 GIVEN = {"q": [0.3, -1.1], "v": [0.5, 0.4], "a": [0.2, 0.9], "tau": [1.0, -2.0]}
@@ -213,15 +214,7 @@ def test_articulated_bodies_answer_a_batch_with_joints_that_slide() -> None:
 
 def test_an_implementation_whose_numbers_overflow_everywhere_is_left_out_by_name() -> None:
     """A joint that turns its follower 1e9 times as fast: C of it is beyond float32."""
-    pendulum = """<link name="{0}"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
-    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>"""
-    joint = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><axis xyz="0 1 0"/>
-    <limit lower="-1" upper="1" effort="1" velocity="1"/>{3}</joint>"""
-    text = (
-        '<robot name="gear"><link name="base"/>' + pendulum.format("a") + pendulum.format("b")
-        + joint.format("lead", "base", "a", "")
-        + joint.format("follow", "a", "b", '<mimic joint="lead" multiplier="1e9"/>') + "</robot>"
-    )  # fmt: skip
+    text = chain(*[body(com="0 0 0.1")] * 2, axes=["0 1 0"], last='<mimic joint="j1" multiplier="1e9"/>')
     with pytest.warns(rd.ModelWarning, match="1e\\+09 times"):
         robot = rd.Robot.from_text(text)
     made = rd.accuracy.certify(robot, samples=100, repeats=1)

@@ -20,14 +20,10 @@ from robot_dyn.lagrange import exact as exact_module
 from robot_dyn.lagrange.exact import RESOLUTION, Exact
 from robot_dyn.queries import FORWARD_DYNAMICS, INVERSE_DYNAMICS, C, M, N
 from tests.campaigns.hard.chains import coincident, text
+from tests.chains import body, chain
 
-FAR = """<robot name="far"><link name="base"/><link name="bar"><inertial><origin xyz="1e6 0 0"/><mass value="1.3"/>
-<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>
-<joint name="one" type="continuous"><parent link="base"/><child link="bar"/><axis xyz="0 1 0"/></joint>
-<link name="tip"><inertial><origin xyz="0.25 0 0"/><mass value="0.4"/>
-<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>
-<joint name="two" type="continuous"><parent link="bar"/><child link="tip"/><origin xyz="2e6 0 0"/><axis xyz="0 1 0"/>
-</joint></robot>"""
+THIN = 0.01, 0.03, 0.03
+FAR = chain(body(1.3, "1e6 0 0", THIN), body(0.4, "0.25 0 0", THIN), at=("0 0 0", "2e6 0 0"), axes=["0 1 0"])
 
 
 def state(robot: rd.Robot, seed: int = 5) -> dict[str, np.ndarray]:
@@ -117,7 +113,9 @@ def test_digits_that_a_lever_of_1000_km_costs_are_seen() -> None:
     x = state(robot)
     assert rd.accuracy.digits(robot, "forward_dynamics", x["q"], x["v"], x["tau"]) < 11
     assert rd.accuracy.digits(robot, "M", x["q"]) > 14
-    with pytest.warns(rd.PrecisionWarning, match=r"^forward_dynamics of far has 10\.\d digits, fewer than 13; use rd"):
+    with pytest.warns(
+        rd.PrecisionWarning, match=r"^forward_dynamics of chain has 10\.\d digits, fewer than 13; use rd"
+    ):
         rd.accuracy.warn_below(robot, 13).forward_dynamics(x["q"], x["v"], x["tau"])
 
 

@@ -26,6 +26,7 @@ from robot_dyn.report import Budget
 from robot_dyn.scene import starter
 from robot_dyn.simulation import StateEquation, machine_code
 from robot_dyn.simulation.compiled.cache import machine_code_of_constants
+from tests.chains import body, chain
 from tests.long import long
 
 ARM = rd.load("planar_2r")
@@ -141,7 +142,8 @@ def test_machine_code_of_constants_has_no_inputs_and_the_numbers_of_its_robot() 
 
 
 def test_what_cannot_be_done_is_said_with_the_reason() -> None:
-    coupled = rd.accuracy.cost(rd.load("mimic_chain"), np.full(rd.load("mimic_chain").n, 0.3), **TINY)
+    follows = chain(*[body(0.7, "0.1 0 0", 0.02)] * 2, last='<mimic joint="j1"/>')
+    coupled = rd.accuracy.cost(rd.Robot.from_text(follows), [0.3], **TINY)
     assert any("joints are coupled" in each for each in coupled.left_out)
     assert any("right angles of the file: the file states none" in each for each in coupled.left_out)
 

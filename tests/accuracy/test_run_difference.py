@@ -14,6 +14,7 @@ import robot_dyn as rd
 from robot_dyn.accuracy.run_difference_figure import draw
 from robot_dyn.foundations import QueryError
 from tests.campaigns.run_pairs import one_motion, two_motions
+from tests.chains import body, chain
 from tests.cli.test_command_documents import names, promised
 from tests.command import document
 from tests.command import run as ran
@@ -285,13 +286,7 @@ def test_titles_of_many_joints_with_long_names_do_not_overlap() -> None:
     from matplotlib.text import Text
 
     names = [f"left_hand_middle_finger_distal_phalanx_flexion_joint_{k}" for k in range(12)]
-    joints = "".join(
-        f'<link name="l{k + 1}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-        f'</inertial></link><joint name="{name}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/>'
-        '<axis xyz="0 0 1"/></joint>'
-        for k, name in enumerate(names)
-    )
-    arm = rd.Robot.from_text(f'<robot name="chain"><link name="l0"/>{joints}</robot>')
+    arm = rd.Robot.from_text(chain(*[body()] * 12, names=names))
     a, b = (rd.simulate(arm, q0=np.full(12, q), duration_s=0.02, estimate_error=False) for q in (0.0, 0.1))
     for theme in ("light", "page"):
         figure = draw(rd.compare_runs(a, b), theme)

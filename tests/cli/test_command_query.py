@@ -1,7 +1,9 @@
-"""What `info` and `query` answer: the numbers of the library, couplings and locks as stated, shares that add up."""
+"""What `info`, `query`, `compare` and `cache` answer: the numbers of the library, as they are stated and kept."""
 
 from __future__ import annotations
 
+import json
+import os
 import re
 from pathlib import Path
 
@@ -9,8 +11,9 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
+from robot_dyn import Lagrangian
 from robot_dyn.queries import QUANTITIES, without_rounding
-from tests.command import ROOT, document, run, said
+from tests.command import MAIN, ROOT, document, run, said, spawn
 
 Q, V, A = "-0.1,0.7,-0.4,0.3,0.9,-0.6", "0.2,-0.3,0.4,0.5,-0.6,0.7", "1.1,-1.2,1.3,0.4,0.5,-0.6"
 
@@ -252,3 +255,111 @@ def test_what_rounding_leaves_of_a_vector_is_shown_as_0_and_kept_in_json() -> No
     shown = without_rounding([-0.0, 1e-16, -2e-11, 10.0, np.inf, np.nan])
     assert [f"{x:g}" for x in shown] == ["0", "0", "-2e-11", "10", "inf", "nan"]
     assert without_rounding([]).tolist() == []
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("ROBOT_DYN_CACHE", str(tmp_path / "kernels"))
+    return tmp_path / "kernels"
+
+
+def test_info_names_the_formulation_of_the_fewest_instructions() -> None:
+    answer = document("info", "planar_2r", "--compiled")["compiled"]
+    assert set(answer) >= {"M", "C", "N", "inverse_dynamics", "forward_dynamics"}
+    for row in answer.values():
+        counts = row["instructions"]
+        assert counts[row["served_by"]] == min(counts.values())
+    assert min(answer["forward_dynamics"]["instructions"].values()) > 20  # M⁻¹ of two joints
+    text = said("info", "planar_2r", "--compiled")
+    assert f"{min(answer['M']['instructions'].values())}" in text and "forward_dynamics" in text
+    assert "compiled" not in document("info", "planar_2r")
+
+
+def test_the_cache_is_listed_and_cleared(folder: Path) -> None:
+    assert "0 kernels" in said("cache")
+    rd.Compiled(rd.load("pendulum")).M(np.array([0.3]))
+    listed = document("cache")
+    assert (listed["folder"], len(listed["kernels"])) == (str(folder), 1)
+    assert listed["bytes"] == listed["kernels"][0]["size"] > 1000
+    assert listed["kernels"][0]["key"][:12] in said("cache")
+    cleared = document("cache", "--clear")
+    assert (cleared["removed"], cleared["kernels"], list(folder.iterdir())) == (1, [], [])
+
+
+def test_a_cache_that_is_off_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
+    assert document("cache")["folder"] is None
+    assert "no cache" in said("cache")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="modes are those of POSIX")
+def test_a_folder_that_others_can_enter_is_told_and_not_used(folder: Path) -> None:
+    folder.mkdir(mode=0o755)
+    done = run("cache")
+    assert done.returncode == 0
+    assert "no cache" in done.stdout and "is not yours alone" in done.stderr
+
+
+def test_explain_counts_instructions_by_effect(tmp_path: Path) -> None:
+    from robot_dyn.scene import starter
+
+    scene = tmp_path / "scene.toml"
+    scene.write_text(starter("cart_pole"), encoding="utf-8")
+    line = next(line for line in said("explain", scene).splitlines() if line.startswith("machine code"))
+    assert "instructions; of effects:" in line and "spring" in line
+
+
+def test_compare_agrees():
+    text = said("compare", "ur5", "--samples", "5")
+    assert "1 of 1 agree" in text and "DISAGREE" not in text
+    pendulum = ROOT / "urdf" / "pendulum.urdf"
+    assert "2 of 2 agree" in said("compare", "pendulum", pendulum, "--samples", "3", "--seed", "5")
+
+
+def test_compare_of_a_locked_robot():
+    locked = document("compare", "panda", "--lock", "panda_finger_joint1=0.01", "--samples", "1")
+    assert len(locked["robots"]["panda"]["quantities"]["N"]["state"]["q"]) == 7
+
+
+def test_same_seed_same_states():
+    first, again, other = (document("compare", "pendulum", "--samples", "2", "--seed", s) for s in ("3", "3", "4"))
+    assert first == again != other
+
+
+def test_piped_tables_are_whole():
+    """A pipe has no width: no name is cut or wrapped."""
+    text = said("compare", "panda", "--samples", "2")
+    rows = [line for line in text.splitlines() if re.match(r"[MCN] +\d", line)]
+    assert len(rows) == 3 and all(re.search(r"panda_(finger_)?joint\d", row) for row in rows)
+    assert "…" not in text
+
+
+def err_by(monkeypatch: pytest.MonkeyPatch, error: float) -> None:
+    """Let the library's own implementation say a wrong N."""
+    exact = Lagrangian.N
+    monkeypatch.setattr(Lagrangian, "N", lambda self, q: exact(self, q) + error)
+
+
+def test_compare_says_where_the_implementations_disagree(monkeypatch: pytest.MonkeyPatch):
+    err_by(monkeypatch, 1e-9)
+    done = run("compare", "ur5", "--samples", "2")
+    assert (done.returncode, done.stderr) == (1, "")
+    assert re.search(r"^N .*DISAGREE", done.stdout, re.M) and "0 of 1 agree" in done.stdout
+    done = run("compare", "pendulum", "ur5", "--samples", "2", "--json")
+    answer = json.loads(done.stdout)
+    assert done.returncode == 1 and answer["ok"] is False
+    assert answer["robots"]["ur5"]["quantities"]["N"]["ok"] is False
+    assert answer["robots"]["ur5"]["quantities"]["M"]["ok"] is True
+
+
+def test_a_process_of_compare_exits_with_1_when_the_implementations_disagree():
+    wrong = "from robot_dyn.lagrange.lagrangian import Lagrangian as L; N = L.N; L.N = lambda self, q: N(self, q) + 1"
+    done = spawn("compare", "pendulum", "--samples", "1", code=f"{wrong}\n{MAIN}")
+    assert (done.returncode, done.stderr) == (1, b"") and b"DISAGREE" in done.stdout
+
+
+def test_a_implementation_that_says_nan_disagrees_in_valid_json(monkeypatch: pytest.MonkeyPatch):
+    err_by(monkeypatch, float("nan"))
+    done = run("compare", "ur5", "--samples", "1", "--json")
+    assert done.returncode == 1
+    assert json.loads(done.stdout, parse_constant=pytest.fail)["robots"]["ur5"]["quantities"]["N"]["error"] is None

@@ -1,4 +1,4 @@
-"""Commands that show a run: what they write, and what they say where they cannot."""
+"""Commands that show or export a run: what they write, and what they print where they cannot."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from rich.filesize import decimal
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError
 from robot_dyn.cli.commands import demo
 from robot_dyn.view import PLOTS
 from tests.browser import opened
-from tests.command import said
+from tests.command import run, said
 
 PROGRAMS = {"scipy": "SciPy", "mujoco": "MuJoCo", "pydrake": "Drake", "heyoka": "heyoka"}
 
@@ -73,3 +74,30 @@ def test_a_plot_is_written_beside_the_run_unless_told(file, tmp_path) -> None:
 def test_help_names_every_plot() -> None:
     text = said("plot", "--help")
     assert all(name in text.replace("\n", " ") for name in PLOTS)
+
+
+@pytest.fixture
+def files(tmp_path: Path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, integrator="rk4")
+    rd.save_run(rd.simulate(setup), "run.npz")
+    rd.save_rollouts(rd.rollouts(setup, [[0.1], [0.2]]), "runs.npz")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", ["run", "runs"])
+def test_export_writes_the_table_of_a_file(files: Path, name: str) -> None:
+    done = run("export", f"{name}.npz", "-o", "x.csv")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == f"written: x.csv ({decimal((files / 'x.csv').stat().st_size)})\n"
+    table = rd.load_run("run.npz").table() if name == "run" else rd.load_rollouts("runs.npz").table()
+    lines = (files / "x.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == ",".join(table) and len(lines) == 1 + len(next(iter(table.values())))
+
+
+@pytest.mark.parametrize(("suffix", "package"), [("parquet", "pyarrow"), ("nc", "xarray"), ("mcap", "mcap_ros2")])
+def test_the_suffix_says_the_format(files: Path, suffix: str, package: str) -> None:
+    pytest.importorskip(package)
+    done = run("export", "run.npz", "-o", f"x.{suffix}")
+    assert done.returncode == 0, done.stderr
+    assert (files / f"x.{suffix}").read_bytes() == rd.export(rd.load_run("run.npz"), f"y.{suffix}").read_bytes()

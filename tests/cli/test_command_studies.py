@@ -1,4 +1,4 @@
-"""The commands accuracy, cost and certify, as a user meets them."""
+"""The commands accuracy, cost, certify and prove, as a user meets them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.test_command_documents import names, promised
-from tests.command import document, interrupted_at_work, run
+from tests.command import document, interrupted_at_work, refusal, run
 from tests.long import long
 
 SCENE = 'robot = "planar_2r"\nduration_s = 0.1\n{}\n[start]\nq = [0.4, 0.9]\n[[effect]]\nkind = "gravity"\n'
@@ -104,3 +104,37 @@ def test_ctrl_c_ends_the_measurement_and_keeps_what_was_measured(command: str, s
     written = json.loads(out)
     assert written["interrupted"] and "interrupted" in written["left_out"][-1]
     assert written["ladders" if command == "accuracy" else "alternatives"]
+
+
+PROVEN = (
+    'robot = "planar_2r"\nduration_s = 0.05\n[start]\nq = [0.3, -0.4]\nv = [0.7, 1.1]\n[[effect]]\nkind = "gravity"\n'
+)
+
+
+@pytest.fixture
+def proven(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(PROVEN, encoding="utf-8")
+    return path
+
+
+def test_prove_says_the_theorem_and_which_numbers_are_meant(proven: Path) -> None:
+    done = run("prove", proven)
+    assert done.returncode == 0, done.stderr
+    assert "planar_2r: the motion exists and is the only one for 0 ≤ t ≤ 0.05 s" in done.stdout
+    assert re.search(r"joint_1 +\[-?0\.\d{18,} \+/- \d\.\d+e-2\d\]", done.stdout)
+    assert "q(0) [0.3, -0.4] as float64" in done.stdout and "Trusted: " in done.stdout
+
+
+def test_document_of_prove_has_the_keys_that_are_promised(proven: Path) -> None:
+    made = json.loads(run("prove", proven, "--until", "0.01", "--bits", "60", "--json").stdout)
+    assert made.keys() == promised("prove").keys()
+    assert made["proven"] is True and made["until_s"] == 0.01 and max(made["radius_q"]) < 1e-12
+
+
+def test_what_is_not_proven_is_told_by_the_exit_code(proven: Path) -> None:
+    done = run("prove", proven, "--until", "100", "--budget", "0.2")
+    assert done.returncode == 1
+    assert re.search(r"Not proven beyond t = 0\.\d+ s, because the budget of 0\.2 s is spent\.", done.stdout)
+    proven.write_text(PROVEN + '[[effect]]\nkind = "dry_friction"\nlevel_N_m = 1.0\n', encoding="utf-8")
+    assert "effect dry_friction switches" in refusal(["prove", str(proven)])

@@ -1,15 +1,27 @@
-"""Programs of any CasADi Function, and their machine code."""
+"""Programs of any CasADi Function, their machine code, and the writer of it for any number of states."""
 
 from __future__ import annotations
+
+import ctypes
+import re
+from functools import cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
+from flint import arb, ctx
+from llvmlite import ir
 
 from robot_dyn.codegen import Kernel, program_of
 from robot_dyn.codegen.llvm import machine_code
+from robot_dyn.codegen.llvm.elementary import RANGE
+from robot_dyn.codegen.llvm.machine_code import addresses
 from robot_dyn.codegen.llvm.one_state import Status
+from robot_dyn.codegen.llvm.vectors import F32, F64, I64
+from robot_dyn.codegen.llvm.writer import Writer
 from robot_dyn.codegen.program import Kind, Op, Program, Programs
+from robot_dyn.codegen.store.keys import digest
 from robot_dyn.codegen.trace.from_casadi import OperationError, instructions
 from tests.codegen.test_kernel import Memory
 
@@ -157,3 +169,121 @@ def test_machine_code_is_restored_from_a_store(way: str, monkeypatch: pytest.Mon
         memory[key] = damaged
         assert np.array_equal(first, answer())
         assert memory[key] == payload
+
+
+THREE = ca.SX.sym("x", 3)
+TWO = ca.SX.sym("z", 2)
+FIRST = ca.Function("f", [THREE], [ca.vertcat(ca.sin(THREE[0]) * THREE[1], ca.cos(THREE[0] + ca.exp(THREE[2])))])
+SECOND = ca.Function(
+    "g", [TWO, THREE], [ca.vertcat(ca.tanh(TWO[0]) / THREE[1], ca.if_else(TWO[1] < 0, TWO[1], THREE[2]), 1.5)]
+)
+
+
+def both_programs(kind: Any, count: int, any_angle: bool) -> Any:
+    """Writes g(f(x), x) of `count` states: number k of state b at x[k · count + b]; returns the states beyond RANGE."""
+
+    def body(module: Any, name: str) -> None:
+        function = ir.Function(module, ir.FunctionType(I64, [kind.as_pointer()] * 2), name + "both")
+        builder = ir.IRBuilder(function.append_basic_block())
+        writer = Writer(builder, kind, count, any_angle)
+        wide = writer.vectors.type.as_pointer()
+        x, y = (builder.bitcast(pointer, wide) for pointer in function.args)
+
+        def place(array: Any, k: int) -> Any:
+            return builder.gep(array, [ir.Constant(I64, k)])
+
+        inputs = [builder.load(place(x, k), align=writer.vectors.size) for k in range(3)]
+        first = writer.write(program_of(FIRST), [inputs])
+        second = writer.write(program_of(SECOND), [first.results, inputs])
+        for k, value in enumerate(second.results):
+            builder.store(value, place(y, k), align=writer.vectors.size)
+        builder.ret(builder.zext(writer.vectors.any(first.out_of_range), I64))
+
+    return body
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 8, 16])
+@pytest.mark.parametrize(("kind", "dtype"), [(F64, "float64"), (F32, "float32")])
+@pytest.mark.parametrize("any_angle", [False, True])
+def test_programs_are_written_for_any_number_of_states(kind: Any, dtype: str, count: int, any_angle: bool) -> None:
+    """Against CasADi's own virtual machine: 8 ulp of numbers of size 1."""
+    key = digest([str(program_of(FIRST)), str(program_of(SECOND)), dtype, str(count), str(any_angle)])
+    place = addresses(("both",), key, both_programs(kind, count, any_angle), None)[0]
+    both = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)(place)
+    x = np.random.default_rng(count).uniform(0.3, 1.2, (3, count)).astype(dtype)
+    y = np.empty((3, count), dtype)
+    assert both(x.ctypes.data, y.ctypes.data) == 0
+    expected = np.array([SECOND(FIRST(column), column).full().ravel() for column in x.T.astype(float)]).T
+    assert np.max(np.abs(y - expected)) < 8 * np.finfo(dtype).eps
+    x[0, -1] = 2 * RANGE
+    assert both(x.ctypes.data, y.ctypes.data) == (not any_angle)
+
+
+@cache
+def kernel(dtype: str) -> Kernel:
+    """The sine and cosine of one angle, in a kernel of all fast-math flags."""
+    x = ca.SX.sym("x", 1)
+    return Kernel(program_of(ca.Function("f", [x], [ca.vertcat(ca.sin(x), ca.cos(x))])), (2,), dtype)
+
+
+def angles(size: float) -> np.ndarray:
+    """General angles, and those nearest to multiples of π/2, where the reduction cancels most."""
+    rng = np.random.default_rng(4)
+    general = rng.uniform(-size, size, 1500)
+    return np.concatenate([general, np.round(general[:500] / (np.pi / 2)) * (np.pi / 2)])
+
+
+def ulps(x: np.ndarray, values: np.ndarray, *functions: Any) -> float:
+    """The largest error of values of functions, a column each, in units of the last place of the value."""
+    last = np.spacing(np.abs(values)).astype(float)
+    with ctx.workprec(160):
+        exact = [[function(arb(at)) for function in functions] for at in x.astype(float).tolist()]
+        errors = [[abs(float(arb(a) - b)) for a, b in zip(*row, strict=True)]
+                  for row in zip(values.astype(float).tolist(), exact, strict=True)]  # fmt: skip
+    return float(np.max(np.array(errors) / last))
+
+
+SINE_AND_COSINE = arb.sin, arb.cos
+
+
+@pytest.mark.parametrize("size", [1.0, 1e3, RANGE])
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_sine_and_cosine_in_a_batch_kernel_err_by_less_than_two_ulp(size: float, dtype: str) -> None:
+    """Half an ulp of the last rounding, half of r, and the polynomial: 1.5 measured, 2 allowed."""
+    x = angles(size).astype(dtype)[:, None]
+    x = x[np.abs(x[:, 0]) <= RANGE]
+    y = np.empty((len(x), 2), dtype)
+    assert kernel(dtype).many([x], y) is Status.FINE
+    assert ulps(x[:, 0], y, *SINE_AND_COSINE) < 2
+
+
+@pytest.mark.parametrize("size", [3e5, 1e9, 1e15])
+def test_beyond_the_range_an_exact_path_serves(size: float) -> None:
+    """The C library is right to 1 ulp at any size; one angle beyond the range sends its batch there."""
+    x = angles(size)[:, None]
+    y = np.empty((len(x), 2))
+    assert kernel("float64").many([x], y) is Status.FINE
+    assert ulps(x[:, 0], y, *SINE_AND_COSINE) < 2
+    one = np.empty(2)
+    assert kernel("float64").call(x[7], one) == Status.FAR
+    assert kernel("float64").any_angle(x[7], one) == Status.FINE
+    assert ulps(x[7], one[None], *SINE_AND_COSINE) < 2
+
+
+@pytest.mark.parametrize(("dtype", "allowed"), [("float64", 2.0), ("float32", 1.0)])
+def test_tanh_in_a_batch_kernel_errs_by_less_than_two_ulp(dtype: str, allowed: float) -> None:
+    """Both branches and their seam at 0.625, tiny and saturated arguments, NaN and infinities."""
+    x = ca.SX.sym("x", 1)
+    made = Kernel(program_of(ca.Function("f", [x], [ca.tanh(x)])), (1,), dtype)
+    rng = np.random.default_rng(1)
+    values = np.concatenate([rng.normal(size=1500), rng.uniform(0.6, 0.65, 200), 10.0 ** rng.uniform(-8, 3, 300)])
+    values = values.astype(dtype)[:, None]
+    y = np.empty_like(values)
+    assert made.many([values], y) is Status.FINE
+    assert not re.search(r"\b_?tanhf?\b", made.assembly())  # no call of the C library
+    assert ulps(values[:, 0], y, arb.tanh) < allowed
+    odd = np.resize(np.array([np.nan, np.inf, -np.inf], dtype), (18, 1))
+    result = np.empty_like(odd)
+    assert made.many([odd], result) is Status.ARGUMENT
+    assert np.isnan(result[0])
+    assert np.array_equal(result[1:3, 0], [1.0, -1.0])

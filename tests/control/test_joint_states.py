@@ -12,13 +12,10 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import PlanError
+from tests.control.test_from_samples import ARM, NAMES, REST, T
 
 writer = pytest.importorskip("mcap_ros2.writer")
 
-ARM = rd.load("ur5")
-NAMES = ARM.joint_names
-T = np.linspace(0, 2, 81)
-Q = 0.3 + np.outer(10 * (T / 2) ** 3 - 15 * (T / 2) ** 4 + 6 * (T / 2) ** 5, np.linspace(0.5, 1.0, 6))
 FIRST = 1_700_000_000_123_456_789  # [ns]: of seconds since 1970, a float keeps 2e-7
 LATE = 3_000_000  # [ns] from the measurement to the log, and a varying part of it
 STATE = """std_msgs/Header header
@@ -44,7 +41,7 @@ class Message(NamedTuple):
     position: list[float]
 
 
-def measured(names: tuple[str, ...] = NAMES, q: np.ndarray = Q) -> list[Message]:
+def measured(names: tuple[str, ...] = NAMES, q: np.ndarray = REST) -> list[Message]:
     """The motion, with the joints of each message in another order."""
     rng, found = np.random.default_rng(0), []
     for t, row in zip(T, q, strict=True):
@@ -70,8 +67,8 @@ def write(path: Path, messages: Iterable[Message], topic: str = "/joint_states",
 def test_joints_are_found_by_name_at_the_times_of_the_headers(tmp_path: Path) -> None:
     """The motion is one polynomial of degree 5: times to the nanosecond give it back to rounding of positions."""
     plan = rd.control.from_samples(ARM, write(tmp_path / "log.mcap", measured()))
-    np.testing.assert_allclose(plan.reference.at(T)[0], Q, atol=1e-8)  # 1 ns at 1 rad/s, 9 digits of a stamp
-    np.testing.assert_allclose(plan.reference.at(0.5 * (T[1:] + T[:-1]))[0], 0.5 * (Q[1:] + Q[:-1]), atol=1e-3)
+    np.testing.assert_allclose(plan.reference.at(T)[0], REST, atol=1e-8)  # 1 ns at 1 rad/s, 9 digits of a stamp
+    np.testing.assert_allclose(plan.reference.at(0.5 * (T[1:] + T[:-1]))[0], 0.5 * (REST[1:] + REST[:-1]), atol=1e-3)
     assert plan.reference.start == 0 and plan.duration == pytest.approx(2.0, abs=1e-9) and plan.findings == ()
     assert "topic /joint_states, times of headers, from 1700000000.123456789 s" in plan.method
 
@@ -103,7 +100,7 @@ def test_other_joints_and_messages_of_others_are_left_out_and_said(tmp_path: Pat
 def test_names_of_the_log_are_given_by_joint(tmp_path: Path) -> None:
     path = write(tmp_path / "log.mcap", measured(tuple(f"left_{name}" for name in NAMES)), "/left/states", "/x")
     plan = rd.control.from_samples(ARM, path, joints={name: f"left_{name}" for name in NAMES})
-    np.testing.assert_allclose(plan.reference.at(T)[0], Q, atol=1e-8)
+    np.testing.assert_allclose(plan.reference.at(T)[0], REST, atol=1e-8)
     with pytest.raises(PlanError, match=r"0 messages of /left/states name joints of the arm.*left_wrist"):
         rd.control.from_samples(ARM, path)
 
@@ -169,7 +166,7 @@ def test_a_broken_log_is_refused_by_name(tmp_path: Path, change: Any, message: s
 
 @pytest.mark.parametrize("options", [{"topic": "/joint_states"}, {"time": "header"}])
 def test_options_of_logs_are_refused_for_other_sources(options: dict[str, str]) -> None:
-    table = {"t": T} | dict(zip(NAMES, Q.T, strict=True))
+    table = {"t": T} | dict(zip(NAMES, REST.T, strict=True))
     with pytest.raises(PlanError, match=r"is of an MCAP log, and the samples are not of one"):
         rd.control.from_samples(ARM, table, **options)
 

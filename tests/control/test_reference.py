@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.polynomial import polynomial
 
 import robot_dyn as rd
 from robot_dyn.control import (
@@ -11,6 +12,7 @@ from robot_dyn.control import (
     PiecewisePolynomial,
     Samples,
     circle,
+    extreme_values,
     hold,
     line,
     orientation_error,
@@ -285,7 +287,7 @@ def test_a_spline_has_the_velocities_asked_for_at_its_ends(kind: str) -> None:
     np.testing.assert_allclose(reference.at(TIMES[-1])[1], -0.8, atol=1e-12)
 
 
-def test_the_estimate_along_dense_samples_is_honest(tmp_path) -> None:
+def test_the_estimate_along_dense_samples_is_honest() -> None:
     """Samples nearer than a step: each ends a step, no order is lost, and the error estimate covers the error.
 
     The truth is a run of a tenth of the step; 2 allows for what Richardson's first term leaves out.
@@ -300,8 +302,30 @@ def test_the_estimate_along_dense_samples_is_honest(tmp_path) -> None:
     error = np.abs(run.q[-1] - truth.q[-1]).max()
     assert run.error is not None and run.error.until_s == 0.3
     assert 0 < error < 2 * run.error.largest < 1e-4
-    (tmp_path / "wave.csv").write_text("\n".join(["t,q joint_1,q joint_2", *(f"{x},{x},{2 * x}" for x in t)]))
-    scene = 'robot = "planar_2r"\nduration_s = 0.1\n[control]\nkind = "pd"\nfrequency_rad_per_s = 5.0\n'
-    (tmp_path / "s.toml").write_text(scene + '[reference]\nkind = "samples"\nfile = "wave.csv"\nends = "measured"\n')
-    followed = rd.read_scene(tmp_path / "s.toml").controller.reference
-    np.testing.assert_allclose(followed.at(np.array([0.05]))[0], [[0.05, 0.1]], atol=1e-12)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("pieces", [1, 7, 100])
+def test_extremes_are_those_at_the_roots_of_the_derivative(pieces: int, order: int) -> None:
+    """Eigenvalues of NumPy's companion matrices find a root to 1e-8 and, being extremes, values to its square."""
+    rng = np.random.default_rng(pieces + order)
+    breaks = np.cumsum(np.concatenate([[0.3], rng.uniform(0.1, 0.9, pieces)]))
+    motion = PiecewisePolynomial(breaks, rng.normal(size=(pieces, 6, 3)))
+    found = extreme_values(motion, order)
+    for joint in range(3):
+        values, times = [], []
+        for start, h, table in zip(breaks, np.diff(breaks), motion.coefficients[..., joint], strict=False):
+            p = polynomial.polyder(table, order)
+            roots = polynomial.polyroots(polynomial.polyder(p))
+            real = roots[np.abs(roots.imag) < 1e-9].real
+            at = np.array([0.0, h, *real[(real > 0) & (real < h)]])
+            values, times = [*values, *polynomial.polyval(at, p)], [*times, *(start + at)]
+        low, high = int(np.argmin(values)), int(np.argmax(values))
+        given = found.least[joint], found.greatest[joint], found.at_least[joint], found.at_greatest[joint]
+        np.testing.assert_allclose(given, [values[low], values[high], times[low], times[high]], rtol=1e-7, atol=1e-9)
+
+
+def test_joints_that_rest_have_their_position_as_both() -> None:
+    found = extreme_values(PiecewisePolynomial([0.0, 1.0, 2.0], np.full((2, 1, 2), [[0.3, -0.4]])))
+    np.testing.assert_array_equal(found.least, [0.3, -0.4])
+    np.testing.assert_array_equal(found.greatest, [0.3, -0.4])

@@ -1,18 +1,23 @@
-"""The catalog: names, paths and package:// addresses → files; each name loads or is refused with its reason."""
+"""The catalog: names, paths, package:// addresses and robot_descriptions → files, or a refusal with its reason."""
 
 from __future__ import annotations
 
 import os
 import shutil
+import subprocess
+import sys
 import warnings
+from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import robot_dyn as rd
 from robot_dyn import ModelWarning
 from robot_dyn.description import catalog
-from robot_dyn.foundations import CatalogError, DescriptionError
+from robot_dyn.foundations import CatalogError, DescriptionError, MissingExtraError
+from tests.hostile.kinds import ARM
 
 URDF = Path(__file__).parents[2] / "urdf"
 REFUSED = {
@@ -42,18 +47,23 @@ def test_names_are_sorted_and_hold_the_well_known_and_the_own_robots():
     assert set(REFUSED) <= set(names)
 
 
+@cache
+def of_catalog(name: str) -> rd.Robot:
+    """A robot without its warnings, loaded once in a process."""
+    with warnings.catch_warnings(action="ignore", category=ModelWarning):
+        return rd.load(name)
+
+
 @pytest.mark.parametrize("name", rd.list_robots())
 def test_every_name_loads_or_says_why_not(name: str):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ModelWarning)
-        if name in REFUSED:
-            with pytest.raises(DescriptionError, match=REFUSED[name]) as refusal:
-                rd.load(name)
-            assert str(refusal.value).startswith(str(catalog.find(name)))
-        else:
-            robot = rd.load(name)
-            assert robot.n == len(robot.joint_names) > 0
-            assert robot.description.source == str(catalog.find(name))
+    if name in REFUSED:
+        with pytest.raises(DescriptionError, match=REFUSED[name]) as refusal:
+            rd.load(name)
+        assert str(refusal.value).startswith(str(catalog.find(name)))
+    else:
+        robot = of_catalog(name)
+        assert robot.n == len(robot.joint_names) > 0
+        assert robot.description.source == str(catalog.find(name))
 
 
 @pytest.mark.parametrize("name", ["human", "romeo", "massless_tip"])
@@ -146,3 +156,73 @@ def test_missing_package_lists_the_places_tried(package: Path, monkeypatch: pyte
     for empty in ("package://", "package:///", "package://arms"):
         with pytest.raises(CatalogError, match="no file for package://"):
             rd.load(empty, package_dirs=[package])
+
+
+UR = "robot_descriptions:ur10e_description"
+XACRO = ARM.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ').replace(
+    '<link name="base"/>', '<xacro:arg name="ur_type" default="none"/><xacro:arg name="name" default=""/>'
+    '<link name="$(arg ur_type)_base"/>',
+).replace('parent link="base"', 'parent link="$(arg ur_type)_base"')  # fmt: skip
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache; a module that was imported from another one is imported again."""
+    monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path))
+    monkeypatch.delitem(sys.modules, "robot_descriptions.ur10e_description", raising=False)
+    return tmp_path
+
+
+def git(folder: Path, *words: str) -> str:
+    who = ("-c", "user.name=a", "-c", "user.email=a@b.c")
+    return subprocess.run(["git", "-C", str(folder), *who, *words], check=True, capture_output=True, text=True).stdout
+
+
+def cloned(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clone as the package keeps it, of a commit that is asked for by its variable."""
+    work = cache / "work"
+    (work / "urdf").mkdir(parents=True)
+    (work / "urdf" / "ur.urdf.xacro").write_text(XACRO, encoding="utf-8")
+    git(work, "init", "-q")
+    git(work, "add", ".")
+    git(work, "commit", "-q", "-m", "arm")
+    commit = git(work, "rev-parse", "HEAD").strip()
+    (cache / f"ur_description-{commit}").mkdir()
+    work.rename(cache / f"ur_description-{commit}" / "ur_description")
+    monkeypatch.setenv("ROBOT_DESCRIPTION_COMMIT", commit)
+
+
+def test_what_is_not_on_disk_is_refused_with_the_line_to_run(cache: Path) -> None:
+    with pytest.raises(CatalogError, match="not on disk; run python -m robot_descriptions pull ur10e_description"):
+        rd.load(UR)
+    assert not list(cache.iterdir())
+
+
+def test_what_is_on_disk_is_loaded_with_the_arguments_of_its_xacro_file(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cloned(cache, monkeypatch)
+    robot, q = rd.load(UR), np.array([0.4, -0.7])
+    assert robot.frame_names[0] == "ur10e_base"
+    assert np.array_equal(robot.M(q), rd.Robot.from_text(ARM).M(q))
+    assert rd.load(UR, xacro={"ur_type": "ur3"}).frame_names[0] == "ur3_base"
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("robot_descriptions:ur10e_descripton", "nearest: ur10e_description"),
+        ("robot_descriptions:", "has no ''"),
+        ("robot_descriptions:os", "has no 'os'"),
+        ("ur5", "download=True needs a name"),
+    ],
+)
+def test_other_names_are_refused(name: str, said: str, cache: Path) -> None:
+    with pytest.raises(CatalogError, match=said):
+        rd.load(name, download=True)
+
+
+def test_without_the_package_the_line_that_installs_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "robot_descriptions", None)  # as if it were not there
+    with pytest.raises(MissingExtraError, match=r"pip install 'robot-dyn\[robots\]'"):
+        rd.load(UR)

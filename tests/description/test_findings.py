@@ -11,6 +11,8 @@ import pytest
 import robot_dyn as rd
 from robot_dyn import ModelWarning
 from robot_dyn.foundations import EffectError, SceneError
+from tests.chains import body, chain
+from tests.description.test_catalog import REFUSED, of_catalog
 from tests.hostile.kinds import BODY, LIMIT, MOMENTS, POINT, inside, joint
 from tests.hostile.kinds import arm as altered
 from tests.snapshots import assert_text
@@ -25,7 +27,6 @@ MOBILE = {
     "talos_full_v2_box", "talos_reduced", "talos_reduced_box", "talos_reduced_corrected", "tiago", "tiago_dual",
     "tiago_no_hand", "tiago_pro",
 }  # fmt: skip
-REFUSED = {"alex_psyonic_hands", "hector", "iris_simple", "ur3_empty"}
 NO_LIMITS = {"double_pendulum", "double_pendulum_continuous", "double_pendulum_simple", "iris", "romeo"}
 
 
@@ -40,9 +41,7 @@ def findings(text: str, tmp_path: Path, **changes) -> tuple[str, ...]:
 @pytest.fixture(scope="module")
 def catalog() -> dict[str, tuple[str, ...]]:
     """The findings about each robot of the catalog."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ModelWarning)
-        return {name: rd.load(name).findings for name in rd.list_robots() if name not in REFUSED}
+    return {name: of_catalog(name).findings for name in rd.list_robots() if name not in REFUSED}
 
 
 def holds(catalog: dict[str, tuple[str, ...]], words: str) -> set[str]:
@@ -100,12 +99,7 @@ def test_a_centre_of_mass_is_beyond_reach_from_twice_the_longest_distance_on_arm
 @pytest.mark.parametrize(("offset", "warns"), [(0.009, False), (0.011, True)])
 def test_the_joints_of_a_gimbal_do_not_tell_its_size(tmp_path: Path, offset: float, warns: bool) -> None:
     """Of 1 kg with ½ tr I = 0.015 kg m² some is 0.12 m away: more than 10 times 11 mm, but nothing of a gimbal."""
-    body = '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>'
-    pan, tilt = (f"<link name='{name}'>{body}</link>" for name in ("pan", "tilt"))
-    text = f"""<robot name="gimbal"><link name="base"/>{pan}{tilt}
-      <joint name="yaw" type="continuous"><parent link="base"/><child link="pan"/><axis xyz="0 0 1"/></joint>
-      <joint name="pitch" type="continuous"><parent link="pan"/><child link="tilt"/><axis xyz="0 1 0"/>
-        <origin xyz="0 0 {offset}"/></joint></robot>"""
+    text = chain(*[body(moments=0.01)] * 2, at=("0 0 0", f"0 0 {offset}"), axes=("0 0 1", "0 1 0"))
     assert bool(findings(text, tmp_path)) == warns
 
 

@@ -14,6 +14,7 @@ from robot_dyn.effects import (
     DryFriction,
     EffortLimit,
     ExternalWrench,
+    JointStopDamper,
     JointStopSpring,
     LineSpringDamper,
     LuGreFriction,
@@ -21,6 +22,7 @@ from robot_dyn.effects import (
     RigidBacklash,
     RigidStops,
     SeriesElastic,
+    Spring,
     ViscousFriction,
 )
 from robot_dyn.foundations import EffectError, QueryError
@@ -62,6 +64,25 @@ CONSTRUCTED = [
     (lambda: CarriedPayload(BODY.payload, 0.2, 0.1), "end_s must lie after start_s, got 0.2 and 0.1"),
 ]
 IN_A_PLANT = [
+    *(
+        (lambda effect=effect: plant(effect, arm=CART), f"{effect.name}: {name} is of [13] joints?, the arm has 2")
+        for effect, name in (
+            (ViscousFriction([1.0, 2.0, 3.0]), "damping"),
+            (RegularisedCoulombFriction(1.0, [1.0, 2.0, 3.0]), "velocity_scale"),
+            (Spring(1.0, [1.0, 2.0, 3.0]), "rest"),
+            (JointStopSpring([-1.0, -1.0, -1.0], 1.0, 1.0), "lower"),
+            (JointStopDamper(-1.0, [1.0, 1.0, 1.0], 1.0), "upper"),
+            (EffortLimit([1.0, 2.0, 3.0]), "limit"),
+            (ViscousFriction([1.0]), "damping"),
+        )
+    ),
+    (lambda: plant(Spring({"slid": 1.0}), arm=CART), "stiffness: no joint 'slid'; nearest: slide"),
+    (lambda: plant(ViscousFriction({"slide": -1.0}), arm=CART), "damping must not be negative"),
+    (lambda: plant(EffortLimit({"slide": -1.0}), arm=CART), "limit must not be negative"),
+    (lambda: plant(RegularisedCoulombFriction(1.0, {"slide": 0.0}), arm=CART), "velocity_scale must be positive"),
+    (lambda: plant(JointStopSpring({"slide": 1.0}, {"slide": -1.0}, 1.0), arm=CART), "lower stops must lie below"),
+    (lambda: plant(ViscousFriction("urdf"), arm=rd.Lagrangian(CART)), "damping='urdf' needs a Robot"),
+    (lambda: plant(ViscousFriction("file"), arm=CART), "damping must be real numbers"),
     (lambda: rd.Plant(CART, "friction"), "give effects, or 'urdf'"),
     (lambda: plant(3), "3 is neither a Force nor a Bound"),
     (lambda: rd.Plant(object(), "urdf"), "give a robot, such as rd.load"),

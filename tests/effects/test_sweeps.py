@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from tests.effects.test_dahl import LEVEL, STIFFNESS, beats
-from tests.effects.test_effect_states import ARM, FRICTION, SLIDER, Q
+from tests.effects.test_effect_states import ARM, FRICTION, LEVEL, SLIDER, STIFFNESS, Q, beats
 from tests.effects.test_line_spring_damper import BETWEEN, TO_WORLD, TREE, state
 from tests.long import long
 

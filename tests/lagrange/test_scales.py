@@ -13,6 +13,7 @@ import robot_dyn as rd
 from robot_dyn.cross_check import random_state
 from robot_dyn.description import check
 from robot_dyn.lagrange import floored, magnitudes, scaled
+from tests.chains import body, chain
 from tests.queries import ARGUMENTS, FRAMED, general
 
 FAR = {"potential_energy", "placement"}  # have the distance in them by definition
@@ -30,7 +31,7 @@ def standing_at(xyz: str) -> rd.Robot:
 
 
 @cache
-def chain() -> rd.Robot:
+def long_chain() -> rd.Robot:
     """Ten joints, one of which slides, on links of 1 km, 100 m … 1 µm and of 1001 … 1 kg."""
     parts, parent, before = ['<link name="base"/>'], "base", 0.0
     for i in range(10):
@@ -77,7 +78,7 @@ def test_implementations_agree_wherever_the_base_stands(xyz: str) -> None:
 
 def test_implementations_agree_on_a_chain_from_a_kilometre_to_a_micrometre() -> None:
     """In all quantities to 1e-12 of the terms; C and its products to a few roundings of them, 4u."""
-    result = rd.compare(chain(), samples=5)
+    result = rd.compare(long_chain(), samples=5)
     assert result.ok, result.worst
     for agreement in result.agreements:
         if "oriolis" in agreement.quantity or agreement.quantity in ("C", "Ṁ = C + Cᵀ"):
@@ -86,7 +87,7 @@ def test_implementations_agree_on_a_chain_from_a_kilometre_to_a_micrometre() -> 
 
 def test_the_coriolis_matrix_is_that_of_300_bits() -> None:
     """Entry by entry of A15's Christoffel symbols: 4u of the terms, where world axes leave 1e-7."""
-    robot, rng = chain(), np.random.default_rng(1)
+    robot, rng = long_chain(), np.random.default_rng(1)
     own, proven = rd.Lagrangian(robot), rd.Lagrangian(robot, rd.accuracy.Ball(300))
     state = random_state(robot, rng)
     q, v = state["q"], state["v"]
@@ -99,7 +100,7 @@ def test_the_coriolis_matrix_is_that_of_300_bits() -> None:
 @pytest.mark.long
 def test_kernels_of_a_chain_from_a_kilometre_to_a_micrometre_pass_their_check() -> None:
     """A kernel as right as the robot is handed out, of C and of what is solved with light links."""
-    robot = chain()
+    robot = long_chain()
     fast = rd.Compiled(robot, cache=False)
     q, v, a = general(robot, 2)
     size = magnitudes(rd.Lagrangian(robot).linkage, q)
@@ -109,23 +110,11 @@ def test_kernels_of_a_chain_from_a_kilometre_to_a_micrometre_pass_their_check() 
     assert np.all(np.abs(back - tau) <= 1e-13 * size.inverse_dynamics(v, a))
 
 
-def light(moment: str) -> rd.Robot:
-    """planar_2r with a last link of that moment about its axis and next to no mass."""
-    joint = '<joint name="j{}" type="continuous"><origin xyz="{} 0 0"/><axis xyz="0 0 1"/>'
-    inertia = '<inertial><mass value="{}"/><inertia ixx="{m}" iyy="{m}" izz="{m}" ixy="0" ixz="0" iyz="0"/></inertial>'
-    text = (
-        f'<link name="a"/><link name="b">{inertia.format(2, m="0.1")}</link>'
-        f'<link name="c">{inertia.format("1e-6", m=moment)}</link>'
-        f'{joint.format(1, 0)}<parent link="a"/><child link="b"/></joint>'
-        f'{joint.format(2, 1)}<parent link="b"/><child link="c"/></joint>'
-    )
-    return rd.Robot(check(f'<robot name="light">{text}</robot>'.encode(), "light"))
-
-
 @pytest.mark.parametrize("moment", ["1e-10", "1e-13"])
 def test_a_kernel_of_a_very_light_tip_is_checked_where_it_answers(moment: str) -> None:
     """Torques of 1 N m would turn such a tip at more than 1e10 rad/s², which a kernel declines and does not write."""
-    robot = light(moment)
+    text = chain(body(2, moments=0.1), body("1e-6", moments=moment), at=("0 0 0", "1 0 0"))
+    robot = rd.Robot(check(text.encode(), "light"))
     fast = rd.Compiled(robot, cache=False)
     q, v, a = np.random.default_rng(6).normal(size=(3, 20, 2))
     tau = robot.inverse_dynamics(q, v, a)
@@ -146,13 +135,8 @@ def test_an_entry_without_terms_is_held_to_its_neighbours() -> None:
 @pytest.mark.filterwarnings("ignore::robot_dyn.foundations.errors.ModelWarning")
 def test_compare_says_what_it_cannot_compare() -> None:
     """Products of inertia of 1e6 make M indefinite at most states; all but forward dynamics is compared."""
-    text = (
-        '<link name="a"/><link name="b"/><link name="c"><inertial><mass value="2.5"/>'
-        '<inertia ixx="0.0003" ixy="1e6" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>'
-        '<joint name="j1" type="continuous"><axis xyz="0 1 0"/><parent link="a"/><child link="b"/></joint>'
-        '<joint name="j2" type="continuous"><axis xyz="0 0 1"/><parent link="b"/><child link="c"/></joint>'
-    )
-    robot = rd.Robot(check(f'<robot name="indefinite">{text}</robot>'.encode(), "indefinite"))
+    text = chain("", body(2.5, moments=(0.0003, 0.03, 0.03), ixy="1e6"), axes=("0 1 0", "0 0 1"))
+    robot = rd.Robot(check(text.encode(), "indefinite"))
     result = rd.compare(robot, samples=6)
     assert result.notes[0] == "forward dynamics not compared at 4 of 6 states: M is not positive definite there"
     assert result.ok

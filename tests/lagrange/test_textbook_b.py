@@ -1,16 +1,19 @@
-"""The systems of deck 001, one test a row of the equations: B1–B6, generalised coordinates and the 2R arm."""
+"""The systems of deck 001, one test a row of the equations, B1–B6, and closed forms of arms in both implementations."""
 
 from __future__ import annotations
 
 import casadi as ca
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import robot_dyn as rd
 from robot_dyn import RobotDynError, euler_lagrange
-from robot_dyn.description import box, from_density
+from robot_dyn.description import box, check, from_density
 from robot_dyn.lagrange import EulerLagrange, lagrangian_of_particles
 from robot_dyn.lagrange.generalized_force import generalized_force
+from tests.chains import body, chain
 
 COUNT = 200  # states of a test, as one batch
 GRAVITY = 9.81
@@ -187,6 +190,20 @@ def planar_2r(m, r, l1: float, inertia) -> EulerLagrange:
     return euler_lagrange(kinetic, potential, 2)
 
 
+def closed_form(m, r, l1: float, inertia, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """M, C and N of the deck's 2R arm, which are Spong's, at one state or a batch."""
+    (m1, m2), (r1, r2), (I1, I2) = m, r, inertia
+    (q1, q2), (v1, v2) = q.T, v.T
+    M12 = m2 * (r2**2 + l1 * r2 * np.cos(q2)) + I2
+    M11 = m1 * r1**2 + I1 + m2 * (l1**2 + r2**2 + 2 * l1 * r2 * np.cos(q2)) + I2
+    h = -m2 * l1 * r2 * np.sin(q2)
+    N2 = GRAVITY * m2 * r2 * np.cos(q1 + q2)
+    M = np.array([[M11, M12], [M12, m2 * r2**2 + I2 + 0 * h]])
+    C = np.array([[h * v2, h * (v1 + v2)], [-h * v1, 0 * h]])
+    N = np.array([GRAVITY * (m1 * r1 + m2 * l1) * np.cos(q1) + N2, N2])
+    return M.T, np.moveaxis(C, (0, 1), (-2, -1)), N.T
+
+
 def uniform_bars(rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
     """m, r, l₁, I_zz of two bars with their centres half-way; those of urdf/planar_2r without a generator."""
     m, length = (np.array([2.0, 1.5]), np.array([1.0, 0.8])) if rng is None else rng.uniform(0.3, 3, (2, 2))
@@ -198,17 +215,9 @@ def test_b5_planar_2r_arm_from_its_energies_is_the_closed_form_and_the_urdf() ->
     """M, C, N of equations.md at random bars and of urdf/planar_2r by both implementations; sign of ẋ₂; 1e-13."""
     rng = np.random.default_rng(5)
     q, v = rng.uniform(-3, 3, (2, COUNT, 2))
-    (q1, q2), (v1, v2) = q.T, v.T
     robot = rd.load("planar_2r").with_(gravity=(0.0, 0.0, -GRAVITY))
     for bars in (uniform_bars(rng), uniform_bars(rng), uniform_bars(None)):
-        (m1, m2), (r1, r2), l1, (I1, I2) = bars
-        M12 = m2 * (r2**2 + l1 * r2 * np.cos(q2)) + I2
-        M11 = m1 * r1**2 + I1 + m2 * (l1**2 + r2**2 + 2 * l1 * r2 * np.cos(q2)) + I2
-        M22, h = np.full(COUNT, m2 * r2**2 + I2), -m2 * l1 * r2 * np.sin(q2)
-        M = np.moveaxis(np.array([[M11, M12], [M12, M22]]), -1, 0)
-        C = np.moveaxis(np.array([[h * v2, h * (v1 + v2)], [-h * v1, 0 * h]]), -1, 0)
-        N2 = GRAVITY * m2 * r2 * np.cos(q1 + q2)
-        N = np.stack([GRAVITY * (m1 * r1 + m2 * l1) * np.cos(q1) + N2, N2], axis=-1)
+        M, C, N = closed_form(*bars, q, v)
         arm = planar_2r(*bars)
         scale = 1e-13 * M.max()
         np.testing.assert_allclose(arm.M(0.0, q, v), M, rtol=0, atol=scale)
@@ -219,6 +228,7 @@ def test_b5_planar_2r_arm_from_its_energies_is_the_closed_form_and_the_urdf() ->
         np.testing.assert_allclose(engine.C(q, v), arm.C(0.0, q, v), rtol=0, atol=6 * scale)
         np.testing.assert_allclose(engine.N(q), arm.N(0.0, q), rtol=0, atol=1e-13 * np.abs(N).max())
 
+    _, (_, r2), l1, _ = bars
     centre = generalized_force(
         lambda t, q: [
             [l1 * ca.cos(q[0]) + r2 * ca.cos(q[0] + q[1]), l1 * ca.sin(q[0]) + r2 * ca.sin(q[0] + q[1]), 0],
@@ -247,3 +257,54 @@ def test_b6_inertia_coriolis_vector_and_gravity_make_up_the_torque() -> None:
     np.testing.assert_allclose(robot.inverse_dynamics(q, v, a), tau, rtol=0, atol=scale)
     assert np.linalg.eigvalsh(B).min() > 0
     np.testing.assert_array_equal(B, np.swapaxes(B, -1, -2))
+
+
+ENGINES = (lambda robot: robot, rd.Lagrangian)
+POSITIVE = st.floats(0.1, 5.0)
+ANGLE, RATE = st.floats(-3.0, 3.0), st.floats(-4.0, 4.0)
+
+
+@settings(max_examples=100)
+@given(
+    st.lists(POSITIVE, min_size=2, max_size=2),
+    st.lists(st.floats(0.05, 2.0), min_size=2, max_size=2),
+    st.floats(0.1, 2.0),
+    st.lists(st.floats(0.01, 1.0), min_size=2, max_size=2),
+    st.tuples(ANGLE, ANGLE),
+    st.tuples(RATE, RATE),
+)
+def test_planar_2r_arm_has_its_closed_form(m, r, l1, I, q, v) -> None:  # noqa: E741
+    """In the plane x–y with gravity along −y; a dozen roundings of the largest terms, so 1e-14 of them."""
+    M, C, N = closed_form(m, r, l1, I, np.array(q), np.array(v))
+    terms, force = m[0] * r[0] ** 2 + I[0] + m[1] * (l1 + r[1]) ** 2 + I[1], m[0] * r[0] + m[1] * (l1 + r[1])
+    bars = [body(mass, f"{com!r} 0 0", moment) for mass, com, moment in zip(m, r, I, strict=True)]
+    text = chain(*bars, at=("0 0 0", f"{l1!r} 0 0"))
+    robot = rd.Robot(check(text.encode(), "2r")).with_(gravity=(0.0, -GRAVITY, 0.0))
+    for engine in ENGINES:
+        dynamics = engine(robot)
+        np.testing.assert_allclose(dynamics.M(q), M, rtol=0, atol=1e-14 * terms)
+        np.testing.assert_allclose(dynamics.C(q, v), C, rtol=0, atol=1e-14 * terms * (1 + np.abs(v).sum()))
+        np.testing.assert_allclose(dynamics.N(q), N, rtol=0, atol=1e-14 * GRAVITY * force)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_pendulum_has_its_closed_form(engine) -> None:
+    """Uniform rod about its end: M = m l²/3, V = −m g (l/2) cos q, N = ∂V/∂q; the file prints 18 digits."""
+    dynamics, q, g = engine(rd.load("pendulum")), [0.7], rd.STANDARD_GRAVITY[2]
+    np.testing.assert_allclose(dynamics.M(q), [[1 / 3]], rtol=1e-15)
+    np.testing.assert_allclose(dynamics.N(q), [-g * 0.5 * np.sin(0.7)], rtol=1e-15)
+    np.testing.assert_allclose(dynamics.C(q, [2.0]), [[0.0]], atol=1e-16)
+    np.testing.assert_allclose(dynamics.potential_energy(q), g * 0.5 * np.cos(0.7), rtol=1e-15)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_cart_pole_has_its_closed_form(engine) -> None:
+    """M = [[m_c + m_p, m_p l cos q], [·, I + m_p l²]], C v = (−m_p l sin q v², 0), N = (0, −m_p g l sin q)."""
+    dynamics, (x, q), (xdot, v) = engine(rd.load("cart_pole")), (0.3, 0.8), (0.5, -1.1)
+    mc, mp, length, inertia, g = 5.0, 1.2, 0.6, 0.144, -rd.STANDARD_GRAVITY[2]
+    M12 = mp * length * np.cos(q)
+    np.testing.assert_allclose(dynamics.M([x, q]), [[mc + mp, M12], [M12, inertia + mp * length**2]], rtol=1e-15)
+    np.testing.assert_allclose(
+        dynamics.coriolis_torque([x, q], [xdot, v]), [-mp * length * np.sin(q) * v**2, 0.0], rtol=1e-15, atol=1e-16
+    )
+    np.testing.assert_allclose(dynamics.N([x, q]), [0.0, -mp * g * length * np.sin(q)], rtol=1e-15, atol=1e-15)

@@ -17,7 +17,7 @@ from robot_dyn.foundations import DescriptionError
 from robot_dyn.lagrange import magnitudes
 from robot_dyn.model.coriolis import MOST_ROUNDING
 from robot_dyn.model.regrouped import joint_axes, least_inertia, reach, regrouped, rounding
-from tests.lagrange.test_scales import chain
+from tests.lagrange.test_scales import long_chain
 from tests.long import long, stress
 from tests.random_trees import RandomTree, trees
 
@@ -120,7 +120,7 @@ def test_pinocchio_is_asked_where_the_bound_is_small(name: str) -> None:
 
 def test_body_axes_are_taken_where_the_bound_is_not_small() -> None:
     """A chain of links from 1 km to 1 µm."""
-    assert chain().coriolis.regrouped is None and chain().coriolis.rounding > MOST_ROUNDING
+    assert long_chain().coriolis.regrouped is None and long_chain().coriolis.rounding > MOST_ROUNDING
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda", "z1", "kinova", "mimic_chain", "skew_tree"])

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.description import parameters, unit_inertias
+from robot_dyn.description import parameter_names, parameters, unit_inertias
 from robot_dyn.lagrange import floored, magnitudes
 from robot_dyn.lagrange.recursions.regressor import regressor
 from tests.queries import general
@@ -88,6 +88,16 @@ def test_columns_do_not_depend_on_masses(name: str) -> None:
     assert np.array_equal(heavy.regressor(*state), robot.regressor(*state))
     assert np.array_equal(rd.Lagrangian(heavy).regressor(*state), rd.Lagrangian(robot).regressor(*state))
     np.testing.assert_allclose(heavy.inertial_parameters, 2 * robot.inertial_parameters, rtol=1e-14)
+
+
+def test_a_column_is_the_torque_of_a_unit_of_its_parameter() -> None:
+    """A payload of 1 kg at the frame of a body adds 1 to its mass: ID grows by that column."""
+    robot = rd.load("ur5")
+    q, v, a = general(robot, 10)
+    loaded = robot.with_(payload=rd.Payload("forearm_link", 1.0))
+    grown = loaded.inverse_dynamics(q, v, a) - robot.inverse_dynamics(q, v, a)
+    column = parameter_names(robot.body_names).index("elbow_joint m")
+    np.testing.assert_allclose(robot.regressor(q, v, a)[:, column], grown, rtol=0, atol=1e-13 * np.abs(grown).max())
 
 
 def test_balls_hold_the_regressor() -> None:

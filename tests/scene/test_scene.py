@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,21 @@ import pytest
 
 import robot_dyn as rd
 from robot_dyn.foundations import SceneError
-from robot_dyn.scene import BY_KIND, of_scene, parse_scene, read_both, starter, starter_names
+from robot_dyn.scene import (
+    BY_KIND,
+    Part,
+    control,
+    effects,
+    of_scene,
+    parse_scene,
+    read_both,
+    references,
+    scene,
+    starter,
+    starter_names,
+)
+from robot_dyn.scene.manual import manual
+from tests.command import run
 from tests.effect_examples import arguments
 from tests.long import long
 
@@ -205,3 +220,160 @@ def test_an_explanation_holds_no_key_that_is_not_read(write) -> None:
     for key in ("frame =", "integral_rate", "effort_limit_N_m", "damping_ratio", "frequency"):
         assert key not in text
     assert "kp = 3.0  (scene)" in text and "pendulum: 1 joint, " in text
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenes.md"
+PARTS = [
+    each
+    for module in (scene, control, effects, references)
+    for each in vars(module).values()
+    if isinstance(each, type) and issubclass(each, Part) and each is not Part
+]
+
+
+def test_the_page_is_that_of_the_schema() -> None:
+    command = "python -m robot_dyn.scene.manual > docs/reference/scenes.md"
+    assert PAGE.read_text(encoding="utf-8") == manual(), f"the page is out of date; write it by {command}"
+
+
+@pytest.mark.parametrize("part", PARTS, ids=lambda each: each.__name__)
+def test_every_key_is_explained(part: type[Part]) -> None:
+    assert part.__doc__
+    assert [key for key, field in part.model_fields.items() if not field.description and key != "kind"] == []
+
+
+def test_every_kind_and_every_key_of_the_starters_is_on_the_page() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert all(f'### `kind = "{kind}"`' in page for kind in BY_KIND)
+    text = "\n".join(starter(name) for name in starter_names())
+    stated = {line.partition("=")[0].strip() for line in text.splitlines() if "=" in line and line[0] not in "#["}
+    assert stated and all(f"`{key}`" in page or key == "kind" for key in stated)
+
+
+GAINS = """
+robot = "planar_2r"
+duration_s = 0.1
+[start]
+q = [0.3, -0.4]
+[[effect]]
+kind = "gravity"
+[control]
+kind = "{kind}"
+{gains}
+"""
+JOINT = ["pd", "pid", "pd_gravity", "feed_forward", "computed_torque"]
+
+
+def built(write, kind: str, gains: str):
+    return rd.read_scene(write(GAINS.format(kind=kind, gains=gains))).controller
+
+
+@pytest.mark.parametrize("kind", JOINT)
+def test_kp_and_kd_are_the_gains(write, kind: str) -> None:
+    law = built(write, kind, "kp = [30.0, 20.0]\nkd = {joint_1 = 4.0}")
+    np.testing.assert_array_equal(law.kp, [30.0, 20.0])
+    np.testing.assert_array_equal(law.kd, [4.0, 0.0])
+    if kind == "pid":
+        np.testing.assert_array_equal(law.ki, [30.0, 20.0])
+
+
+@pytest.mark.parametrize("kind", JOINT)
+def test_frequency_and_damping_ratio_are_kp_and_kd(write, kind: str) -> None:
+    """ω² and 2 ζ ω, times the diagonal of M without a model in the loop."""
+    law = built(write, kind, "frequency_rad_per_s = 7.0\ndamping_ratio = 0.6")
+    inertia = 1.0 if kind == "computed_torque" else np.diag(rd.load("planar_2r").M([0.3, -0.4]))
+    np.testing.assert_allclose(law.kp, 49.0 * inertia * np.ones(2), rtol=1e-15)
+    np.testing.assert_allclose(law.kd, 8.4 * inertia * np.ones(2), rtol=1e-15)
+
+
+def test_operational_space_takes_gains_of_the_frame(write) -> None:
+    circle = 'frame = "tip"\n[reference]\nkind = "circle"\nradius_m = 0.1\nperiod_s = 1.0\nnormal = [0.0, 1.0, 0.0]'
+    circle += "\nto_centre = [1.0, 0.0, 0.0]"
+    law = built(write, "operational_space", f"kp = 100.0\nkd = 20.0\n{circle}")
+    assert (law.kp, law.kd, law.posture_kp) == (100.0, 20.0, 10.0)
+
+
+HEAD = """robot = "planar_2r"
+duration_s = 0.1
+method = "rk4"
+step_s = 1e-3
+estimate_error = false
+engine = "interpreted"
+[start]
+q = [0.3, -0.4]
+[[effect]]
+kind = "gravity"
+"""
+LOOP = """[control]
+kind = "pd"
+kp = 50.0
+kd = [5.0, 4.0]
+period_s = 0.004
+measurement_delay_periods = 1.0
+actuation_delay_periods = 0.4
+noise_seed = 5
+[[control.position]]
+kind = "noise"
+deviation_rad = 1e-3
+[[control.position]]
+kind = "quantisation"
+resolution_rad = {joint_1 = 1e-4, joint_2 = 2e-4}
+[[control.velocity]]
+kind = "differences"
+[[control.velocity]]
+kind = "low_pass"
+cutoff_rad_per_s = 300.0
+order = 1
+[[control.actuation]]
+kind = "low_pass"
+cutoff_rad_per_s = 400.0
+[[control.actuation]]
+kind = "quantisation"
+resolution_N_m = 0.01
+[[control.actuation]]
+kind = "rate_limit"
+rate_N_m_per_s = 2000.0
+[reference]
+kind = "hold"
+q = [0.5, 0.1]
+"""
+
+
+def by_hand() -> rd.control.Loop:
+    q = rd.control.hold([0.5, 0.1])
+    return rd.control.Loop(
+        rd.control.PD(q, 50.0, [5.0, 4.0], 0.004),
+        [rd.control.Noise(1e-3), rd.control.Quantisation([1e-4, 2e-4])],
+        [rd.control.Differences(), rd.control.LowPass(300.0, 1)],
+        [rd.control.LowPass(400.0), rd.control.Quantisation(0.01), rd.control.RateLimit(2000.0)], 1.0, 0.4, 5,
+    )  # fmt: skip
+
+
+def test_a_loop_of_a_scene_is_that_of_python(write, tmp_path: Path) -> None:
+    setup = rd.read_scene(write(HEAD + LOOP))
+    one, two = rd.simulate(setup), rd.simulate(setup, controller=by_hand())
+    np.testing.assert_array_equal(one.q, two.q)
+    np.testing.assert_array_equal(one.controller_states, two.controller_states)
+    saved = rd.load_run(rd.save_run(one, tmp_path / "run"))
+    np.testing.assert_array_equal(saved.controller_states, one.controller_states)
+
+
+def test_explain_says_what_stands_in_the_loop_and_what_it_takes(write) -> None:
+    said = run("explain", write(HEAD + LOOP)).stdout
+    for line in (
+        "u = kp (q_d − q) + kd (v_d − v)",
+        "measurement_delay_periods = 1.0  (scene)",
+        "position: quantisation, y = Δ ⌊x/Δ + ½⌋",
+        "resolution_rad = {'joint_1': 0.0001, 'joint_2': 0.0002}  (scene)",
+        "order = 2  (default)",
+        "machine code of a tick of the control: ",
+        "; pd alone takes 8",
+    ):
+        assert line in said, line
+    assert "of the control" not in said.partition("\ncontrol: ")[0]  # nothing is left out
+    said = run("explain", write(HEAD + LOOP.partition("measurement_delay")[0])).stdout
+    assert (
+        "of the control: measurement_delay, actuation_delay, noise, quantisation, low_pass, differences, rate_limit"
+        in said
+    )
+    assert "machine code of a tick of the control: 8 instructions\n" in said

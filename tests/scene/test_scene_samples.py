@@ -1,4 +1,4 @@
-"""Recorded motions in a scene: those of rd.control.from_samples, with its options; what is doubtful is a warning."""
+"""Recorded motions and way points of files in a scene; a doubtful recording is a warning."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations import PlanWarning, SceneError
+from robot_dyn.foundations import ControlError, PlanWarning, SceneError
+from robot_dyn.scene import of_scene, read_both
 
 SCENE = """robot = "planar_2r"
 duration_s = 0.1
@@ -81,3 +82,51 @@ def test_what_has_no_single_meaning_is_refused(
     write(tmp_path / "log.csv", heads, *columns)
     with pytest.raises(SceneError, match=rf"scene\.toml: .*{message}"):
         reference(tmp_path, 'file = "log.csv"\n' + text)
+
+
+OF_POINTS = """robot = "cart_pole"
+duration_s = 0.1
+[start]
+q = {hinge = 0.3}
+[control]
+kind = "pd"
+frequency_rad_per_s = 5
+[reference]
+kind = "via_points"
+"""
+HEAD = "t [s],q hinge [rad],q slide [m]\n"
+ROWS = "0.5,0.4,0.1\n0.9,-0.2,0.3\n1.6,0.7,0.2\n"
+TIMES, POINTS = [0.5, 0.9, 1.6], [[0.1, 0.4], [0.3, -0.2], [0.2, 0.7]]  # in the order of the joints: slide, hinge
+
+
+def followed(folder: Path, text: str) -> rd.control.PiecewisePolynomial:
+    """What the controller of a scene follows; the scene is written beside its table."""
+    path = folder / "scene.toml"
+    path.write_text(OF_POINTS + text, encoding="utf-8")
+    controller = rd.read_scene(path).controller
+    assert controller is not None and isinstance(controller.desired, rd.control.PiecewisePolynomial)
+    return controller.desired
+
+
+def test_points_of_a_file_are_those_of_the_scene(tmp_path) -> None:
+    """From rest at the start through the rows, columns by the names of joints; a row at 0 s is the start itself."""
+    (tmp_path / "way.csv").write_text(HEAD + ROWS)
+    (tmp_path / "whole.csv").write_text(HEAD + "0,0.3,0\n" + ROWS)
+    stated = followed(tmp_path, f"times_s = {TIMES}\npoints = {POINTS}\n")
+    for name in ("way.csv", "whole.csv"):
+        read = followed(tmp_path, f'file = "{name}"\n')
+        np.testing.assert_array_equal(read.breaks, stated.breaks)
+        np.testing.assert_array_equal(read.coefficients, stated.coefficients)
+    for t, q in zip([0.0, *TIMES], [[0.0, 0.3], *POINTS], strict=True):
+        np.testing.assert_allclose(stated.at(t)[0], q, atol=1e-14)  # units of rounding
+    assert np.abs(stated.at(0.0)[1]).max() == 0
+    assert "file = " in repr(of_scene(*read_both(tmp_path / "scene.toml")))
+
+
+def test_more_points_than_their_equations_can_be_solved_for_are_refused() -> None:
+    """1e6 points would ask for 5e13 numbers."""
+    t = np.arange(1e6)
+    with pytest.raises(
+        ControlError, match=r"points must be 2000 at most, got 1000000; rd\.control\.Samples takes more"
+    ):
+        rd.control.via_points(t, np.zeros((len(t), 1)))
