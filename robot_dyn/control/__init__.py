@@ -1,11 +1,11 @@
 """Torque from a reference and a measured state: each controller owns its model of the arm and never sees the plant.
 
-    each joint alone   PD, PID; gains_from: gains of a frequency and a damping ratio
+    joint by joint     PD, PID; gains_from: gains from a frequency and a damping ratio
     with a model       ComputedTorque, PDGravity, FeedForward
     of a frame         OperationalSpace; task_dynamics (TaskDynamics), orientation_error, rotation_vector
     a function         ControlLaw: (t, q, v) as a controller
     joint motions      quintic, via_points, hold (PiecewisePolynomial), Samples
-    recorded motions   from_samples: of files, data frames, logs and arrays (Plan)
+    recorded motions   from_samples: from files, data frames, logs and arrays (Plan)
     motions of a frame line, circle (CartesianReference); inverse_kinematics (InverseKinematics)
     a real loop        Loop with delays and blocks: Quantisation, Differences, LowPass, RateLimit, Noise
     to write one       Controller, Stateless, Block, Reference: base classes

@@ -20,7 +20,7 @@ from robot_dyn.foundations.spatial import rotation as rotation_about
 from robot_dyn.foundations.validate import duration
 
 _MOST_TURNS = 1000
-_TURN_KNOTS, _RAMP_KNOTS = 64, 32  # per turn and per ramp: the accuracy that `circle` states
+_TURN_KNOTS, _RAMP_KNOTS = 64, 32  # per turn and per ramp, for the accuracy stated in `circle`
 
 
 @final
@@ -29,7 +29,7 @@ class CartesianReference(Reference):
     """A motion of a frame in the base.
 
     Attributes:
-        position: p(t) of its origin, 3 coordinates, in [m].
+        position: p(t) of the frame's origin, 3 coordinates, in [m].
         rotation: R₀, shape (3, 3); None leaves the orientation free.
         axis: Unit axis a of the turn in base axes, shape (3,).
         angle: φ(t), 1 coordinate, in [rad]; None for a constant orientation.
@@ -46,24 +46,25 @@ class CartesianReference(Reference):
         if self.angle is not None and not isinstance(self.angle, PiecewisePolynomial):
             raise ControlError(f"angle must be a PiecewisePolynomial of 1 coordinate, got {shown(self.angle)}")
         if self.angle is not None and (self.rotation is None or self.angle.n != 1):
-            raise ControlError("angle must have 1 coordinate and needs a rotation R₀ that it turns")
+            raise ControlError("angle must have 1 coordinate and needs a rotation R₀ to turn")
         if self.rotation is not None:
             object.__setattr__(self, "rotation", _rotation("rotation", self.rotation))
         object.__setattr__(self, "axis", _direction("axis", self.axis))
 
     @property
     def knots(self) -> np.ndarray:
-        """Times in [s] at which position or angle pass to another polynomial."""
+        """Times in [s] at which the polynomial of the position or the angle changes."""
         return self.position.knots if self.angle is None else np.union1d(self.position.knots, self.angle.knots)
 
     def at(self, t: Scalar) -> tuple[Array, Array | None, Array, Array]:
-        """Position, orientation, twist and its rate at t.
+        """Evaluate position, orientation, twist and rate of the twist at t.
 
         Args:
             t: Time, shape () or (...), in [s].
 
         Returns:
-            (p, R, V, V̇): shapes (..., 3), (..., 3, 3) or None if it is free, (..., 6) and (..., 6), linear part first.
+            (p, R, V, V̇): shapes (..., 3), (..., 3, 3), (..., 6) and (..., 6), linear part first; R is None if the
+            orientation is free.
         """
         p, p_rate, p_rate2 = self.position.at(t)
         if self.angle is None:
@@ -75,18 +76,18 @@ class CartesianReference(Reference):
         return p, R, np.concatenate(V, -1), np.concatenate(V_rate, -1)
 
 
-@np.errstate(all="ignore")  # what overflows is refused as not finite
+@np.errstate(all="ignore")  # the check for finite values catches overflow
 def line(
     p0: Any, p1: Any, duration_s: float, *, rotation: Any = None, rotation_end: Any = None, start_s: float = 0.0
 ) -> CartesianReference:
-    """The straight line from p0 to p1 and the shortest turn between two orientations, both of least jerk from rest.
+    """Return the straight line from p0 to p1 and the shortest turn between two orientations, as minimum-jerk motions.
 
     Args:
         p0: Start, shape (3,), in [m].
-        p1: End, shape (3,).
-        duration_s: In [s], positive.
+        p1: End, shape (3,), in [m].
+        duration_s: Duration, in [s], positive.
         rotation: Orientation at the start, (3, 3); None leaves it free.
-        rotation_end: Orientation at the end, (3, 3); None keeps that of the start.
+        rotation_end: Orientation at the end, (3, 3); None keeps the orientation constant.
         start_s: Time of the start, in [s].
 
     Raises:
@@ -107,7 +108,7 @@ def line(
     return CartesianReference(position, rotation, turn, quintic([0.0], [angle], duration_s, start_s=start_s))
 
 
-@np.errstate(all="ignore")  # what overflows is refused as not finite
+@np.errstate(all="ignore")  # the check for finite values catches overflow
 def circle(
     centre: Any,
     radius: float,
@@ -120,34 +121,34 @@ def circle(
     rotation: Any = None,
     start_s: float = 0.0,
 ) -> CartesianReference:
-    """A circle at constant speed, with a smooth start and end: quintic pieces within 1e-9 of the radius.
+    """Return a circle at constant speed, with a smooth start and end: quintic pieces within 1e-9 of the radius.
 
-    The pieces match p, ṗ, p̈ at 64 knots a turn or more; between knots the distance from the centre is off by less than
-    1e-9 of the radius. The speed rises as the quintic of least jerk over `ramp_s` and falls likewise, so the motion
-    lasts turns · period_s + ramp_s.
+    The pieces match p, ṗ, p̈ at 64 or more knots per turn; between knots the distance from the centre is off by less
+    than 1e-9 of the radius. The speed rises and falls over `ramp_s` as the minimum-jerk quintic, so the motion lasts
+    turns · period_s + ramp_s.
 
     Args:
-        centre: Shape (3,), in [m].
-        radius: In [m], positive.
-        normal: Axis about which it turns by the right hand, shape (3,), of any length.
+        centre: Centre, shape (3,), in [m].
+        radius: Radius, in [m], positive.
+        normal: Axis of the turn by the right-hand rule, shape (3,), of any length.
         period_s: Time of one turn at full speed, in [s].
-        turns: Number of turns, positive, 1000 at most; ramp_s may be at most turns · period_s.
-        ramp_s: Time to full speed in [s]; 0 starts at full speed, with a jump. By default a quarter of the period,
-            or turns · period_s if that is less.
-        toward: Direction from the centre to the starting point; by default that of the base axis (x, y or z) closest
-            to the plane, projected onto it.
+        turns: Number of turns, positive, at most 1000.
+        ramp_s: Time to full speed, in [s], at most turns · period_s; 0 starts at full speed, with a jump. By default
+            a quarter of the period, or turns · period_s if that is less.
+        toward: Direction from the centre to the starting point, (3,); by default the base axis (x, y or z) closest to
+            the plane, projected onto it.
         rotation: Constant orientation, (3, 3); None leaves it free.
         start_s: Time of the start, in [s].
 
     Raises:
-        ControlError: If a value is not allowed.
+        ControlError: If a value is invalid.
 
     Source: Siciliano et al. 2009, sec. 4.3.1 (path primitives).
     """
     centre, r, normal = numbers("centre", centre, (3,)), number("radius", radius, above=0), _direction("normal", normal)
     T, turns = duration("period_s", period_s, error=ControlError), number("turns", turns, above=0)
     if turns > _MOST_TURNS:
-        raise ControlError(f"turns must be at most {_MOST_TURNS}, got {turns:g}; each takes {_TURN_KNOTS} pieces")
+        raise ControlError(f"turns must be at most {_MOST_TURNS}, got {turns:g}; each turn takes {_TURN_KNOTS} pieces")
     rise = number("ramp_s", min(T / 4, turns * T) if ramp_s is None else ramp_s, least=0)
     if rise > turns * T:
         raise ControlError(f"ramp_s must be at most turns · period_s = {turns * T} s, got {rise} s")
@@ -164,7 +165,7 @@ def circle(
 
 
 def _ramped_angle(speed: float, cruise: float, rise: float) -> PiecewisePolynomial:
-    """The angle of a speed that rises by a quintic over `rise`, and falls so that it ends at speed · cruise."""
+    """Return an angle whose rate rises and falls as a quintic over `rise`; it ends at speed · cruise."""
     if rise == 0:
         return PiecewisePolynomial([0.0, cruise], [[[0.0], [speed]]])
     # ∫ 10 s³ − 15 s⁴ + 6 s⁵ is of degree 6, and ½ at s = 1
@@ -177,7 +178,7 @@ def _ramped_angle(speed: float, cruise: float, rise: float) -> PiecewisePolynomi
 
 
 def _knots(angle: PiecewisePolynomial, period: float, rise: float) -> np.ndarray:
-    """Times that cut each phase evenly, _TURN_KNOTS a turn and _RAMP_KNOTS a ramp at least."""
+    """Return times that divide each phase evenly, with at least _TURN_KNOTS per turn and _RAMP_KNOTS per ramp."""
     per_turn = np.ceil(np.diff(angle.breaks) / period * _TURN_KNOTS * (1 - 1e-12)).astype(int)  # 1e-12 for rounding
     ramps = np.isclose(np.diff(angle.breaks), rise)
     counts = np.where(ramps, np.maximum(per_turn, _RAMP_KNOTS), per_turn)
@@ -186,9 +187,9 @@ def _knots(angle: PiecewisePolynomial, period: float, rise: float) -> np.ndarray
     return np.concatenate([*parts, angle.breaks[-1:]])
 
 
-@np.errstate(all="ignore")  # what overflows is refused as not finite
+@np.errstate(all="ignore")  # the check for finite values catches overflow
 def _rotation(name: str, values: Any) -> np.ndarray:
-    """A rotation matrix, frozen; ControlError if RᵀR is not 1 to 1e-8 or det R is not positive."""
+    """Return a rotation matrix, read-only; raise a ControlError if RᵀR is not 1 to 1e-8 or det R is not positive."""
     R = numbers(name, values, (3, 3))
     if not np.abs(R.T @ R - np.eye(3)).max() <= 1e-8 or np.linalg.det(R) < 0:
         raise ControlError(f"{name} must be a rotation matrix, got {shown(values)}")
@@ -196,9 +197,9 @@ def _rotation(name: str, values: Any) -> np.ndarray:
 
 
 def _direction(name: str, values: Any) -> np.ndarray:
-    """A unit vector, (3,), frozen; raises ControlError if it is zero."""
+    """Return a unit vector, (3,), read-only; raise a ControlError if it is zero."""
     vector = numbers(name, values, (3,))
-    largest = np.abs(vector).max()  # scaled by it, no square overflows
+    largest = np.abs(vector).max()  # used as a scale, so that no square overflows
     if not largest > 1e-12:
         raise ControlError(f"{name} must not be zero, got {shown(values)}")
     return numbers(name, vector / largest / np.linalg.norm(vector / largest), (3,))

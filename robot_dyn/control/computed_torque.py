@@ -31,7 +31,7 @@ class ModelBased(Stateless):
         period_s: Sampling period, in [s]; 0 for continuous control.
 
     Raises:
-        ControlError: If the model and the reference differ in the number of joints, or a gain is invalid.
+        ControlError: If the numbers of joints of model and reference differ, or a gain is invalid.
     """
 
     model: Dynamics
@@ -46,7 +46,9 @@ class ModelBased(Stateless):
         check_model(self.model)
         n, count = self.model.n, joint_count(self.reference)
         if n != count:
-            raise ControlError(f"the model has {n} joints, the reference {count}")
+            raise ControlError(
+                f"the model has {n} joints, but the reference has {count}; use a reference of {n} joints"
+            )
         super().__post_init__()
 
     @property

@@ -1,7 +1,7 @@
-"""Base classes of controllers: τ = τ(t, q, v, z), with states ż = rate(t, q, v, z) where one needs some; `ControlLaw`.
+"""Base classes of controllers, τ = τ(t, q, v, z) with optional states ż = rate(t, q, v, z); `ControlLaw`.
 
-The controller states z are states like q and v: a continuous controller (`period_s` 0) has them integrated with the
-plant, a sampled one takes z⁺ = z + period · rate at its ticks and keeps its torque between them (zero-order hold).
+The states z of a continuous controller (`period_s` 0) are integrated with the plant. A sampled controller updates
+z⁺ = z + period · rate at its ticks and keeps its torque constant between them (zero-order hold).
 [Siciliano et al. 2009, ch. 8]
 """
 
@@ -27,11 +27,11 @@ from robot_dyn.queries.dynamics import Dynamics
 
 
 class Nested(NamedTuple):
-    """A part of a controller that consists of others.
+    """A part of a composite controller.
 
     Attributes:
-        path: Where it is, as "controller" or "position.0".
-        label: What its coefficients begin with in sweeps, as "position.quantisation.".
+        path: Path of the attribute, such as "controller" or "position.0".
+        label: Prefix of its coefficients in sweeps, such as "position.quantisation.".
         part: A controller or a block.
     """
 
@@ -57,10 +57,9 @@ class Controller(Value, ABC):
         v: velocity, (n,), in [rad/s] or [m/s]
         z: controller states, (state_size,)
 
-    and with symbols in place of these numbers where it is compiled: written in `robot_dyn.foundations.arithmetic` and
-    NumPy's operators it runs in both engines. Its attributes may be references, models of the arm and numbers, of any
-    names; coefficients that are declared (`robot_dyn.foundations.coefficients`) are checked on construction, and may be
-    swept.
+    and with symbols instead of numbers when it is compiled. Methods that use only `robot_dyn.foundations.arithmetic`
+    and NumPy's operators run in both engines. Attributes may be references, models of the arm and numbers, under any
+    names. Declared coefficients (`robot_dyn.foundations.coefficients`) are checked on construction and may be swept.
 
     Attributes:
         term: The law u = … in short form, for `explain`.
@@ -68,7 +67,7 @@ class Controller(Value, ABC):
     """
 
     term: ClassVar[str] = ""
-    outermost: ClassVar[bool] = False  # whether it may not be part of another controller
+    outermost: ClassVar[bool] = False  # True if it must not be part of another controller
     period_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -78,26 +77,26 @@ class Controller(Value, ABC):
 
     @property
     def name(self) -> str:
-        """Its name in messages: that of its class."""
+        """Name in messages: the name of the class."""
         return type(self).__name__
 
     @property
     def parts(self) -> tuple[Nested, ...]:
-        """Controllers and blocks that it consists of, nested ones included; () for a control law."""
+        """The controllers and blocks inside it, nested ones included; () for a plain control law."""
         return ()
 
     @property
     def references(self) -> dict[str, Reference]:
-        """Its references, by attribute, or by path."""
+        """The references, by attribute or path."""
         return {name: value for name, value in self._attributes() if isinstance(value, Reference)}
 
     @property
     def models(self) -> dict[str, Dynamics]:
-        """Its models of the arm, by attribute, or by path."""
+        """The models of the arm, by attribute or path."""
         return {name: value for name, value in self._attributes() if isinstance(value, Dynamics)}
 
     def _attributes(self) -> Iterator[tuple[str, Any]]:
-        """Its attributes, and those of controllers in it by path."""
+        """Yield the attributes, and by path the attributes of nested controllers."""
         yield from vars(self).items()
         for path, _, part in self.parts:
             if isinstance(part, Controller):
@@ -105,24 +104,24 @@ class Controller(Value, ABC):
 
     @property
     def desired(self) -> Reference | None:
-        """The reference that a run is compared with: its first one, or None."""
+        """The reference that a run is compared with: the first one, or None."""
         return next(iter(self.references.values()), None)
 
     @property
     def task_frame(self) -> str | None:
-        """The link whose motion is controlled; None if it is that of the joints."""
+        """The link whose motion is controlled; None if the controller controls the joints."""
         return None
 
     @property
     def saturation(self) -> Scalar:
-        """Greatest torque that it commands, a scalar or (n,), in [N m] or [N]; inf where nothing limits it."""
+        """Largest torque that it commands, a scalar or (n,), in [N m] or [N]; inf without a limit."""
         return np.inf
 
     def thresholds(self) -> tuple[Threshold, ...]:
-        """Levels of its `demand` where it switches from one smooth formula to another; () if it is smooth everywhere.
+        """Return the levels of `demand` at which it switches between smooth formulas; () if it is smooth everywhere.
 
-        A class that does not define this declares nothing, as of `Effect`. In continuous control, steps of integration
-        end where a level is passed.
+        A class that does not define this method makes no claim; see `Effect.thresholds`. In continuous control,
+        integration steps end where a level is passed.
         """
         return ()
 
@@ -131,13 +130,13 @@ class Controller(Value, ABC):
         return self
 
     def demand(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        """Its torque without a limit, (n,), in [N m] or [N]; by default its torque."""
+        """Return the torque before its limit, (n,), in [N m] or [N]; by default the torque itself."""
         return self.torque(t, q, v, z)
 
     @property
     @abstractmethod
     def n(self) -> int:
-        """Number of joints it drives."""
+        """Number of driven joints."""
 
     @property
     @abstractmethod
@@ -146,30 +145,30 @@ class Controller(Value, ABC):
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Times in [s] at which a reference passes to another polynomial: a step of integration ends there."""
-        return tuple(sorted({t for each in self.references.values() for t in each.knots.tolist()}))
+        """Times in [s] at which a reference changes to another polynomial: integration steps end there."""
+        return tuple(sorted({t for reference in self.references.values() for t in reference.knots.tolist()}))
 
     @abstractmethod
     def torque(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        """Torque that it commands, shape (n,), in [N m] or [N]."""
+        """Return the commanded torque, shape (n,), in [N m] or [N]."""
 
     def state_rate(self, t: float, q: Array, v: Array, z: Array) -> Array:
         """Return the rate ż of the controller states, shape (state_size,), in the unit of z per [s].
 
-        A class that defines `next_state` alone has the mean rate over a period, (z⁺ − z) / period.
+        If the class defines only `next_state`, this is the mean rate over a period, (z⁺ − z) / period.
 
         Raises:
-            ControlError: If the class defines neither, or defines `next_state` alone and acts continuously.
+            ControlError: If the class defines neither method, or only `next_state` without a period.
         """
-        if not self._from_tick_to_tick:
+        if not self._has_only_next_state:
             raise ControlError(f"{self.name} has states: define state_rate(t, q, v, z), or next_state and a period_s")
         if not self.period_s:
-            raise ControlError(f"{self.name} defines next_state alone, a sampled law: give it a period_s")
+            raise ControlError(f"{self.name} defines only next_state, so it is a sampled law: give it a period_s")
         return (self.next_state(t, q, v, z) - z) / self.period_s
 
     @property
-    def _from_tick_to_tick(self) -> bool:
-        """Whether its states are defined by `next_state` alone."""
+    def _has_only_next_state(self) -> bool:
+        """True if the states are defined by `next_state` only."""
         own = type(self)
         return own.state_rate is Controller.state_rate and own.next_state is not Controller.next_state
 
@@ -179,27 +178,27 @@ class Controller(Value, ABC):
 
     @property
     def instants(self) -> tuple[float, ...]:
-        """Times of its ticks in a period, as parts of it: the first is 0."""
+        """Times of the ticks in a period, as fractions of the period; the first is 0."""
         return (0.0,)
 
     @property
     def acting_instant(self) -> int:
-        """Number of the instant at which its torque changes."""
+        """Index of the instant at which the torque changes."""
         return 0
 
     @property
     def cycle(self) -> int:
-        """Number of periods after which its ticks repeat."""
+        """Number of periods after which the ticks repeat."""
         return 1
 
     @property
     def deviates(self) -> int:
-        """Number of its last states that are standard normal deviates, drawn again before each tick."""
+        """Number of states at the end of z that are standard normal deviates, drawn again before each tick."""
         return 0
 
     @property
     def noise_key(self) -> tuple[int, int]:
-        """Seed and number of the run, which determine these deviates."""
+        """Seed and number of the run, which determine the deviates."""
         return 0, 0
 
     def of_run(self, run: int) -> Controller:
@@ -209,18 +208,18 @@ class Controller(Value, ABC):
     def at_period(self, period_s: float) -> Controller:
         """Return the controller with another period, in [s]; 0 for continuous control.
 
-        A sampled law that defines `next_state` alone has no continuous form: it keeps its period then.
+        A sampled law that defines only `next_state` has no continuous form and keeps its period.
         """
-        if not period_s and self._from_tick_to_tick:
+        if not period_s and self._has_only_next_state:
             return self
         return with_values(self, {"period_s": period_s})
 
     def small_signal(self) -> Controller:
-        """Return the controller linearised for small signals: without rounding, for example."""
+        """Return the controller linearised for small signals, for example without rounding."""
         return self
 
     def settled(self, t: float, q: Array, v: Array, z: Array) -> Array:
-        """Return the states of the sampled controller after a motion of constant velocity, from continuous ones z."""
+        """Return the sampled controller's states after a motion at constant velocity, from continuous states z."""
         return z
 
 
@@ -232,7 +231,7 @@ class Stateless(Controller):
         def torque(self, t, q, v, z): ...              # (n,), in [N m] or [N]
         def thresholds(self): ...                      # () if it is smooth everywhere
 
-    and the property `n`, the number of joints. Contract: see `Controller`. A gain that is declared can be swept:
+    and the property `n`, the number of joints. Contract: see `Controller`. A declared gain can be swept:
 
         @dataclass(frozen=True)
         class Damped(rd.control.Stateless):
@@ -256,37 +255,38 @@ class Stateless(Controller):
 
 
 def check_model(model: Any) -> None:
-    """Raise a ControlError unless it is the dynamics of an arm."""
+    """Raise a ControlError unless the model is the dynamics of an arm."""
     if not isinstance(model, Dynamics):
-        raise ControlError(f"model: give a robot, such as rd.load('ur5'), got {shown(model)}")
+        raise ControlError(f"model must be a robot, such as rd.load('ur5'), got {shown(model)}")
 
 
 def check_joints(part: Any, n: int, where: str = "") -> None:
-    """Raise a ControlError if a coefficient of joints is neither one number nor one for each of n joints."""
-    for name, each in declared(type(part)).items():
+    """Raise a ControlError if a coefficient of joints is neither one number nor one number for each of n joints."""
+    for name, declared_as in declared(type(part)).items():
         shape = np.shape(getattr(part, name))
-        if each.of_joints and shape not in ((), (n,)):
+        if declared_as.of_joints and shape not in ((), (n,)):
             raise ControlError(f"{where}{name} must be one number or of shape ({n},), got {shape}")
 
 
 def check_sampled(name: str, controller: Any) -> None:
-    """Raise a ControlError unless it is a sampled controller that may be nested."""
+    """Raise a ControlError unless the controller is sampled and may be nested."""
     if not isinstance(controller, Controller):
         raise ControlError(
             f"{name} must be a controller, such as rd.control.PD(…, period_s=1e-3), got {shown(controller)}"
         )
     if controller.outermost:
         raise ControlError(
-            f"{name} must not be a {type(controller).__name__}: give the controller in it, and put the loop around all"
+            f"{name} must not be a {type(controller).__name__}: pass its inner controller, and put the loop around the"
+            " outermost controller"
         )
     if not controller.period_s > 0:
-        raise ControlError(f"{name} acts continuously, and a loop samples: give {controller.name} a period_s")
+        raise ControlError(f"{name} is continuous, but a loop is sampled: give {controller.name} a period_s")
 
 
 def nested(of: Controller, attribute: str, label: str) -> tuple[Nested, ...]:
-    """Return a controller that is an attribute of another, and its parts."""
+    """Return a controller that is an attribute of another one, and the parts of it."""
     part: Controller = getattr(of, attribute)
-    below = (Nested(f"{attribute}.{path}", f"{label}{inner}", each) for path, inner, each in part.parts)
+    below = (Nested(f"{attribute}.{path}", f"{label}{inner}", x) for path, inner, x in part.parts)
     return Nested(attribute, label, part), *below
 
 
@@ -295,11 +295,11 @@ def nested(of: Controller, attribute: str, label: str) -> tuple[Nested, ...]:
 class ControlLaw(Stateless):
     """A function (t, q, v) → τ as a continuous controller.
 
-    An arm inside a function cannot be traced: make it an attribute of a `Stateless` controller.
+    A model of the arm inside a function cannot be traced: make it an attribute of a `Stateless` controller.
 
     Attributes:
-        function: Returns the torque of each joint, shape (n,), in [N m] or [N].
-        joints: n.
+        function: Function that returns the torque of each joint, shape (n,), in [N m] or [N].
+        joints: Number of joints n.
 
     Raises:
         ControlError: If the function does not take three arguments.
@@ -311,11 +311,11 @@ class ControlLaw(Stateless):
     def __post_init__(self) -> None:
         super().__post_init__()
         with suppress(ValueError):  # the arguments of some functions written in C are unknown
-            known = signature(self.function)
+            parameters = signature(self.function)
             try:
-                known.bind(0.0, None, None)
+                parameters.bind(0.0, None, None)
             except TypeError:
-                raise ControlError(f"controller {self.name}{known}: give a function of (t, q, v)") from None
+                raise ControlError(f"controller {self.name}{parameters}: give a function of (t, q, v)") from None
 
     @property
     def name(self) -> str:

@@ -1,8 +1,8 @@
-"""Extremes of piecewise polynomials: where a derivative is zero, at the ends of pieces, and no grid between.
+"""Extremes of piecewise polynomials, at the zeros of a derivative and at the ends of pieces; no grid is used.
 
-Between two neighbouring zeros of its derivative a polynomial is monotonic, so bisection finds its own zeros: degree by
-degree, from the linear one up. In Bernstein's form the coefficients of a polynomial enclose it, which leaves a few
-pieces of a long motion to look at.
+A polynomial is monotonic between two neighbouring zeros of its derivative, so bisection finds its zeros: degree by
+degree, beginning with the linear derivative. The Bernstein coefficients of a polynomial enclose its values, so only a
+few pieces of a long motion must be examined.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 
 from robot_dyn.control.reference import PiecewisePolynomial
 
-_HALVINGS = 60  # beyond those that floats resolve
-_ROUNDING = 1e-12  # of the largest coefficient
+_HALVINGS = 60  # more than the bits of a double
+_ROUNDING = 1e-12  # relative to the largest coefficient
 
 
 class Extremes(NamedTuple):
-    """The least and the greatest value of each joint, (n,) each, and their times in [s]."""
+    """The smallest and the largest value of each joint, and their times in [s], all (n,)."""
 
     least: np.ndarray
     greatest: np.ndarray
@@ -33,10 +33,10 @@ class Extremes(NamedTuple):
 
 
 def extreme_values(motion: PiecewisePolynomial, order: int = 0) -> Extremes:
-    """The extremes of q (order 0), or of a derivative, between the first and the last break.
+    """Compute the extremes of q (order 0), or of a derivative, between the first and the last break.
 
     Args:
-        motion: With k pieces.
+        motion: A motion of k pieces.
         order: 1 for the velocity, 2 for the acceleration, 3 for the jerk.
     """
     h = np.diff(motion.breaks)
@@ -44,8 +44,8 @@ def extreme_values(motion: PiecewisePolynomial, order: int = 0) -> Extremes:
     for _ in range(order):
         c = _derivative(c)
     c = c / h[:, None, None] ** order
-    kept = _may_be_extreme(c)
-    c, h, starts = c[kept], h[kept], motion.breaks[:-1][kept]
+    candidates = _may_be_extreme(c)
+    c, h, starts = c[candidates], h[candidates], motion.breaks[:-1][candidates]
     s = _critical(c)
     values = _value(c, s)  # (k, n, zeros)
     t = starts[:, None, None] + s * h[:, None, None]
@@ -55,7 +55,7 @@ def extreme_values(motion: PiecewisePolynomial, order: int = 0) -> Extremes:
 
 
 def _may_be_extreme(c: np.ndarray) -> np.ndarray:
-    """Which pieces may hold an extreme of a joint, (k,): those enclosed by values at the starts of pieces do not."""
+    """Return True for pieces that may contain an extreme, (k,): not enclosed by values at the starts of pieces."""
     d = c.shape[-1] - 1
     to_bernstein = np.array([[comb(i, j) / comb(d, j) for i in range(d + 1)] for j in range(d + 1)])
     b, starts = c @ to_bernstein, c[..., 0]
@@ -65,12 +65,12 @@ def _may_be_extreme(c: np.ndarray) -> np.ndarray:
 
 
 def _derivative(c: np.ndarray) -> np.ndarray:
-    """Coefficients of p′ from those of p, (..., d + 1); of a constant, 0."""
+    """Return the coefficients of p′ from the coefficients of p, (..., d + 1); 0 for a constant."""
     return c[..., 1:] * np.arange(1, c.shape[-1]) if c.shape[-1] > 1 else 0 * c
 
 
 def _value(c: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """p(s) for c (..., d + 1) and s (..., m)."""
+    """Evaluate p(s) for c, (..., d + 1), and s, (..., m)."""
     p = np.zeros_like(s)
     for j in reversed(range(c.shape[-1])):
         p = p * s + c[..., j, None]
@@ -78,7 +78,7 @@ def _value(c: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def _critical(c: np.ndarray) -> np.ndarray:
-    """The ends of [0, 1] and the zeros of p′ between them, increasing, (..., m); some are there twice."""
+    """Return the ends of [0, 1] and the zeros of p′ between them, increasing, (..., m), possibly repeated."""
     ends = np.broadcast_to([0.0, 1.0], (*c.shape[:-1], 2))
     if c.shape[-1] <= 2:
         return ends

@@ -1,4 +1,4 @@
-"""Control of each joint alone, with the coupling as a disturbance: τ = kp e + kd ė + ki ∫ e dt, with e = q_d − q.
+"""Independent joint control, with coupling as a disturbance: τ = kp e + kd ė + ki ∫ e dt, with e = q_d − q.
 
 [Siciliano et al. 2009, sec. 8.3; Spong, Hutchinson, Vidyasagar 2006, ch. 6]
 """
@@ -32,7 +32,7 @@ class PD(Stateless):
         reference: q_d(t) of the n joints.
         kp: Stiffness, a scalar or (n,), in [N m/rad] or [N/m], not negative.
         kd: Damping, a scalar or (n,), in [N m s/rad] or [N s/m], not negative.
-        period_s: In [s], 0 for continuous control.
+        period_s: Sampling period, in [s]; 0 for continuous control.
     """
 
     reference: PiecewisePolynomial
@@ -57,7 +57,7 @@ class PD(Stateless):
 class PID(Controller):
     """PD with an integral that does not wind up at an effort limit.
 
-    The state z is the integral's torque. Where the desired torque u exceeds the limit, the excess flows back:
+    The state z is the torque of the integral. If the desired torque u exceeds the limit, the excess is fed back:
 
         τ = sat(u),   u = kp e + kd ė + z,   ż = ki e + (sat(u) − u)/T_t
 
@@ -66,12 +66,12 @@ class PID(Controller):
 
     Attributes:
         reference: q_d(t) of the n joints.
-        kp: A scalar or (n,), in [N m/rad] or [N/m], not negative; likewise kd, with [s].
-        ki: A scalar or (n,), in [N m/(rad s)] or [N/(m s)], not negative.
-        kd: A scalar or (n,), in [N m s/rad] or [N s/m], not negative.
-        effort_limit: Greatest torque, a scalar or (n,), in [N m] or [N], positive; inf where there is none.
-        tracking_time_s: T_t, in [s], positive; by default the greatest √(kd/ki) of the joints.
-        period_s: In [s], 0 for continuous control.
+        kp: Proportional gain, a scalar or (n,), in [N m/rad] or [N/m], not negative.
+        ki: Integral gain, a scalar or (n,), in [N m/(rad s)] or [N/(m s)], not negative.
+        kd: Derivative gain, a scalar or (n,), in [N m s/rad] or [N s/m], not negative.
+        effort_limit: Largest torque, a scalar or (n,), in [N m] or [N], positive; inf for no limit.
+        tracking_time_s: T_t, in [s], positive; by default the largest √(kd/ki) of the joints.
+        period_s: Sampling period, in [s]; 0 for continuous control.
 
     Source: Åström and Hägglund, PID Controllers, 1995, sec. 3.5 (back-calculation).
     """
@@ -96,7 +96,9 @@ class PID(Controller):
             time = np.sqrt((kd[acts] / ki[acts]).max()) if acts.any() else 1.0  # without ki nothing winds up
             object.__setattr__(self, "tracking_time_s", float(time))
         elif np.isinf(self.effort_limit).all():
-            raise ControlError("tracking_time_s has no effect without an effort_limit; give one, or leave it out")
+            raise ControlError(
+                "tracking_time_s has no effect without an effort_limit; give one, or remove tracking_time_s"
+            )
 
     @property
     def n(self) -> int:
@@ -137,9 +139,9 @@ class PID(Controller):
 
 
 def gains_from(inertia_diagonal: Any, frequency: Any, damping_ratio: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Gains of a joint of inertia M_ii for the closed loop ë + 2 ζ ω ė + ω² e = 0: kp = M_ii ω², kd = 2 ζ ω M_ii.
+    """Compute gains for the closed loop ë + 2 ζ ω ė + ω² e = 0 of a joint: kp = M_ii ω², kd = 2 ζ ω M_ii.
 
-    With inertia 1 they are those of computed torque, which cancels the inertia.
+    For computed torque, which cancels the inertia, pass inertia 1.
 
     Args:
         inertia_diagonal: M_ii, a scalar or (n,), in [kg m²] or [kg], positive.
@@ -151,8 +153,8 @@ def gains_from(inertia_diagonal: Any, frequency: Any, damping_ratio: Any = 1.0) 
 
     Source: Siciliano et al. 2009, sec. 8.3.1.
     """
-    given = {"inertia_diagonal": inertia_diagonal, "frequency": frequency, "damping_ratio": damping_ratio}
-    inertia, omega, zeta = (numbers(name, x, (), ("n",), least=0) for name, x in given.items())
+    arguments = {"inertia_diagonal": inertia_diagonal, "frequency": frequency, "damping_ratio": damping_ratio}
+    inertia, omega, zeta = (numbers(name, x, (), ("n",), least=0) for name, x in arguments.items())
     if len({x.shape for x in (inertia, omega, zeta)} - {()}) > 1:
         raise ControlError(f"shapes do not match: {inertia.shape}, {omega.shape}, {zeta.shape}")
     if not ((inertia > 0).all() and (omega > 0).all()):
@@ -163,7 +165,7 @@ def gains_from(inertia_diagonal: Any, frequency: Any, damping_ratio: Any = 1.0) 
 
 
 def joint_count(reference: Any) -> int:
-    """Number of joints of a joint reference; ControlError if it is not one."""
+    """Return the number of joints of a joint reference; raise a ControlError for other values."""
     if not isinstance(reference, PiecewisePolynomial):
         raise ControlError(f"reference must be a PiecewisePolynomial, such as hold(q), got {shown(reference)}")
     return reference.n

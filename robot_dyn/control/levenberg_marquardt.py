@@ -1,10 +1,10 @@
-"""Levenberg–Marquardt within bounds: q with lower ≤ q ≤ upper and least ½‖e(q)‖², from many starts in lock step.
+"""Levenberg–Marquardt within bounds: minimise ½‖e(q)‖² over lower ≤ q ≤ upper, from many starts in parallel.
 
     d = Jᵀ (J Jᵀ + λ 1)⁻¹ e,   λ = μ ‖e‖²,   q⁺ = min(max(q + d, lower), upper)
 
-J has the columns of the joints that are free: not of those at a bound which the descent direction Jᵀ e pushes against.
-μ shrinks after steps that do what J predicts, and grows after those that do not (Nielsen). Where e tends to 0, λ does
-as its square, so that convergence is quadratic.
+J has columns only for free joints, without joints that Jᵀ e pushes against a bound. μ decreases after steps that
+reduce e as J predicts, and increases after others (Nielsen). If e tends to 0, λ tends to 0 as its square, so
+convergence is quadratic.
 
 [Yamashita, Fukushima, On the rate of convergence of the Levenberg–Marquardt method, 2001; Kanzow, Yamashita, Fukushima,
 Levenberg–Marquardt methods with strong local convergence properties for solving nonlinear equations with convex
@@ -18,21 +18,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-_START = 1e-2  # μ
-_LEAST, _MOST = 1e-12, 1e16  # μ; beyond, no step descends
-_ROUNDING = 1e-13  # of the trace of J Jᵀ: where rows of J depend on each other the solve stays regular
+_START = 1e-2  # initial μ
+_LEAST, _MOST = 1e-12, 1e16  # range of μ; above it, no step descends
+_ROUNDING = 1e-13  # relative to the trace of J Jᵀ: keeps the solve regular if rows of J are dependent
 
 Residual = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 class Descent(NamedTuple):
-    """Where B starts ended.
+    """The results of B starts.
 
     Attributes:
-        q: Shape (B, n).
-        e: Residuals there, (B, m).
-        J: −∂e/∂q there, (B, m, n).
-        iterations: Evaluations of e, (B,).
+        q: Final positions, (B, n).
+        e: Residuals at q, (B, m).
+        J: −∂e/∂q at q, (B, m, n).
+        iterations: Number of evaluations of e, (B,).
     """
 
     q: np.ndarray
@@ -44,15 +44,15 @@ class Descent(NamedTuple):
 def descend(
     residual: Residual, q: np.ndarray, lower: np.ndarray, upper: np.ndarray, *, tolerance: float, most: int
 ) -> Descent:
-    """Descend from each row of q until ‖e‖ ≤ tolerance, or no step descends, or after `most` evaluations.
+    """Descend from each row of q until ‖e‖ ≤ tolerance, no step descends, or `most` evaluations are spent.
 
     Args:
-        residual: Of positions (b, n) and their rows, (b,), of the B starts: e (b, m) and J = −∂e/∂q, (b, m, n).
+        residual: Function of positions, (b, n), and their rows in q, (b,); returns e, (b, m), and −∂e/∂q, (b, m, n).
         q: Starts within the bounds, (B, n).
-        lower: Bounds, (n,), −inf where there is none.
-        upper: Likewise, inf.
-        tolerance: Of ‖e‖.
-        most: Evaluations of each start.
+        lower: Lower bounds, (n,), −inf for none.
+        upper: Upper bounds, (n,), inf for none.
+        tolerance: Bound on ‖e‖.
+        most: Largest number of evaluations for each start.
     """
     q, rows = q.copy(), np.arange(len(q))
     e, J = residual(q, rows)
@@ -76,7 +76,7 @@ def descend(
 
 
 def held(q: np.ndarray, e: np.ndarray, J: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Joints at a bound which the descent direction Jᵀ e pushes against, (..., n)."""
+    """Return True for joints at a bound that the descent direction Jᵀ e pushes against, (..., n)."""
     pull = np.swapaxes(J, -1, -2) @ e[..., None]
     return ((q <= lower) & (pull[..., 0] < 0)) | ((q >= upper) & (pull[..., 0] > 0))
 

@@ -76,26 +76,26 @@ class TaskDynamics(Answer, Value):
 def task_dynamics(
     dynamics: Dynamics, q: Array, v: Array, frame: str, *, rows: tuple[int, ...] = POSE, threshold: float = 0.01
 ) -> TaskDynamics:
-    """The dynamics of a frame as a task, damped near singularities.
+    """Compute the dynamics of a frame as a task, damped near singularities.
 
     Along an eigenvector of A = J M⁻¹ Jᵀ with eigenvalue s, Λ is 1/s; for s below the threshold ε it is
 
         s/ε² = s/(s² + λ²),   λ² = ε² − s²,
 
-    which keeps Λ below 1/ε, and gives no force at the singularity itself, where none can act. The other directions
-    stay exact. Metres and radians have equal weight.
+    which keeps Λ below 1/ε and gives zero force at the singularity itself, where no force can act. The other
+    directions stay exact. Metres and radians have equal weight.
 
     Args:
         dynamics: The arm.
         q: Shape (n,) or (..., n), in [rad] or [m].
         v: Shape (n,) or (..., n), in [rad/s] or [m/s].
         frame: Name of a link.
-        rows: Which of (ṗ, ω) are the task: POSE, POSITION, or others such as (0, 1) for a planar arm.
+        rows: Rows of (ṗ, ω) that form the task: POSE, POSITION, or others such as (0, 1) for a planar arm.
         threshold: ε in [1/kg] and [1/(kg m²)], positive: the default bounds the apparent mass by 100 kg.
 
     Raises:
         QueryError: If q or v has the wrong shape or the frame is unknown.
-        ControlError: If rows or threshold are not allowed.
+        ControlError: If rows or threshold are invalid.
         SingularError: If M is singular.
 
     Source: Khatib 1987; Chiaverini, Siciliano, Egeland 1994 (damping in the singular directions only).
@@ -107,7 +107,7 @@ def task_dynamics(
 def _task_dynamics(
     dynamics: Dynamics, q: Array, v: Array, frame: str, rows: tuple[int, ...], epsilon: float
 ) -> TaskDynamics:
-    """As `task_dynamics`, for checked arguments."""
+    """Compute `task_dynamics` from checked arguments."""
     J = dynamics.jacobian(q, frame)[..., rows, :]
     drift = apply(dynamics.jacobian_rate(q, v, frame)[..., rows, :], np.asarray(v))
     # rows of J M⁻¹, one solve each: M is symmetric
@@ -126,7 +126,7 @@ def _task_dynamics(
 @final
 @dataclass(frozen=True, eq=False)
 class OperationalSpace(Stateless):
-    """Computed torque for a frame, and a posture in the motions the task leaves free.
+    """Computed torque for a frame, with a posture in the null space of the task.
 
         F = Λ (ẍ_d + kd ė + kp e) + μ + p
         τ = Jᵀ F + (1 − Jᵀ J̄ᵀ)(M (posture_kp (q_p − q) − posture_kd v) + C v + N)
@@ -137,16 +137,16 @@ class OperationalSpace(Stateless):
 
     Attributes:
         model: The controller's model of the arm.
-        frame: Name of the link that is controlled.
-        reference: Its motion; where that leaves the orientation free, only the position is controlled.
-        kp: A scalar or one for each row of the task, in [1/s²], not negative.
-        kd: A scalar or one for each row of the task, in [1/s], not negative.
-        posture: q_p, shape (n,), in [rad] or [m]; None for damping alone.
-        posture_kp: A scalar or (n,), in [1/s²], not negative.
-        posture_kd: A scalar or (n,), in [1/s], not negative.
-        rows: Which of (ṗ, ω) are the task; by default POSE, or POSITION if the orientation is free.
-        threshold: ε of `task_dynamics`.
-        period_s: In [s], 0 for continuous control.
+        frame: Name of the controlled link.
+        reference: Motion of the link; if it leaves the orientation free, only the position is controlled.
+        kp: Position gain, a scalar or one for each row of the task, in [1/s²], not negative.
+        kd: Velocity gain, a scalar or one for each row of the task, in [1/s], not negative.
+        posture: q_p, shape (n,), in [rad] or [m]; None for damping only.
+        posture_kp: Position gain of the posture, a scalar or (n,), in [1/s²], not negative.
+        posture_kd: Velocity gain of the posture, a scalar or (n,), in [1/s], not negative.
+        rows: Rows of (ṗ, ω) that form the task; by default POSE, or POSITION if the orientation is free.
+        threshold: ε of `task_dynamics`, in [1/kg] and [1/(kg m²)].
+        period_s: Sampling period, in [s]; 0 for continuous control.
 
     Source: Khatib 1987; Siciliano et al. 2009, sec. 8.6.
     """
@@ -173,13 +173,13 @@ class OperationalSpace(Stateless):
         free = self.reference.rotation is None
         rows = _rows((POSITION if free else POSE) if self.rows is None else self.rows)
         if free and max(rows) > 2:
-            raise ControlError(f"rows {rows} hold the orientation, which the reference leaves free")
-        self.model.jacobian(np.zeros(self.n), self.frame)  # so that an unknown frame is reported now
+            raise ControlError(f"rows {rows} include the orientation, which the reference leaves free; use rows 0 to 2")
+        self.model.jacobian(np.zeros(self.n), self.frame)  # reports an unknown frame now, not during a run
         object.__setattr__(self, "rows", rows)
         if self.posture is None:
             object.__setattr__(self, "posture", np.zeros(self.n))
             if np.any(self.posture_kp):
-                raise ControlError("posture_kp needs a posture")
+                raise ControlError("posture_kp needs a posture: give both, or neither")
         super().__post_init__()
         for name, *shapes in (("kp", (), (len(rows),)), ("kd", (), (len(rows),)), ("posture", (self.n,))):
             numbers(name, getattr(self, name), *shapes)
@@ -200,7 +200,7 @@ class OperationalSpace(Stateless):
         return apply(transpose(task.J), F) + apply(task.projector, free)
 
     def task_acceleration(self, t: float, q: Array, v: Array) -> Array:
-        """Desired acceleration ẍ_d + kd ė + kp e of the task, shape (m,), in [m/s²] and [rad/s²]."""
+        """Return the desired task acceleration ẍ_d + kd ė + kp e, shape (m,), in [m/s²] and [rad/s²]."""
         rows = self.rows
         p_d, R_d, twist_d, rate_d = self.reference.at(t)
         g = self.model.placement(q, self.frame)
@@ -212,7 +212,7 @@ class OperationalSpace(Stateless):
 
 
 def _rows(rows: Any) -> tuple[int, ...]:
-    """Rows of a twist, increasing; ControlError if they are not."""
+    """Return rows of a twist as a tuple; raise a ControlError unless they increase from 0 to 5."""
     try:
         chosen = tuple(index(row) for row in rows if not isinstance(row, bool))
     except (TypeError, OverflowError):

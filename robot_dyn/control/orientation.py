@@ -13,9 +13,9 @@ from robot_dyn.foundations.validate import real
 
 
 def rotation_vector(R: Array) -> Array:
-    """Logarithm of a rotation, φ with exp(φ̂) = R: accurate from no turn to half a turn.
+    """Compute the logarithm of a rotation, φ with exp(φ̂) = R, accurately for all angles from 0 to π.
 
-    By the unit quaternion (w, x): θ = 2 atan2(‖x‖, |w|), which loses no digits where the textbook's
+    The unit quaternion (w, x) gives θ = 2 atan2(‖x‖, |w|), which loses no digits where the textbook's
     (R − Rᵀ)θ/(2 sin θ) is 0/0. At exactly half a turn φ and −φ are the same rotation; one of them is returned.
 
     Args:
@@ -38,17 +38,17 @@ def rotation_vector(R: Array) -> Array:
 
 
 def orientation_error(R_desired: Array, R: Array) -> Array:
-    """The turn in base axes that takes R to the desired orientation: φ with R_desired = exp(φ̂) R, shape (..., 3)."""
+    """Compute the rotation vector from R to the desired orientation, in base axes: R_desired = exp(φ̂) R, (..., 3)."""
     return rotation_vector(_matrices("R_desired", R_desired) @ transpose(_matrices("R", R)))
 
 
 def _matrices(name: str, R: Array) -> Array:
-    """Matrices of numbers, or of symbols; QueryError if they are not 3 by 3, or no rotation has such an entry."""
+    """Return matrices of numbers or symbols; raise a QueryError if they are not 3 by 3 or have entries above 2."""
     symbols = isinstance(R, np.ndarray) and R.dtype.kind == "O"
     try:
         array = R if symbols else real(R)
-    except ValueError as found:
-        raise QueryError(f"{name} must be rotations of shape (..., 3, 3), got {found}") from None
+    except ValueError as error:
+        raise QueryError(f"{name} must be rotations of shape (..., 3, 3), got {error}") from None
     if array.shape[-2:] != (3, 3):
         raise QueryError(f"{name} must be rotations of shape (..., 3, 3), got {shown(R)}")
     if not symbols and not (np.abs(array) <= 2).all():  # nan, or squares that might overflow
@@ -57,9 +57,9 @@ def _matrices(name: str, R: Array) -> Array:
 
 
 def _quaternion(R: Array) -> tuple[Array, Array]:
-    """The unit quaternion (w, x), shapes (..., 1) and (..., 3), of a rotation; its sign is free.
+    """Compute the unit quaternion (w, x) of a rotation, (..., 1) and (..., 3), up to sign.
 
-    It is the row of the largest of its four parts: dividing by that one is what keeps all digits.
+    The row of the largest of its four parts is normalised, which keeps all digits.
     """
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = ([R[..., i, j : j + 1] for j in range(3)] for i in range(3))
     rows = (  # of 4 (w, x)(w, x)ᵀ
@@ -68,7 +68,7 @@ def _quaternion(R: Array) -> tuple[Array, Array]:
         (xz - zx, xy + yx, 1 - xx + yy - zz, yz + zy),
         (yx - xy, xz + zx, yz + zy, 1 - xx - yy + zz),
     )
-    outer = np.stack([np.concatenate(each, axis=-1) for each in rows], axis=-2)
+    outer = np.stack([np.concatenate(entries, axis=-1) for entries in rows], axis=-2)
     row, largest = outer[..., 0, :], outer[..., 0, :1]
     for k in (1, 2, 3):
         other = outer[..., k, k : k + 1]

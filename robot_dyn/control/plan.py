@@ -1,4 +1,4 @@
-"""A planned motion: what a controller follows, with the limits that it was made for and what is doubtful in it."""
+"""A planned motion for a controller, with the limits that it respects and findings about doubtful parts."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _PER = {"velocity": "[/s]", "acceleration": "[/s²]", "jerk": "[/s³]"}
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(Answer, Value):
-    """A motion of the joints of an arm; `plan.reference` is what controllers follow.
+    """A motion of the joints of an arm; pass `plan.reference` to a controller.
 
     Attributes:
         arm: Name of the arm.
         joint_names: Names of the n joints, in the order of q.
-        joint_types: Their types, such as "revolute".
+        joint_types: Types of the joints, such as "revolute".
         reference: The motion q(t).
-        method: How it was made, in a line.
-        limits: Greatest absolute values, (n,) each, inf where there is none, by "velocity", "acceleration", "jerk" or
-            "torque": those that it was made for, or compared with.
-        findings: What is doubtful, in words, each with its remedy.
+        method: Description of the method, in one line.
+        limits: Limits that the motion was planned for or compared with, (n,), inf for none, by "velocity",
+            "acceleration", "jerk" or "torque".
+        findings: Doubtful parts of the motion, in words, with remedies.
     """
 
     arm: str
@@ -49,12 +49,12 @@ class Plan(Answer, Value):
 
     @reported
     def duration(self) -> float:
-        """Time from the first to the last break, in [s]."""
+        """Return the time from the first to the last break, in [s]."""
         return self.reference.end - self.reference.start
 
     @cached_property
     def peaks(self) -> dict[str, np.ndarray]:
-        """Largest absolute velocity, acceleration and jerk of each joint, (n,) each, exact but for rounding."""
+        """Largest absolute velocity, acceleration and jerk of each joint, all (n,), exact up to rounding."""
         return {name: extreme_values(self.reference, order).largest for name, order in _ORDERS.items()}
 
     def blocks(self) -> Iterator[Block]:
@@ -67,10 +67,10 @@ class Plan(Answer, Value):
         units = [of_joint("rad", kind) for kind in self.joint_types]
         heading = "joint", "unit", "from", "to", *(f"{name} {_PER[name]}, of its limit" for name in shown)
         yield Table(heading, tuple(zip(self.joint_names, units, start, end, *columns, strict=True)), right=heading[4:])
-        yield from (f"finding: {each}" for each in self.findings)
+        yield from (f"finding: {finding}" for finding in self.findings)
 
     def _cells(self, name: str) -> list[str]:
-        """The largest value of each joint, with its limit where there is one."""
+        """Return the largest value of each joint, with its limit if there is one."""
         limits = self.limits.get(name, np.full(len(self.joint_names), np.inf))
         pairs = zip(self.peaks[name], limits, strict=True)
         return [f"{x:.4g} of {limit:.4g}" if limit < np.inf else f"{x:.4g}" for x, limit in pairs]

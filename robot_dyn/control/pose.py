@@ -27,30 +27,30 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import Axes
 from robot_dyn.queries.units import of_joint
 
-_SOUGHT = 1e-11  # of ‖e‖, in [m] and [rad]: below what is asked for, above rounding
-_ROTATION = 1e-6  # of RᵀR − 1: beyond, R was not meant as a rotation
-_SAME = 1e-4  # [rad] or [m] between solutions that are one
-_FAR = 100.0  # [m] from the pose: beyond, it may be in [mm]
-_RANK = 1e-9  # of the largest singular value of J
+_SOUGHT = 1e-11  # largest ‖e‖ of a descent, in [m] and [rad]: below usual tolerances, above rounding
+_ROTATION = 1e-6  # largest entry of RᵀR − 1 for a rotation
+_SAME = 1e-4  # [rad] or [m]: solutions closer than this count as one
+_FAR = 100.0  # [m]: a pose further away may be in [mm]
+_RANK = 1e-9  # relative to the largest entry of J
 
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class InverseKinematics(Answer, Value):
-    """The joint positions that bring a frame to a pose, or as near as the search came.
+    """The joint positions that bring a frame to a pose, or as near to it as the search came.
 
     Attributes:
         arm: Name of the arm.
         joint_names: Names of the n joints, in the order of q.
-        joint_types: Their types.
-        frame: The frame that was brought there.
-        q: The solution nearest to q0; without one, the position of the least ‖e‖², in which 1 rad of rotation counts as
+        joint_types: Types of the joints, such as "revolute".
+        frame: Name of the frame.
+        q: The solution nearest to q0; without a solution, the position of the smallest ‖e‖², in which 1 rad counts as
             much as 1 m. Shape (n,), in [rad] or [m].
         position_error: Distance of the frame's origin from the pose at q, in [m].
-        rotation_error: Angle of the turn that is left at q, in [rad]; nan if the orientation is free.
-        converged: Whether both are within the tolerance.
+        rotation_error: Angle between the frame and the pose at q, in [rad]; nan if the orientation is free.
+        converged: True if both errors are within the tolerance.
         held_by: Limits that keep the frame from coming nearer to the pose, in words; empty if it converged.
-        solutions: All that were found, the nearest to q0 first, (k, n).
+        solutions: All solutions, the nearest to q0 first, (k, n).
         starts: Number of starts.
         first: Number of the first start that converged, from 1; 0 if none did.
         redundancy: Number of directions in which the joints may move at q with the frame at rest.
@@ -75,7 +75,7 @@ class InverseKinematics(Answer, Value):
 
     @reported
     def unique(self) -> bool:
-        """Whether no other start gave another solution."""
+        """Return True if all converged starts gave the same solution."""
         return len(self.solutions) == 1
 
     def blocks(self) -> Iterator[Block]:
@@ -86,11 +86,11 @@ class InverseKinematics(Answer, Value):
         yield Table(("joint", "q", "unit"), tuple(zip(self.joint_names, self.q.tolist(), units, strict=True)), 10)
         if not self.converged:
             far = f"; it is {self.position_error:.4g} m away: if the pose is in mm, give it in m"
-            free = f"no joint limit holds it: it is out of reach{far if self.position_error > _FAR else ''}"
+            free = f"out of reach; no joint limit is active{far if self.position_error > _FAR else ''}"
             yield f"held by {', '.join(self.held_by)}" if self.held_by else free
             if not np.isnan(self.rotation_error):
-                yield "as near as it comes: the sum of both errors squared is least, where 1 rad counts as 1 m"
-            yield f"the nearest of {self.starts} starts; give q0 near a solution, or more starts, to be surer"
+                yield "q minimises the sum of both squared errors, where 1 rad counts as 1 m"
+            yield f"best of {self.starts} starts; to be surer, give q0 near a solution, or more starts"
             return
         others = len(self.solutions) - 1
         more = f"; {self.redundancy} directions are free" if self.redundancy else ""
@@ -108,27 +108,28 @@ def inverse_kinematics(
     tolerance: float = 1e-9,
     iterations: int = 100,
 ) -> InverseKinematics:
-    """Joint positions within the limits that bring a frame to a pose, by Levenberg–Marquardt from several starts.
+    """Compute joint positions within the limits that bring a frame to a pose.
 
-    The first start is q0; the others are random positions of the joints that move the frame, within their limits. All
-    descend in lock step, so that a further solution costs little. Joints that do not move the frame keep q0. A joint
-    that turns is given in the turn nearest to q0 that its limits allow. Where no start reaches the pose, the answer is
-    the position of the least ‖e‖² = ‖v‖² + ‖ω‖², with 1 rad as heavy as 1 m: a compromise between place and rotation.
+    The method is Levenberg–Marquardt from several starts. The first start is q0; the others are random positions of the
+    joints that move the frame, within their limits. All starts descend in parallel, so more starts take little time.
+    Joints that do not move the frame keep q0. Angles are in the turn nearest to q0 that the limits allow. If no start
+    reaches the pose, the result minimises ‖e‖² = ‖v‖² + ‖ω‖², a compromise between position and rotation in which 1 rad
+    counts as much as 1 m.
 
     Args:
         arm: The robot.
-        pose: Of the frame in base axes, as `arm.placement` returns it, (4, 4); or a position (3,) in [m] and a rotation
-            (3, 3), as a pair; with None in place of the rotation the orientation is free.
+        pose: Pose of the frame in base axes, as `arm.placement` returns it, (4, 4); or a pair of a position, (3,), in
+            [m], and a rotation, (3, 3), or None to leave the orientation free.
         frame: Name of a link.
-        q0: The first start, (n,), in [rad] or [m]; by default the middle between the limits, 0 without.
-        seed: Of the random starts.
-        starts: How many, with q0.
-        tolerance: What an error of position, in [m], and of rotation, in [rad], may be at a solution.
-        iterations: Most evaluations of each start.
+        q0: The first start, (n,), in [rad] or [m]; by default the middle between the limits, or 0 without limits.
+        seed: Seed of the random starts.
+        starts: Number of starts, including q0.
+        tolerance: Largest error of position, in [m], and of rotation, in [rad], at a solution.
+        iterations: Largest number of evaluations for each start.
 
     Raises:
-        PlanError: If the pose is not one, or q0 is outside the limits.
-        QueryError: If the frame is unknown, or a value is not allowed.
+        PlanError: If the pose is invalid, or q0 is outside the limits.
+        QueryError: If the frame is unknown, or a value is invalid.
 
     Source: Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg–Marquardt method, 2011.
     """
@@ -147,14 +148,14 @@ def inverse_kinematics(
     def residual(q: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return error_and_jacobian(arm, frame, pose[None], q, turns)
 
-    found = descend(residual, q, arm.lower, arm.upper, tolerance=min(_SOUGHT, tolerance), most=most)
-    return _answer(arm, frame, start, pose, found, tolerance, int(moving.sum()))
+    descent = descend(residual, q, arm.lower, arm.upper, tolerance=min(_SOUGHT, tolerance), most=most)
+    return _best(arm, frame, start, pose, descent, tolerance, int(moving.sum()))
 
 
 def error_and_jacobian(
     arm: Robot, frame: str, g: np.ndarray, q: np.ndarray, turns: bool = True
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The body twist e = log(g(q)⁻¹ g) and the body Jacobian, (B, 6) and (B, 6, n); (B, 3) of a position alone."""
+    """Return e = log(g(q)⁻¹ g), (B, 6), and the body Jacobian, (B, 6, n); without `turns` only the position rows."""
     here = arm.placement(q, frame)
     J, R_back = arm.jacobian(q, frame, expressed_in=Axes.BODY), transpose(here[:, :3, :3])
     p = (R_back @ (g[:, :3, 3] - here[:, :3, 3])[..., None])[..., 0]
@@ -164,7 +165,7 @@ def error_and_jacobian(
 
 
 def logarithm(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """The twist (v, φ) whose exponential is (R, p), shape (..., 6).
+    """Compute the twist (v, φ) whose exponential is (R, p), shape (..., 6).
 
     v = p − ½ φ × p + c φ × (φ × p),   c = (1 − (θ/2) cot(θ/2))/θ²,   θ = ‖φ‖ ≤ π
     """
@@ -177,18 +178,18 @@ def logarithm(R: np.ndarray, p: np.ndarray) -> np.ndarray:
     return np.concatenate([p - turned / 2 + c * np.cross(phi, turned), phi], axis=-1)
 
 
-def _answer(
-    arm: Robot, frame: str, start: np.ndarray, g: np.ndarray, found: Descent, tolerance: float, moving: int
+def _best(
+    arm: Robot, frame: str, start: np.ndarray, g: np.ndarray, descent: Descent, tolerance: float, moving: int
 ) -> InverseKinematics:
-    """The solution nearest to the start, or else the position of the least error."""
-    q = _nearest_turns(arm, found.q, start)
+    """Return the solution nearest to the start or, without a solution, the position of the smallest error."""
+    q = _nearest_turns(arm, descent.q, start)
     length = np.linalg.norm(arm.placement(q, frame)[:, :3, 3] - g[:3, 3], axis=1)
-    angle = np.linalg.norm(found.e[:, 3:], axis=1) if found.e.shape[1] > 3 else np.full(len(q), np.nan)
+    angle = np.linalg.norm(descent.e[:, 3:], axis=1) if descent.e.shape[1] > 3 else np.full(len(q), np.nan)
     good = np.flatnonzero((length <= tolerance) & ~(angle > tolerance))
     order = good[np.argsort(np.abs(q[good] - start).max(axis=1), kind="stable")]
-    best = order[0] if len(order) else int((found.e**2).sum(axis=1).argmin())
-    J = found.J[best]
-    held_by = () if len(order) else _limits(arm, q[best], held(q[best], found.e[best], J, arm.lower, arm.upper))
+    best = order[0] if len(order) else int((descent.e**2).sum(axis=1).argmin())
+    J = descent.J[best]
+    held_by = () if len(order) else _limits(arm, q[best], held(q[best], descent.e[best], J, arm.lower, arm.upper))
     return InverseKinematics(
         *(arm.name, arm.joint_names, arm.joint_types, frame, q[best], float(length[best]), float(angle[best])),
         *(bool(len(order)), held_by, _distinct(q[order]), len(q), int(good[0]) + 1 if len(good) else 0),
@@ -197,26 +198,26 @@ def _answer(
 
 
 def _distinct(solutions: np.ndarray) -> np.ndarray:
-    """The first of each group of solutions that are one."""
-    kept = solutions[:0]
-    for each in solutions:
-        if (np.abs(kept - each).max(axis=1) > _SAME).all():
-            kept = np.vstack([kept, each])
-    return kept
+    """Return the first solution of each group of equal ones."""
+    distinct = solutions[:0]
+    for solution in solutions:
+        if (np.abs(distinct - solution).max(axis=1) > _SAME).all():
+            distinct = np.vstack([distinct, solution])
+    return distinct
 
 
 def _limits(arm: Robot, q: np.ndarray, blocked: np.ndarray) -> tuple[str, ...]:
-    """The limits at which joints are held, in words."""
+    """Return the limits that hold joints, in words."""
     rows = zip(arm.joint_names, arm.joint_types, q, arm.lower, blocked, strict=True)
     return tuple(
         f"the {'lower' if x <= low else 'upper'} limit of {name}, {x:.6g} {of_joint('rad', kind)}"
-        for name, kind, x, low, at in rows
-        if at
+        for name, kind, x, low, is_blocked in rows
+        if is_blocked
     )
 
 
 def _start(arm: Robot, q0: Any) -> np.ndarray:
-    """The first start; PlanError if it is outside the limits."""
+    """Return the first start; raise a PlanError if it is outside the limits."""
     if q0 is None:
         both = np.isfinite(arm.lower) & np.isfinite(arm.upper)
         middle = (np.where(both, arm.lower, 0.0) + np.where(both, arm.upper, 0.0)) / 2
@@ -229,7 +230,7 @@ def _start(arm: Robot, q0: Any) -> np.ndarray:
 
 
 def _pose(pose: Any) -> tuple[np.ndarray, bool]:
-    """The pose as a matrix (4, 4), and whether its orientation counts; the rotation is made exact to rounding."""
+    """Return the pose as a matrix (4, 4), orthogonal to rounding, and False if the orientation is free."""
     if isinstance(pose, tuple) and len(pose) == 2:
         p, R = numbers("the position of the pose", pose[0], (3,), error=PlanError), pose[1]
         if R is None:
@@ -242,22 +243,22 @@ def _pose(pose: Any) -> tuple[np.ndarray, bool]:
             raise PlanError(f"pose: its last row must be 0 0 0 1, got {g[3]}")
     off = float(np.abs(R.T @ R - np.eye(3)).max())
     if off > _ROTATION or np.linalg.det(R) < 0:
-        what = f"RᵀR is off 1 by {off:.2g}" if off > _ROTATION else "it mirrors"
-        raise PlanError(f"pose: its rotation is none, {what}; give an orthogonal matrix of determinant 1")
+        fault = f"RᵀR differs from 1 by {off:.2g}" if off > _ROTATION else "its determinant is −1"
+        raise PlanError(f"pose: its 3 × 3 part is not a rotation, {fault}; give an orthogonal matrix of determinant 1")
     U, _, V = np.linalg.svd(R)
     return homogeneous(U @ V, p), True
 
 
 def _moving(arm: Robot, frame: str, rng: np.random.Generator) -> np.ndarray:
-    """The joints that move a frame, (n,): those of the way from the base to it."""
+    """Return True for joints that move a frame, (n,)."""
     q = np.array([arm.random_configuration(rng) for _ in range(3)])
     return np.any(arm.jacobian(q, frame) != 0, axis=(0, 1))
 
 
 def _nearest_turns(arm: Robot, q: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Positions (B, n) with joints that turn in the turn nearest to the start, within their limits.
+    """Return positions (B, n) with angles in the turn nearest to the start, within the limits.
 
-    A whole turn is no motion of a joint unless others follow it by a ratio.
+    Joints that others follow by a ratio are left as they are: a whole turn would move the others.
     """
     S = arm.couplings.S
     alone = ((S != 0).sum(axis=0) == 1) & ((S == 1).sum(axis=0) == 1)

@@ -20,11 +20,11 @@ from robot_dyn.foundations.errors import ControlError, QueryError, shown
 from robot_dyn.foundations.validate import choice, duration, times
 from robot_dyn.foundations.values import Value
 
-# values given at each end of a piece, by kind of spline
+# number of prescribed values at each end of a piece, by kind of spline
 _DERIVATIVES = {"cubic": 2, "quintic": 3}
-_MOST_POINTS = 2000  # of a spline: their equations are solved together, in 200 MB
+_MOST_POINTS = 2000  # the equations of a spline are solved together, in 200 MB
 _FACTORIALS = np.array([factorial(j) for j in range(6)], dtype=float)
-# The inverse of [j!/(j − r)!] with r < m ≤ j < 2m: from what the low half leaves at s = 1 to the high half.
+# The inverse of [j!/(j − r)!] with r < m ≤ j < 2m: maps the remainder of the low half at s = 1 to the high half.
 _UPPER = {
     2: np.array([[3, -1], [-2, 1.0]]),
     3: np.array([[10, -4, 0.5], [-15, 7, -1], [6, -3, 0.5]]),
@@ -43,7 +43,7 @@ class Reference(Value, ABC):
 
     @property
     def polynomials(self) -> dict[str, PiecewisePolynomial]:
-        """Its piecewise polynomials, by attribute; by "" if it is one itself."""
+        """The piecewise polynomials by attribute; by "" if the reference is one itself."""
         return {name: value for name, value in vars(self).items() if isinstance(value, PiecewisePolynomial)}
 
 
@@ -76,7 +76,7 @@ class PiecewisePolynomial(Reference):
 
     @property
     def knots(self) -> np.ndarray:
-        """Times in [s] at which it passes to another polynomial: its breaks, or none if it rests."""
+        """Times in [s] at which the polynomial changes: the breaks, or none for a motion at rest."""
         return self.breaks[:0] if self.coefficients.shape[:2] == (1, 1) else self.breaks
 
     @property
@@ -94,16 +94,16 @@ class PiecewisePolynomial(Reference):
         return float(self.breaks[-1])
 
     def at(self, t: Scalar) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration at t, by Horner's rule.
+        """Evaluate position, velocity and acceleration at t by Horner's rule.
 
-        At a break the piece to its right counts; at the last one, the piece to its left. The search for the piece is
-        the only branch on a value: a trace must look it up in `breaks`.
+        At a break the piece to its right is evaluated; at the last break, the piece to its left. The search for the
+        piece is the only branch on a value: traced code must look it up in `breaks`.
 
         Args:
             t: Time, shape () or (...), in [s].
 
         Returns:
-            (q, v, a), each of shape (n,) or (..., n).
+            (q, v, a), all of shape (n,) or (..., n).
         """
         if not (isinstance(t, float) and isfinite(t)):
             t = times("t", t)
@@ -119,7 +119,7 @@ class PiecewisePolynomial(Reference):
 
 
 def polynomial(c: Array, s: Array) -> tuple[Array, Array, Array]:
-    """Value and two derivatives of Σⱼ cⱼ sʲ by Horner's rule, each (..., n), for c (..., d + 1, n) and s (..., 1)."""
+    """Evaluate Σⱼ cⱼ sʲ and two derivatives, (..., n), by Horner's rule, for c (..., d + 1, n) and s (..., 1)."""
     q = c[..., -1, :] + 0 * s  # a new array even if the degree is 0
     v = a = 0 * q
     for j in reversed(range(c.shape[-2] - 1)):
@@ -130,7 +130,7 @@ def polynomial(c: Array, s: Array) -> tuple[Array, Array, Array]:
 
 
 def hold(q: Any) -> PiecewisePolynomial:
-    """Rest at q, shape (n,), at all times; raises ControlError for any other array."""
+    """Return a reference at rest at q, shape (n,); raise a ControlError for other shapes."""
     return PiecewisePolynomial([0.0, 1.0], numbers("q", q, ("n",))[None, None])
 
 
@@ -146,9 +146,10 @@ def quintic(
     a0: Any = 0.0,
     a1: Any = 0.0,
 ) -> PiecewisePolynomial:
-    """The quintic from q0 to q1; from rest to rest, the minimum-jerk motion q0 + (q1 − q0)(10 s³ − 15 s⁴ + 6 s⁵).
+    """Return the quintic from q0 to q1.
 
-    From rest to rest, the velocity peaks halfway, at 15/8 · (q1 − q0)/duration_s.
+    From rest to rest it is the minimum-jerk motion q0 + (q1 − q0)(10 s³ − 15 s⁴ + 6 s⁵), whose velocity peaks halfway,
+    at 15/8 · (q1 − q0)/duration_s.
 
     Args:
         q0: Initial position, shape (n,), in [rad] or [m].
@@ -156,9 +157,9 @@ def quintic(
         duration_s: Duration, in [s], positive.
         start_s: Start time, in [s].
         v0: Velocity at the start, a scalar or (n,), in [rad/s] or [m/s].
-        v1: Velocity at the end, likewise.
+        v1: Velocity at the end, a scalar or (n,), in [rad/s] or [m/s].
         a0: Acceleration at the start, a scalar or (n,), in [rad/s²] or [m/s²].
-        a1: Acceleration at the end, likewise.
+        a1: Acceleration at the end, a scalar or (n,), in [rad/s²] or [m/s²].
 
     Raises:
         ControlError: If a value is not finite or has the wrong shape.
@@ -179,7 +180,7 @@ def quintic(
 def via_points(
     times_s: Any, points: Any, *, kind: str = "quintic", v0: Any = 0.0, v1: Any = 0.0
 ) -> PiecewisePolynomial:
-    """The spline through points at given times, from rest to rest unless end velocities are given.
+    """Return the spline through points at prescribed times, from rest to rest unless end velocities are passed.
 
     "quintic" has four continuous derivatives and starts and ends with zero acceleration; "cubic" has two, and its
     acceleration jumps at both ends.
@@ -189,7 +190,7 @@ def via_points(
         points: Shape (k + 1, n), in [rad] or [m].
         kind: "quintic" or "cubic".
         v0: Velocity at the start, a scalar or (n,), in [rad/s] or [m/s].
-        v1: Velocity at the end, likewise.
+        v1: Velocity at the end, a scalar or (n,), in [rad/s] or [m/s].
 
     Raises:
         ControlError: If times do not increase, shapes do not match, the kind is unknown, or there are over 2000 points.
@@ -199,9 +200,9 @@ def via_points(
     kind = choice("kind of spline", kind, _DERIVATIVES, error=ControlError)
     m, points = _DERIVATIVES[kind], numbers("points", points, ("k + 1", "n"))
     if len(points) < 2:
-        raise ControlError(f"points must be 2 at least, got {len(points)}; to rest at one, hold(q)")
+        raise ControlError(f"points: at least 2 are needed, got {len(points)}; to rest at one point, use hold(q)")
     if len(points) > _MOST_POINTS:
-        raise ControlError(f"points must be {_MOST_POINTS} at most, got {len(points)}; rd.control.Samples takes more")
+        raise ControlError(f"points: at most {_MOST_POINTS} are allowed, got {len(points)}; use rd.control.Samples")
     t = increasing("times_s", times_s, len(points))
     unit = (t[-1] - t[0]) / (len(t) - 1)  # time unit: derivatives of similar size keep the solve well conditioned
     shape = points.shape[1:]
@@ -212,14 +213,14 @@ def via_points(
 
 
 def hermite(h: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Coefficients of the polynomials of degree 2m − 1 on [0, h] with value and m − 1 derivatives given at each end.
+    """Compute polynomials of degree 2m − 1 on [0, h] from the value and m − 1 derivatives at both ends.
 
     Args:
         h: Lengths of the pieces, shape (k,), in [s].
         ends: q, q̇, … at the left end, then at the right end, shape (k, 2m, n).
 
     Returns:
-        Shape (k, 2m, n).
+        Coefficients by ascending power, shape (k, 2m, n).
     """
     m = ends.shape[-2] // 2
     powers = h[:, None, None] ** np.arange(2 * m)[:, None]
@@ -230,9 +231,9 @@ def hermite(h: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 
 def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int, ends: np.ndarray) -> np.ndarray:
-    """Values and m − 1 derivatives at the knots, (k + 1, m, n), that make derivatives m … 2m − 2 continuous.
+    """Compute values and m − 1 derivatives at the knots, (k + 1, m, n), that make derivatives m … 2m − 2 continuous.
 
-    End velocities are given by `ends`, (2, n); end accelerations are zero.
+    The end velocities are `ends`, (2, n); the end accelerations are zero.
     """
     k, n = len(h), points.shape[-1]
     basis = hermite(h, np.broadcast_to(np.eye(2 * m), (k, 2 * m, 2 * m)))  # coefficients of each piece from its ends
@@ -248,15 +249,15 @@ def _smooth_derivatives(h: np.ndarray, points: np.ndarray, m: int, ends: np.ndar
     data = np.zeros((k + 1, m, n))
     data[:, 0], data[[0, -1], 1] = points, ends
     size = (k - 1) * (m - 1)
-    known = jumps[..., 0].reshape(size, k + 1) @ points  # accelerations at the ends are zero and add nothing
-    known += jumps[:, :, [0, -1], 1].reshape(size, 2) @ ends
-    unknown = jumps[:, :, 1:-1, 1:].reshape(size, size)
-    data[1:-1, 1:] = np.linalg.solve(unknown, -known).reshape(k - 1, m - 1, n)
+    right_side = jumps[..., 0].reshape(size, k + 1) @ points  # accelerations at the ends are zero and add nothing
+    right_side += jumps[:, :, [0, -1], 1].reshape(size, 2) @ ends
+    matrix = jumps[:, :, 1:-1, 1:].reshape(size, size)
+    data[1:-1, 1:] = np.linalg.solve(matrix, -right_side).reshape(k - 1, m - 1, n)
     return data
 
 
 def increasing(name: str, values: Any, count: int) -> np.ndarray:
-    """Increasing times, shape (count,), frozen; raises ControlError if they do not increase."""
+    """Return increasing times as a read-only array, (count,); raise a ControlError if they do not increase."""
     times = numbers(name, values, (count,))
     if not (np.diff(times) > 0).all():
         raise ControlError(f"{name} must increase, got {shown(values)}")

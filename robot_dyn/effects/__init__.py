@@ -1,4 +1,4 @@
-"""What acts on the joints besides actuation: effects, each a torque or a bound, summed by a `Plant`.
+"""Effects on the joints besides actuation: torques and bounds on the actuation, summed by a `Plant`.
 
     friction           ViscousFriction, RegularisedCoulombFriction, DryFriction, LuGreFriction, DahlFriction
     stops and springs  joint_stops (JointStopSpring, JointStopDamper), RigidStops, Spring
@@ -6,8 +6,8 @@
     drives             EffortLimit, ActuatorLag, SeriesElastic, RigidBacklash
     loads              ExternalWrench, CarriedPayload
     to write one       Conservative, Dissipative, Active, Bound, Stateful, Drive, SetValued: base classes of Effect
-                       coefficient, Threshold, Layer: what an effect declares; Dynamics: what it is called with
-    about them         Plant, EquationOfMotion, Force, Hold, Interval, Mode
+                       coefficient, Threshold, Layer: declarations of an effect; Dynamics: its first argument
+    used with effects  Plant, EquationOfMotion, Force, Hold, Interval, Mode
 
 docs/developers/extending.md writes an effect step by step; robot_dyn/effects/README.md lists its files.
 """

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, eq=False)
 class EffortLimit(Bound):
-    """The actuation saturates at the effort limits: −u_max ≤ u ≤ u_max.
+    """Saturation of the actuation at effort limits: −u_max ≤ u ≤ u_max.
 
     Attributes:
-        limit: u_max, a scalar or (n,), inf for none, in [N m] or [N], not negative; "urdf" for those in the
-            file, which must not be 0.
+        limit: u_max, a scalar or (n,), inf for none, in [N m] or [N], not negative; "urdf" for the limits in the
+            robot's file, which must not be 0.
 
     Example:
         >>> rd.effects.EffortLimit(limit=[3.0, 2.0])
@@ -54,10 +54,10 @@ class EffortLimit(Bound):
         return with_values(self, {"limit": limit, "_middle": middle})
 
     def on(self, dynamics: Any) -> Effect:
-        known = super().on(dynamics)
+        resolved = super().on(dynamics)
         if self.limit is URDF:
-            stated_efforts(dynamics)  # refuses limits of 0
-        return known
+            stated_efforts(dynamics)  # raises for limits of 0
+        return resolved
 
     def actuation(self, u: Array) -> Array:
         return saturated(u, self.limit, self._middle)
@@ -66,9 +66,9 @@ class EffortLimit(Bound):
 @final
 @dataclass(frozen=True, eq=False)
 class ActuatorLag(Stateful, Bound):
-    """The actuation follows its command with a lag of first order: u' = (u_command − u) / T, from u = 0.
+    """First-order lag of the actuation: u' = (u_command − u) / T, from u = 0.
 
-    Bounds before it in a plant act on the command, bounds after it on u.
+    Bounds listed before it in a plant act on the command, bounds listed after it on u.
 
     Attributes:
         time_constant: T, a scalar or (n,), in [s], positive.
@@ -95,7 +95,7 @@ class ActuatorLag(Stateful, Bound):
 
 
 def stated_efforts(robot: Any) -> np.ndarray:
-    """Effort limits in the file of a robot, (n,), inf for none, in [N m] or [N].
+    """Return the effort limits in the file of a robot, (n,), inf for none, in [N m] or [N].
 
     Raises:
         EffectError: If one is 0, which files use for an unknown limit: the joint would have no actuation.
@@ -103,7 +103,7 @@ def stated_efforts(robot: Any) -> np.ndarray:
     if names := [name for name, limit in zip(robot.joint_names, robot.effort_limit, strict=True) if limit == 0]:
         listed = ", ".join(map(repr, names[:6])) + (", …" if len(names) > 6 else "")
         raise EffectError(
-            f"the file states an effort limit of 0 for {listed}, which would cut every torque of a controller there to"
-            f" 0; give limits by joint, such as {{{names[0]!r}: 87.0}}: joints left out have none"
+            f"the file states an effort limit of 0 for {listed}, so no controller could move these joints; give limits"
+            f" by joint, such as {{{names[0]!r}: 87.0}}: joints left out have none"
         )
     return robot.effort_limit

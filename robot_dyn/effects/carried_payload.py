@@ -27,16 +27,16 @@ _END = coefficient("s", shapes=((),), infinite=True, swept=False)
 @final
 @dataclass(frozen=True, eq=False)
 class CarriedPayload(Timed):
-    """A payload that is carried for start_s ≤ t < end_s; from the start of a run if start_s ≤ 0.
+    """A payload carried for start_s ≤ t < end_s; from the start of a run if start_s ≤ 0.
 
-    In the energy ledger its work is the energy that the body brings, less what it takes away; the kinetic energy that
-    is lost when it is picked up at rest is the work of `pick_up`.
+    In the energy ledger its work is the energy that the body brings minus the energy that it takes away. The kinetic
+    energy lost when a body at rest is picked up is the work of `pick_up`.
 
     Attributes:
         payload: The body and its link.
         start_s: Time at which it is picked up, in [s].
         end_s: Time at which it is dropped, in [s].
-        at_rest: Whether it is at rest until it is picked up; otherwise it moves with the link by then.
+        at_rest: True if the body is at rest before it is picked up; False if it moves with the link.
 
     Example:
         >>> rd.effects.CarriedPayload(payload=rd.Payload("tip", 0.5), start_s=0.004, end_s=0.5, at_rest=True)
@@ -52,13 +52,13 @@ class CarriedPayload(Timed):
     term = "a rigid body on a link, in M, C and N while it is carried"
 
     def __post_init__(self) -> None:
-        instance("payload", self.payload, Payload, "give one, as rd.Payload('tool0', 1.5)", error=EffectError)
+        instance("payload", self.payload, Payload, "give one, such as rd.Payload('tool0', 1.5)", error=EffectError)
         truth("at_rest", self.at_rest, error=EffectError)
         super().__post_init__()
 
     def on(self, dynamics: Any) -> CarriedPayload:
         if self.carried is None:
-            robot_with(dynamics, [self], [True])  # so that an unknown link is reported now
+            robot_with(dynamics, [self], [True])  # reports an unknown link now, not during a run
         return self
 
 
@@ -66,14 +66,14 @@ def robot_with(dynamics: Any, effects: Sequence[CarriedPayload], carried: Sequen
     """Return the robot with all these payloads, massless where they are not carried.
 
     Raises:
-        EffectError: If the dynamics is not a robot, or has no such link.
+        EffectError: If the dynamics are not a robot, or the link is unknown.
     """
     if not hasattr(dynamics, "with_"):
         raise EffectError(f"carried_payload: needs a Robot, got {type(dynamics).__name__}; give rd.Plant(robot, …)")
-    nothing = ((0.0, 0.0, 0.0),) * 3
+    massless = ((0.0, 0.0, 0.0),) * 3
     bodies = [
-        each.payload if taken else replace(each.payload, mass=0.0, inertia=nothing)
-        for each, taken in zip(effects, carried, strict=True)
+        effect.payload if is_carried else replace(effect.payload, mass=0.0, inertia=massless)
+        for effect, is_carried in zip(effects, carried, strict=True)
     ]
     try:
         return dynamics.with_(payload=bodies)

@@ -2,8 +2,8 @@
 
     s = sign(v),   τ = −σ z
 
-From rest it is a spring of stiffness σ; sliding on, |F| goes to f_c, and behind a reversal F runs along the other
-branch of the hysteresis. It depends on the path, not on time. [Dahl 1968; Dahl 1976; Bliman 1992]
+From rest the friction is a spring of stiffness σ. While the joint slides, |F| approaches f_c; after a reversal F
+follows the other branch of the hysteresis. F depends on the path, not on time. [Dahl 1968; Dahl 1976; Bliman 1992]
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from robot_dyn.foundations.coefficients import coefficient
 from robot_dyn.foundations.threshold import Threshold
 from robot_dyn.queries.dynamics import Dynamics
 
-_SLOW = 1e-6  # of the deflection f_c/σ, per second: no digit depends on reversals of slower motion
+_SLOW = 1e-6  # relative to the deflection f_c/σ, per second: reversals of slower motion change no digit
 
 
 @final

@@ -19,12 +19,13 @@ from robot_dyn.queries.dynamics import Dynamics
 @final
 @dataclass(frozen=True, eq=False)
 class DryFriction(SetValued):
-    """Coulomb friction: τ = −f sign(v) where v ≠ 0, and the |τ| ≤ f_s that keeps the joint at rest where v = 0.
+    """Coulomb friction: τ = −f sign(v) if v ≠ 0; if v = 0, the torque |τ| ≤ f_s that keeps the joint at rest.
 
     A joint at rest stays exactly there for as long as the load does not exceed f_s. Then it slides, with f = f_k, or
-    by Stribeck's curve, f = f_k + (f_s − f_k) exp(−(v/v_s)²), if v_s is given. Where f_s > f_k, rest and sliding are
-    both consistent with some loads: a joint at rest stays at rest. [Armstrong-Hélouvry, Dupont, Canudas de Wit, A
-    survey of models, analysis tools and compensation methods for the control of machines with friction, 1994]
+    by Stribeck's curve, f = f_k + (f_s − f_k) exp(−(v/v_s)²), if v_s is given. If f_s > f_k, both rest and sliding
+    solve the equations for some loads: a joint at rest then stays at rest.
+    [Armstrong-Hélouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and compensation methods for the
+    control of machines with friction, 1994]
 
     The acceleration of a plant accounts for sticking; its N, torque and inverse dynamics use 0 for the friction of a
     joint at rest, which depends on the load.
@@ -52,7 +53,7 @@ class DryFriction(SetValued):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.stribeck_velocity is not None and self.static is None:
-            raise EffectError("stribeck_velocity: has no effect without static, the static friction; give both")
+            raise EffectError("stribeck_velocity has no effect without static, the static friction; give both")
         require("static must not be less than level", np.greater_equal, self.static, self.level)
 
     @property
@@ -66,7 +67,7 @@ class DryFriction(SetValued):
         return -self.sliding(v) * direction
 
     def sliding(self, v: Array) -> Array:
-        """Sliding friction, f(v)."""
+        """Return the sliding friction, f(v)."""
         if self.static is None or self.stribeck_velocity is None:
             return self.level + 0 * v
         return self.level + (self.static - self.level) * np.exp(-((v / self.stribeck_velocity) ** 2))

@@ -26,7 +26,7 @@ from robot_dyn.queries.dynamics import Dynamics
 
 
 class _ClassName:
-    """The name of an effect that states none: the name of its class in snake case."""
+    """The default name of an effect: the name of its class in snake case."""
 
     def __get__(self, effect: Effect | None, kind: type[Effect]) -> str:
         return re.sub(r"(?<!^)(?=[A-Z])", "_", kind.__name__).lower()
@@ -42,11 +42,11 @@ class Effect(Value):
         q: position, (..., n), in [rad] or [m] by joint
         v: velocity, (..., n), in [rad/s] or [m/s]
 
-    and with symbols in place of these numbers when it is compiled. Methods that use only
+    and with symbols instead of numbers when it is compiled. Methods that use only
     `robot_dyn.foundations.arithmetic` and NumPy's operators run in both engines.
 
     Declared coefficients (`robot_dyn.foundations.coefficients`) are checked on construction and may be swept. They may
-    be given by joint name, or as "urdf" where files state them.
+    be given by joint name, or as "urdf" to read them from the robot's file.
 
     Attributes:
         name: Name in scenes and ledgers: the class name in snake case, unless the class states another.
@@ -65,11 +65,11 @@ class Effect(Value):
         Raises:
             EffectError: If a joint is unknown, the file states no value, or the number of joints differs.
         """
-        known = {
-            key: each.on(f"{self.name}: {key}", getattr(self, key), dynamics)
-            for key, each in declared(type(self)).items()
+        resolved = {
+            key: coefficient.on(f"{self.name}: {key}", getattr(self, key), dynamics)
+            for key, coefficient in declared(type(self)).items()
         }
-        changed: Any = {key: value for key, value in known.items() if value is not getattr(self, key)}
+        changed: Any = {key: value for key, value in resolved.items() if value is not getattr(self, key)}
         return replace(self, **changed) if changed else self  # pyright: ignore[reportArgumentType]  a dataclass
 
     @property
@@ -121,7 +121,7 @@ class Force(Effect, ABC):
 
     @abstractmethod
     def torque(self, dynamics: Dynamics, t: float, q: Array, v: Array) -> Array:
-        """The torque this effect exerts on the joints, shape (..., n), in [N m] or [N]."""
+        """Return the torque this effect exerts on the joints, shape (..., n), in [N m] or [N]."""
 
 
 class Conservative(Force):
@@ -179,7 +179,7 @@ class Stateful(Effect, ABC):
 
     @abstractmethod
     def state_size(self, n: int) -> int:
-        """Number of states on an arm with n joints."""
+        """Return the number of states on an arm with n joints."""
 
     def start(self, dynamics: Dynamics, q: Array, v: Array) -> Array:
         """Return the states at the start of a run from q, v, (..., n), shape (..., state_size); 0 by default."""
@@ -191,45 +191,45 @@ class Stateful(Effect, ABC):
         """Return ż, (state_size,), in the unit of z per second.
 
         Args:
-            dynamics: See `Effect`; likewise t, q and v, all at one state.
-            t: Time.
-            q: Position.
-            v: Velocity.
-            u: The actuation, (n,), in [N m] or [N]; for a bound, as left by the preceding bounds.
+            dynamics: The rigid bodies of the plant; see `Effect`.
+            t: Time, in [s].
+            q: Position, (n,), in [rad] or [m].
+            v: Velocity, (n,), in [rad/s] or [m/s].
+            u: Actuation, (n,), in [N m] or [N]; for a bound, after the preceding bounds.
             z: States of the effect, (state_size,).
         """
 
     def stored_energy(self, dynamics: Dynamics, t: float, q: Array, z: Array) -> Array:
-        """Energy E stored in its states, in [J], for the ledger; 0 by default."""
+        """Return the energy E stored in the states, in [J], for the ledger; 0 by default."""
         return 0 * q[..., 0]
 
 
 class Drive(Stateful, Force, ABC):
-    """A stateful force whose motors receive the actuation of some joints in place of these joints.
+    """A stateful force with motors, which receive the actuation of some joints instead of the joints themselves.
 
     The ledger counts the work of its torque on the joints minus the work of the actuation on its motors.
     """
 
     @abstractmethod
     def driven(self, n: int) -> Sequence[int]:
-        """Indices of the joints whose actuation the motors receive, on an arm with n joints."""
+        """Return the indices of the joints whose actuation the motors receive, on an arm with n joints."""
 
-    coupled: ClassVar[bool] = False  # whether motors may move with their joints; state_rate then takes a as well
+    coupled: ClassVar[bool] = False  # True if motors may move with their joints; state_rate then also takes a
 
     @abstractmethod
     def speeds(self, z: Array) -> Array:
-        """Velocities at which the actuation of the driven joints does work, in the order of `driven`."""
+        """Return the velocities at which the actuation of the driven joints does work, in the order of `driven`."""
 
     def reaching(self, u: Array) -> Array:
-        """The part of the actuation u, (..., n), that acts on the driven joints; 0 by default."""
+        """Return the part of the actuation u, (..., n), that acts on the driven joints; 0 by default."""
         return 0 * u[..., list(self.driven(u.shape[-1]))]
 
     def added_inertia(self, n: int) -> Array:
-        """Inertia of motors that move with the driven joints; 0 by default."""
+        """Return the inertia of motors that move with the driven joints; 0 by default."""
         return np.zeros(len(self.driven(n)))
 
     def power(self, v: Array, u: Array, torque: Array, z: Array, a: Array) -> Array:
-        """Power at one state, given velocity, actuation, torque and states of the drive, and acceleration."""
+        """Return the power at one state from v, u, the torque and states of the drive, and the acceleration."""
         return torque @ v - u[list(self.driven(len(v)))] @ self.speeds(z)
 
 
@@ -249,7 +249,7 @@ class Bound(Effect, ABC):
         """Return the bounded actuation for u, (..., n), in [N m] or [N]."""
 
     largest: ClassVar[Any] = inf
-    """Largest |u| that it lets through, a scalar or (n,), in [N m] or [N]; inf by default. Runs report it."""
+    """Largest bounded |u|, a scalar or (n,), in [N m] or [N]; inf by default. Runs report it."""
 
 
 class Timed(Effect):
@@ -269,7 +269,7 @@ class Timed(Effect):
         return self.start_s, self.end_s
 
     def acts(self, t: Any) -> Array:
-        """Whether the effect acts at times t (...,), including `start_s` but not `end_s`."""
+        """Return True at times t, (...,), at which the effect acts, including `start_s` but not `end_s`."""
         t = rows("t", t)
         return (self.start_s <= t) & (t < self.end_s)
 
@@ -298,9 +298,9 @@ def check_frame(effect: Effect, dynamics: Any, frame: str) -> None:
 
 
 def numbered(*names: str) -> tuple[str, ...]:
-    """Names, each of them once: a second part of a name gets a number, "spring" and "spring 2"."""
-    made: list[str] = []
+    """Return unique names: repeated ones are numbered, "spring" and "spring 2"."""
+    unique: list[str] = []
     for name in names:
         others = (f"{name} {k}" for k in count(2))
-        made.append(name if name not in made else next(each for each in others if each not in {*made, *names}))
-    return tuple(made)
+        unique.append(name if name not in unique else next(x for x in others if x not in {*unique, *names}))
+    return tuple(unique)

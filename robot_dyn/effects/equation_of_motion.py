@@ -30,7 +30,7 @@ class EquationOfMotion:
 
     Attributes:
         dynamics: The rigid bodies in gravity.
-        effects: What else acts.
+        effects: The forces and bounds on them.
     """
 
     dynamics: Dynamics
@@ -53,7 +53,7 @@ class EquationOfMotion:
 
     @cached_property
     def states(self) -> Mapping[int, slice]:
-        """Place of the states of each effect among those of all, by the number of the effect."""
+        """Slice of each effect's states in the vector of all states, by the index of the effect."""
         places, end = {}, 0
         for k, effect in enumerate(self.effects):
             if isinstance(effect, Stateful):
@@ -68,16 +68,16 @@ class EquationOfMotion:
 
     @cached_property
     def drives(self) -> Mapping[int, Drive]:
-        """The effects that take the actuation of joints, by their number."""
-        found = {k: effect for k, effect in enumerate(self.effects) if isinstance(effect, Drive)}
-        joints = [i for drive in found.values() for i in drive.driven(self.dynamics.n)]
+        """The effects that take the actuation of joints, by index."""
+        drives = {k: effect for k, effect in enumerate(self.effects) if isinstance(effect, Drive)}
+        joints = [i for drive in drives.values() for i in drive.driven(self.dynamics.n)]
         for i in joints:
             if joints.count(i) > 1:
                 raise EffectError(f"joint {self.dynamics.joint_names[i]!r} has two drives; keep one")
-        return found
+        return drives
 
     def on_joints(self, u: Array) -> Array:
-        """The part of the actuation u, (..., n), that acts on joints: 0 where it acts on the motor of a drive."""
+        """Return the part of the actuation u, (..., n), that acts on joints: 0 where it acts on a drive's motor."""
         if not self.drives:
             return u
         on_joints = u.copy()
@@ -88,10 +88,10 @@ class EquationOfMotion:
     def torques(
         self, t: float, q: Array, v: Array, shape: tuple[int, ...] | None = None, z: Array | None = None
     ) -> list[Array]:
-        """Return the torque of each force, broadcast to a shape if it is given, at states z of the effects.
+        """Return the torque of each force at states z of the effects, broadcast to `shape` if it is not None.
 
         Raises:
-            EffectError: If one does not fit the joints.
+            EffectError: If a torque does not fit the joints.
         """
         return [
             self._torque_of(force, (t, q, v, *self._states_of(k, q, v, z)), shape)
@@ -100,14 +100,14 @@ class EquationOfMotion:
         ]
 
     def _states_of(self, k: int, q: Array, v: Array, z: Array | None) -> tuple[Array, ...]:
-        """The states of an effect as its last argument, those of the start by default; () if it has none."""
+        """Return the states of an effect as its last argument, initial ones by default; () if it has none."""
         effect = self.effects[k]
         if not isinstance(effect, Stateful):
             return ()
         return (effect.start(self.dynamics, q, v) if z is None else z[self.states[k]],)
 
     def start(self, q: Array, v: Array) -> Array:
-        """The states of the effects at the start of a run, (state_size,)."""
+        """Return the states of the effects at the start of a run, (state_size,)."""
         starts = [effect.start(self.dynamics, q, v) for effect in self.effects if isinstance(effect, Stateful)]
         return np.concatenate([*starts, np.zeros(0)])
 
@@ -127,7 +127,7 @@ class EquationOfMotion:
         """Return the actuation after all bounds without states, in the order of the effects.
 
         Raises:
-            EffectError: If one does not fit.
+            EffectError: If a bound does not fit the shape of u.
         """
         for k, effect in enumerate(self.effects):
             if isinstance(effect, Bound) and k not in self.states:
@@ -136,7 +136,7 @@ class EquationOfMotion:
 
     @cached_property
     def _lags(self) -> int:
-        """Number of the first bound with states: only the bounds before it act before the actuation is held."""
+        """Index of the first bound with states: only the bounds before it act before the actuation is sampled."""
         return next((k for k in self.states if isinstance(self.effects[k], Bound)), len(self.effects))
 
     def commanded(self, u: Array) -> Array:
@@ -145,11 +145,11 @@ class EquationOfMotion:
 
     @cached_property
     def bounds_at_all_times(self) -> range:
-        """Numbers of the effects whose bounds act between ticks too: those from the first bound with states on."""
+        """Indices of the effects whose bounds also act between ticks: from the first bound with states onwards."""
         return range(self._lags, len(self.effects))
 
     def applied(self, u: Array, z: Array, of: range | None = None) -> tuple[Array, Mapping[int, Array]]:
-        """Return the actuation after the other bounds, at states z of the effects, and what reaches each of them."""
+        """Return the actuation after the remaining bounds, at states z, and the actuation that enters each bound."""
         reached = {}
         for k in self.bounds_at_all_times if of is None else of:
             effect = self.effects[k]
@@ -169,9 +169,10 @@ class EquationOfMotion:
     def state_rates(
         self, t: float, q: Array, v: Array, u: Array, reached: Mapping[int, Array], z: Array, a: Array | None = None
     ) -> list[tuple[slice, Array]]:
-        """Return the place and ż of each effect with states, at the actuation u and what reaches each bound.
+        """Return the slice and ż of each effect with states.
 
-        Motors that may move with their joints take the acceleration, 0 by default.
+        Bounds are evaluated at the actuation in `reached`, others at u. Motors that may move with their joints also
+        take the acceleration a, 0 by default.
         """
         a = 0 * v if a is None else a
         rates = []
@@ -182,24 +183,24 @@ class EquationOfMotion:
         return rates
 
     def acceleration(self, q: Array, v: Array, total: Array) -> Array:
-        """The acceleration under the total torque τ + Σ τ_effect."""
+        """Return the acceleration under the total torque τ + Σ τ_effect."""
         if not self.set_valued:
             return self.dynamics.forward_dynamics(q, v, total)
         return self.with_reaction(q, v, total)[0]
 
     def with_reaction(self, q: Array, v: Array, total: Array) -> tuple[Array, Array]:
-        """The acceleration of one state, and the reaction λ of what holds joints: M a + C v + ∂V/∂q = total + λ.
+        """Return the acceleration of one state and the reaction λ on held joints: M a + C v + ∂V/∂q = total + λ.
 
-        A held joint has a = 0, the others have λ = 0. Effects without a mode hold every joint at rest that they can.
+        Held joints have a = 0, the others λ = 0. Effects without a mode hold every resting joint that they can.
         """
         M, load = self.dynamics.M(q), total - self.dynamics.inverse_dynamics(q, v, 0 * v)
         held = self.set_valued[0].held
         if held is None:
-            acceleration(M, load, self.dynamics.joint_names)  # raises if M is singular, as without friction
+            acceleration(M, load, self.dynamics.joint_names)  # raises if M is singular
             if M.dtype not in (np.float32, np.float64):
                 raise EffectError(
-                    f"{self.set_valued[0].name}: which joints it holds is decided in float64, not in {M.dtype}; use a"
-                    " plant of the robot, or of its Lagrangian in float64"
+                    f"{self.set_valued[0].name}: held joints can be determined in float64 only, not in {M.dtype}; use"
+                    " a plant of the robot, or of its Lagrangian in float64"
                 )
             a = settled(self.set_valued, M, load, q, v)[0]
             held = (a == 0).astype(float)
@@ -212,7 +213,7 @@ class EquationOfMotion:
         return a, held * (M @ a - load)
 
     def _added_inertia(self) -> Array:
-        """The inertia of motors that move with their joints, (n, n)."""
+        """Return the inertia of motors that move with their joints, (n, n)."""
         n = self.dynamics.n
         added = 0 * self.set_valued[0].held
         for drive in self.drives.values():
@@ -221,11 +222,11 @@ class EquationOfMotion:
         return added * np.eye(n)
 
     def momentum_rate(self, q: Array, v: Array, total: Array) -> Array:
-        """The rate of the momentum p = M v under the total torque."""
+        """Return the rate of the momentum p = M v under the total torque."""
         return total + self.dynamics.coriolis_transpose(q, v) - self.dynamics.N(q)
 
     def energies(self, t: Scalar, q: Array, v: Array) -> tuple[Array, Array]:
-        """Kinetic energy, and the potential of gravity and of all conservative effects, (...)."""
+        """Return the kinetic energy, and the potential of gravity and all conservative effects, (...)."""
         potential = self.dynamics.potential_energy(q)
         for force in self.forces:
             if isinstance(force, Conservative):
@@ -233,12 +234,12 @@ class EquationOfMotion:
         return self.dynamics.kinetic_energy(q, v), potential
 
     def powers(self, v: Array, u: Array, torques: list[Array], z: Array, a: Array) -> list[Scalar]:
-        """Power of the actuation, and of each force without a potential, at one state.
+        """Return the power of the actuation, and of each force without a potential, at one state.
 
         Args:
             v: Velocity, (n,).
             u: Actuation, (n,).
-            torques: Of each force, (n,).
+            torques: Torque of each force, (n,).
             z: States of the effects.
             a: Acceleration, (n,), for motors that move with their joints.
         """

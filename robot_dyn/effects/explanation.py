@@ -1,4 +1,4 @@
-"""The equation of motion of a plant in words: its terms, what acts, and the coefficients as they act."""
+"""The equation of motion of a plant in words: its terms, the effects, and their coefficients."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ EDITED = {
     "payload": "a rigid body on a link, in M, C and N",
     "armature": "added to the diagonal of M",
     "mass_scale": "factor on mass and inertia of all links, payloads excepted",
-    "mass": "of a link, in place of that of the file",
-    "inertia": "of a link, in place of that of the file",
+    "mass": "of a link, replaces the value in the file",
+    "inertia": "of a link, replaces the value in the file",
 }
-"""What each edit of a robot does, in a line."""
+"""Description of each edit of a robot, in one line."""
 
 
 @final
@@ -37,13 +37,13 @@ class Number:
 @final
 @dataclass(frozen=True)
 class Term:
-    """What acts: an edit of the robot or an effect.
+    """An edit of the robot, or an effect.
 
     Attributes:
         kind: Its name in scenes.
-        term: Its equation in a line; empty for a user-defined effect that states none.
-        numbers: Of a scene, as they are written there.
-        coefficients: As they act, with units.
+        term: Its equation in one line; empty for a user-defined effect without `term`.
+        numbers: Numbers as written in a scene.
+        coefficients: Coefficients as they act, with units.
     """
 
     kind: str
@@ -55,20 +55,20 @@ class Term:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Explanation(Answer):
-    """What a plant, a setup or a scene integrates.
+    """The equations that a plant, a setup or a scene integrates.
 
     Attributes:
-        robot: Its name.
+        robot: Name of the robot.
         joints: Names of the joints.
         equation: Lines of the equation of motion.
-        effects: What acts.
-        absent: Kinds that do not act.
-        absent_of_control: What a digital loop can have and that of the controller has not.
+        effects: Edits of the robot and effects.
+        absent: Kinds of effects that do not act.
+        absent_of_control: Features of a digital loop that the controller does not have.
         control: Lines on controller and reference.
         method: Lines on method and start.
         machine_code: Lines on instructions.
         source: Path of the robot's file; empty if there is none.
-        findings: What of the robot is estimated, and what was assumed or left out of its file.
+        findings: Estimated values of the robot, and assumptions and omissions when its file was read.
     """
 
     robot: str
@@ -90,11 +90,11 @@ class Explanation(Answer):
         yield from (f"    {line}" for line in self.equation)
         yield ""
         yield "effects:" if self.effects else "effects: none"
-        for each in self.effects:
-            yield f"  {each.kind}: {each.term}" if each.term else f"  {each.kind}"
-            yield from (f"    {x.key} = {x.value}  ({x.source})" for x in each.numbers)
-            if each.coefficients:
-                yield f"    as it acts: {'; '.join(each.coefficients)}"
+        for effect in self.effects:
+            yield f"  {effect.kind}: {effect.term}" if effect.term else f"  {effect.kind}"
+            yield from (f"    {x.key} = {x.value}  ({x.source})" for x in effect.numbers)
+            if effect.coefficients:
+                yield f"    as it acts: {'; '.join(effect.coefficients)}"
         if self.absent:
             yield ""
             yield "not simulated, since nothing names it:"
@@ -106,7 +106,7 @@ class Explanation(Answer):
         if self.source:
             yield ""
             yield f"the file of the robot: {abbreviated(self.source)}"
-            yield from (f"  {each}" for each in self.findings)
+            yield from (f"  {finding}" for finding in self.findings)
 
 
 def explanation(dynamics: Any, effects: tuple[Effect, ...]) -> Explanation:
@@ -131,18 +131,18 @@ def explanation(dynamics: Any, effects: tuple[Effect, ...]) -> Explanation:
 
 
 def _sum(terms: list[str]) -> str:
-    """Terms of N; the sign of the first one stands before it."""
+    """Join the terms of N, without a space after a leading sign."""
     return " ".join(terms).replace("− ", "−", 1) if terms and terms[0][0] == "−" else " ".join(terms) or "0"
 
 
 def _by_effect(effects: Iterable[Effect]) -> Iterator[list[Effect]]:
-    """The parts of each effect: neighbours of one name and different classes."""
+    """Yield the parts of each effect: neighbours of one name and different classes."""
     parts: list[Effect] = []
-    for each in effects:
-        if parts and (each.name != parts[0].name or type(each) in map(type, parts)):
+    for effect in effects:
+        if parts and (effect.name != parts[0].name or type(effect) in map(type, parts)):
             yield parts
             parts = []
-        parts.append(each)
+        parts.append(effect)
     if parts:
         yield parts
 
@@ -152,20 +152,20 @@ def _term(parts: list[Effect], dynamics: Any) -> Term:
 
 
 def term_of(parts: Iterable[Any]) -> str:
-    """The sum of the terms of the parts of an effect, or of their classes."""
-    first, *rest = (each.term for each in parts)
+    """Return the sum of the terms of an effect's parts, or of their classes."""
+    first, *rest = (part.term for part in parts)
     return " ".join((first, *(f"− {term[1:]}" if term[:1] == "−" else f"+ {term}" for term in rest)))
 
 
 def as_they_act(parts: Iterable[Any], dynamics: Any, signal: str = "signal") -> tuple[str, ...]:
-    """Coefficients of the parts of an effect or a controller, with units; `signal` as of `coefficient_texts`."""
+    """Return the coefficients of the parts of an effect or a controller, with units; see `coefficient_texts`."""
     types = joint_types_of(dynamics)
-    texts = {name: text for each in parts for name, text in coefficient_texts(each, types, signal).items()}
+    texts = {name: text for part in parts for name, text in coefficient_texts(part, types, signal).items()}
     return tuple(texts.values())
 
 
 def edit_terms(edits: Any) -> Iterator[Term]:
-    """What was changed of a robot, gravity included."""
+    """Yield a term for each edit of a robot, gravity included."""
     texts = {
         "gravity": [f"g = ({', '.join(f'{x:g}' for x in edits.gravity)}) m/s²"] if any(edits.gravity) else [],
         "lock": [f"{joint} = {x:g}" for joint, x in edits.lock],
@@ -175,4 +175,4 @@ def edit_terms(edits: Any) -> Iterator[Term]:
         "mass": [f"{link} {x:g} kg" for link, x in edits.masses],
         "inertia": [link for link, _ in edits.inertias],
     }
-    yield from (Term(kind, EDITED[kind], coefficients=tuple(each)) for kind, each in texts.items() if each)
+    yield from (Term(kind, EDITED[kind], coefficients=tuple(lines)) for kind, lines in texts.items() if lines)

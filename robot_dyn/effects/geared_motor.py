@@ -1,4 +1,4 @@
-"""Base of geared drives: which joints they drive, and the rotor inertia reflected through the gear, n² J."""
+"""Base class of geared drives: the driven joints, and the rotor inertia reflected through the gear, n² J."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from robot_dyn.foundations.errors import EffectError
 
 
 class GearedMotor(Drive):
-    """Geared motors, one for each joint where the coefficient named by `through` is positive.
+    """Geared motors, one for each joint at which the coefficient named by `through` is positive.
 
     Attributes:
         inertia: J of the rotor, a scalar or (n,).
         ratio: n of the gear, a scalar or (n,); None for 1.
         joints: Indices of the driven joints; None outside a plant.
-        through: Name of the coefficient that describes how a motor moves its joint.
+        through: Name of the coefficient that couples a motor to its joint.
     """
 
     inertia: Any
@@ -29,26 +29,30 @@ class GearedMotor(Drive):
     through: ClassVar[str]
 
     def on(self, dynamics: Any) -> Any:
-        known: Any = super().on(dynamics)
-        driven = np.flatnonzero(np.broadcast_to(getattr(known, self.through), dynamics.n) > 0)
+        resolved: Any = super().on(dynamics)
+        driven = np.flatnonzero(np.broadcast_to(getattr(resolved, self.through), dynamics.n) > 0)
         if not len(driven):
-            raise EffectError(f"{self.name}: {self.through} is 0 for all joints; give a positive one, or leave it out")
-        return with_values(known, {"joints": tuple(driven.tolist())})
+            raise EffectError(
+                f"{self.name}: {self.through} is 0 for all joints; give a positive value, or remove the effect"
+            )
+        return with_values(resolved, {"joints": tuple(driven.tolist())})
 
     @property
     def _driven(self) -> list[int]:
         if self.joints is None:
-            raise EffectError(f"{self.name}: its joints are known in a plant; ask that")
+            raise EffectError(
+                f"{self.name}: the driven joints are determined by a plant; use rd.Plant(robot, [effect])"
+            )
         return list(self.joints)
 
     def driven(self, n: int) -> Sequence[int]:
         return self._driven
 
     def of(self, name: str, n: int) -> Array:
-        """Values of a coefficient for the driven joints, (k,)."""
+        """Return the values of a coefficient at the driven joints, (k,)."""
         return np.broadcast_to(getattr(self, name), (n,), subok=True)[self._driven]
 
     def reflected(self, n: int) -> Array:
-        """Rotor inertia reflected through the gear, n² J, (k,)."""
+        """Return the rotor inertia reflected through the gear, n² J, (k,)."""
         J = self.of("inertia", n)
         return J if self.ratio is None else self.of("ratio", n) ** 2 * J

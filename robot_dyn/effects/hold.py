@@ -1,4 +1,4 @@
-"""How firmly dry friction and rigid stops hold a joint at rest: its load, and the loads at which it breaks away.
+"""Joints held at rest by dry friction and rigid stops: the load of each, and the loads at which it breaks away.
 
     M a + C v + ∂V/∂q = τ + Σ τ_effect + λ,    load = −λ
 
@@ -23,7 +23,7 @@ class Hold:
 
     Attributes:
         joint: Name of the joint.
-        by: Names of the effects that can hold it.
+        by: Names of the effects that can hold the joint.
         load: Torque or force that these effects balance, in [N m] or [N].
         least, most: Loads below and above which the joint breaks away; −inf or inf towards a stop.
     """
@@ -36,7 +36,7 @@ class Hold:
 
     @reported
     def margin(self) -> float:
-        """Smallest change of load, in either direction, that breaks the joint away, in [N m] or [N]; at least 0."""
+        """Return the smallest change of load, in either direction, at which the joint breaks away; at least 0."""
         return max(min(self.load - self.least, self.most - self.load), 0.0)
 
 
@@ -52,11 +52,11 @@ def held(equation: EquationOfMotion, q: np.ndarray, v: np.ndarray, total: np.nda
     if not equation.set_valued:
         return ()
     a, reaction = equation.with_reaction(q, v, total)
-    intervals = [(each.name, each.at_rest(q)) for each in equation.set_valued]
+    intervals = [(effect.name, effect.at_rest(q)) for effect in equation.set_valued]
     least, most = (sum(interval[k] for _, interval in intervals) for k in (0, 1))
-    found = []
+    holds = []
     for i in np.flatnonzero((v == 0) & (a == 0) & (np.less(least, 0) | np.greater(most, 0))):
-        by = tuple(name for name, each in intervals if each.least[i] < 0 or each.most[i] > 0)
+        by = tuple(name for name, interval in intervals if interval.least[i] < 0 or interval.most[i] > 0)
         ends = -float(most[i]), -float(least[i])  # pyright: ignore[reportIndexIssue]
-        found.append(Hold(equation.dynamics.joint_names[i], by, -float(reaction[i]) + 0.0, *(x + 0.0 for x in ends)))
-    return tuple(found)
+        holds.append(Hold(equation.dynamics.joint_names[i], by, -float(reaction[i]) + 0.0, *(x + 0.0 for x in ends)))
+    return tuple(holds)

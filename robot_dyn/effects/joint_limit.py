@@ -1,4 +1,4 @@
-"""Joint stops as one-sided spring and damper: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth past a stop.
+"""Joint stops as one-sided springs and dampers: τ = k (δ₋ − δ₊) − c (δ₋ + δ₊) v, with δ the depth past a stop.
 
 The damping grows with the depth, so that the torque is continuous at contact [Hunt, Crossley 1975]. Soft stops are
 overrun by about v √(M/k); for rigid ones see `rigid_stops`.
@@ -28,7 +28,7 @@ UPPER = coefficient("rad", symbol="Upper stop", infinite=True, elsewhere=inf, st
 
 @dataclass(frozen=True, eq=False)
 class _JointStops(Effect):
-    """What both parts of joint stops share."""
+    """Base class of the two parts of joint stops."""
 
     lower: Any = field(metadata=LOWER)
     upper: Any = field(metadata=UPPER)
@@ -41,8 +41,8 @@ class _JointStops(Effect):
         for name in ("lower", "upper"):
             stop = getattr(self, name)
             if not isinstance(stop, np.ndarray):
-                return  # by name, or as the file states: checked when the joints are known
-            # finite also where there is no stop: inf − inf is avoided
+                return  # by joint name or "urdf": checked by the plant
+            # finite even without a stop, to avoid inf − inf
             stop = np.clip(stop, -_NOWHERE, _NOWHERE)
             stop.setflags(write=False)
             object.__setattr__(self, name, stop)
@@ -53,7 +53,7 @@ class _JointStops(Effect):
 
     @property
     def widths(self) -> tuple[Any, Any]:
-        with np.errstate(divide="ignore"):  # the depth at which a stop holds 1 N m or 1 N: loads that matter lie deeper
+        with np.errstate(divide="ignore"):  # depth at 1 N m or 1 N: relevant loads lie deeper
             return np.divide(1.0, getattr(self, self.through)), inf
 
     def thresholds(self, n: int) -> tuple[Threshold, ...]:
@@ -66,13 +66,13 @@ class _JointStops(Effect):
         )
 
     def on_side(self, n: int, sides: Mapping[Threshold, int]) -> Effect:
-        """Without the stops that are not touched; the depth at a touched one continues to both sides, as a spring."""
+        """Return the effect without untouched stops; touched ones act on both sides, like springs."""
         lower, upper = np.broadcast_to(self.lower, n).copy(), np.broadcast_to(self.upper, n).copy()
-        for joint in {each.joint for each in sides}:
+        for joint in {threshold.joint for threshold in sides}:
             lower[joint], upper[joint] = -_NOWHERE, _NOWHERE
-        for each, side in sides.items():
-            if side == (1 if each.name == _UPPER_STOP[0] else -1):
-                lower[each.joint] = upper[each.joint] = each.level
+        for threshold, side in sides.items():
+            if side == (1 if threshold.name == _UPPER_STOP[0] else -1):
+                lower[threshold.joint] = upper[threshold.joint] = threshold.level
         return with_values(self, {"lower": lower, "upper": upper})
 
 
@@ -109,7 +109,8 @@ class JointStopDamper(_JointStops, Dissipative):
     """The dissipative part of joint stops: τ = −c (δ₋ + δ₊) v.
 
     Attributes:
-        lower, upper: Positions of the stops, as of the spring.
+        lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m].
+        upper: Position of the upper stop, inf for none, above the lower one.
         damping: c, damping for each unit of depth, a scalar or (n,), in [N m s/rad²] or [N s/m²], not negative.
 
     Example:

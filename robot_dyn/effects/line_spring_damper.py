@@ -1,7 +1,7 @@
 """Spring and damper along the line between two points: τ = −(∂ℓ/∂q)ᵀ (k (ℓ − ℓ₀) + c ℓ'), with ℓ their distance.
 
 Each point is fixed to a frame of the arm, or to the world. With e = (p − p') / ℓ, the direction of the line, and the
-Jacobians of the points, ∂ℓ/∂q = eᵀ (J − J') and ℓ' = ∂ℓ/∂q v. Where the points meet, ℓ = 0, the line has no direction.
+Jacobians of the points, ∂ℓ/∂q = eᵀ (J − J') and ℓ' = ∂ℓ/∂q v. If the points coincide, the line has no direction.
 [Shabana, Computational Dynamics, 3rd ed., 2010, sec. 3.3]
 """
 
@@ -59,19 +59,19 @@ class _Line(Effect):
         return self
 
     def _line(self, dynamics: Dynamics, q: Array) -> tuple[Array, Array]:
-        """The vector p − p' in base axes, and ℓ, (..., 3) and (..., 1); EffectError where ℓ is 0."""
+        """Return the vector p − p' in base axes, (..., 3), and ℓ, (..., 1); raise an EffectError if ℓ is 0."""
         other = _position(dynamics, q, self.other_frame, self.other_point)
         line = _position(dynamics, q, self.frame, self.point) - other
         square = (line**2).sum(axis=-1, keepdims=True)
         if square.dtype != object and not square.all():
             other = "the world" if self.other_frame is None else repr(self.other_frame)
             raise EffectError(
-                f"{self.name}: its points of {self.frame!r} and {other} meet, where their line has no direction"
+                f"{self.name}: the points of {self.frame!r} and {other} coincide, so their line has no direction"
             )
         return line, sqrt(square)
 
     def _along(self, dynamics: Dynamics, q: Array) -> tuple[Array, Array]:
-        """ℓ, (..., 1), and ∂ℓ/∂q, (..., n)."""
+        """Return ℓ, (..., 1), and ∂ℓ/∂q, (..., n)."""
         line, length = self._line(dynamics, q)
         direction = line / length
         slope = _slope(dynamics, q, self.frame, self.point, direction)
@@ -81,7 +81,7 @@ class _Line(Effect):
 
 
 def _position(dynamics: Dynamics, q: Array, frame: str | None, point: Array) -> Array:
-    """A point in base axes, (..., 3)."""
+    """Return a point in base axes, (..., 3)."""
     if frame is None:
         return point
     placement = dynamics.placement(q, frame)
@@ -89,7 +89,7 @@ def _position(dynamics: Dynamics, q: Array, frame: str | None, point: Array) -> 
 
 
 def _slope(dynamics: Dynamics, q: Array, frame: str, point: Array, direction: Array) -> Array:
-    """∂(eᵀ p)/∂q of a point of a frame along a direction e: Jᵀ (e, r × e), with r from the frame to the point."""
+    """Compute ∂(eᵀ p)/∂q for a point of a frame and a direction e: Jᵀ (e, r × e), with r from frame to point."""
     r = apply(dynamics.placement(q, frame)[..., :3, :3], point)
     force = np.concatenate([direction, apply(hat(r), direction)], axis=-1)
     return apply(transpose(dynamics.jacobian(q, frame)), force)
@@ -101,7 +101,7 @@ class LineSpring(_Line, Conservative):
     """The elastic part of a line spring-damper: τ = −(∂ℓ/∂q)ᵀ k (ℓ − ℓ₀), of energy ½ k (ℓ − ℓ₀)².
 
     Attributes:
-        frame, other_frame, point, other_point, stiffness, length: As of `LineSpringDamper`.
+        frame, other_frame, point, other_point, stiffness, length: Same as in `LineSpringDamper`.
 
     Example:
         >>> rd.effects.LineSpring(frame="tip", other_frame="bar_1", point=[0.1, 0.0, 0.2],
@@ -128,7 +128,7 @@ class LineDamper(_Line, Dissipative):
     """The dissipative part of a line spring-damper: τ = −(∂ℓ/∂q)ᵀ c ℓ'.
 
     Attributes:
-        frame, other_frame, point, other_point, damping: As of `LineSpringDamper`.
+        frame, other_frame, point, other_point, damping: Same as in `LineSpringDamper`.
 
     Example:
         >>> rd.effects.LineDamper(frame="tip", other_frame="bar_1", point=[0.1, 0.0, 0.2],
@@ -149,17 +149,17 @@ class LineDamper(_Line, Dissipative):
 class LineSpringDamper(_Line):
     """A spring and a damper along the line between two points: τ = −(∂ℓ/∂q)ᵀ (k (ℓ − ℓ₀) + c ℓ').
 
-    A plant takes it as its two parts, a `LineSpring` and a `LineDamper`. Where the points meet, the line has no
-    direction: the torque raises an EffectError there, and a run ends.
+    A plant splits it into a `LineSpring` and a `LineDamper`. If the points coincide, the line has no direction: the
+    torque raises an EffectError, and a run ends.
 
     Attributes:
         frame: A frame of the arm.
-        other_frame: Another one; None for the world.
-        point: A point of the frame, in its axes, (3,), in [m]; its origin unless given.
-        other_point: A point of the other frame, in its axes, or of the world, in those of the base.
+        other_frame: Another frame of the arm; None for the world.
+        point: A point in the axes of the frame, (3,), in [m]; the origin by default.
+        other_point: A point in the axes of the other frame, or of the base for the world, (3,), in [m].
         stiffness: k, in [N/m], not negative.
         damping: c, in [N s/m], not negative.
-        length: ℓ₀, without force, in [m], not negative.
+        length: ℓ₀, length without force, in [m], not negative.
 
     Example:
         >>> rd.effects.LineSpringDamper(frame="tip", other_frame="bar_1", point=[0.1, 0.0, 0.2],

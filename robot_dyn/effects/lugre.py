@@ -2,7 +2,7 @@
 
     g(v) = f_c + (f_s − f_c) exp(−(v/v_s)²)
 
-At rest it is a spring of stiffness σ₀ that holds up to f_s; sliding steadily it is g(v) sign(v) + σ₂ v.
+At rest the friction is a spring of stiffness σ₀ that holds up to f_s; in steady sliding it is g(v) sign(v) + σ₂ v.
 [Canudas de Wit, Olsson, Åström, Lischinsky 1995]
 """
 
@@ -20,7 +20,7 @@ from robot_dyn.foundations.coefficients import coefficient
 from robot_dyn.foundations.threshold import Layer, Threshold
 from robot_dyn.queries.dynamics import Dynamics
 
-_SLOW = 1e-6  # of v_s: no digit depends on reversals of slower motion
+_SLOW = 1e-6  # relative to v_s: reversals of slower motion change no digit
 _REVERSAL = "velocity", "turns positive", "turns negative"
 
 
@@ -43,7 +43,7 @@ class Bristles(Stateful):
         return tuple(Layer(i, float(sliding[i] / stiffness[i]), level=None, state=i) for i in joints)
 
     def reversals(self, slack: Any, n: int) -> tuple[Threshold, ...]:
-        """Where the velocity of a joint with bristles reverses, passed by the slack, (n,)."""
+        """Return the thresholds at which a joint with bristles reverses, for speeds above the slack, (n,)."""
         acts, slow = np.broadcast_to(self.bristle_stiffness, n) > 0, np.broadcast_to(slack, n)
         return tuple(Threshold(i, 0.0, *_REVERSAL, of_velocity=True, slack=slow[i]) for i in range(n) if acts[i])
 
@@ -61,8 +61,8 @@ class LuGreFriction(Bristles, Active):
         bristle_stiffness: σ₀, a scalar or (n,), in [N m/rad] or [N/m], not negative.
         bristle_damping: σ₁, in [N m s/rad] or [N s/m], not negative.
         viscous: σ₂, in [N m s/rad] or [N s/m], not negative.
-        coulomb: f_c, of sliding, in [N m] or [N], positive.
-        breakaway: f_s, of rest, in [N m] or [N], not less than f_c.
+        coulomb: f_c, sliding friction, in [N m] or [N], positive.
+        breakaway: f_s, static friction, in [N m] or [N], not less than f_c.
         stribeck_velocity: v_s, in [rad/s] or [m/s], positive.
 
     Example:

@@ -32,7 +32,7 @@ class Plant(Caching):
 
     Attributes:
         dynamics: The rigid bodies in gravity.
-        effects: What else acts; "urdf" for the friction in the robot's file, if there is any.
+        effects: The effects; "urdf" for the friction in the robot's file, if there is any.
     """
 
     dynamics: Dynamics
@@ -40,27 +40,32 @@ class Plant(Caching):
 
     def __init__(self, dynamics: Dynamics, effects: Iterable[Effect] | str = ()) -> None:
         if isinstance(getattr(dynamics, "plant", None), Plant):
-            raise EffectError(f"got a {type(dynamics).__name__} for a plant: give the Plant, engine='compiled'")
+            raise EffectError(
+                f"dynamics: got a {type(dynamics).__name__}; pass the Plant itself, with engine='compiled'"
+            )
         if not isinstance(dynamics, Dynamics):
-            raise EffectError(f"dynamics: give a robot, such as rd.load('ur5'), got {shown(dynamics)}")
+            raise EffectError(f"dynamics must be a robot, such as rd.load('ur5'), got {shown(dynamics)}")
         object.__setattr__(self, "dynamics", dynamics)
         if isinstance(effects, str):
             if effects != "urdf":
-                raise EffectError(f"effects={shown(effects)}; give effects, or 'urdf' for those the file states")
+                raise EffectError(f"effects={shown(effects)}; give effects, or 'urdf' for the friction in the file")
             effects = stated_friction(dynamics)
-        if (given := several(effects)) is None:
+        if (sequence := several(effects)) is None:
             raise EffectError(
-                f"effects must be several, such as [rd.effects.ViscousFriction(0.1)], got {shown(effects)}"
+                f"effects must be a sequence, such as [rd.effects.ViscousFriction(0.1)], got {shown(effects)}"
             )
-        parts = [part for effect in given for part in (effect.parts if isinstance(effect, Effect) else (effect,))]
+        parts = [part for effect in sequence for part in (effect.parts if isinstance(effect, Effect) else (effect,))]
         for part in parts:
             if not isinstance(part, Force | Bound | CarriedPayload):
                 raise EffectError(
-                    f"{shown(part)} is neither a Force nor a Bound, so nothing would evaluate it; subclass"
+                    f"{shown(part)} is neither a Force nor a Bound and would never be evaluated; subclass"
                     " Conservative, Dissipative, Active or Bound"
                 )
             if isinstance(part, Conservative) and isinstance(part, Stateful):
-                raise EffectError(f"{part.name} is Conservative and has states; its energy is their stored_energy")
+                raise EffectError(
+                    f"{part.name} is Conservative and has states; derive it from Active or Dissipative and define"
+                    " stored_energy"
+                )
         object.__setattr__(self, "effects", tuple(part.on(dynamics) for part in parts))
 
     def __repr__(self) -> str:
@@ -71,58 +76,58 @@ class Plant(Caching):
 
     @cached_property
     def equation_of_motion(self) -> EquationOfMotion:
-        """Its equation of motion, for arguments that are not checked."""
+        """The equation of motion, which does not check its arguments."""
         return EquationOfMotion(self.dynamics, self.effects)
 
     @cached_property
-    def _comes_and_goes(self) -> tuple[CarriedPayload, ...]:
-        """The payloads that come and go: a run fixes which of them are carried."""
-        return tuple(each for each in self.effects if isinstance(each, CarriedPayload) and each.carried is None)
+    def _timed_payloads(self) -> tuple[CarriedPayload, ...]:
+        """The payloads that come and go; within a phase of a run, payloads are fixed as carried or not."""
+        return tuple(x for x in self.effects if isinstance(x, CarriedPayload) and x.carried is None)
 
     def at(self, t: float) -> Plant:
-        """Return the plant with the payloads that it carries at time t, in [s], fixed to it; itself without payloads.
+        """Return the plant with the payloads carried at time t, in [s], as fixed bodies; itself without payloads.
 
         Raises:
             QueryError: If t is not a finite number.
         """
-        t, payloads = number("t", t), self._comes_and_goes
+        t, payloads = number("t", t), self._timed_payloads
         if not payloads:
             return self
-        carried = [each.payload for each in payloads if each.acts(t)]
+        carried = [effect.payload for effect in payloads if effect.acts(t)]
         robot: Any = self.dynamics
-        others = [each for each in self.effects if each not in payloads]
+        others = [effect for effect in self.effects if effect not in payloads]
         return Plant(robot.with_(payload=carried), others)
 
-    def _whenever(self, what: str) -> None:
-        if self._comes_and_goes:
-            raise EffectError(f"{what} depends on the carried payloads, and so on the time: use plant.at(t), t in [s]")
+    def _require_fixed_payloads(self, query: str) -> None:
+        if self._timed_payloads:
+            raise EffectError(f"{query} depends on the carried payloads, and so on the time: use plant.at(t), t in [s]")
 
     @property
     def forces(self) -> tuple[Force, ...]:
-        """The effects that are torques."""
+        """The effects that exert a torque."""
         return self.equation_of_motion.forces
 
     def actuation(self, u: Array) -> Array:
-        """Return the actuation after all bounds, for u (..., n); EffectError if one does not fit."""
+        """Return the actuation u, (..., n), after all bounds; raise an EffectError if a bound does not fit."""
         (u,) = (u,) if self._is_plain(u) else self._states(u=u)
         return self.equation_of_motion.actuation(u)
 
     def M(self, q: Array) -> Array:
-        """Mass matrix, (..., n, n); EffectError if a payload comes or goes: use `at` first."""
-        self._whenever("M")
+        """Return the mass matrix, (..., n, n); raise an EffectError if a payload comes or goes: call `at` first."""
+        self._require_fixed_payloads("M")
         return self.dynamics.M(q)
 
     def C(self, q: Array, v: Array) -> Array:
-        """Coriolis matrix, (..., n, n); EffectError as of M."""
-        self._whenever("C")
+        """Return the Coriolis matrix, (..., n, n); raise an EffectError if a payload comes or goes: call `at` first."""
+        self._require_fixed_payloads("C")
         return self.dynamics.C(q, v)
 
     def N(self, t: float, q: Array, v: Array) -> Array:
-        """All forces but actuation, with the sign of a load: N = ∂V/∂q − Σ τ_effect, (..., n)."""
+        """Return gravity minus the torques of the effects, N = ∂V/∂q − Σ τ_effect, (..., n), in [N m] or [N]."""
         return self._finite(self.at(t).dynamics.N(q) - self.torque(t, q, v))
 
     def torque(self, t: float, q: Array, v: Array) -> Array:
-        """Σ τ_effect, the torque of all effects on the joints, (..., n); 0 without effects.
+        """Return the torque of all effects on the joints, Σ τ_effect, (..., n); 0 without effects.
 
         Args:
             t: Time, one number, in [s].
@@ -144,11 +149,11 @@ class Plant(Caching):
             return self._finite(sum(self.equation_of_motion.torques(t, q, v, zeros.shape), start=zeros))
 
     def inverse_dynamics(self, t: float, q: Array, v: Array, a: Array) -> Array:
-        """Actuation τ = M a + C v + N that gives the acceleration a, (..., n)."""
+        """Return the actuation that causes the acceleration a, τ = M a + C v + N, (..., n)."""
         return self._finite(self.at(t).dynamics.inverse_dynamics(q, v, a) - self.torque(t, q, v))
 
     def forward_dynamics(self, t: float, q: Array, v: Array, u: Array) -> Array:
-        """Acceleration under the actuation u, (..., n)."""
+        """Return the acceleration under the actuation u, (..., n)."""
         equation = self.at(t).equation_of_motion
         total = equation.on_joints(self.actuation(u)) + self.torque(t, q, v)
         if not equation.set_valued:
@@ -169,11 +174,11 @@ class Plant(Caching):
 
         Raises:
             QueryError: If an argument has another shape or is not finite.
-            EffectError: If the arithmetic of the dynamics does not decide which joints are held.
+            EffectError: If the arithmetic of the dynamics cannot decide which joints are held.
         """
         q, v, u = self._states(q=q, v=v, u=u)
         if any(x.shape != (self.dynamics.n,) for x in (q, v, u)):
-            raise QueryError(f"held is of one state: q, v and u must have shape ({self.dynamics.n},)")
+            raise QueryError(f"held takes one state: q, v and u must have shape ({self.dynamics.n},)")
         equation = self.at(t).equation_of_motion
         return held(equation, q, v, equation.on_joints(self.actuation(u)) + self.torque(t, q, v))
 
@@ -183,15 +188,15 @@ class Plant(Caching):
 
     @cached_property
     def _shape(self) -> tuple[int] | None:
-        """Shape of one state for the short checks; None if states are converted to another arithmetic."""
+        """Shape of one state for the fast checks; None if states are converted to another arithmetic."""
         return (self.dynamics.n,) if self._arithmetic == FLOAT64 else None
 
     def _is_plain(self, x: Any) -> bool:
         return is_plain(x, self._shape)
 
-    def _states(self, **given: Any) -> list[Array]:
+    def _states(self, **arguments: Any) -> list[Array]:
         names = self.dynamics.joint_names
-        return [joint_values(name, x, names, self._arithmetic) for name, x in given.items()]
+        return [joint_values(name, x, names, self._arithmetic) for name, x in arguments.items()]
 
     def _finite(self, result: Array) -> Array:
         if not self._arithmetic.finite(result).all():
@@ -200,16 +205,16 @@ class Plant(Caching):
 
 
 def carrying(plant: Plant, carried: Sequence[bool]) -> Plant:
-    """Return the plant of a run that carries these of its payloads."""
+    """Return the plant with each of its payloads fixed as carried or not."""
     payloads = plant.equation_of_motion.payloads
-    of = {each: with_values(each, {"carried": taken}) for each, taken in zip(payloads, carried, strict=True)}
-    effects = [of[each] if isinstance(each, CarriedPayload) else each for each in plant.effects]
+    fixed = {x: with_values(x, {"carried": is_carried}) for x, is_carried in zip(payloads, carried, strict=True)}
+    effects = [fixed[effect] if isinstance(effect, CarriedPayload) else effect for effect in plant.effects]
     return Plant(robot_with(plant.dynamics, payloads, carried), effects)
 
 
 def in_mode(plant: Plant, mode: Mode) -> Plant:
     """Return the plant in a mode of its set-valued effects."""
-    effects = [each.in_mode(mode) if isinstance(each, SetValued) else each for each in plant.effects]
+    effects = [effect.in_mode(mode) if isinstance(effect, SetValued) else effect for effect in plant.effects]
     return Plant(plant.dynamics, effects)
 
 

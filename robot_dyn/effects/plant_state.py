@@ -1,4 +1,4 @@
-"""A plant at one state: M, C, N, the torque of each effect, and the joints that are held."""
+"""The terms of a plant at one state: M, C, N, the torque of each effect, and the joints held at rest."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ class PlantState(Answer, Value):
     Attributes:
         robot: Name of the robot.
         gravity: Acceleration of free fall in base axes, in [m/s²].
-        gravity_acts: Whether it has a torque on a joint at some position.
+        gravity_acts: True if gravity exerts a torque on a joint at some position.
         joints: Names of the n joints.
-        types: Their types, such as "revolute".
+        types: Types of the joints, such as "revolute".
         q, v, a, tau: The state, (n,), in SI units.
         M, C: (n, n).
-        N: Gravity and effects, as what must be overcome, (n,).
+        N: Gravity minus the torques of effects, (n,), in [N m] or [N].
         effects: Torque of each effect on the joints, (n,), by name.
-        held: The joints that dry friction and rigid stops hold, where a follows from tau.
-        plant: The plant, with the payloads that it carries at that time.
-        of_tau: Whether a follows from tau.
+        held: The joints that dry friction and rigid stops hold; () if tau follows from a.
+        plant: The plant, with the payloads it carries at that time.
+        of_tau: True if a follows from tau, False if tau follows from a.
     """
 
     robot: str
@@ -78,7 +78,7 @@ class PlantState(Answer, Value):
             yield f"{name}, {meaning} [{of_entries}]:"
             rows = getattr(self, name).reshape(len(self.joints), -1)
             one_unit = name == "N" or force in ("N m", "N")
-            rows = without_rounding(rows) if one_unit else rows  # M stays symmetric; elsewhere row by row
+            rows = without_rounding(rows) if one_unit else rows  # together, so that M stays symmetric
             yield from (f"  {numbers_row(row)}  {joint}" for row, joint in zip(rows, self.joints, strict=True))
         if not self.gravity_acts:
             yield ""
@@ -94,15 +94,15 @@ class PlantState(Answer, Value):
 
 
 def plant_state(plant: Any, q: Any, v: Any, a: Any = None, tau: Any = None, t: float = 0.0) -> PlantState:
-    """A plant, or a robot, at a state: tau from a, or a, and what is held, from tau.
+    """Evaluate a plant, or a robot, at a state: tau from a, or a and the joints held at rest from tau.
 
     Raises:
-        QueryError: If there is no robot in the plant, neither or both of a and tau are given, or one has another shape
-            than (n,) or is not finite.
+        QueryError: If the dynamics of the plant is not a robot, not exactly one of a and tau is passed, or an argument
+            does not have shape (n,) or is not finite.
     """
     plant = plant if isinstance(plant, Plant) else Plant(plant)
     plant = plant.at(t := number("t", t))
-    robot = instance("plant", plant.dynamics, Robot, "give that of a robot, such as rd.Plant(rd.load('ur5'))")
+    robot = instance("plant", plant.dynamics, Robot, "give the plant of a robot, such as rd.Plant(rd.load('ur5'))")
     if (a is None) == (tau is None):
         raise QueryError("give one of a and tau: the other follows from it")
     q, v = (one_state(name, x, robot.joint_names) for name, x in (("q", q), ("v", v)))
@@ -116,7 +116,7 @@ def plant_state(plant: Any, q: Any, v: Any, a: Any = None, tau: Any = None, t: f
         tau = plant.inverse_dynamics(t, q, v, a)
     torques = plant.equation_of_motion.torques(t, q, v, q.shape)
     state = {"q": q, "v": v, "a": a, "tau": tau}
-    terms = {each.name: each.ask(plant, state | {"t": t}) for each in (M, C, PLANT["N"])}
+    terms = {query.name: query.ask(plant, state | {"t": t}) for query in (M, C, PLANT["N"])}
     effects = dict(zip(numbered(*(force.name for force in plant.forces)), torques, strict=True))
     return PlantState(
         robot.name, robot.edits.gravity, robot.gravity_acts, robot.joint_names, robot.joint_types, **state, **terms,

@@ -2,7 +2,7 @@
 
     |δ| ≤ β,  δ = θ − q:   n² J θ̈ = u − b θ̇ within the gap;   δ̇⁺ = −e δ̇⁻ where an end is struck;   θ̈ = q̈ where it rests
 
-θ is the motor's angle behind the gear. An impact is that of the whole arm and its motors, by one convex problem.
+θ is the motor angle at the output of the gear. One convex problem solves an impact for the whole arm and its motors.
 [Nordin, Gutman 2002; Brogliato, Nonsmooth Mechanics, 2016]
 """
 
@@ -27,18 +27,18 @@ class RigidBacklash(GearedMotor, SetValued):
     """Joints that a motor drives through a rigid gear with a gap: |δ| ≤ β, δ = θ − q, and δ̇⁺ = −e δ̇⁻ at its ends.
 
     A run starts in the middle of the gap, δ = 0, with motors that move with their joints. The actuation u of such a
-    joint is the torque of its motor behind the gear, n times that at the rotor. Steps end where an end of the gap is
-    reached or left. States are δ of each of these joints, then δ̇, θ̇ and the impulse of the contact in the latest step.
+    joint is the motor torque at the output of the gear, n times the torque of the rotor. Steps end when an end of the
+    gap is reached or left. The states are δ of all driven joints, then δ̇, θ̇, and the contact impulse of the last step.
 
-    In the energy ledger the work of the control is done on the motors, which store ½ n² J θ̇². The motion of the rotors
-    with the arm is neglected.
+    In the energy ledger the control does its work on the motors, which store ½ n² J θ̇². The motion of the rotors with
+    the arm is neglected.
 
     Attributes:
         gap: β, to each side, a scalar or (n,), in [rad] or [m], not negative; joints of gap 0 are driven directly.
         inertia: J of the rotor, in [kg m²], or [kg] for a prismatic joint, positive.
         ratio: n of the gear; 1 by default.
         restitution: e, a scalar or (n,), 0 to 1; 0 by default.
-        viscous: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
+        viscous: b of the motor at the output of the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
 
     Example:
         >>> rd.effects.RigidBacklash(gap=[0.01, 0.0], inertia=0.02, ratio=5.0, restitution=0.4, viscous=0.2)
@@ -81,11 +81,11 @@ class RigidBacklash(GearedMotor, SetValued):
         return np.concatenate([0 * v, 0 * v, v, 0 * v], axis=-1)
 
     def drag(self, n: int, z: Array) -> Array:
-        """The friction b θ̇ of the motors, (k,)."""
+        """Return the friction b θ̇ of the motors, (k,)."""
         return 0 * self.speeds(z) if self.viscous is None else self.of("viscous", n) * self.speeds(z)
 
     def _touching(self, n: int) -> Array:
-        """1 for each of its joints whose motor rests at an end of the gap, else 0."""
+        """Return 1 for driven joints whose motor rests at an end of the gap, else 0, (k,)."""
         return np.zeros(len(self._driven)) if self._contact is None else self.of("_contact", n) ** 2
 
     def reaching(self, u: Array) -> Array:

@@ -15,19 +15,20 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import coefficient, with_values
 from robot_dyn.queries.dynamics import Dynamics
 
-_NEAR = 4e-15  # of a stop, or in its unit: as close as rounding leaves an event
+_NEAR = 4e-15  # relative to a stop, or absolute in its unit: the precision to which events are located
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class RigidStops(SetValued):
-    """Stops that are never passed: lower ≤ q ≤ upper, with Newton's law v⁺ = −e v⁻ for each one that is struck.
+    """Stops that are never passed: lower ≤ q ≤ upper, with Newton's law of impact, v⁺ = −e v⁻.
 
     Simultaneous impacts and contacts are solved together, and no impact adds energy. At rest at a stop the torque may
     have any size, directed away from it. [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
 
     Attributes:
-        lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m]; "urdf" for the file's.
+        lower: Position of the lower stop, −inf for none, a scalar or (n,), in [rad] or [m]; "urdf" to read it from the
+            robot's file.
         upper: Position of the upper stop, inf for none, above the lower one.
         restitution: e, a scalar or (n,), 0 to 1; 0 by default.
 
@@ -60,18 +61,18 @@ class RigidStops(SetValued):
         return Interval(np.where(side > 0, -inf, 0.0), np.where(side < 0, inf, 0.0))
 
     def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
-        # Newton's law where a joint approaches; one that leaves is reversed at most, so that r (v + v⁺) / 2 is 0
+        # Newton's law for joints that approach; a joint that leaves is reversed at most, so that r (v + v⁺) / 2 is 0
         back = -self.restitution * v
         lower = np.where(q <= self.lower + 0 * q, np.minimum(back, -v), 0 * v - inf)
         return lower, np.where(q >= self.upper + 0 * q, np.maximum(back, -v), 0 * v + inf)
 
     def touched(self, q: np.ndarray) -> np.ndarray:
-        """−1 for each joint at its lower stop, to rounding, or past it, 1 at the upper one, 0 elsewhere, (n,)."""
+        """Return −1 for joints at or past the lower stop, to rounding, 1 for the upper stop, 0 for others, (n,)."""
         lower, upper = (touching(level, side) for level, side in zip(self._levels(q), (-1, 1), strict=True))
         return np.where(q <= lower, -1, np.where(q >= upper, 1, 0))
 
     def penetration(self, q: np.ndarray) -> np.ndarray:
-        """Depth of each joint past a stop if it is more than rounding, (n,); 0 for the others."""
+        """Return the depth of each joint past a stop, (n,); 0 if it is within rounding."""
         lower, upper = self._levels(q)
         depth = np.maximum(lower - q, q - upper)
         return np.where(depth > _near(np.where(q < lower, lower, upper)), depth, 0.0)
@@ -87,7 +88,7 @@ class RigidStops(SetValued):
 
 
 def touching(level: np.ndarray, side: int) -> np.ndarray:
-    """Where stops at these levels, on one side, are touched to rounding."""
+    """Return the positions from which stops at these levels, on one side, count as touched."""
     return level - side * _near(level)
 
 

@@ -1,9 +1,9 @@
-"""Series-elastic joints: a motor behind a gear moves its joint through a spring and a damper, δ = θ − q.
+"""Series-elastic joints: a geared motor moves its joint through a spring and a damper, δ = θ − q.
 
     n² J θ̈ = u − k δ − d δ̇ − b θ̇,     τ = k δ + d δ̇
 
-θ is the motor's angle behind the gear, u its torque there, n times that of the motor. The rotor turns about the joint's
-axis alone: its motion with the arm is neglected. [Spong 1987; Albu-Schäffer, Ott, Hirzinger 2007]
+θ is the motor angle at the output of the gear, u the torque there, n times the torque of the motor. The motion of the
+rotor with the arm is neglected. [Spong 1987; Albu-Schäffer, Ott, Hirzinger 2007]
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ _BACKWARD = ("backward side of the backlash", "left", "touched")
 class SeriesElastic(GearedMotor, Dissipative):
     """Joints that a motor drives through a gear, a spring and a damper: τ = k δ + d δ̇, n² J θ̈ = u − τ − b θ̇.
 
-    δ = θ − q is the deflection of the spring, θ the angle of the motor behind the gear; states are δ of each of these
-    joints, then θ̇. A run starts with relaxed springs, δ = 0, and motors that move with their joints. The actuation u
-    of such a joint is the torque of its motor behind the gear, n times that at the rotor. With a backlash β the spring
-    has no torque while |δ| ≤ β; the damper acts there as well.
+    δ = θ − q is the deflection of the spring, θ the motor angle at the output of the gear. The states are δ of all
+    driven joints, then θ̇. A run starts with relaxed springs, δ = 0, and motors that move with their joints. The
+    actuation u of a driven joint is the motor torque at the output of the gear, n times the torque of the rotor. With a
+    backlash β the spring exerts no torque while |δ| ≤ β; the damper still acts.
 
-    In the energy ledger the work of the control is done on the motors, and what the motors and springs store is
-    ½ n² J θ̇² + ½ k δ². The motion of the rotors with the arm is neglected.
+    In the energy ledger the control does its work on the motors; motors and springs store ½ n² J θ̇² + ½ k δ². The
+    motion of the rotors with the arm is neglected.
 
     Attributes:
         stiffness: k, a scalar or (n,), in [N m/rad] or [N/m], not negative; joints of stiffness 0 are driven directly.
         inertia: J of the rotor, in [kg m²], or [kg] for a prismatic joint, positive.
         ratio: n of the gear; 1 by default.
         damping: d of the spring, in [N m s/rad] or [N s/m], not negative; 0 by default.
-        friction: b of the motor behind the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
+        friction: b of the motor at the output of the gear, in [N m s/rad] or [N s/m], not negative; 0 by default.
         backlash: β, to each side, in [rad] or [m], not negative; 0 by default.
 
     Example:
@@ -79,9 +79,9 @@ class SeriesElastic(GearedMotor, Dissipative):
         if self.backlash is None:
             return self
         side = np.zeros(n)
-        for each, passed in sides.items():
-            way = 1 if each.name == _FORWARD[0] else -1
-            side[each.joint] += way * (passed == way)
+        for threshold, passed in sides.items():
+            way = 1 if threshold.name == _FORWARD[0] else -1
+            side[threshold.joint] += way * (passed == way)
         return with_values(self, {"_side": side})
 
     def speeds(self, z: Array) -> Array:
@@ -113,7 +113,7 @@ class SeriesElastic(GearedMotor, Dissipative):
         return (self.reflected(n) * self.speeds(z) ** 2 / 2 + k * self._stretch(n, z) ** 2 / 2).sum(axis=-1)
 
     def _stretch(self, n: int, z: Array) -> Array:
-        """Deflection of the springs, without backlash."""
+        """Return the deflection of the springs, minus the backlash."""
         deflection = z[..., : len(self._driven)]
         if self.backlash is None:
             return deflection

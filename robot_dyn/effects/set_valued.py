@@ -1,9 +1,9 @@
-"""Effects that hold joints: at rest their torque may be any of an interval, and is the one that keeps the joint there.
+"""Effects that hold joints: at rest, their torque is the value in an interval that keeps the joint at rest.
 
     τ ∈ −F(v):   one value where v ≠ 0,   an interval where v = 0
 
-The mode of a run is which joints they hold, and in which direction the others slide. Within a mode the equation of
-motion is smooth; where a torque would leave its interval, or a velocity reaches 0, the mode changes.
+The mode of a run lists the held joints and the directions in which the others slide. Within a mode the equation of
+motion is smooth; when a torque would leave its interval, or a velocity reaches 0, the mode changes.
 [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
 """
 
@@ -24,19 +24,19 @@ from robot_dyn.foundations.threshold import smooth
 
 
 class Interval(NamedTuple):
-    """Bounds of the torque on joints at rest, each (n,), in [N m] or [N]; (0, 0) where the effect does not act."""
+    """Bounds of the torque on joints at rest, both (n,), in [N m] or [N]; 0 and 0 where the effect does not act."""
 
     least: np.ndarray
     most: np.ndarray
 
 
 class Mode(NamedTuple):
-    """Which joints are held, and in which direction the others slide, each (n,).
+    """The held joints, and the directions in which the others slide, all (n,).
 
     Attributes:
-        held: 1 for each joint that is held, 0 for the others.
-        direction: 1 or −1 for each joint that slides or is about to; 0 for held ones and those that nothing holds.
-        contact: 1 or −1 where the motor of a joint rests at an end of its backlash, else 0; None for 0 everywhere.
+        held: 1 for held joints, 0 for the others.
+        direction: 1 or −1 for joints that slide or are about to; 0 for joints that are held or have no dry friction.
+        contact: 1 or −1 if the motor of a joint rests at an end of its backlash, else 0; None for 0 everywhere.
     """
 
     held: np.ndarray
@@ -48,8 +48,9 @@ class SetValued(Dissipative):
     """An effect with a mode.
 
     Attributes:
-        held: 1 for each joint that is held and 0 for the others, (n,); None before a mode is chosen.
-        rubs, stops: Whether it is friction, and whether it has `bounds`, for time stepping.
+        held: 1 for held joints, 0 for the others, (n,); None before a mode is chosen.
+        rubs: True if it is friction, for time stepping.
+        stops: True if it has `bounds`, for time stepping.
     """
 
     held: Any
@@ -63,20 +64,20 @@ class SetValued(Dissipative):
         """Return the effect in a mode of the plant: smooth in q and v."""
 
     def sliding(self, v: Array) -> Array:
-        """Friction of sliding joints, not negative, (..., n); 0 by default."""
+        """Return the friction of sliding joints, not negative, (..., n); 0 by default."""
         return 0 * v
 
     def friction(self, v: Array) -> Array:
-        """Greatest friction, at the velocity at the start of a step, (n,)."""
+        """Return the largest friction at the velocity at the start of a step, (n,); 0 by default."""
         return 0 * v
 
     def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Bounds of the velocity at the end of a step, each (n,), from its middle q and the velocity at its start."""
+        """Return bounds of the velocity at the end of a step, both (n,), from q at its middle and v at its start."""
         return 0 * v - np.inf, 0 * v + np.inf
 
     @abstractmethod
     def at_rest(self, q: np.ndarray) -> Interval:
-        """Interval of its torque on joints of velocity 0, at q; it depends on q for stops alone."""
+        """Return the interval of the torque on joints of velocity 0; only stops depend on q."""
 
 
 def settled(
@@ -94,32 +95,33 @@ def settled(
     Args:
         effects: The set-valued effects.
         M: Mass matrix, (n, n).
-        load: All other torques less C v and ∂V/∂q, with the friction of the joints that slide, (n,).
+        load: All other torques minus C v and ∂V/∂q, with the friction of sliding joints, (n,).
         q: Position, (n,).
         v: Velocity, (n,).
-        forced: The direction of joints at rest that are known to break away.
+        forced: Direction of joints at rest that break away, by index.
     """
     n, zero = len(v), np.zeros_like(v)
-    intervals = [each.at_rest(q) for each in effects]
-    least, most = (sum((each[k] for each in intervals), start=zero) for k in (0, 1))
-    slides = sum((each.sliding(zero) for each in effects), start=zero)
-    (held, direction), room = np.zeros((2, n)), settling(n)
-    room.least[:], room.most[:] = least, most
+    intervals = [effect.at_rest(q) for effect in effects]
+    least, most = (sum((interval[k] for interval in intervals), start=zero) for k in (0, 1))
+    slides = sum((effect.sliding(zero) for effect in effects), start=zero)
+    (held, direction), work = np.zeros((2, n)), settling(n)
+    work.least[:], work.most[:] = least, most
     for i, way in (forced or {}).items():
-        room.forced[i] = way
+        work.forced[i] = way
     with np.errstate(all="ignore"):
-        solved = settle(M, load, slides, v, held, direction, room)
+        solved = settle(M, load, slides, v, held, direction, work)
     if not solved:
         raise not_found(M, load)
-    return room.a, Mode(held, direction)
+    return work.a, Mode(held, direction)
 
 
 def in_a_step(effects: Sequence[SetValued], q: Array, v: Array) -> tuple[Array, Array, Array, list[Array]]:
-    """Greatest friction, bounds of v⁺, and shares of effects, for a step of time stepping with the middle q.
+    """Return the largest friction, bounds of v⁺ and shares of effects, for a time step with q at its middle.
 
-    Shares are those of each of several effects with friction in it, and of each of several with bounds, (n,).
+    Shares, (n,), distribute the friction over several effects with friction, then the bounds over several effects with
+    bounds; there are none for a single effect.
     """
-    rub, stop = [[x for x in effects if getattr(x, of)] for of in ("rubs", "stops")]
+    rub, stop = [[x for x in effects if getattr(x, kind)] for kind in ("rubs", "stops")]
     levels, bounds = [x.friction(v) for x in rub], [x.bounds(q, v) for x in stop]
     friction = sum(levels, start=0 * v)
     lower, upper = 0 * v - np.inf, 0 * v + np.inf
@@ -139,17 +141,17 @@ def in_a_step(effects: Sequence[SetValued], q: Array, v: Array) -> tuple[Array, 
 
 
 def impulses_of(effects: Sequence[SetValued], rubbing: Array, stopping: Array, shares: Array) -> Iterator[Array]:
-    """Impulse of each effect, from the total impulses of friction and of stops, by consecutive shares."""
+    """Yield the impulse of each effect, from the total impulses of friction and stops and the consecutive shares."""
     n = len(rubbing)
-    rub, stop = (sum(getattr(x, of) for x in effects) for of in ("rubs", "stops"))
-    each_n = (shares[k * n : (k + 1) * n] for k in count())
-    of_rub = [next(each_n) for _ in range(rub)] if rub > 1 else [np.ones(n)]
-    of_stop = [next(each_n) for _ in range(stop)] if stop > 1 else [np.ones(n)]
-    rubs, stops = iter(of_rub), iter(of_stop)
-    for each in effects:
+    rub, stop = (sum(getattr(x, kind) for x in effects) for kind in ("rubs", "stops"))
+    parts = (shares[k * n : (k + 1) * n] for k in count())
+    rub_shares = [next(parts) for _ in range(rub)] if rub > 1 else [np.ones(n)]
+    stop_shares = [next(parts) for _ in range(stop)] if stop > 1 else [np.ones(n)]
+    rubs, stops = iter(rub_shares), iter(stop_shares)
+    for effect in effects:
         impulse = 0 * rubbing
-        if each.rubs:
+        if effect.rubs:
             impulse = impulse + next(rubs) * rubbing
-        if each.stops:
+        if effect.stops:
             impulse = impulse + next(stops) * stopping
         yield impulse

@@ -1,10 +1,11 @@
-"""Which joints stick and which slide: the acceleration of least constraint, and the mode that follows from it.
+"""Sticking and sliding joints: the acceleration of least constraint, and the mode that follows from it.
 
     a = argmin ½ (a − M⁻¹ load)ᵀ M (a − M⁻¹ load) + Σ fᵢ |aᵢ|   over joints at rest, away from stops
 
-Where static friction exceeds sliding friction, joints break away one by one, that of the greatest energy first, and
-the problem is solved again; a joint that would then move the other way is restored to rest. Plain functions of arrays,
-as `convex.active_set`. [Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
+Where static friction exceeds sliding friction, joints break away one by one, the one of greatest energy first, and
+the problem is solved again. A joint that would then move the other way is restored to rest. Like `convex.active_set`,
+these are plain functions of arrays, so that machine code can be made of them.
+[Moreau 1988; Glocker, Set-Valued Force Laws, 2001]
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.convex import active_set
 
-_ROUNDING = 1e-12  # of the accelerations that add up
+_ROUNDING = 1e-12  # relative to the accelerations that add up
 
 
 class Settling(NamedTuple):
@@ -26,12 +27,12 @@ class Settling(NamedTuple):
         least, most: Bounds of the torque on a joint at rest, (n,).
         forced: Direction of joints at rest that break away, else 0, (n,); `settle` adds all that do.
         a: Output: the acceleration, (n,).
-        p, f, lower, upper, place: Of the convex problem, (n,).
-        rests: 1 for each joint that may stay at rest, (n,).
-        friction: Friction that holds it there, (n,).
-        back: 1 for each joint that broke away and was restored to rest, (n,).
-        size: Size of the terms that cancel in its acceleration, (n,).
-        L: For the active set, (n + 1, n); wider for n = 1, since machine code has a type for arrays of one column.
+        p, f, lower, upper, place: Arrays of the convex problem, (n,).
+        rests: 1 for joints that may stay at rest, else 0, (n,).
+        friction: Friction that holds these joints, (n,).
+        back: 1 for joints that broke away and were restored to rest, else 0, (n,).
+        size: Size of the terms that cancel in the acceleration, (n,).
+        L: Matrix for the active set, (n + 1, max(n, 2)): machine code has another type for arrays of one column.
     """
 
     least: Array
@@ -56,72 +57,72 @@ def settling(n: int) -> Settling:
 
 
 def settle(
-    M: Array, load: Array, sliding: Array, v: Array, held: Array, direction: Array, room: Settling
+    M: Array, load: Array, slides: Array, v: Array, held: Array, direction: Array, work: Settling
 ) -> bool:  # fmt: skip
     """Write the acceleration, 0 for joints that stay at rest, and the mode; return False if there is no solution.
 
     Args:
         M: Mass matrix, (n, n).
-        load: All torques but those on joints at rest, less C v and ∂V/∂q, (n,).
-        sliding: Friction where sliding begins, (n,).
+        load: All torques, without those that hold joints at rest, minus C v and ∂V/∂q, (n,).
+        slides: Friction at the start of sliding, (n,).
         v: Velocity, (n,).
         held: Output: 1 for each joint that is held, (n,).
         direction: Output: 1 or −1 for each joint that slides or is about to, (n,).
-        room: Bounds of the torques at rest, and joints that break away; the acceleration is written into it.
+        work: Bounds of the torques at rest, and joints that break away; the acceleration is written into it.
     """
-    least, most, forced, a = room.least, room.most, room.forced, room.a
+    least, most, forced, a = work.least, work.most, work.forced, work.a
     for i in range(len(v)):
         rests = v[i] == 0.0 and (least[i] < 0.0 or most[i] > 0.0)
-        held_by = most[i] if most[i] < np.inf else -least[i]
-        room.rests[i], room.friction[i], room.back[i] = 1.0 if rests else 0.0, held_by if rests else 0.0, 0.0
-        room.lower[i] = 0.0 if rests and most[i] == np.inf else -np.inf
-        room.upper[i] = 0.0 if rests and least[i] == -np.inf else np.inf
+        friction = most[i] if most[i] < np.inf else -least[i]
+        work.rests[i], work.friction[i], work.back[i] = 1.0 if rests else 0.0, friction if rests else 0.0, 0.0
+        work.lower[i] = 0.0 if rests and most[i] == np.inf else -np.inf
+        work.upper[i] = 0.0 if rests and least[i] == -np.inf else np.inf
     while True:  # each joint breaks away and is restored at most once
         for i in range(len(v)):
-            room.p[i] = load[i] - sliding[i] * forced[i]
-            room.f[i] = room.friction[i] if forced[i] == 0.0 else 0.0
-        if not least_value(M, room, a):
+            work.p[i] = load[i] - slides[i] * forced[i]
+            work.f[i] = work.friction[i] if forced[i] == 0.0 else 0.0
+        if not least_value(M, work, a):
             return False
-        if not taken_back(M, load, forced, a, room) and not broken_away(M, sliding, forced, a, room):
+        if not taken_back(M, load, forced, a, work) and not broken_away(M, slides, forced, a, work):
             break
     for i in range(len(v)):
-        way = np.sign(v[i]) if v[i] != 0.0 else np.sign(a[i]) * room.rests[i]
-        free = forced[i] != 0.0  # its load has just reached what held it: its acceleration may be 0 yet
+        way = np.sign(v[i]) if v[i] != 0.0 else np.sign(a[i]) * work.rests[i]
+        free = forced[i] != 0.0  # the load has just reached breakaway: the acceleration may still be 0
         direction[i] = forced[i] if free else way
-        held[i] = 0.0 if free or a[i] != 0.0 else room.rests[i]
+        held[i] = 0.0 if free or a[i] != 0.0 else work.rests[i]
     return True
 
 
-def least_value(M: Array, room: Settling, x: Array) -> bool:
-    """Write the minimum of the convex problem in `room`; return whether there is one, of finite numbers."""
+def least_value(M: Array, work: Settling, x: Array) -> bool:
+    """Write the minimum of the convex problem in `work`; return False if there is no finite one."""
     total = 0.0
-    if not active_set(M, room.p, room.f, room.lower, room.upper, x, room.place, room.L):
+    if not active_set(M, work.p, work.f, work.lower, work.upper, x, work.place, work.L):
         return False
     for i in range(len(x)):
         total += abs(x[i])
     return total < np.inf
 
 
-def taken_back(M: Array, load: Array, forced: Array, a: Array, room: Settling) -> bool:
-    """Restore the joints that broke away and would move the other way, by more than rounding; whether there are any."""
-    against, largest, found = False, 0.0, False
+def taken_back(M: Array, load: Array, forced: Array, a: Array, work: Settling) -> bool:
+    """Restore joints that broke away but would move the other way, by more than rounding; return True if any."""
+    against, largest, restored = False, 0.0, False
     for i in range(len(a)):
         against = against or a[i] * forced[i] < 0.0
         largest = max(largest, abs(a[i]))
     if not against:
         return False
-    weigh(M, load, room)
+    weigh(M, load, work)
     for i in range(len(a)):
-        if a[i] * forced[i] < -_ROUNDING * (largest + room.size[i]):
-            forced[i], room.back[i], found = 0.0, 1.0, True
-    return found
+        if a[i] * forced[i] < -_ROUNDING * (largest + work.size[i]):
+            forced[i], work.back[i], restored = 0.0, 1.0, True
+    return restored
 
 
-def weigh(M: Array, load: Array, room: Settling) -> None:
-    """Write |M⁻¹| (|load| + friction), by the Cholesky factor of M."""
-    n, L, x = len(load), room.L, room.L[len(load)]
+def weigh(M: Array, load: Array, work: Settling) -> None:
+    """Write |M⁻¹| (|load| + friction) to `work.size`, by the Cholesky factor of M."""
+    n, L, x = len(load), work.L, work.L[len(load)]
     for i in range(n):
-        room.size[i] = 0.0
+        work.size[i] = 0.0
         for j in range(i + 1):
             entry = M[i, j]
             for k in range(j):
@@ -137,18 +138,18 @@ def weigh(M: Array, load: Array, room: Settling) -> None:
             for k in range(i + 1, n):
                 x[i] -= L[k, i] * x[k]
             x[i] /= L[i, i]
-            room.size[i] += abs(x[i]) * (abs(load[column]) + room.friction[column])
+            work.size[i] += abs(x[i]) * (abs(load[column]) + work.friction[column])
 
 
-def broken_away(M: Array, slides: Array, forced: Array, a: Array, room: Settling) -> bool:
-    """Let the joint of greatest energy break away, of those with less sliding friction; whether there is one."""
-    which, most = -1, -1.0
+def broken_away(M: Array, slides: Array, forced: Array, a: Array, work: Settling) -> bool:
+    """Let the joint of greatest energy whose sliding friction is less break away; return False if there is none."""
+    largest, most = -1, -1.0
     for i in range(len(a)):
-        known = forced[i] != 0.0 or room.back[i] != 0.0
-        if room.rests[i] != 0.0 and a[i] != 0.0 and slides[i] < room.friction[i] and not known:
+        was_decided = forced[i] != 0.0 or work.back[i] != 0.0
+        if work.rests[i] != 0.0 and a[i] != 0.0 and slides[i] < work.friction[i] and not was_decided:
             size = abs(a[i]) * np.sqrt(M[i, i])
             if size > most:
-                which, most = i, size
-    if which >= 0:
-        forced[which] = np.sign(a[which])
-    return which >= 0
+                largest, most = i, size
+    if largest >= 0:
+        forced[largest] = np.sign(a[largest])
+    return largest >= 0

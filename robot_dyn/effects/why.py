@@ -1,4 +1,4 @@
-"""Why a joint needs its torque: τ_i = Σ_links (M_l a + C_l v + N_l)_i − Σ τ_effect,i, split by link and cause."""
+"""The torque of one joint, split by link and cause: τ_i = Σ_links (M_l a + C_l v + N_l)_i − Σ τ_effect,i."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _CAUSES: tuple[str, ...] = "inertia", "Coriolis", "gravity", "effect"
 @final
 @dataclass(frozen=True)
 class Share:
-    """What one link, or the armature, adds to a joint's torque, in [N m] or [N]."""
+    """The contribution of one link, or of the armature, to a joint's torque, in [N m] or [N]."""
 
     source: str
     inertia: float
@@ -39,16 +39,16 @@ class Share:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Why(Answer):
-    """One joint's torque by link and cause; shares, effects and at_rest add up to tau.
+    """The torque of one joint by link and cause; shares, effects and at_rest add up to tau.
 
     Attributes:
         joint: Name of the joint.
-        tau: Its torque, in `unit`, as all other numbers here.
-        unit: "N m" for a joint that turns, "N" for one that slides.
-        shares: Of each link that moves and has mass, and of the armature.
-        effects: What each effect asks for, by name: the torque that it exerts, with the opposite sign.
-        at_rest: What dry friction and stops balance of a joint whose velocity is 0, where a follows from tau.
-        coefficients: Of each effect at the joint, in words with units.
+        tau: Torque of the joint, in `unit`, like all other numbers here.
+        unit: "N m" for a revolute joint, "N" for a prismatic one.
+        shares: Contributions of the moving links that have mass, and of the armature.
+        effects: Torque needed against each effect, by name: minus the torque that the effect exerts.
+        at_rest: Torque that dry friction and stops balance if the joint is at rest and a follows from tau.
+        coefficients: Coefficients of each effect at the joint, as text with units.
     """
 
     joint: str
@@ -62,7 +62,7 @@ class Why(Answer):
     @property
     def _rows(self) -> Iterator[tuple[str, float, float, float, float]]:
         """Source, inertia, Coriolis, gravity and effect."""
-        yield from ((each.source, each.inertia, each.coriolis, each.gravity, 0.0) for each in self.shares)
+        yield from ((share.source, share.inertia, share.coriolis, share.gravity, 0.0) for share in self.shares)
         yield from ((effect, 0.0, 0.0, 0.0, torque) for effect, torque in self.effects.items())
         if self.at_rest:
             yield _AT_REST, 0.0, 0.0, 0.0, self.at_rest
@@ -72,7 +72,7 @@ class Why(Answer):
         named = {effect: ", ".join((effect, *texts)) for effect, texts in self.coefficients.items()}
         sources, terms = [source for source, *_ in self._rows], np.array([terms for _, *terms in self._rows])
         terms = np.vstack([terms.reshape(-1, len(_CAUSES)), terms.reshape(-1, len(_CAUSES)).sum(axis=0)])
-        shown = without_rounding(np.column_stack([terms, terms.sum(axis=1)]))  # all of one torque
+        shown = without_rounding(np.column_stack([terms, terms.sum(axis=1)]))  # all in one unit
         names = [*(named.get(source, source) for source in sources), "sum"]
         yield Table(("from", *_CAUSES, "sum"), tuple((name, *row) for name, row in zip(names, shown, strict=True)))
 
@@ -87,30 +87,31 @@ class Why(Answer):
 def why(
     plant: Plant | Dynamics, q: Any, v: Any, a: Any | None, joint: str, *, tau: Any | None = None, t: float = 0.0
 ) -> Why:
-    """Why a joint needs its torque: its shares by link and cause, which add up to it.
+    """Split the torque of a joint by link and cause.
 
         τ_i = Σ_links (M_l a + C_l v + N_l)_i − Σ_effects τ_effect,i
 
-    Its `repr` is the table that `robot-dyn query --why` prints, `to_json()` the document `why` of its JSON.
+    The `repr` of the result is the table that `robot-dyn query --why` prints; its `to_json()` is the `why` document of
+    the command's JSON.
 
     Args:
         plant: A plant of a robot, or a robot.
         q: Positions, (n,), in [rad] or [m].
         v: Velocities, (n,), in [rad/s] or [m/s].
-        a: Accelerations, (n,), in [rad/s²] or [m/s²]; None where tau is given.
+        a: Accelerations, (n,), in [rad/s²] or [m/s²]; None if tau is passed.
         joint: Name of the joint.
-        tau: Actuation, (n,), in [N m] or [N], from which a follows, and what dry friction and stops balance.
+        tau: Actuation, (n,), in [N m] or [N]; determines a and the torque that dry friction and stops balance.
         t: Time, in [s], for effects that come and go.
 
     Raises:
-        QueryError: If the joint is unknown, the plant is not of a robot, neither or both of a and tau are given, or one
-            of them has another shape or is not finite.
+        QueryError: If the joint is unknown, the dynamics of the plant is not a robot, not exactly one of a and tau is
+            passed, or an argument has another shape or is not finite.
     """
     return why_at(plant_state(plant, q, v, a, tau, t), joint)
 
 
 def why_at(state: PlantState, joint: str) -> Why:
-    """One joint's torque in a state; QueryError if the joint is unknown."""
+    """Split the torque of a joint at a state by link and cause; raise a QueryError if the joint is unknown."""
     if instance("joint", joint, str, "give the name of a joint") not in state.joints:
         raise QueryError(f"why: no joint {joint!r}; {nearest(joint, state.joints)}")
     i, plant = state.joints.index(joint), state.plant
@@ -125,12 +126,14 @@ def why_at(state: PlantState, joint: str) -> Why:
         for name, force in zip(state.effects, plant.forces, strict=True)
     }
     rests = state.of_tau and state.v[i] == 0 and any(x.rubs or x.stops for x in plant.equation_of_motion.set_valued)
-    needed = sum(each.inertia + each.coriolis + each.gravity for each in shares) + sum(effects.values())
+    needed = sum(share.inertia + share.coriolis + share.gravity for share in shares) + sum(effects.values())
     tau = float(state.tau[i])
     return Why(joint, tau, unit("tau", state.types[i]), shares, effects, tau - needed if rests else 0.0, texts)
 
 
 def _at(force: Force, i: int) -> Force:
-    """A force as it is at one joint."""
-    numbers = {name: getattr(force, name) for name, each in declared(type(force)).items() if each.of_joints}
+    """Return a force with its coefficients at one joint."""
+    numbers = {
+        name: getattr(force, name) for name, declared_as in declared(type(force)).items() if declared_as.of_joints
+    }
     return with_values(force, {name: x[i] if np.ndim(x) else x for name, x in numbers.items()})

@@ -1,4 +1,4 @@
-"""External wrench on a link: τ = J(q)ᵀ F, constant or in a window of time."""
+"""External wrench on a link, constant or during an interval of time: τ = J(q)ᵀ F."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ class ExternalWrench(Timed, Active):
     Attributes:
         frame: The link.
         wrench: F = (force, torque), (6,), in [N] and [N m].
-        expressed_in: "world_aligned": at the frame's origin, base axes; "body": its axes; "world": at the base.
-        start_s: When it starts, in [s].
-        end_s: When it ends, in [s]; it acts for start_s ≤ t < end_s.
+        expressed_in: "world_aligned": at the frame's origin, in base axes; "body": at the frame's origin, in frame
+            axes; "world": at the origin of the base, in base axes.
+        start_s: Time at which it starts, in [s].
+        end_s: Time at which it ends, in [s]; it acts for start_s ≤ t < end_s.
 
     Example:
         >>> rd.effects.ExternalWrench(frame="tip", wrench=[1.0, 0.0, 2.0, 0.0, 0.5, 0.0], expressed_in="body",
@@ -60,7 +61,7 @@ class ExternalWrench(Timed, Active):
         return times(transpose(J), self.wrench)
 
     def at(self, placement: Array) -> Array:
-        """The wrench in base axes at the frame's origin, (..., 6), where the frame is placed at (..., 4, 4)."""
+        """Return the wrench in base axes at the frame's origin, (..., 6), for placements of the frame, (..., 4, 4)."""
         placement = rows("placement", placement, 4, 4)
         R, p = placement[..., :3, :3], placement[..., :3, 3]
         force, torque = self.wrench[:3], self.wrench[3:]

@@ -1,4 +1,4 @@
-"""Foundations: arithmetic, spatial algebra, checks of arguments, errors, values, files and what shows an answer.
+"""Foundations: arithmetic, spatial algebra, checks of arguments, errors, values, files and the display of results.
 
 arithmetic, linear_algebra, spatial   numbers of any arithmetic; small dense systems; rigid-body transforms
 convex, saturation, threshold         the convex problem of dry friction and stops; limits; levels at which laws switch

@@ -1,8 +1,8 @@
-"""The numbers the equations run in: float32, float64, longdouble, or balls with a proven radius.
+"""Arithmetics of the equations: float32, float64, longdouble, or balls with a proven radius.
 
-Every formulation is written once with NumPy's operators; an `Arithmetic` converts the literals that a file
-states, and the functions below hide what NumPy does not do for every kind of number. A ball is an interval
-midpoint ± radius that is certain to hold the exact value [Johansson, Arb, 2017].
+Every formulation is written once with NumPy's operators; an `Arithmetic` converts the literals of a file, and the
+functions below fill the gaps of NumPy for other kinds of numbers. A ball is an interval midpoint ± radius that
+certainly contains the exact value [Johansson, Arb, 2017].
 """
 
 from __future__ import annotations
@@ -28,29 +28,29 @@ class Arithmetic(ABC):
     """A kind of number.
 
     Attributes:
-        dtype: Of the arrays that hold these numbers.
+        dtype: Type of the entries of arrays.
     """
 
     dtype: np.dtype
 
     @abstractmethod
     def number(self, literal: Any) -> Any:
-        """One number from the text of a file, or from a number, which is taken exactly."""
+        """Return one number from the text of a file, or from a number, which is converted exactly if possible."""
 
     @abstractmethod
     def scope(self) -> AbstractContextManager[None]:
-        """The context in which operations have this arithmetic's precision."""
+        """Return the context in which operations have the precision of this arithmetic."""
 
     @abstractmethod
     def asarray(self, values: Any) -> Array:
-        """Array of numbers; TypeError or ValueError if one is not a number. Not copied if of this kind already."""
+        """Return an array of this kind of number, not copied if it is one; raise TypeError or ValueError if invalid."""
 
     @abstractmethod
     def finite(self, x: Array) -> np.ndarray:
-        """Which entries are finite numbers."""
+        """Return True for entries that are finite numbers."""
 
     def array(self, literals: Any) -> Array:
-        """Array of numbers, of the shape of the nested literals."""
+        """Return an array of numbers with the shape of the nested literals."""
         source = np.asarray(literals, dtype=object)
         result = np.empty(source.size, dtype=self.dtype)
         result[:] = [self.number(literal) for literal in source.flat]
@@ -72,7 +72,7 @@ class Float(Arithmetic):
 
     def asarray(self, values: Any) -> Array:
         array = real(values)
-        with np.errstate(over="ignore"):  # a longdouble may be too large: then it is not finite
+        with np.errstate(over="ignore"):  # a longdouble that is too large becomes infinite
             return array.astype(self.dtype, copy=False)
 
     def finite(self, x: Array) -> np.ndarray:
@@ -81,7 +81,7 @@ class Float(Arithmetic):
 
 FLOAT64 = Float(np.dtype(np.float64))
 
-MOST_BITS = 1_000_000  # of a ball: a product of such takes milliseconds
+MOST_BITS = 1_000_000  # largest precision of a ball: a product then takes milliseconds
 
 # flint keeps one working precision for the whole process, so balls of two precisions must take turns.
 _flint_turn = RLock()
@@ -93,7 +93,7 @@ class Ball(Arithmetic):
     """Balls (flint.arb) with midpoints of `bits` bits: every result encloses the exact value.
 
     Attributes:
-        bits: Precision of the midpoints, from 2 to a million, 53 for that of float64.
+        bits: Precision of the midpoints, from 2 to a million; 53 is the precision of float64.
     """
 
     bits: int = 53
@@ -129,24 +129,24 @@ class Ball(Arithmetic):
 
 
 def arithmetic_of(dtype: Any) -> Arithmetic:
-    """The arithmetic that a user names: a float dtype of NumPy, or an `Arithmetic` such as `Ball(200)`.
+    """Return the arithmetic for a float dtype of NumPy, or an `Arithmetic` such as `Ball(200)`.
 
     Raises:
-        QueryError: If it is neither.
+        QueryError: If the argument is neither.
     """
     if isinstance(dtype, Arithmetic):
         return dtype
     try:
-        found = np.dtype(dtype)
-    except Exception:  # whatever a foreign object makes of it
-        found = None
-    if dtype is None or found is None or found.kind != "f" or found.itemsize < 4:
+        numpy_dtype = np.dtype(dtype)
+    except Exception:  # any error in the conversion of a foreign object
+        numpy_dtype = None
+    if dtype is None or numpy_dtype is None or numpy_dtype.kind != "f" or numpy_dtype.itemsize < 4:
         raise QueryError(f"no arithmetic {shown(dtype)}: give float32, float64, np.longdouble or Ball(bits)")
-    return Float(found)
+    return Float(numpy_dtype)
 
 
 def in_arithmetic(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Run a method in the precision of its object's `arithmetic`."""
+    """Wrap a method so that it runs in the precision of its object's `arithmetic`."""
 
     @wraps(method)
     def scoped(self: Any, *args: Any, **options: Any) -> Any:
@@ -157,24 +157,24 @@ def in_arithmetic(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def midpoint(x: Array) -> Array:
-    """The float64 nearest to the midpoint of each ball."""
-    return _of_each(x, lambda ball: float(ball.mid()))
+    """Return the float64 nearest to the midpoint of each ball."""
+    return _per_ball(x, lambda ball: float(ball.mid()))
 
 
 def radius(x: Array) -> Array:
-    """A float64 upper bound of the radius of each ball."""
-    return _of_each(x, lambda ball: float(ball.rad().upper()))
+    """Return a float64 upper bound of the radius of each ball."""
+    return _per_ball(x, lambda ball: float(ball.rad().upper()))
 
 
-def _of_each(x: Any, of: Callable[[Any], float]) -> Array:
+def _per_ball(x: Any, function: Callable[[Any], float]) -> Array:
     from flint import arb
 
     balls = np.asarray(x, dtype=object)
     if not all(isinstance(ball, arb) for ball in balls.flat):
         raise QueryError(
-            f"give an array of balls, such as rd.Lagrangian(robot, rd.accuracy.Ball(200)) answers, got {shown(x)}"
+            f"give an array of balls, such as a result of rd.Lagrangian(robot, rd.accuracy.Ball(200)), got {shown(x)}"
         )
-    return np.vectorize(of, otypes=[float])(balls)
+    return np.vectorize(function, otypes=[float])(balls)
 
 
 # NumPy applies these to object arrays by calling the method of the same name on each entry, so one name serves all.
@@ -182,26 +182,26 @@ sin, cos, sqrt, tanh = np.sin, np.cos, np.sqrt, np.tanh
 
 
 def positive_part(x: Array) -> Array:
-    """max(x, 0), exactly; of balls (x + |x|) / 2, for the larger of two that overlap is not known."""
+    """Return max(x, 0); for balls (x + |x|) / 2, because the larger of two overlapping balls is unknown."""
     if type(x) is np.ndarray and x.dtype == object:
         return (x + np.abs(x)) / 2
     return np.maximum(x, 0.0)
 
 
 def transpose(x: Array) -> Array:
-    """Transpose of the last two axes."""
+    """Transpose the last two axes."""
     return np.swapaxes(x, -1, -2)
 
 
 def apply(A: Array, x: Array) -> Array:
-    """A x for A (..., m, n) and x (..., n)."""
+    """Return A x for A (..., m, n) and x (..., n)."""
     return (A @ x[..., None])[..., 0]
 
 
 def symmetric(A: Array) -> Array:
-    """A (..., m, m), symmetric but for rounding, with its upper triangle in place of the lower: less to trace.
+    """Return A (..., m, m), symmetric up to rounding, with its lower triangle copied from the upper: less to trace.
 
-    Floats are left as they are, for speed.
+    Arrays of floats are returned unchanged, for speed.
     """
     if A.dtype != object:
         return A
@@ -210,7 +210,7 @@ def symmetric(A: Array) -> Array:
 
 
 def rounding(x: Array) -> str:
-    """The name of what the numbers of an array are rounded to."""
+    """Return the name of the numbers that an array is rounded to."""
     if x.dtype.kind == "f":
         return x.dtype.name
     from flint import ctx

@@ -2,8 +2,8 @@
 
     damping: Any = field(metadata=coefficient("N m s/rad", symbol="b", least=0, stated="damping"))
 
-The declaration determines how a coefficient is checked, whether it may be given by joint name or as "urdf", its key in
-scenes and its name in sweeps, and makes it an input of machine code.
+The declaration determines the checks of a coefficient, values by joint name or "urdf", its key in scenes and its name
+in sweeps, and makes it an input of machine code.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ import numpy as np
 from robot_dyn.foundations.errors import EffectError, RobotDynError, nearest, shown
 from robot_dyn.foundations.validate import instance, number, numbers, truth
 
-URDF = "urdf"  # in place of a coefficient: the value in the robot's file
+URDF = "urdf"  # as the value of a coefficient: the value in the robot's file
 _KEY = "robot_dyn.foundations.coefficients"
-JOINTS = ((), ("n",))  # one number for all joints, or one for each
+JOINTS = ((), ("n",))  # one number for all joints, or one number for each joint
 
 
 @final
@@ -35,10 +35,10 @@ class Coefficient:
         symbol: Symbol in the equation, such as "b".
         shapes: Allowed shapes; a string stands for any length.
         least, above: Inclusive and exclusive lower bound; None for no bound.
-        infinite: Whether ±inf is allowed.
+        infinite: True if ±inf is allowed.
         elsewhere: Value for joints that are not named.
-        stated: The attribute of a `Robot` that "urdf" stands for; "" if files do not state this coefficient.
-        swept: Whether it may differ from run to run in `rollouts`.
+        stated: The attribute of a `Robot` that "urdf" refers to; "" if files do not state this coefficient.
+        swept: True if it may vary from run to run in `rollouts`.
     """
 
     unit: str = ""
@@ -66,27 +66,27 @@ class Coefficient:
 
     @property
     def of_joints(self) -> bool:
-        """Whether the coefficient is one number for all joints or one per joint."""
+        """True if the coefficient is one number for all joints, or one number for each joint."""
         return self.shapes == JOINTS
 
     def checked(self, name: str, values: Any, *, error: type[RobotDynError], resolved: bool) -> Any:
         """Return the checked numbers, as a frozen copy or as a float.
 
-        If `resolved`, values by joint name and "urdf" are kept as given, for `on` to resolve once the joints are known.
+        If `resolved`, values by joint name and "urdf" are returned unchanged; `on` resolves them for an arm.
 
         Raises:
             RobotDynError: If the numbers have the wrong shape or sign, or are not finite; of the class `error`.
         """
         if resolved and self.of_joints and isinstance(values, Mapping):
             if not values:
-                raise error(f"{name} names no joint; give values by joint, or one for all")
+                raise error(f"{name} names no joint; give values by joint, or one number for all joints")
             return values
         if resolved and self.stated and isinstance(values, str) and values == URDF:
             return URDF
-        found = numbers(
+        array = numbers(
             name, values, *self.shapes, error=error, least=self.least, above=self.above, infinite=self.infinite
         )
-        return float(found) if self.shapes == ((),) else found
+        return float(array) if self.shapes == ((),) else array
 
     def on(self, name: str, values: Any, dynamics: Any) -> Any:
         """Return the numbers for the joints of an arm; values by joint name or "urdf" become (n,).
@@ -104,7 +104,8 @@ class Coefficient:
         if self.of_joints and np.ndim(values) and np.shape(values) != (len(names),):
             count = f"{len(values)} joint{'s' if len(values) > 1 else ''}"
             raise EffectError(
-                f"{name} is of {count}, the arm has {len(names)}; give one number for all, or one for each joint"
+                f"{name} has values for {count}, but the arm has {len(names)}; give one number for all joints, or one"
+                " for each joint"
             )
         return values
 
@@ -115,8 +116,8 @@ class Coefficient:
             raise EffectError(f"{name}='urdf' needs a Robot, got {type(dynamics).__name__}") from None
         if np.all(stated == self.elsewhere):
             raise EffectError(
-                f"{name}='urdf' has no effect: the file of {dynamics.name} states none for any joint; give"
-                " numbers, or leave the effect out"
+                f"{name}='urdf' has no effect: the file of {dynamics.name} states no value for any joint; give"
+                " numbers, or remove the effect"
             )
         return stated
 
@@ -133,21 +134,22 @@ def coefficient(
     stated: str = "",
     swept: bool = True,
 ) -> Mapping[str, Coefficient]:
-    """Metadata that declares a dataclass field as a coefficient; for the arguments, see `Coefficient`."""
-    return {_KEY: Coefficient(unit, symbol, shapes, least, above, infinite, elsewhere, stated, swept)}
+    """Return metadata that declares a dataclass field as a coefficient; for the arguments, see `Coefficient`."""
+    form = {"shapes": shapes, "least": least, "above": above, "infinite": infinite}
+    return {_KEY: Coefficient(unit, symbol, **form, elsewhere=elsewhere, stated=stated, swept=swept)}
 
 
 @cache
 def declared(kind: type) -> Mapping[str, Coefficient]:
-    """The coefficients that a class declares, by name."""
-    return {each.name: each.metadata[_KEY] for each in _fields(kind) if _KEY in each.metadata}
+    """Return the coefficients that a class declares, by name."""
+    return {field.name: field.metadata[_KEY] for field in _fields(kind) if _KEY in field.metadata}
 
 
 @cache
 def defaults(kind: type) -> Mapping[str, Any]:
-    """The defaults of those coefficients of a class that have one."""
-    known = declared(kind)
-    return {each.name: each.default for each in _fields(kind) if each.name in known and each.default is not MISSING}
+    """Return the defaults of coefficients of a class, by name, if they have one."""
+    names = declared(kind)
+    return {x.name: x.default for x in _fields(kind) if x.name in names and x.default is not MISSING}
 
 
 def _fields(kind: type) -> tuple[Field[Any], ...]:
@@ -156,14 +158,15 @@ def _fields(kind: type) -> tuple[Field[Any], ...]:
 
 def check_coefficients(part: Any, error: type[RobotDynError], *, resolved: bool = False) -> None:
     """Check and freeze the coefficients of a part under construction; see `Coefficient.checked`."""
-    for name, each in declared(type(part)).items():
-        if getattr(part, name) is None and defaults(type(part)).get(name, 0) is None:
+    for name, declared_as in declared(type(part)).items():
+        value = getattr(part, name)
+        if value is None and defaults(type(part)).get(name, 0) is None:
             continue  # optional
-        object.__setattr__(part, name, each.checked(name, getattr(part, name), error=error, resolved=resolved))
+        object.__setattr__(part, name, declared_as.checked(name, value, error=error, resolved=resolved))
 
 
 def with_values(part: Any, values: Mapping[str, Any]) -> Any:
-    """A copy of a part with other coefficients, unchecked: symbols, for example, would not pass the checks.
+    """Return a copy of a part with other coefficients, unchecked: symbols, for example, would fail the checks.
 
     A name may be a path into a nested part, such as "controller.kp" or "position.0.resolution".
     """
@@ -182,9 +185,9 @@ def with_values(part: Any, values: Mapping[str, Any]) -> Any:
 
 
 def cached_properties(part: Any) -> tuple[str, ...]:
-    """Names of the cached properties of a part that have been evaluated."""
-    known, kind = getattr(part, "__dict__", ()), type(part)
-    return tuple(name for name in known if _is_cached(kind, name))
+    """Return the names of the cached properties of a part that have been evaluated."""
+    kind = type(part)
+    return tuple(name for name in getattr(part, "__dict__", ()) if _is_cached(kind, name))
 
 
 @cache
@@ -193,20 +196,20 @@ def _is_cached(kind: type, name: str) -> bool:
 
 
 def rebuilt(part: Any, values: Mapping[str, Any]) -> Any:
-    """A copy of a part with other coefficients, constructed again and thus checked."""
+    """Return a copy of a part with other coefficients, constructed again and thus checked."""
     inside = {head: _within(getattr(part, head), below, rebuilt) for head, below in _by_head(values).items()}
     return replace(part, **{name: value for name, value in values.items() if "." not in name}, **inside)
 
 
 def value_at(part: Any, path: str) -> Any:
-    """The attribute of a part at a path."""
+    """Return the attribute of a part at a path."""
     for name in path.split("."):
         part = part[int(name)] if isinstance(part, tuple) else getattr(part, name)
     return part
 
 
 def _by_head(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Values inside nested parts, grouped by the attribute of the part, then by the rest of the path."""
+    """Group values inside nested parts by the attribute of the part, then by the rest of the path."""
     parts: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         head, _, rest = name.partition(".")
@@ -219,4 +222,4 @@ def _within(part: Any, values: dict[str, Any], change: Callable[[Any, Mapping[st
     if not isinstance(part, tuple):
         return change(part, values)
     inside = _by_head(values)
-    return tuple(change(each, inside[str(k)]) if str(k) in inside else each for k, each in enumerate(part))
+    return tuple(change(x, inside[str(k)]) if str(k) in inside else x for k, x in enumerate(part))

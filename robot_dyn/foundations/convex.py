@@ -1,12 +1,12 @@
-"""The convex problem behind dry friction and rigid stops, for velocities at an impact and accelerations at rest.
+"""The convex problem of dry friction and rigid stops, for velocities at an impact and accelerations at rest.
 
     min ½ (x − x₀)ᵀ M (x − x₀) + Σ fᵢ |xᵢ|   subject to   lower ≤ x ≤ upper,   given p = M x₀
 
-    p − M x ∈ f ∂|x| + N(x)   at its one minimum, with N the normal cone of the box
+    p − M x ∈ f ∂|x| + N(x)   at its unique minimum, with N the normal cone of the box
 
-Each xᵢ has a place: fixed at a breakpoint, where it is exact, or free between two.
+Each xᵢ has a place: fixed at a breakpoint, where it is exact, or free between two breakpoints.
 
-    −2 lower   −1 between   0 middle   1 between   2 upper,   where middle is 0, or the bound that is nearest to 0
+    −2 lower   −1 between   0 middle   1 between   2 upper,   where middle is 0, or the bound nearest to 0
 
 [Moreau, Unilateral contact and dry friction in finite freedom dynamics, 1988; Hintermüller, Ito, Kunisch 2002; Nocedal,
 Wright, Numerical Optimization, 2nd ed., 2006, ch. 16]
@@ -20,18 +20,18 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.foundations.linear_algebra import cholesky_solve
 
-PASSES = 8  # of Newton's method, before one place is changed at a time: 6 were enough in 18 000 steps of an arm
-LARGE = 1e300  # a larger bound does not exist; infinity cannot be compared with symbols
+PASSES = 8  # Newton passes before places are changed one at a time: 6 sufficed in 18 000 steps of an arm
+LARGE = 1e300  # larger bounds count as infinite; infinity cannot be compared with symbols
 ROUNDING = 16 * float(np.finfo(float).eps)
 
 
 def not_found(M: np.ndarray, p: np.ndarray) -> RobotDynError:
-    """The error of a problem without a minimum."""
-    return RobotDynError(f"no minimum was found for M = {M.tolist()} and p = {p.tolist()}: give finite numbers")
+    """Return the error for a problem without a minimum."""
+    return RobotDynError(f"no minimum exists for M = {M.tolist()} and p = {p.tolist()}: give finite numbers")
 
 
 def residual(M: np.ndarray, p: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray, x: np.ndarray) -> float:
-    """How far p − M x is from f ∂|x| + N(x), the largest over i, as a part of |pᵢ| + Σⱼ |Mᵢⱼ xⱼ| + fᵢ."""
+    """Return the largest distance of p − M x from f ∂|x| + N(x) over i, relative to |pᵢ| + Σⱼ |Mᵢⱼ xⱼ| + fᵢ."""
     s, scale = p - M @ x, np.abs(p) + np.abs(M) @ np.abs(x) + f
     least = np.where(x == lower, -np.inf, np.where(x > 0, f, -f))
     most = np.where(x == upper, np.inf, np.where(x < 0, -f, f))
@@ -40,10 +40,10 @@ def residual(M: np.ndarray, p: np.ndarray, f: np.ndarray, lower: np.ndarray, upp
 
 
 def newton(M: Array, p: Array, f: Array, lower: Array, upper: Array, place: Array) -> tuple[Array, Array]:
-    """A semismooth Newton step: x with each coordinate at its place, and the places with all violated ones changed.
+    """Make a semismooth Newton step: return x with each coordinate at its place, and corrected places.
 
-    Where no place changes, x is the minimum. In floats or symbols, without a branch; a place at a bound that is not
-    there, as where the places of a problem before are taken, is that beside it.
+    If no place changes, x is the minimum. The step runs in floats or symbols, without branches. A place at a bound that
+    does not exist, for example from a previous problem, becomes the free place next to it.
     """
     place = np.minimum(np.maximum(place, np.where(lower > -LARGE, -2.0, -1.0)), np.where(upper < LARGE, 2.0, 1.0))
     free = place * place * (4 - place * place) / 3
@@ -57,10 +57,10 @@ def newton(M: Array, p: Array, f: Array, lower: Array, upper: Array, place: Arra
     least = np.where(high, f, np.where(low, -np.inf, np.where(middle > lower, -f, -np.inf)))
     most = np.where(low, -f, np.where(high, np.inf, np.where(middle < upper, f, np.inf)))
     released = _one(s > most + slack) - _one(s < least - slack)
-    rough = np.where(middle > lower, np.where(middle < upper, f, 1.0), 1.0) > 0  # else it is one piece, with f = 0
+    rough = np.where(middle > lower, np.where(middle < upper, f, 1.0), 1.0) > 0  # otherwise one piece, with f = 0
     below, above = np.where(rough, middle, lower), np.where(rough, middle, upper)
-    met = _one(x >= np.where(place > 0, upper, above)) - _one(x <= np.where(place > 0, below, lower))
-    return x, place + np.where(free > 0.5, met, released)
+    reached = _one(x >= np.where(place > 0, upper, above)) - _one(x <= np.where(place > 0, below, lower))
+    return x, place + np.where(free > 0.5, reached, released)
 
 
 def _one(condition: Array) -> Array:
@@ -68,15 +68,15 @@ def _one(condition: Array) -> Array:
 
 
 def active_set(
-    M: Array, p: Array, f: Array, lower: Array, upper: Array, x: Array, place: Array, room: Array
+    M: Array, p: Array, f: Array, lower: Array, upper: Array, x: Array, place: Array, work: Array
 ) -> bool:  # fmt: skip
-    """Write the minimum into x and its places, from coordinates in the middle; whether it was found.
+    """Write the minimum into x and its places, beginning with coordinates in the middle; return False on failure.
 
-    The value falls from face to face, so that no face comes twice. A plain function of arrays, which machine code
-    takes as it stands; `room` is (n + 1, n).
+    The value decreases from face to face, so no face is visited twice. This is a plain function of arrays, which can be
+    translated to machine code; `work` is (n + 1, n).
     """
-    n, L = len(p), room
-    there = room[n]
+    n, L = len(p), work
+    there = work[n]
     for i in range(n):
         place[i], x[i] = 0.0, min(max(0.0, lower[i]), upper[i])
     for _ in range(100 * n + 100):
@@ -87,7 +87,7 @@ def active_set(
 
 
 def on_face(M: Array, p: Array, f: Array, lower: Array, upper: Array, place: Array, L: Array, x: Array) -> None:
-    """The stationary x with each coordinate at its place, by the Cholesky factor of the free ones."""
+    """Write the stationary x with each coordinate at its place, by the Cholesky factor of the free coordinates."""
     n = len(p)
     for i in range(n):
         if abs(place[i]) != 1.0:
@@ -119,7 +119,7 @@ def on_face(M: Array, p: Array, f: Array, lower: Array, upper: Array, place: Arr
 
 
 def descended(lower: Array, upper: Array, place: Array, there: Array, x: Array) -> bool:
-    """Go from x towards a point on its face, up to the first breakpoint, and fix that coordinate; whether one is."""
+    """Move x towards a point on its face, at most to a breakpoint; return True if it fixed a coordinate there."""
     part, hit, end, way = 1.0, -1, 0.0, 0.0
     for i in range(len(x)):
         middle = min(max(0.0, lower[i]), upper[i])
@@ -127,9 +127,9 @@ def descended(lower: Array, upper: Array, place: Array, there: Array, x: Array) 
         if abs(place[i]) == 1.0 and not low < there[i] < high:
             up = there[i] >= high
             point = high if up else low
-            share = (point - x[i]) / (there[i] - x[i]) if there[i] != x[i] else 0.0
-            if share <= part:
-                part, hit, end, way = max(share, 0.0), i, point, 1.0 if up else -1.0
+            fraction = (point - x[i]) / (there[i] - x[i]) if there[i] != x[i] else 0.0
+            if fraction <= part:
+                part, hit, end, way = max(fraction, 0.0), i, point, 1.0 if up else -1.0
     for i in range(len(x)):
         x[i] = x[i] + part * (there[i] - x[i]) if hit >= 0 else there[i]
     if hit >= 0:
@@ -139,8 +139,8 @@ def descended(lower: Array, upper: Array, place: Array, there: Array, x: Array) 
 
 
 def released(M: Array, p: Array, f: Array, lower: Array, upper: Array, place: Array, x: Array) -> bool:
-    """Free the fixed coordinate whose condition is violated most, by its scale; False if none is."""
-    worst, which, way = ROUNDING, -1, 0.0
+    """Free the fixed coordinate with the largest relative violation; return False without a violation."""
+    worst, index, way = ROUNDING, -1, 0.0
     for i in range(len(p)):
         if abs(place[i]) == 1.0:
             continue
@@ -155,9 +155,9 @@ def released(M: Array, p: Array, f: Array, lower: Array, upper: Array, place: Ar
         elif place[i] > 1:
             least, most = f[i], np.inf
         if s - most > worst * scale:
-            worst, which, way = (s - most) / scale, i, 1.0
+            worst, index, way = (s - most) / scale, i, 1.0
         if least - s > worst * scale:
-            worst, which, way = (least - s) / scale, i, -1.0
-    if which >= 0:
-        place[which] += way
-    return which >= 0
+            worst, index, way = (least - s) / scale, i, -1.0
+    if index >= 0:
+        place[index] += way
+    return index >= 0

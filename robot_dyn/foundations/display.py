@@ -1,6 +1,6 @@
 """HTML of values for notebooks: tables as HTML and figures of Matplotlib as SVG, without scripts.
 
-Text and axes take the colour of the page (`currentColor`), so that they stand on light and on dark ones.
+Text and axes have the colour of the page (`currentColor`), so that they are legible on light and on dark pages.
 """
 
 from __future__ import annotations
@@ -51,17 +51,17 @@ _STYLE = (
 
 
 def page(title: str, *parts: str) -> str:
-    """A block of HTML with a title; the parts are HTML."""
+    """Return a block of HTML with a title; the parts are HTML."""
     return f'<div class="robot-dyn">{_STYLE}<div class="t">{escape(title)}</div>{"".join(parts)}</div>'
 
 
 def text(lines: str | Iterable[str]) -> str:
-    """Lines of text as they are."""
+    """Return lines of preformatted text."""
     return f"<pre>{escape(lines if isinstance(lines, str) else chr(10).join(lines))}</pre>"
 
 
 def grid(heading: Sequence[str], cells: Iterable[Sequence[str]], words: Collection[str]) -> str:
-    """Return a table of texts; the columns that are not of words stand at the right.
+    """Return a table of texts; columns not listed in `words` are aligned at the right.
 
     On a narrow page each row of a table of many columns is a block, whose cells have their headings.
     """
@@ -80,12 +80,12 @@ def grid(heading: Sequence[str], cells: Iterable[Sequence[str]], words: Collecti
 
 
 def side_by_side(parts: Iterable[str]) -> str:
-    """Blocks of HTML side by side, as many as there is room for."""
+    """Return blocks of HTML side by side, wrapped at the width of the page."""
     return f'<div class="s">{"".join(parts)}</div>'
 
 
 def legend(names: Iterable[str]) -> str:
-    """The names of curves in their colours."""
+    """Return the names of curves in their colours."""
     return side_by_side(
         f'<span><span style="color:{_COLOURS[k % len(_COLOURS)]}">■</span> {escape(name)}</span>'
         for k, name in enumerate(names)
@@ -146,9 +146,9 @@ def plot(label: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> str:
     """Draw curves over time.
 
     Args:
-        label: What they are, with the unit.
+        label: Name of the quantity, with the unit.
         t: Times, (m,), in [s].
-        columns: Curves (m,) by name; what is not finite is left out.
+        columns: Curves, (m,), by name; non-finite values are omitted.
     """
     if not any(np.isfinite(x).any() for x in columns.values()):
         return ""
@@ -162,7 +162,7 @@ def plot(label: str, t: np.ndarray, columns: Mapping[str, np.ndarray]) -> str:
 
 
 def _extremes(values: np.ndarray) -> np.ndarray:
-    """Return places of finite values: of many samples the least and the largest of each part."""
+    """Return indices of finite values: for many samples, of the smallest and the largest in each part."""
     at = np.flatnonzero(np.isfinite(values))
     if len(at) <= MOST_POINTS:
         return at
@@ -171,12 +171,12 @@ def _extremes(values: np.ndarray) -> np.ndarray:
 
 
 def bars(label: str, rows: Mapping[str, Mapping[str, float]], causes: Sequence[str]) -> str:
-    """Draw horizontal bars, one a row, each stacked from 0: positive parts to the right, the others to the left.
+    """Draw horizontal bars, one per row, stacked from 0: positive parts to the right, negative ones to the left.
 
     Args:
-        label: What they are, with the unit.
-        rows: Parts of each bar by cause, by the name of the bar; what is not finite is left out.
-        causes: In the order of colours, of which the legend names those that occur.
+        label: Name of the quantity, with the unit.
+        rows: Parts of each bar by cause, by the name of the bar; non-finite values are omitted.
+        causes: Causes in the order of colours; the legend names the causes that occur.
     """
     parts = np.array([[row.get(cause, 0.0) for cause in causes] for row in rows.values()]).reshape(
         len(rows), len(causes)
@@ -198,20 +198,22 @@ def bars(label: str, rows: Mapping[str, Mapping[str, float]], causes: Sequence[s
 
 
 def levels(label: str, values: Mapping[str, float], limit: float) -> str:
-    """Draw marks on a logarithmic axis, one a row, and a limit as a dashed line.
+    """Draw marks on a logarithmic axis, one per row, and a limit as a dashed line.
 
     Args:
-        label: What they are, with the unit.
-        values: By the names of the rows; what is not finite and positive is left out.
-        limit: In the unit of the values; what is not finite and positive is left out.
+        label: Name of the quantity, with the unit.
+        values: Values by the names of the rows; values that are not finite and positive are omitted.
+        limit: Limit in the unit of the values; omitted unless finite and positive.
     """
-    known = {name: min(max(x, _LEAST), 1 / _LEAST) for name, x in values.items() if isfinite(x) and x > 0}
-    if not known:
+    positive = {name: min(max(x, _LEAST), 1 / _LEAST) for name, x in values.items() if isfinite(x) and x > 0}
+    if not positive:
         return ""
-    axes = _axes(label, _BAR * (len(known) + 2), known)
+    axes = _axes(label, _BAR * (len(positive) + 2), positive)
     axes.set_xscale("log")
-    axes.plot([*known.values()], range(len(known)), "o", color=_COLOURS[0], markersize=5, clip_on=False, gid="levels")
-    shown = [*known.values()]
+    axes.plot(
+        [*positive.values()], range(len(positive)), "o", color=_COLOURS[0], markersize=5, clip_on=False, gid="levels"
+    )
+    shown = [*positive.values()]
     if isfinite(limit) and limit > 0:
         axes.axvline(limit, color=_COLOURS[1], linestyle="--", clip_on=False)
         shown.append(limit)

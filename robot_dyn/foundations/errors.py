@@ -1,4 +1,4 @@
-"""Errors a user can act on: each message says what, where, the value and the remedy; and calls of user-written code."""
+"""Errors whose messages name the fault, its place, the value and the remedy; and calls of user-written code."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from unicodedata import category
 
 
 def escaped(text: str) -> str:
-    r"""The text in one line, its control and invisible characters written as Python writes them: \x1b, \n, \u202e."""
+    r"""Return the text in one line, with control and invisible characters escaped as in Python: \x1b, \n, \u202e."""
     if text.isprintable():
         return text
-    visible = (each if each.isprintable() or category(each) == "Zs" else repr(each)[1:-1] for each in text)
-    return "".join(visible)
+    return "".join(c if c.isprintable() or category(c) == "Zs" else repr(c)[1:-1] for c in text)
 
 
 class PortableError(Exception):
-    """An error that survives `pickle` and `copy` with its message and attributes, and so passes between processes."""
+    """An error that keeps its message and attributes through `pickle` and `copy`, and so between processes."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Rebuild the error from its message and attributes: `__init__` of a subclass may take other arguments."""
@@ -29,14 +28,14 @@ class PortableError(Exception):
 
 
 def _rebuilt(kind: type[PortableError], args: tuple[Any, ...]) -> PortableError:
-    return kind.__new__(kind, *args)  # which sets args
+    return kind.__new__(kind, *args)  # __new__ sets args
 
 
 class RobotDynError(PortableError):
-    """Base of every error this library raises; its message has no control characters of the file that it is about.
+    """Base class of all errors of this library; control characters in its message are escaped.
 
     Attributes:
-        row: Index of the state that has no answer in a batch, None where there is no batch.
+        row: Index of the state in a batch that caused the error; None without a batch.
     """
 
     row: tuple[int, ...] | None = None
@@ -46,7 +45,7 @@ class RobotDynError(PortableError):
 
 
 class CatalogError(RobotDynError):
-    """No robot, file or package of that name was found."""
+    """No robot, file or package of that name exists."""
 
 
 class DescriptionError(RobotDynError):
@@ -58,35 +57,35 @@ class EditError(RobotDynError):
 
 
 class MissingExtraError(RobotDynError):
-    """A package that an answer needs is not installed."""
+    """A required optional package is not installed."""
 
 
 class PlanError(RobotDynError):
-    """A motion that cannot be planned: limits, way points or samples that are not allowed, or that nothing can meet."""
+    """A motion that cannot be planned: limits, way points or samples are invalid or cannot be satisfied."""
 
 
 class VideoError(RobotDynError):
-    """A video that cannot be made: of a page without a run, too long, or without a browser that shows the page."""
+    """A video that cannot be made: the page has no run, the video is too long, or there is no browser."""
 
 
 class TraceError(RobotDynError):
-    """A function that cannot be traced: it does what symbols cannot."""
+    """A function that cannot be traced: it uses operations that symbols do not support."""
 
 
 class MachineCodeError(RobotDynError, ArithmeticError):
-    """Machine code that ended at an index out of range, an integer that overflows or one divided by zero."""
+    """Machine code that stopped at an index out of range, an integer overflow or an integer division by zero."""
 
 
 class ControlError(RobotDynError):
-    """A controller or reference with values that are not allowed, or of the wrong shape."""
+    """A controller or reference with invalid values or shapes."""
 
 
 class ProofError(RobotDynError):
-    """A run for which no theorem can be proven: a part of it switches, or is not known to be analytic."""
+    """A run for which no theorem can be proven: a part of it switches, or may not be analytic."""
 
 
 class EffectError(RobotDynError):
-    """An effect with coefficients that have no physical meaning, or of the wrong shape."""
+    """An effect with coefficients that have no physical meaning, or the wrong shape."""
 
 
 class QueryError(RobotDynError):
@@ -102,15 +101,15 @@ class OverflowedError(QueryError):
 
 
 class SceneError(RobotDynError):
-    """A scene that cannot be read; names file, line, key and value."""
+    """A scene that cannot be read; the message names file, line, key and value."""
 
 
 class SweepError(RobotDynError):
-    """A sweep that cannot be made, run or read: its specification, its folder or a question to its rows."""
+    """A sweep that cannot be specified, run or read: an invalid specification, folder or query."""
 
 
 class SingularError(RobotDynError):
-    """Forward dynamics that has no answer: M is singular.
+    """Forward dynamics without a solution: M is singular.
 
     Attributes:
         joint: Name of the joint that carries no inertia.
@@ -122,67 +121,67 @@ class SingularError(RobotDynError):
 
 
 class UndecidedError(SingularError):
-    """Forward dynamics that is not decided: whether M is singular is lost in the rounding of an arithmetic."""
+    """Undecided forward dynamics: rounding hides whether M is singular."""
 
     def __init__(self, joint: str, where: str, arithmetic: str) -> None:
         RobotDynError.__init__(
             self,
-            f"forward dynamics not decided: whether joint {joint!r} carries inertia {where} is lost in the rounding of"
-            f" {arithmetic}; ask rd.Lagrangian(robot, rd.accuracy.Ball(bits)) with enough bits",
+            f"forward dynamics not decided: rounding of {arithmetic} hides whether joint {joint!r} carries inertia"
+            f" {where}; use rd.Lagrangian(robot, rd.accuracy.Ball(bits)) with enough bits",
         )
         self.joint = joint
 
 
 class RobotDynWarning(UserWarning):
-    """Base of the warnings of this library; messages as of the errors."""
+    """Base class of all warnings of this library; control characters in its message are escaped."""
 
     def __str__(self) -> str:
         return escaped(super().__str__())
 
 
 class ModelWarning(RobotDynWarning):
-    """A robot that loads although some of its bodies cannot exist, or cannot be drawn, as described."""
+    """A robot that loads although some bodies, as described, are physically impossible or cannot be drawn."""
 
 
 class PlanWarning(RobotDynWarning):
-    """A motion of a scene whose samples are doubtful: gaps, jumps, limits passed."""
+    """A motion of a scene with doubtful samples: gaps, jumps, or values beyond limits."""
 
 
 class PrecisionWarning(RobotDynWarning):
-    """An answer with fewer digits than requested by `rd.accuracy.warn_below`, or of a nearly singular robot."""
+    """A result with fewer digits than requested by `rd.accuracy.warn_below`, or of a nearly singular robot."""
 
 
 def announce(robot: str, findings: Sequence[str]) -> None:
-    """One ModelWarning of findings about a robot, if there are any, at the line that loads it, three calls above."""
+    """Issue one ModelWarning if there are findings about a robot, at the line that loads it, three calls above."""
     if findings:
-        more = f" (the first of {len(findings)} findings; all of them: Robot.findings, robot-dyn info)"
+        more = f" (the first of {len(findings)} findings; see Robot.findings or robot-dyn info for all)"
         text = f"{robot}: {findings[0]}{more if len(findings) > 1 else ''}"
         warnings.warn(text, ModelWarning, stacklevel=4)
 
 
-_COMPARED = 48  # characters of a name: likeness costs the square of it
+_COMPARED = 48  # compared characters of a name: the time grows with the square
 
 
 def shorten(value: object, most: int = 60) -> str:
-    """The text of a value that a message shows, cut if it is long."""
+    """Return the text of a value for a message, cut if it is long."""
     text = str(value)
     return text if len(text) <= most else text[: most - 1] + "…"
 
 
 def shown(value: object) -> str:
-    """A value in a message."""
+    """Return the `repr` of a value for a message, cut if it is long."""
     try:
         return shorten(repr(value))
-    except Exception:  # an int of many digits, or whatever an object's repr raises
+    except Exception:  # an int of many digits, or any error in the repr of an object
         return f"a value of type {type(value).__name__}"
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """Advice after an unknown name: the nearest valid names, or the first few."""
+    """Return advice after an unknown name: the nearest valid names, or the first few."""
     names = list(names)
-    by_key = {known.casefold()[:_COMPARED]: known for known in names}
+    by_key = {valid.casefold()[:_COMPARED]: valid for valid in names}
     close = [by_key[key] for key in get_close_matches(name.casefold()[:_COMPARED], by_key, n=4, cutoff=0.5)]
-    shown = [shorten(each) for each in close or names[:8]]
+    shown = [shorten(valid) for valid in close or names[:8]]
     if not shown:
         return "there are none"
     more = "" if close or len(names) == len(shown) else f", … ({len(names)} in all)"
@@ -195,9 +194,9 @@ _NOT_USER_CODE = {"robot_dyn", "numpy", "scipy", "casadi", *sys.stdlib_module_na
 
 
 def call(method: Callable[..., Any], *arguments: Any) -> Any:
-    """What a method of an effect or controller returns.
+    """Call a method of an effect or controller and return its result.
 
-    An exception of its code passes as it is, with a note of the part's name; errors of the library name it themselves.
+    An exception in its code gets a note with the name of the part; errors of the library already contain it.
     """
     try:
         return method(*arguments)
@@ -205,34 +204,34 @@ def call(method: Callable[..., Any], *arguments: Any) -> Any:
         raise
     except Exception as error:
         part: Any = getattr(method, "__self__", None)
-        of = "" if part is None else f" of {getattr(part, 'name', type(part).__name__)}"  # None: a plain function
-        error.add_note(f"in {getattr(method, '__name__', 'a method')}{of}")
+        owner = "" if part is None else f" of {getattr(part, 'name', type(part).__name__)}"  # None: a plain function
+        error.add_note(f"in {getattr(method, '__name__', 'a method')}{owner}")
         raise
 
 
 def users_line(error: BaseException) -> str:
-    """The innermost line of a user's code on the way to an exception, "line 12 of arm.py"; empty without one."""
-    found = ""
+    """Return the innermost line of user code in a traceback, such as "line 12 of arm.py"; empty without one."""
+    innermost = ""
     for frame, line in walk_tb(error.__traceback__):
         if str(frame.f_globals.get("__name__", "")).partition(".")[0] not in _NOT_USER_CODE:
-            found = f"line {line} of {Path(frame.f_code.co_filename).name}"
-    return found
+            innermost = f"line {line} of {Path(frame.f_code.co_filename).name}"
+    return innermost
 
 
 def is_mistake(error: RobotDynError) -> bool:
-    """Whether user-written code gave the library an invalid argument, such as one of a wrong shape.
+    """Return True if user-written code passed an invalid argument to the library, such as one of a wrong shape.
 
-    So does a step that cannot be machine code, or fails as such. Other errors of the library, raised or met there, are
-    outcomes of a run: numbers that overflow, a singular M.
+    A step that cannot be traced, or fails as machine code, is a mistake, too. Other errors of the library in user code
+    are outcomes of a run: numbers that overflow, a singular M.
     """
     if isinstance(error, TraceError | MachineCodeError):
         return True
-    refused = isinstance(error, QueryError) and not isinstance(error, NotFiniteError | OverflowedError)
-    return refused and bool(users_line(error))
+    is_invalid = isinstance(error, QueryError) and not isinstance(error, NotFiniteError | OverflowedError)
+    return is_invalid and bool(users_line(error))
 
 
 def because(error: BaseException) -> str:
-    """The message of an exception, with the line of a user's code that raised it."""
+    """Return the message of an exception, with the line of user code that raised it."""
     line = users_line(error)
     message = str(error) if isinstance(error, RobotDynError) else f"{type(error).__name__}: {error}"
     return f"{line}: {message}" if line else str(error)

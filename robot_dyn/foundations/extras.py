@@ -1,4 +1,4 @@
-"""Installed packages: their versions, and those that only some answers need, imported on use."""
+"""Installed packages: their versions, and imports of optional packages on use."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from robot_dyn.foundations.errors import MissingExtraError
 
 
 def needs(module: str, *, extra: str) -> ModuleType:
-    """A module of an optional dependency, imported now.
+    """Import and return a module of an optional dependency.
 
     Args:
-        module: Its name, such as "ruckig".
+        module: Name of the module, such as "ruckig".
         extra: The extra of robot-dyn that installs it, such as "plan".
 
     Raises:
@@ -24,7 +24,7 @@ def needs(module: str, *, extra: str) -> ModuleType:
         return import_module(module)
     except ModuleNotFoundError as error:
         if error.name is None or error.name.partition(".")[0] != module.partition(".")[0]:
-            raise  # it is there, and lacks a package of its own
+            raise  # the module is installed, but one of its dependencies is not
         raise MissingExtraError(
             f"{module.partition('.')[0]} is not installed: pip install 'robot-dyn[{extra}]'"
         ) from None
@@ -32,12 +32,12 @@ def needs(module: str, *, extra: str) -> ModuleType:
 
 @cache
 def version_of(name: str) -> str:
-    """The version of an installed distribution, or "unknown"."""
-    from importlib.metadata import PackageNotFoundError, distribution  # a query of a robot needs none of it
+    """Return the version of an installed distribution, or "unknown"."""
+    from importlib.metadata import PackageNotFoundError, distribution  # slow to import, and rarely needed
 
     try:
-        found = distribution(name)
+        installed = distribution(name)
     except PackageNotFoundError:  # run from its folder
         return "unknown"
-    head = re.search("^Version: (.*)$", found.read_text("METADATA") or "", re.MULTILINE)
-    return head[1] if head else found.version  # which starts a mail parser
+    head = re.search("^Version: (.*)$", installed.read_text("METADATA") or "", re.MULTILINE)
+    return head[1] if head else installed.version  # slower: starts a mail parser

@@ -1,6 +1,6 @@
-"""Files: read if regular and within a size limit; written whole or not at all, and only over files of their kind.
+"""Files: read if regular and within a size limit; written completely or not at all, and only over files of their kind.
 
-A file is written beside its target, synchronised and renamed, so that readers see the old file or the new one, even
+A file is written next to its target, synchronised and renamed, so that readers see the old file or the new one, even
 after a power loss. Links are followed, permissions are kept, and leftovers of killed writers are removed.
 """
 
@@ -20,11 +20,11 @@ from typing import Any, BinaryIO, final
 
 from robot_dyn.foundations.errors import RobotDynError, shown
 
-_NEW_S = 10.0  # a younger file may be open and not yet locked
-# Locks distinguish a file that is being written from an abandoned one; Windows cannot remove open files, so needs none.
+_NEW_S = 10.0  # [s]: a younger file may be open and not yet locked
+# Locks distinguish files being written from abandoned ones; Windows needs none, because open files cannot be removed.
 _locks: Any = import_module("fcntl") if os.name == "posix" else None
 # Opening a pipe would wait for its writer; Windows has no O_NONBLOCK, POSIX no O_BINARY.
-_PART = 2**24  # bytes of a read
+_PART = 2**24  # bytes per read
 _READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 
@@ -46,19 +46,19 @@ def target(
     inputs: Iterable[str | Path] = (),
     force: bool = True,
 ) -> Path:
-    """Check the path of a file before the work is done; return it, with the suffix of the first kind if it has none.
+    """Check the path of a new file before any work; return it, with the suffix of the first kind if it has none.
 
     Args:
-        path: Where to write.
-        kinds: Kinds of file that are allowed.
+        path: Path of the file.
+        kinds: Allowed kinds of file.
         error: Type of the errors.
-        inputs: Files and folders that are read, none of which may be replaced, even with `force`.
-        force: Whether a file of its kind may be replaced.
+        inputs: Files and folders that are read; they must not be replaced, even with `force`.
+        force: True if an existing file of the same kind may be replaced.
 
     Raises:
-        RobotDynError: Of type `error`, if the suffix is wrong; if the folder is missing or not writable; if anything
-            but a file of its kind has that path, or any file unless `force`; or if it is one of `inputs` or in one of
-            them, even through a link.
+        RobotDynError: Of type `error`, if the suffix is wrong; the folder is missing or not writable; the path is
+            something other than a file of its kind, or exists and `force` is False; or the path is one of `inputs` or
+            inside one, even through a link.
     """
     kinds = kinds if isinstance(kinds, tuple) else (kinds,)
     try:
@@ -88,12 +88,12 @@ def _check(path: Path, real: Path, kind: FileKind, error: type[RobotDynError], i
         raise error(f"{path}: is a link to itself; remove it, or give another path")
     for other in map(Path, inputs):
         if os.path.realpath(other) == str(real) or (real.exists() and other.exists() and real.samefile(other)):
-            raise error(f"{path}: is the same file as {other}, which would be lost; give another path")
+            raise error(f"{path}: is the same file as the input {other}; give another path")
         if real.is_relative_to(os.path.realpath(other)):
-            raise error(f"{path}: is in {other}, which is read; give a path in another folder")
+            raise error(f"{path}: is in the input folder {other}; give a path in another folder")
     if not real.exists():
         if not os.access(real.parent, os.W_OK | os.X_OK):
-            raise error(f"{path}: the folder {real.parent} is not writable; give a path in another one")
+            raise error(f"{path}: the folder {real.parent} is not writable; give a path in another folder")
         return
     start = read_start(path, len(kind.start), error, "give another path")
     if not os.access(real, os.W_OK):
@@ -103,24 +103,24 @@ def _check(path: Path, real: Path, kind: FileKind, error: type[RobotDynError], i
 
 
 def check_folder(path: Path, error: type[RobotDynError]) -> None:
-    """Check that files can be written into a folder, or that it can be made, before the work is done.
+    """Check, before any work, that a folder can be written or created.
 
     Raises:
-        RobotDynError: Of type `error`, if the path is not a folder; if it, or the folder above it, is not writable.
+        RobotDynError: Of type `error`, if the path is not a folder, or it, or the folder above it, is not writable.
     """
     try:
         real = Path(os.path.realpath(path))
-        there = next(each for each in (real, *real.parents) if os.path.lexists(each))
-        if not there.is_dir():
-            raise error(f"{path}: {there} is not a folder; give another path")
-        if not os.access(there, os.W_OK | os.X_OK) or _is_read_only(there):
-            raise error(f"{path}: the folder {there} is not writable; give a path in another one")
+        existing = next(folder for folder in (real, *real.parents) if os.path.lexists(folder))
+        if not existing.is_dir():
+            raise error(f"{path}: {existing} is not a folder; give another path")
+        if not os.access(existing, os.W_OK | os.X_OK) or _is_read_only(existing):
+            raise error(f"{path}: the folder {existing} is not writable; give a path in another folder")
     except (OSError, ValueError) as cause:  # ValueError: a NUL in the path
         raise error(f"{shown(str(path))}: cannot be written ({why(cause)}); give another path") from None
 
 
 def _is_read_only(folder: Path) -> bool:
-    """Return True if the system refuses a new file for another reason than permissions, such as a read-only disk."""
+    """Return True if the system refuses a new file for reasons other than permissions, such as a read-only disk."""
     handle, name = -1, folder / f".{os.urandom(8).hex()}.unfinished"
     try:
         handle = os.open(name, _NEW, 0o600)
@@ -132,7 +132,7 @@ def _is_read_only(folder: Path) -> bool:
 
 
 def save(path: Path, write: Callable[[BinaryIO], object], error: type[RobotDynError]) -> Path:
-    """Write a file that readers see whole or not at all; `path` comes from `target`.
+    """Write a file that readers see completely or not at all; `path` comes from `target`.
 
     Raises:
         RobotDynError: Of type `error`, if the file cannot be written; any old file is then unchanged.
@@ -141,48 +141,48 @@ def save(path: Path, write: Callable[[BinaryIO], object], error: type[RobotDynEr
     try:
         _remove_abandoned(real)
         old = real.stat() if real.exists() else None
-        with _unfinished(real, 0o600 if old else 0o666) as (beside, stream):
+        with _unfinished(real, 0o600 if old else 0o666) as (temporary, stream):
             write(stream)
             stream.flush()
             if old:
-                _as_before(beside, old)
+                _copy_permissions(temporary, old)
             os.fsync(stream.fileno())
             if not _locks:
                 stream.close()  # Windows cannot rename open files; elsewhere it stays locked until renamed
-            os.replace(beside, real)
+            os.replace(temporary, real)
         sync_folder(real.parent)
     except MemoryError:
-        raise error(f"{path}: cannot be written (not enough memory); free some, or save less") from None
+        raise error(f"{path}: cannot be written (not enough memory); free memory, or save less") from None
     except OSError as cause:
-        raise error(f"{path}: cannot be written ({why(cause)}); make room, or give another path") from None
+        raise error(f"{path}: cannot be written ({why(cause)}); free disk space, or give another path") from None
     return path
 
 
-def _as_before(beside: Path, old: os.stat_result) -> None:
+def _copy_permissions(temporary: Path, old: os.stat_result) -> None:
     """Copy the owner and permissions of the file that is replaced."""
     if hasattr(os, "chown"):
-        with suppress(OSError):  # only root may give a file away
-            os.chown(beside, old.st_uid, old.st_gid)
-    os.chmod(beside, S_IMODE(old.st_mode))
+        with suppress(OSError):  # only root may change the owner
+            os.chown(temporary, old.st_uid, old.st_gid)
+    os.chmod(temporary, S_IMODE(old.st_mode))
 
 
 @contextmanager
 def _unfinished(real: Path, mode: int) -> Iterator[tuple[Path, BinaryIO]]:
-    """A new file beside the target, open and locked; removed if anything fails."""
-    beside = real.with_name(f"{_prefix(real)}{os.urandom(8).hex()}.unfinished")
-    handle = os.open(beside, _NEW, mode)
+    """Open and lock a new file next to the target; remove it if anything fails."""
+    temporary = real.with_name(f"{_prefix(real)}{os.urandom(8).hex()}.unfinished")
+    handle = os.open(temporary, _NEW, mode)
     try:
         with os.fdopen(handle, "wb") as stream:
             _lock(handle)
-            yield beside, stream
+            yield temporary, stream
     except BaseException:
         with suppress(OSError):
-            beside.unlink()
+            temporary.unlink()
         raise
 
 
 def _lock(handle: int, only_if_free: bool = False) -> None:
-    """Lock a file until it is closed; unless `only_if_free`, failure to lock is ignored."""
+    """Lock a file until it is closed; a failure to lock is ignored unless `only_if_free`."""
     if _locks and only_if_free:
         _locks.flock(handle, _locks.LOCK_EX | _locks.LOCK_NB)
     elif _locks:
@@ -191,16 +191,16 @@ def _lock(handle: int, only_if_free: bool = False) -> None:
 
 
 def _remove_abandoned(real: Path) -> None:
-    """Remove what killed writers of this file left: files beside it that are neither new nor locked."""
+    """Remove leftovers of killed writers of this file: neighbouring files that are neither new nor locked."""
     name = re.compile(re.escape(_prefix(real)) + r"[0-9a-f]{16}\.unfinished")
-    for each in [path for path in real.parent.iterdir() if name.fullmatch(path.name)]:
-        with suppress(OSError):  # locked, removed meanwhile, or another user's
-            if time() - each.lstat().st_mtime < _NEW_S:
+    for leftover in [path for path in real.parent.iterdir() if name.fullmatch(path.name)]:
+        with suppress(OSError):  # locked, removed meanwhile, or owned by another user
+            if time() - leftover.lstat().st_mtime < _NEW_S:
                 continue
-            handle = os.open(each, _READ)
+            handle = os.open(leftover, _READ)
             try:
                 _lock(handle, only_if_free=True)
-                each.unlink()
+                leftover.unlink()
             finally:
                 os.close(handle)
 
@@ -210,7 +210,7 @@ def _prefix(real: Path) -> str:
 
 
 def sync_folder(folder: Path) -> None:
-    """Wait until the disk has the names in a folder, where the system can; readers see them already."""
+    """Wait until the names in a folder are on disk, if the system supports it; readers see them before."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -221,7 +221,7 @@ def sync_folder(folder: Path) -> None:
 
 @contextmanager
 def reading(path: str | Path, error: type[RobotDynError], remedy: str) -> Iterator[BinaryIO]:
-    """A regular file, open for reading; a device, pipe or folder is refused.
+    """Open a regular file for reading; devices, pipes and folders are errors.
 
     Raises:
         RobotDynError: Of type `error`, with the remedy, if the file cannot be read.
@@ -231,7 +231,7 @@ def reading(path: str | Path, error: type[RobotDynError], remedy: str) -> Iterat
 
 
 def read(path: str | Path, most: int, error: type[RobotDynError], remedy: str) -> bytes:
-    """The content of a regular file of at most `most` bytes; errors as in `reading`."""
+    """Return the content of a regular file of at most `most` bytes; for errors, see `reading`."""
     data = read_start(path, most + 1, error, remedy)
     if len(data) > most:
         raise error(f"{path}: is larger than {most / 2**20:.3g} MiB; {remedy}")
@@ -241,12 +241,12 @@ def read(path: str | Path, most: int, error: type[RobotDynError], remedy: str) -
 def csv_rows(
     path: str | Path, most: int, error: type[RobotDynError], remedy: str, *, skip_blank: bool = False
 ) -> Iterator[tuple[str, list[str]]]:
-    """Yield the lines of a CSV file, each with its place in words, the first of which names the columns.
+    """Yield the place, in words, and the entries of each line of a CSV file; the first line names the columns.
 
-    Empty lines are skipped; if `skip_blank`, also lines of spaces and commas alone.
+    Empty lines are skipped; if `skip_blank`, so are lines of only spaces and commas.
 
     Raises:
-        RobotDynError: Of type `error`, if it cannot be read, or a line has not one entry for each column.
+        RobotDynError: Of type `error`, if the file cannot be read, or a line does not have one entry for each column.
     """
     data = read(path, most, error, remedy)
     try:
@@ -261,15 +261,15 @@ def csv_rows(
                 raise error(f"{path}: line {lines.line_num} has {counts}; correct it")
             yield f"{path}: line {lines.line_num}", row
     except (UnicodeDecodeError, csv.Error) as cause:
-        raise error(f"{path}: is not a CSV file in UTF-8 ({cause}); write it again") from None
+        raise error(f"{path}: is not a CSV file in UTF-8 ({cause}); save it again as CSV") from None
 
 
 def read_start(path: str | Path, count: int, error: type[RobotDynError], remedy: str) -> bytes:
-    """The first bytes of a regular file, all if it has fewer; errors as in `reading`."""
+    """Return the first bytes of a regular file, all if it has fewer; for errors, see `reading`."""
     with reading(path, error, remedy) as stream:
         try:
             parts, left = [], count
-            while left and (part := stream.read(min(left, _PART))):  # one read would ask for all of its bound at once
+            while left and (part := stream.read(min(left, _PART))):  # one read would allocate the whole bound
                 parts.append(part)
                 left -= len(part)
             return b"".join(parts)
@@ -288,7 +288,7 @@ def _opened(path: str | Path, error: type[RobotDynError], remedy: str) -> Binary
     except FileNotFoundError:
         raise error(f"{path}: there is no such file; {remedy}") from None
     except MemoryError:
-        raise error(f"{path}: cannot be read (not enough memory); free some, or {remedy}") from None
+        raise error(f"{path}: cannot be read (not enough memory); free memory, or {remedy}") from None
     except (OSError, ValueError, TypeError) as cause:
         raise error(f"{path}: cannot be read ({why(cause)}); {remedy}") from None
 
@@ -301,11 +301,11 @@ def _refuse_irregular(path: Path, mode: int, error: type[RobotDynError], remedy:
 def file_path(value: Any, error: type[RobotDynError]) -> Path:
     """Return the path of a file or folder."""
     if not isinstance(value, str | os.PathLike):
-        raise error(f"path: give the path of a file, got {shown(value)}")
+        raise error(f"path must be the path of a file, got {shown(value)}")
     try:
         path = Path(value)
-    except TypeError as cause:  # of bytes
-        raise error(f"path: give a text, got {shown(value)} ({cause})") from None
+    except TypeError as cause:  # an os.PathLike of bytes
+        raise error(f"path must be a text, got {shown(value)} ({cause})") from None
     if "\0" in str(path):
         raise error(f"path: {shown(str(path))} has an embedded null character; give another path")
     return path
@@ -315,7 +315,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # OWASP, CSV injection
 
 
 def table_cell(value: object) -> object:
-    """Return a cell of a CSV table; a text that spreadsheets would compute as a formula begins with an apostrophe."""
+    """Return a cell of a CSV table, with an apostrophe before a text that spreadsheets would run as a formula."""
     if not isinstance(value, str) or not value.startswith(_FORMULA):
         return value
     try:
@@ -326,5 +326,5 @@ def table_cell(value: object) -> object:
 
 
 def why(cause: Exception) -> str:
-    """The system's message for an error."""
+    """Return the system's message for an error."""
     return getattr(cause, "strerror", None) or str(cause)

@@ -1,12 +1,12 @@
 """Linear algebra in any arithmetic: eigenvalues of symmetric matrices, and M x = b for positive definite M.
 
-Floats are solved by L D Lᵀ, balls by a verified solution: approximate inverse, residual, enclosure.
+For floats M x = b is solved by L D Lᵀ; for balls a solution is verified: approximate inverse, residual, enclosure.
 
     |x − x̃| ≤ w / (1 − α)   where   w ≥ |R (b − M x̃)|,   |I − R M| w ≤ α w,  α < 1,   R ≈ mid(M)⁻¹,  x̃ ≈ R mid(b)
 
-Elimination in balls widens them by 5 to 6 bits a row; here the balls of M and b are multiplied once, and R and x̃ are
-exact numbers of more bits. As mid(M) is positive definite and no matrix of the ball is singular, all symmetric ones in
-it are positive definite. [Rump, Verification methods, Acta Numerica 19, 2010, sec. 10]
+Elimination in balls would widen them by 5 to 6 bits a row; here the balls of M and b are multiplied once, and R and x̃
+are exact numbers with more bits. Because mid(M) is positive definite and no matrix in the ball is singular, all
+symmetric matrices in the ball are positive definite. [Rump, Verification methods, Acta Numerica 19, 2010, sec. 10]
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array, sqrt
 from robot_dyn.foundations.errors import PortableError
 
-_SWEEPS = 8  # of Jacobi's method: it converges quadratically, six rows in six sweeps
+_SWEEPS = 8  # Jacobi's method converges quadratically, for six rows in six sweeps
 
 
 def eigh(A: Array) -> tuple[Array, Array]:
-    """Eigenvalues (..., m) and orthonormal eigenvectors (..., m, m) of symmetric A; by LAPACK for float64, ascending.
+    """Compute eigenvalues (..., m) and orthonormal eigenvectors (..., m, m) of symmetric A.
 
-    For other numbers by Jacobi's cyclic method with a fixed number of sweeps, so that it can be traced; in no order.
+    For float64, LAPACK returns ascending eigenvalues. For other numbers Jacobi's cyclic method with a fixed number of
+    sweeps, which can be traced, returns them in no particular order.
 
     Source: Golub and Van Loan, Matrix Computations, 4th ed., 2013, sec. 8.5.
     """
@@ -45,7 +46,7 @@ def eigh(A: Array) -> tuple[Array, Array]:
 
 
 def _rotation(app: Array, apr: Array, arr: Array) -> tuple[Array, Array]:
-    """Cosine and sine of the smaller angle that makes a symmetric 2 × 2 matrix diagonal."""
+    """Return cosine and sine of the smaller angle that makes a symmetric 2 × 2 matrix diagonal."""
     d, b = arr - app, 2 * apr
     size = np.abs(d) + sqrt(d * d + b * b)
     t = np.where(d < 0, -1, 1) * b / np.where(size > 0, size, 1)
@@ -58,9 +59,9 @@ def _turned(x: Array, y: Array, c: Array, s: Array) -> tuple[Array, Array]:
 
 
 class NotPositiveDefiniteError(PortableError):
-    """Internal: a pivot of a factorisation is not positive; the caller names the joint of `row`.
+    """Internal error: a pivot of a factorisation is not positive; the caller translates `row` to a joint.
 
-    `decided` says whether that is certain, or its sign is lost in rounding.
+    `decided` is False if the sign of the pivot is lost in rounding.
     """
 
     def __init__(self, row: int, decided: bool) -> None:
@@ -69,7 +70,7 @@ class NotPositiveDefiniteError(PortableError):
 
 
 def _lapack_solve(M: Array, b: Array) -> Array | None:
-    """The same by LAPACK, for speed; None where a pivot is in doubt."""
+    """Solve M x = b by LAPACK, for speed; return None if a pivot may not be positive."""
     try:
         pivots = np.linalg.cholesky(M).diagonal(axis1=-2, axis2=-1) ** 2
     except np.linalg.LinAlgError:
@@ -80,7 +81,7 @@ def _lapack_solve(M: Array, b: Array) -> Array | None:
     return np.linalg.solve(M, b[..., None])[..., 0]
 
 
-judging_regularity: ContextVar[bool] = ContextVar("judging_regularity", default=False)  # a trace assumes that it is
+judging_regularity: ContextVar[bool] = ContextVar("judging_regularity", default=False)  # tracing assumes regularity
 
 
 def _is_regular(pivot: Array, least: Array, whole: Array) -> bool:
@@ -102,8 +103,8 @@ def cholesky_solve(M: Array, b: Array) -> Array:
         The solution, shape (..., n).
 
     Raises:
-        NotPositiveDefiniteError: If a pivot is not certain to be positive: for floats, 4 n ε of the diagonal at least;
-            for balls, positive throughout. Tells the row.
+        NotPositiveDefiniteError: If a pivot is not certainly positive, with its row: for floats, if it is at most 4 n ε
+            of the diagonal entry; for balls, if it contains numbers that are not positive.
 
     Source: Golub and Van Loan, Matrix Computations, 4th ed., 2013, alg. 4.1.2.
     """
@@ -119,11 +120,11 @@ def _are_balls(x: Array) -> bool:
         return False
     from flint import arb
 
-    return any(isinstance(each, arb) for each in x.flat)
+    return any(isinstance(entry, arb) for entry in x.flat)
 
 
 def _verified_solves(M: Array, b: Array) -> Array | None:
-    """The same for balls, without the loss of digits by elimination; None where a pivot is in doubt."""
+    """Solve M x = b for balls, without loss of digits by elimination; return None if M may not be regular."""
     n = M.shape[-1]
     batch = np.broadcast_shapes(M.shape[:-2], b.shape[:-1])
     matrices, rows = np.broadcast_to(M, (*batch, n, n)), np.broadcast_to(b, (*batch, n))
@@ -137,10 +138,10 @@ def _verified_solves(M: Array, b: Array) -> Array | None:
 
 
 def _verified_solve(M: Array, b: Array) -> Array | None:
-    """The solution x (n,) of one system in the working precision, or None where M is not certainly positive definite.
+    """Solve one system, (n,), in the working precision; return None if M is not certainly positive definite.
 
     Args:
-        M: Shape (n, n); its upper triangle counts.
+        M: Shape (n, n); only the upper triangle is read.
         b: Shape (n,).
     """
     from flint import arb, ctx
@@ -156,7 +157,7 @@ def _verified_solve(M: Array, b: Array) -> Array | None:
         R = _each(inverse, "mid")
         x = _each(R @ _each(b, "mid"), "mid")
         w = _each(np.abs(R @ (b - M @ x)), "upper")
-        w = w + (max(w) + max(np.abs(x)) + arb(2) ** -bits) * arb(2) ** (-2 * bits)  # positive, and hardly more
+        w = w + (max(w) + max(np.abs(x)) + arb(2) ** -bits) * arb(2) ** (-2 * bits)  # makes w positive
         alpha = max(_each(np.abs(identity - R @ M) @ w / w, "upper"))
         if not alpha < 1:
             return None
@@ -166,16 +167,16 @@ def _verified_solve(M: Array, b: Array) -> Array | None:
 
 
 def _each(x: Array, name: str) -> Array:
-    """The midpoint, or upper bound, of each ball, exactly."""
+    """Return the midpoint, or upper bound, of each ball, exactly."""
     from flint import arb
 
     return np.vectorize(lambda ball: getattr(arb(ball), name)(), otypes=[object])(x)
 
 
 def _not_positive_definite(M: Array, row: int, pivot: Array) -> NotPositiveDefiniteError:
-    """The error of a pivot that may not be positive; of floats only an M_ii ≤ 0, of whatever row, makes it certain.
+    """Return the error for a pivot that may not be positive.
 
-    The rounding of M itself may turn the sign of a pivot.
+    For floats it is certain only if some M_ii ≤ 0, because rounding of M may change the sign of a pivot.
     """
     n = M.shape[-1]
     if len(rows := np.flatnonzero(np.any(np.diagonal(M, axis1=-2, axis2=-1).reshape(-1, n) <= 0, axis=0))):

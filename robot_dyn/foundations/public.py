@@ -1,25 +1,25 @@
-"""The names that a folder offers: its stub `__init__.pyi` lists them, and each is imported when first used (PEP 562).
+"""Public names of a folder: its stub `__init__.pyi` lists them, and they are imported on first use (PEP 562).
 
-Tools and tests import names that a folder lists; a module of the core imports modules, as contracts see. Names above
-`__all__` are documented as public; names below it are not, nor are those of a stub without `__all__`.
+Tools and tests import names that a folder lists; modules of the core import modules, so that contracts on imports hold.
+Names above `__all__` are documented as public; names below it, and names of a stub without `__all__`, are not.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
 
-TYPE_CHECKING = False  # as of typing, whose import takes longer than all of this
+TYPE_CHECKING = False  # same as in typing, which takes longer to import than this module
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
 
 def public_names(spec: Any) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """`__getattr__`, `__dir__` and `__all__` of a package, so that importing it imports none of its modules.
+    """Return `__getattr__`, `__dir__` and `__all__` of a package, so that importing it imports none of its modules.
 
     Args:
-        spec: Its `__spec__`. Lines of the stub are such as `from robot_dyn.model.robot import Robot as Robot`; a module
-            that is offered as a whole is `from robot_dyn import effects as effects`.
+        spec: `__spec__` of the package. Lines of its stub read `from robot_dyn.model.robot import Robot as Robot`, or
+            `from robot_dyn import effects as effects` for a whole module.
     """
     stub = spec.loader.get_data(spec.origin.removesuffix(".py") + ".pyi").decode()
     homes = _homes(stub)
@@ -35,6 +35,6 @@ def public_names(spec: Any) -> tuple[Callable[[str], Any], Callable[[], list[str
 
 
 def _homes(stub: str) -> dict[str, str]:
-    """The module of each name."""
+    """Return the module of each name."""
     lines = (line.split() for line in stub.splitlines() if line.startswith("from "))
     return {name: module for _, module, _, name, *_ in lines}

@@ -1,4 +1,4 @@
-"""Results as plain data, the same for all: of a dataclass its fields, and the properties that are part of it."""
+"""Results as plain data: the fields of a dataclass, and the properties declared as `reported`."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from typing import Any
 import numpy as np
 
 UNREPORTED: Mapping[str, bool] = {"reported": False}
-"""Metadata of a field that plain data leave out."""
+"""Metadata of a field that plain data omit."""
 
 
-class reported(property):  # noqa: N801 - used as `property` is
-    """A property that plain data hold as they hold the fields."""
+class reported(property):  # noqa: N801 - used like `property`
+    """A property that plain data include, like a field."""
 
 
 def plain(value: Any) -> Any:
-    """What JSON can hold of a value: a number that is not finite is None, a complex one a pair.
+    """Convert a value for JSON: non-finite numbers become None, complex numbers pairs.
 
     Args:
-        value: Dataclasses, mappings, sequences, arrays, enumerations, numbers and texts, in each other.
+        value: Nested dataclasses, mappings, sequences, arrays, enumerations, numbers and texts.
     """
     if is_dataclass(value):
-        names = [each.name for each in fields(value) if each.metadata.get("reported", True)]
+        names = [field.name for field in fields(value) if field.metadata.get("reported", True)]
         kinds = reversed(type(value).__mro__)
-        names += [name for kind in kinds for name, each in vars(kind).items() if isinstance(each, reported)]
+        names += [name for kind in kinds for name, x in vars(kind).items() if isinstance(x, reported)]
         return {name: plain(getattr(value, name)) for name in names}
     if isinstance(value, Mapping):
-        return {key: plain(each) for key, each in value.items()}
+        return {key: plain(entry) for key, entry in value.items()}
     if isinstance(value, tuple | list):
-        return [plain(each) for each in value]
+        return [plain(entry) for entry in value]
     if isinstance(value, np.ndarray | np.generic):
         return plain(value.tolist())
     if isinstance(value, Enum):
@@ -44,5 +44,5 @@ def plain(value: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """Plain data of a value as JSON."""
+    """Return the plain data of a value as JSON."""
     return json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"

@@ -1,8 +1,8 @@
-"""Saturation: what is requested is cut at ±u_max; in three pieces, each smooth.
+"""Saturation of a command at ±u_max, in three smooth pieces.
 
     sat(u) = c + min(max(u − c, −l), l)
 
-With c = 0 and l = u_max it is the bound itself; with l = inf u passes; with l = −u_max it is the constant c − u_max.
+With c = 0 and l = u_max this is the bound itself; with l = inf, u is unchanged; with l = −u_max it is c − u_max.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ _UPPER, _LOWER = ("upper effort limit", "reached", "left"), ("lower effort limit
 
 
 def saturated(u: Array, limit: Array, middle: Array | None) -> Array:
-    """sat(u), (..., n), with limit l and middle c; None for c = 0 where nothing is ever cut."""
+    """Return sat(u), (..., n), for limit l and middle c; None for c = 0 without reachable limits."""
     if middle is None:
         return np.minimum(np.maximum(u, -limit), limit)
     return middle + np.minimum(np.maximum(u - middle, -limit), limit)
 
 
 def middle_of(limit: Any) -> float | None:
-    """The middle of a bound as stated: 0, or None where no limit can be reached, or none is known yet."""
-    known = isinstance(limit, np.ndarray) and (np.isfinite(limit) & (limit > 0)).any()
-    return 0.0 if known else None
+    """Return the middle of a bound as stated: 0, or None if no limit can be reached, or limits are not resolved yet."""
+    reachable = isinstance(limit, np.ndarray) and (np.isfinite(limit) & (limit > 0)).any()
+    return 0.0 if reachable else None
 
 
 def limits_reached(limit: Array, middle: Array | None, n: int) -> tuple[Threshold, ...]:
-    """Where the actuation of n joints passes ±u_max."""
+    """Return the thresholds at which the actuation of n joints passes ±u_max."""
     return tuple(
         Threshold(i, sign * float(most), *words, of_actuation=True)
         for sign, words in ((1, _UPPER), (-1, _LOWER))
@@ -42,12 +42,12 @@ def limits_reached(limit: Array, middle: Array | None, n: int) -> tuple[Threshol
 
 
 def piece(limit: Array, n: int, sides: Mapping[Threshold, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Limit and middle, (n,) each, of the bound on those sides of its thresholds."""
+    """Return limit and middle of the bound, both (n,), on the given sides of its thresholds."""
     limits, middles = np.broadcast_to(limit, n).copy(), np.zeros(n)
-    for each in sides:
-        limits[each.joint] = np.inf
-    for each, side in sides.items():
-        if side * each.level > 0:
-            most = abs(each.level)
-            limits[each.joint], middles[each.joint] = -most, each.level + most
+    for threshold in sides:
+        limits[threshold.joint] = np.inf
+    for threshold, side in sides.items():
+        if side * threshold.level > 0:
+            most = abs(threshold.level)
+            limits[threshold.joint], middles[threshold.joint] = -most, threshold.level + most
     return limits, middles

@@ -1,4 +1,4 @@
-"""Signatures of functions that take options by keyword, whose names and defaults are defined elsewhere."""
+"""Signatures of functions that take keyword options whose names and defaults are defined elsewhere."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ class _Unchanged:
 
 
 UNCHANGED = _Unchanged()
-"""In a signature: what is not given stays as it is."""
+"""Default in a signature of an option that leaves the value unchanged."""
 
 
 def takes(options: Iterable[Parameter]) -> Callable[[Function], Function]:
-    """A decorator: `help`, `inspect.signature` and completion show each option in place of `**options`."""
+    """Return a decorator: `help`, `inspect.signature` and completion then show the options instead of `**options`."""
 
     def decorate(function: Function) -> Function:
-        known = signature(function)
-        given = [each for each in known.parameters.values() if each.kind is not Parameter.VAR_KEYWORD]
-        by_keyword = [each.replace(kind=Parameter.KEYWORD_ONLY) for each in options]
-        function.__signature__ = known.replace(parameters=[*given, *by_keyword])  # pyright: ignore[reportFunctionMemberAccess]
+        old = signature(function)
+        parameters = [x for x in old.parameters.values() if x.kind is not Parameter.VAR_KEYWORD]
+        parameters += [option.replace(kind=Parameter.KEYWORD_ONLY) for option in options]
+        function.__signature__ = old.replace(parameters=parameters)  # pyright: ignore[reportFunctionMemberAccess]
         return function
 
     return decorate
 
 
 def unchanged(names: Iterable[str]) -> list[Parameter]:
-    """Options that leave unchanged what is not given."""
+    """Return options with the default UNCHANGED."""
     return [Parameter(name, Parameter.KEYWORD_ONLY, default=UNCHANGED) for name in names]

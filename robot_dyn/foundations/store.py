@@ -1,7 +1,7 @@
-"""Files of values: the arrays of a dataclass as .npz, all else as JSON by pydantic, read within bounds.
+"""Files of values: the arrays of a dataclass as .npz, other fields as JSON by pydantic, with limits on sizes.
 
-The member `about` is the JSON: a format and the fields of the value. Each array is another member. Its field in the
-JSON contains the name of the member, which is the path of the field, for example `ledger/kinetic`.
+The member `about` is the JSON: a format and the fields of the value. Arrays are further members. The field of an array
+in the JSON contains the name of its member, which is the path of the field, for example `ledger/kinetic`.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from robot_dyn.foundations.errors import RobotDynError, shorten
 from robot_dyn.foundations.files import FileKind, reading, save, target
 
 ABOUT = "about"
-_LONGEST = 10_000  # characters of a name
-_MOST = 20  # bytes of arrays for each byte of the file: zeros take 1000
+_LONGEST = 10_000  # largest number of characters in a name
+_MOST = 20  # largest ratio of unpacked to packed bytes: zeros would have 1000
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 Stored = TypeVar("Stored")
 
 
 class StoreError(RobotDynError):
-    """A file that does not hold the arrays or the value that it should."""
+    """A file without the expected arrays or value."""
 
 
 @final
 @dataclass
 class Found:
-    """Arrays of a file that the fields of a value take.
+    """The arrays of a file while the fields of a value are read from them.
 
     Attributes:
-        arrays: The arrays that no field has taken yet, by name.
+        arrays: Arrays that no field has read yet, by name.
         lengths: Lengths of axes, by letter.
-        not_finite: Names of arrays that should be finite and hold nan or inf.
+        not_finite: Names of arrays that should be finite but contain nan or inf.
     """
 
     arrays: dict[str, np.ndarray]
@@ -54,11 +54,11 @@ class Layout:
     """Form of an array in a file, stated in the type of its field: `Annotated[np.ndarray, Layout(("m", "n"))]`.
 
     Attributes:
-        shape: A number; a letter, which stands for the same length in all arrays of a file; None for any length; or
-            several of these, each of which is allowed.
-        dtype: Of its entries.
-        finite: Whether nan and inf are refused unless the run diverged.
-        absent: Whether all of it may be nan: what a run of rollouts did not record.
+        shape: Lengths of the axes: a number; a letter for the same length in all arrays of a file; None for any length;
+            or a tuple of alternatives.
+        dtype: Type of the entries.
+        finite: True if nan and inf are errors unless the run diverged.
+        absent: True if the whole array may be nan, for quantities that a run of rollouts did not record.
     """
 
     shape: tuple[Any, ...]
@@ -69,30 +69,30 @@ class Layout:
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         from pydantic import PlainValidator, ValidationInfo
 
-        def taken(name: Any, info: ValidationInfo) -> np.ndarray:
-            return self._taken(name, info.context)
+        def take(name: Any, info: ValidationInfo) -> np.ndarray:
+            return self._take(name, info.context)
 
-        return PlainValidator(taken).__get_pydantic_core_schema__(source, handler)
+        return PlainValidator(take).__get_pydantic_core_schema__(source, handler)
 
-    def _taken(self, name: Any, found: Any) -> np.ndarray:
-        """Return the array of a name; ValueError if the file lacks it, or if it does not have this layout."""
-        if not isinstance(name, str) or name not in found.arrays:
+    def _take(self, name: Any, members: Any) -> np.ndarray:
+        """Remove and return the array of a name; raise ValueError if it is missing or does not have this layout."""
+        if not isinstance(name, str) or name not in members.arrays:
             raise ValueError("its array is missing")
-        x, lengths = found.arrays.pop(name), found.lengths
+        x, lengths = members.arrays.pop(name), members.lengths
         fits = x.ndim == len(self.shape) and x.dtype == self.dtype
         if not fits or not all(_fits(*pair, lengths) for pair in zip(x.shape, self.shape, strict=True)):
-            shape = ", ".join(f"{each} = {lengths[each]}" if each in lengths else str(each) for each in self.shape)
-            raise ValueError(f"holds {x.dtype.name} {x.shape}, not {self.dtype} ({shape})")
+            shape = ", ".join(f"{axis} = {lengths[axis]}" if axis in lengths else str(axis) for axis in self.shape)
+            raise ValueError(f"contains {x.dtype.name} {x.shape}, not {self.dtype} ({shape})")
         if x.dtype == np.bool_ and x.view(np.uint8).max(initial=0) > 1:
-            raise ValueError("holds bytes that are not truth values")
+            raise ValueError("contains bytes that are not truth values")
         if self.finite and not np.isfinite(x).all() and not (self.absent and np.isnan(x).all()):
-            found.not_finite.append(name)
+            members.not_finite.append(name)
         return x
 
 
 def _fits(length: int, allowed: Any, lengths: dict[str, int]) -> bool:
     if isinstance(allowed, tuple):
-        return any(_fits(length, each, lengths) for each in allowed)
+        return any(_fits(length, alternative, lengths) for alternative in allowed)
     if isinstance(allowed, str):
         return lengths.setdefault(allowed, length) == length
     return allowed in (None, length)
@@ -116,13 +116,13 @@ class StoredFormat(Generic[Stored]):
     """A format of files of values.
 
     Attributes:
-        name: Name or number of the format, which changes with its form.
+        name: Name or number of the format; it changes with the form of the files.
         of: Type of the values, a dataclass whose arrays have a `Layout`.
         kind: Kind of the files.
         error: Type of the errors.
-        remedy: What to do where a file cannot be read.
-        check: Raises a StoreError if the parts of a value do not fit together.
-        other: Returns what reads a file of another format, from its JSON.
+        remedy: Remedy in messages about files that cannot be read.
+        check: Function that raises a StoreError if the parts of a value do not fit together.
+        other: Function that returns the remedy for a file of another format, from its JSON.
     """
 
     name: int | str
@@ -141,10 +141,10 @@ class StoredFormat(Generic[Stored]):
         return TypeAdapter(list[self.of], config=config)  # pyright: ignore[reportInvalidTypeForm]
 
     def save(self, value: Stored, path: str | Path) -> Path:
-        """Write a value, whole or not at all, after the checks of a reader.
+        """Write a value, completely or not at all, after the checks of a reader.
 
         Raises:
-            RobotDynError: Of type `error`, if it cannot be written.
+            RobotDynError: Of type `error`, if the file cannot be written.
         """
         path = target(path, self.kind, self.error)
         arrays: dict[str, np.ndarray] = {}
@@ -154,7 +154,7 @@ class StoredFormat(Generic[Stored]):
             self._value(dict(arrays))
             return save(path, lambda stream: write_arrays(stream, arrays), self.error)
         except (StoreError, TypeError, ValueError) as error:
-            raise self.error(f"{path}: cannot be written: {error}; save one as the library returns it") from None
+            raise self.error(f"{path}: cannot be written: {error}; save a value as the library returns it") from None
 
     def load(self, path: str | Path) -> Stored:
         """Return the value of a file.
@@ -175,20 +175,20 @@ class StoredFormat(Generic[Stored]):
         about = _about(arrays)
         if about["format"] != self.name:
             form = shorten(repr(about["format"]))
-            raise StoreError(f"it has format {form}, this version reads {self.name!r}; {self.other(about)}")
+            raise StoreError(f"it has format {form}, but this version reads {self.name!r}; {self.other(about)}")
         if about.keys() != {"format", "value"}:
             raise StoreError(f"{ABOUT!r} has the keys {shorten(', '.join(map(str, about)))}, not format and value")
-        found = Found(arrays)
+        members = Found(arrays)
         try:
-            value = self._adapter.validate_json(json.dumps([about["value"]]), context=found)[0]
+            value = self._adapter.validate_json(json.dumps([about["value"]]), context=members)[0]
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
-            given = f"{first['msg']}, got {shorten(repr(first['input']))}"
-            cause = first.get("ctx", {}).get("error", given)  # a Layout states what its array holds
+            message = f"{first['msg']}, got {shorten(repr(first['input']))}"
+            cause = first.get("ctx", {}).get("error", message)  # the message of a Layout is more precise
             raise StoreError(f"{shorten('/'.join(map(str, first['loc'][1:])) or ABOUT)!r}: {cause}") from None
         if arrays:
-            raise StoreError(f"member {shorten(min(arrays))!r} is not known to this version")
-        self.check(value, found)
+            raise StoreError(f"member {shorten(min(arrays))!r} is unknown to this version")
+        self.check(value, members)
         return value
 
 
@@ -207,7 +207,7 @@ def _about(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
 
 
 def _without_arrays(value: Any, path: str, arrays: dict[str, np.ndarray]) -> Any:
-    """Return plain data for JSON, with the names of arrays in their place; put the arrays into `arrays`."""
+    """Return plain data for JSON in which names replace arrays; store the arrays in `arrays`."""
     if isinstance(value, np.ndarray):
         arrays[path] = value
         return path
@@ -219,10 +219,10 @@ def _without_arrays(value: Any, path: str, arrays: dict[str, np.ndarray]) -> Any
 
 
 def write_arrays(stream: BinaryIO, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write arrays as .npz: compressed, unless a reader would take them for a bomb.
+    """Write arrays as .npz, compressed unless the ratio would exceed the limit of readers.
 
     Raises:
-        StoreError: If a name cannot be that of a member.
+        StoreError: If a name is not a valid name of a member.
     """
     if any("\0" in name or len(name) > _LONGEST for name in arrays):
         raise StoreError(f"a name has a NUL, or more than {_LONGEST} characters; use a shorter one, without NUL")
@@ -238,27 +238,27 @@ def _read_arrays(stream: BinaryIO) -> dict[str, np.ndarray]:
     """Return the arrays of a .npz file; nothing is unpickled.
 
     Raises:
-        StoreError: If the file is damaged, cut short, or holds anything else or far more than its size allows.
+        StoreError: If the file is damaged or cut short, or contains anything else or far more than its size allows.
     """
     try:
         most = _MOST * stream.seek(0, SEEK_END)
         with zipfile.ZipFile(stream) as file:
-            members = {each.filename.removesuffix(".npy"): each for each in file.infolist()}
+            members = {member.filename.removesuffix(".npy"): member for member in file.infolist()}
             if len(members) < len(file.infolist()):
-                raise StoreError("it holds two members of one name")
-            if (size := sum(each.file_size for each in members.values())) > most:
+                raise StoreError("it contains two members of one name")
+            if (size := sum(member.file_size for member in members.values())) > most:
                 raise StoreError(f"it unpacks to {size / 2**20:.3g} MiB, more than {_MOST} times its size")
             return {name: _array(file, name, member) for name, member in members.items()}
     except StoreError:
         raise
     except MemoryError:
         raise StoreError("it does not fit into memory") from None
-    except Exception as error:  # zipfile and zlib promise no types
+    except Exception as error:  # zipfile and zlib do not document the types of their errors
         raise StoreError(f"it is damaged or cut short ({type(error).__name__})") from None
 
 
 def _array(file: zipfile.ZipFile, name: str, member: zipfile.ZipInfo) -> np.ndarray:
-    """Return the array of a member, whose header and size must agree before anything is allocated."""
+    """Return the array of a member; its header and size are compared before anything is allocated."""
     with file.open(member) as stream:
         supported = member.compress_type in _COMPRESSIONS and np.lib.format.read_magic(stream) == (1, 0)
         shape, _, dtype = np.lib.format.read_array_header_1_0(stream) if supported else ((), False, np.dtype(object))

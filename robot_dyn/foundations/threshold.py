@@ -1,4 +1,4 @@
-"""Levels at which an effect, or a controller, switches between smooth formulas, and layers within which it bends."""
+"""Levels at which an effect or a controller switches between smooth formulas, and layers in which a formula bends."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from typing import final
 from robot_dyn.foundations.errors import EffectError
 from robot_dyn.foundations.validate import instance, integer, number, truth
 
-_MOST = 10**6  # joints
+_MOST = 10**6  # largest index of a joint or a state
 
 
 @final
 @dataclass(frozen=True)
 class Threshold:
-    """A level of the position or the velocity of a joint, or of its actuation.
+    """A level of the position, the velocity or the actuation of a joint, or of a state of an effect.
 
     Attributes:
-        joint: Its index.
-        level: In [rad] or [m], [rad/s] or [m/s], or [N m] or [N].
-        name: What it is, as "upper stop".
-        rising, falling: What happens where the coordinate grows through it, or falls, as "touched" and "left".
-        of_velocity: Whether the velocity passes it.
-        of_actuation: Whether the actuation passes it: what reaches a bound, or what a controller asks for.
-        state: Index of the state of the effect that passes it, in place of a coordinate of the joint; None for none.
-        slack: By how much a position or a velocity passes it before that counts, in its unit; no less than rounding.
+        joint: Index of the joint.
+        level: Level in [rad] or [m], [rad/s] or [m/s], or [N m] or [N].
+        name: Name of the level, such as "upper stop".
+        rising, falling: Events when the coordinate rises or falls through it, such as "touched" and "left".
+        of_velocity: True for a level of the velocity.
+        of_actuation: True for a level of the actuation at the input of a bound, or of a controller's demand.
+        state: Index of the effect's state that passes the level instead of a coordinate of the joint; None for none.
+        slack: Distance past the level at which a position or a velocity counts as past it; rounding is the minimum.
 
     Raises:
-        EffectError: If an attribute is of another type, the level is not finite, or it is of both.
+        EffectError: If an attribute has another type, the level is not finite, or it is a level of two coordinates.
     """
 
     joint: int
@@ -51,11 +51,13 @@ class Threshold:
         for name in ("of_velocity", "of_actuation"):
             truth(name, getattr(self, name), error=EffectError)
         if self.of_velocity + self.of_actuation + (self.state is not None) > 1:
-            raise EffectError(f"{self.name}: a threshold is of the velocity, the actuation or a state, not of both")
+            raise EffectError(
+                f"{self.name}: a threshold has one coordinate; set only one of of_velocity, of_actuation and state"
+            )
 
     @property
     def own(self) -> bool:
-        """Whether it is of what belongs to its effect, and of no coordinate, which effects share."""
+        """True if the level belongs to one effect: to its actuation or a state, not to a shared coordinate."""
         return self.of_actuation or self.state is not None
 
 
@@ -90,9 +92,9 @@ class Layer:
             integer("state", self.state, most=_MOST, error=EffectError)
         truth("of_velocity", self.of_velocity, error=EffectError)
         if self.of_velocity and self.state is not None:
-            raise EffectError("a layer is of the velocity of a joint or of a state, not of both")
+            raise EffectError("a layer has one coordinate; set only one of of_velocity and state")
 
 
 def smooth(self: object, n: int = 0) -> tuple[Threshold, ...]:
-    """No thresholds: with `thresholds = smooth` a class declares that its formulas are smooth everywhere."""
+    """Return no thresholds: `thresholds = smooth` declares that the formulas of a class are smooth everywhere."""
     return ()

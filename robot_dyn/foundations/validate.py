@@ -1,7 +1,7 @@
-"""Arguments of public functions, checked where they enter: real numbers, their shape and sign; counts; names; kinds.
+"""Checks of arguments of public functions: real numbers, shape and sign; counts; names; types.
 
-Each function returns the argument in one form, or raises the `error` of its caller with one sentence: what must be, and
-what was given. Time loops call what is behind these checks.
+A check returns the argument in one form, or raises the `error` of its caller with one sentence: the requirement and the
+value. Time loops skip these checks.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from robot_dyn.foundations.errors import (
     shown,
 )
 
-Shape = tuple[int | str, ...]  # a length with a name, such as "n", may be any but 0
+Shape = tuple[int | str, ...]  # a named length, such as "n", is any length except 0
 Kind = type[RobotDynError]
-LEAST_EXACT = 1e-3  # [rad], [m] or [s]: to which rounding must leave positions and times known
+LEAST_EXACT = 1e-3  # [rad], [m] or [s]: largest rounding error of positions and times
 _F8 = np.dtype(np.float64)
-_PLAIN = {float, int, np.float64}  # most entries of lists; bool is another class
+_PLAIN = {float, int, np.float64}  # usual types of entries in lists; bool is excluded
 
 
 def real(values: Any) -> np.ndarray:
-    """Real numbers as an array of floats or integers; not copied if they are one.
+    """Return real numbers as an array of floats or integers, not copied if they are one.
 
     Raises:
-        ValueError: If they are truth values, complex, text, ragged, too large or anything else, or have masked entries;
-            its text is what was found.
+        ValueError: If they are truth values, complex, text, ragged, too large, masked or anything else; its text
+            describes the value.
     """
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         raise ValueError("masked entries")
     try:
         if isinstance(values, list | tuple) and not set(map(type, values)) <= _PLAIN:
-            for each in values:  # NumPy takes True for 1, and ignores masks
-                real(each)
+            for value in values:  # NumPy converts True to 1 and ignores masks
+                real(value)
         array = np.asarray(values)
         if array.dtype == object and not isinstance(values, np.ndarray):
             array = _of_objects(array)
@@ -51,7 +51,7 @@ def real(values: Any) -> np.ndarray:
         raise ValueError("a number too large for a float") from None
     except (MemoryError, KeyboardInterrupt):
         raise
-    except Exception:  # a ragged list, or whatever an object's conversion raises
+    except Exception:  # a ragged list, or any error in the conversion of an object
         raise ValueError(shown(values)) from None
     if array.dtype.kind not in "fiu":
         raise ValueError(shown(values))
@@ -59,14 +59,14 @@ def real(values: Any) -> np.ndarray:
 
 
 def _of_objects(array: np.ndarray) -> np.ndarray:
-    """Python numbers that NumPy has no type for, such as 2**64 or a Fraction, as float64."""
+    """Return Python numbers without a NumPy type, such as 2**64 or a Fraction, as float64."""
     if not all(isinstance(x, Real) and not isinstance(x, bool) for x in array.flat):
         raise TypeError
     return array.astype(float)
 
 
 def float64(values: Any) -> np.ndarray:
-    """Real numbers as float64; ValueError as of `real`. What is too large for it becomes infinite."""
+    """Return real numbers as float64; numbers that are too large become infinite. Raise ValueError like `real`."""
     with np.errstate(over="ignore"):
         return real(values).astype(np.float64, copy=False)
 
@@ -80,24 +80,24 @@ def numbers(
     least: float | None = None,
     infinite: bool = False,
 ) -> np.ndarray:
-    """Finite numbers of one of the shapes, copied and frozen.
+    """Return finite numbers of one of the shapes as a read-only copy.
 
     Args:
-        what: What messages call them.
+        what: Name of the argument in messages.
         values: The argument.
-        *shapes: Of which they must have one.
-        error: What is raised.
-        above: They must be greater than this.
-        least: They must not be less than this.
-        infinite: Whether ±inf is taken as well.
+        *shapes: Allowed shapes.
+        error: Type of the error.
+        above: Exclusive lower bound.
+        least: Inclusive lower bound.
+        infinite: True if ±inf is allowed.
     """
     lengths = " or ".join(str(shape).replace("'", "") for shape in dict.fromkeys(shapes) if shape)
     one = () in shapes
     try:
         array = np.array(float64(values))
-    except ValueError as found:
+    except ValueError as fault:
         kind = f"real numbers{', one or' if one else ''} of shape {lengths}" if lengths else "a real number"
-        raise error(f"{what} must be {kind}, got {found}") from None
+        raise error(f"{what} must be {kind}, got {fault}") from None
     if not any(_fits(array.shape, shape) for shape in shapes):
         kind = ("be one number or of shape" if one else "have shape") + f" {lengths}" if lengths else "be one number"
         raise error(f"{what} must {kind}, got {'' if lengths else 'shape '}{array.shape}")
@@ -132,35 +132,35 @@ def number(
     least: float | None = None,
     infinite: bool = False,
 ) -> float:
-    """One finite number, as of `numbers`."""
+    """Return one finite number; for the arguments, see `numbers`."""
     if value.__class__ is float and isfinite(value) and above is least is None:
         return value
     return float(numbers(what, value, (), error=error, above=above, least=least, infinite=infinite))
 
 
 def duration(what: str, value: Any, *, zero: bool = False, error: Kind = QueryError) -> float:
-    """A time in [s], 1e-12 s or more; or 0, where that has a meaning."""
+    """Return a time in [s], at least 1e-12 s, or 0 if `zero`."""
     seconds = number(what, value, error=error)
     if not (seconds >= 1e-12 or (zero and seconds == 0)):
-        least = "1e-12 at least, or 0" if zero else "1e-12 at least"
+        least = "at least 1e-12, or 0" if zero else "at least 1e-12"
         raise error(f"{what} must be a positive number of seconds, {least}; got {seconds:g}")
     return seconds
 
 
 def times(what: str, t: Any) -> np.ndarray:
-    """Times in [s], finite or not, of any shape, not copied; QueryError if they are anything else."""
+    """Return times in [s], finite or not, of any shape, not copied; raise a QueryError for other values."""
     try:
         return float64(t)
-    except ValueError as found:
-        raise QueryError(f"{what} must be a time in seconds, got {found}") from None
+    except ValueError as fault:
+        raise QueryError(f"{what} must be a time in seconds, got {fault}") from None
 
 
 def rows(what: str, values: Any, *shape: int) -> np.ndarray:
-    """Finite numbers of shape (..., *shape), not copied; QueryError if they are anything else."""
+    """Return finite numbers of shape (..., *shape), not copied; raise a QueryError for other values."""
     try:
         array = float64(values)
-    except ValueError as found:
-        raise QueryError(f"{what} must be an array of real numbers, got {found}") from None
+    except ValueError as fault:
+        raise QueryError(f"{what} must be an array of real numbers, got {fault}") from None
     if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
         expected = ", ".join(map(str, shape))
         raise QueryError(f"{what} must have shape {shape} or (..., {expected}), got {array.shape}")
@@ -170,33 +170,33 @@ def rows(what: str, values: Any, *shape: int) -> np.ndarray:
 
 
 def is_state(x: Any, shape: tuple[int] | None) -> bool:
-    """Whether x has the form that goes to Pinocchio as it is: float64 of that shape."""
+    """Return True if Pinocchio can take x unchanged: float64 of that shape."""
     return x.__class__ is np.ndarray and x.dtype is _F8 and x.shape == shape
 
 
 def is_moderate(x: np.ndarray, most: float = 1e100) -> bool:
-    """Whether ‖x‖ < most: then x holds neither NaN nor inf, nor numbers whose squares overflow."""
+    """Return True if ‖x‖ < most: x then contains neither NaN nor inf, nor numbers whose squares overflow."""
     return hypot(*x.tolist()) < most  # faster than any reduction of NumPy at this size, and never warns
 
 
 def is_plain(x: Any, shape: tuple[int] | None) -> bool:
-    """`is_state`, of numbers so moderate that no answer overflows: terms have at most four of them, as q² v²."""
+    """Return True for an `is_state` of moderate numbers: no result overflows, as terms have at most four factors."""
     return x.__class__ is np.ndarray and x.dtype is _F8 and x.shape == shape and hypot(*x.tolist()) < 1e50
 
 
 def joint_values(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
-    """Finite numbers of each joint, shape (..., n), not copied; errors as of `shaped` and `converted`."""
+    """Return finite numbers of each joint, shape (..., n), not copied; for errors, see `shaped` and `converted`."""
     return converted(what, shaped(what, values, joint_names, arithmetic), joint_names, arithmetic)
 
 
 def shaped(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
-    """Numbers of each joint, finite or not, shape (..., n), not copied; floats and integers keep their type.
+    """Return numbers of each joint, finite or not, shape (..., n), not copied; floats and integers keep their type.
 
     Args:
-        what: What messages call them.
+        what: Name of the argument in messages.
         values: The argument.
-        joint_names: Of the n joints.
-        arithmetic: An `Arithmetic`; float64 unless given.
+        joint_names: Names of the n joints.
+        arithmetic: An `Arithmetic`; float64 by default.
 
     Raises:
         QueryError: If they are not real numbers, or have another shape.
@@ -204,23 +204,23 @@ def shaped(what: str, values: Any, joint_names: Sequence[str], arithmetic: Any =
     n = len(joint_names)
     try:
         array = real(values) if arithmetic is None or arithmetic.dtype.kind == "f" else arithmetic.asarray(values)
-    except (TypeError, ValueError, OverflowError) as found:
-        raise QueryError(f"{what} must be an array of {n} real numbers, got {found}") from None
+    except (TypeError, ValueError, OverflowError) as fault:
+        raise QueryError(f"{what} must be an array of {n} real numbers, got {fault}") from None
     if array.ndim == 0 or array.shape[-1] != n:
         raise QueryError(f"{what} must have shape ({n},) or (..., {n}), got {array.shape}")
     return array
 
 
 def converted(what: str, array: Any, joint_names: Sequence[str], arithmetic: Any = None) -> Any:
-    """An array of real numbers as numbers of an arithmetic, float64 unless given; not copied if it has them.
+    """Convert an array of real numbers to an arithmetic, by default float64; not copied if it has that type.
 
     Raises:
-        NotFiniteError: If one is not finite; names the joint.
-        OverflowedError: If the position q or the time t is rounded so much that it is not known to LEAST_EXACT.
+        NotFiniteError: If a number is not finite; the message names the joint.
+        OverflowedError: If rounding changes the position q or the time t by more than LEAST_EXACT.
     """
     dtype = _F8 if arithmetic is None else arithmetic.dtype
     numbers = array
-    if array.dtype != dtype:  # what is too large for the arithmetic becomes infinite
+    if array.dtype != dtype:  # numbers too large for the arithmetic become infinite
         numbers = float64(array) if arithmetic is None else arithmetic.asarray(array)
     check_finite(what, numbers, joint_names, arithmetic)
     if numbers is not array and what in ("q", "t"):
@@ -229,19 +229,19 @@ def converted(what: str, array: Any, joint_names: Sequence[str], arithmetic: Any
 
 
 def _check_rounding(what: str, exact: np.ndarray, rounded: np.ndarray, joint_names: Sequence[str]) -> None:
-    """Raise OverflowedError where numbers were rounded and are not known to LEAST_EXACT in the arithmetic."""
+    """Raise an OverflowedError if numbers were rounded and the arithmetic does not resolve LEAST_EXACT there."""
     far = np.finfo(rounded.dtype).eps * np.abs(rounded) > LEAST_EXACT
     if far.any() and (lost := far & (exact.astype(np.longdouble) != rounded)).any():
         place = tuple(np.argwhere(lost)[0])
         joint = "" if what == "t" else f" of joint {joint_names[place[-1]]!r}"
         raise OverflowedError(
             f"{what}{joint} is so large that {rounded.dtype} does not resolve {LEAST_EXACT:g} rad, m or s, got"
-            f" {exact[place]}; take a smaller one, or numbers with more digits"
+            f" {exact[place]}; use a smaller value, or a dtype with more digits"
         )
 
 
 def check_finite(what: str, array: Any, joint_names: Sequence[str], arithmetic: Any = None) -> None:
-    """Raise NotFiniteError, which names the joint, unless every number of an argument (..., n) is finite."""
+    """Raise a NotFiniteError that names the joint unless all numbers of an argument, (..., n), are finite."""
     finite = np.isfinite(array) if arithmetic is None else arithmetic.finite(array)
     if not finite.all():
         place = tuple(np.argwhere(~finite)[0])
@@ -250,7 +250,7 @@ def check_finite(what: str, array: Any, joint_names: Sequence[str], arithmetic: 
 
 
 def one_state(what: str, values: Any, joint_names: Sequence[str]) -> np.ndarray:
-    """Finite numbers of each joint, shape (n,), copied and frozen; QueryError if they are anything else."""
+    """Return finite numbers of each joint, shape (n,), as a read-only copy; raise a QueryError for other values."""
     array = np.array(joint_values(what, values, joint_names))
     if array.ndim != 1:
         raise QueryError(f"{what} must be one state of shape ({len(joint_names)},), got {array.shape}")
@@ -259,7 +259,7 @@ def one_state(what: str, values: Any, joint_names: Sequence[str]) -> np.ndarray:
 
 
 def check_batches(**arrays: Any) -> tuple[int, ...]:
-    """The common batch shape of arguments (..., n); QueryError if they do not broadcast."""
+    """Return the common batch shape of arguments (..., n); raise a QueryError if they do not broadcast."""
     try:
         return np.broadcast_shapes(*(array.shape[:-1] for array in arrays.values()))
     except ValueError:
@@ -268,7 +268,7 @@ def check_batches(**arrays: Any) -> tuple[int, ...]:
 
 
 def integer(what: str, value: Any, *, least: int = 0, most: int | None = None, error: Kind = QueryError) -> int:
-    """A whole number from `least` to `most`."""
+    """Return an integer from `least` to `most`."""
     try:
         whole = None if isinstance(value, bool) else index(value)
     except TypeError:
@@ -280,29 +280,29 @@ def integer(what: str, value: Any, *, least: int = 0, most: int | None = None, e
 
 
 def truth(what: str, value: Any, *, error: Kind = QueryError) -> bool:
-    """True or False."""
+    """Return a truth value."""
     if not isinstance(value, bool | np.bool_):
         raise error(f"{what} must be True or False, got {shown(value)}")
     return bool(value)
 
 
-def choice(what: str, value: Any, known: Collection[str], *, error: Kind = QueryError) -> str:
-    """One of the known names."""
-    if not isinstance(value, str) or value not in known:
-        advice = nearest(value if isinstance(value, str) else "", known)
+def choice(what: str, value: Any, names: Collection[str], *, error: Kind = QueryError) -> str:
+    """Return a name if it is one of the valid ones."""
+    if not isinstance(value, str) or value not in names:
+        advice = nearest(value if isinstance(value, str) else "", names)
         raise error(f"no {what} {shown(value)}; {advice}")
     return value
 
 
 def function(what: str, value: Any, arguments: str, *, error: Kind = QueryError) -> Any:
-    """A function, or None; `arguments` names those that it takes."""
+    """Return a function or None; `arguments` lists its arguments for the message."""
     if not (value is None or callable(value)):
         raise error(f"{what} must be a function of {arguments}, or None, got {shown(value)}")
     return value
 
 
 def instance(what: str, value: Any, kind: Any, remedy: str, *, error: Kind = QueryError) -> Any:
-    """An object of a kind; the remedy says how to get one."""
+    """Return an object of a type; the remedy in the message describes how to get one."""
     if not isinstance(value, kind):
         raise error(f"{what}: {remedy}, got {shown(value)}")
     return value

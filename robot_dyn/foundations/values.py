@@ -1,4 +1,4 @@
-"""Values that hold arrays, read-only in copies too; values computed when they are read; caches; aligned arrays."""
+"""Value classes whose arrays stay read-only in copies, values computed on first access, caches, aligned arrays."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any, TypeVar, final
 
 import numpy as np
 
-LINE = 64  # bytes of a cache line and of the widest vector: one that lies across two lines is two accesses
+LINE = 64  # bytes of a cache line and of the widest vector: a vector across two lines takes two accesses
 
 Result = TypeVar("Result")
 Late = TypeVar("Late", bound="Derived")
 
-_MOST = 64  # values that a cache by identity holds
+_MOST = 64  # largest number of values in a cache by identity
 
 
 class Value:
-    """A value whose arrays, where they are read-only, stay so through `copy.deepcopy` and `pickle`."""
+    """A value whose read-only arrays stay read-only through `copy.deepcopy` and `pickle`."""
 
     def __getstate__(self) -> Any:
         state = dict(vars(self))
@@ -50,13 +50,13 @@ class Caching:
 def cached(
     value: Caching, compute: Callable[..., Result], *more: Any, lasts: Callable[[Result], bool] | None = None
 ) -> Result:
-    """Return what a function of the value computes, from the cache if it was called before.
+    """Return the result of a function of the value, from the cache if it was called before.
 
     Args:
         value: The first argument of the function.
-        compute: Depends on the value alone, as far as its results are cached.
+        compute: The function; cached results must depend on the value only.
         *more: Further arguments.
-        lasts: Whether a result is cached; all are by default.
+        lasts: Predicate of results to cache; by default all are cached.
     """
     if compute in value.cache:
         return value.cache[compute]
@@ -68,75 +68,75 @@ def cached(
 
 @final
 class LRUByIdentity:
-    """A cache: values by hashable keys and by the identity of objects, for as long as these live; the latest ones."""
+    """A cache of the latest values by hashable keys and by the identity of objects, as long as these exist."""
 
     def __init__(self) -> None:
         self._values: dict[tuple[Any, ...], tuple[list[weakref.ref[Any]], Any]] = {}
         self._lock = RLock()  # runs may start in several threads
 
     def get(self, objects: tuple[Any, ...], more: tuple[Any, ...], compute: Callable[[], Any]) -> Any:
-        """The value of objects and of further, hashable values; it must not hold on to the objects."""
+        """Return the value of objects and further hashable keys; the value must not refer to the objects."""
         key = (*map(id, objects), *more)
         with self._lock:
             entry = self._values.pop(key, None)
-            if entry is None or any(ref() is not each for ref, each in zip(entry[0], objects, strict=True)):
-                entry = [weakref.ref(each) for each in objects], compute()
+            if entry is None or any(ref() is not x for ref, x in zip(entry[0], objects, strict=True)):
+                entry = [weakref.ref(x) for x in objects], compute()
             self._values[key] = entry
             while len(self._values) > _MOST or any(ref() is None for ref in next(iter(self._values.values()))[0]):
                 del self._values[next(iter(self._values))]
             return entry[1]
 
     def known(self, objects: tuple[Any, ...], more: tuple[Any, ...]) -> Any:
-        """The value that `get` would return without computing it, or None."""
+        """Return the value that `get` would return without computing it, or None."""
         with self._lock:
             entry = self._values.get((*map(id, objects), *more))
-            same = entry is not None and all(ref() is each for ref, each in zip(entry[0], objects, strict=True))
+            same = entry is not None and all(ref() is x for ref, x in zip(entry[0], objects, strict=True))
             return entry[1] if entry is not None and same else None
 
 
 class Derived(Value):
-    """A frozen dataclass that may be built from a source: each field is read from it at its first use.
+    """A frozen dataclass that may be built from a source: a field is read from the source on first access.
 
-    A field that may be read later has no default but by a factory: a default of the class would hide it.
+    Such a field has no default except a factory: a default of the class would hide the source.
     """
 
     if not TYPE_CHECKING:  # so that a type checker reports names that are not fields
 
         def __getattr__(self, name: str) -> Any:
-            held = vars(self)
-            if name in self.__dataclass_fields__ and (stored := held.get("_source")) is not None:
+            values = vars(self)
+            if name in self.__dataclass_fields__ and (stored := values.get("_source")) is not None:
                 source, lock = stored
                 with lock:
-                    if name not in held:
-                        held[name] = _frozen(getattr(source, name))
-                if self.__dataclass_fields__.keys() <= held.keys():
-                    held.pop("_source", None)  # nothing more is read from it
-            if name not in held:  # another thread may have read it, and the last one, by now
+                    if name not in values:
+                        values[name] = _frozen(getattr(source, name))
+                if self.__dataclass_fields__.keys() <= values.keys():
+                    values.pop("_source", None)  # all fields are read
+            if name not in values:  # otherwise another thread has read it, and possibly dropped the source
                 raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
-            return held[name]
+            return values[name]
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *(each.name for each in fields(self))} - {"_source"})  # pyright: ignore[reportArgumentType]
+        return sorted({*super().__dir__(), *(field.name for field in fields(self))} - {"_source"})  # pyright: ignore[reportArgumentType]
 
     def __getstate__(self) -> Any:
-        for each in fields(self):  # pyright: ignore[reportArgumentType]
-            getattr(self, each.name)
+        for field in fields(self):  # pyright: ignore[reportArgumentType]
+            getattr(self, field.name)
         return super().__getstate__()
 
 
-def derived(of: type[Late], source: Any, **known: Any) -> Late:
-    """One whose fields are the attributes of the same name of a source, but for those that are given."""
-    value = object.__new__(of)
-    vars(value).update({name: _frozen(x) for name, x in known.items()})
-    if len(known) < len(of.__dataclass_fields__):  # pyright: ignore[reportAttributeAccessIssue]
+def derived(kind: type[Late], source: Any, /, **values: Any) -> Late:
+    """Create an instance whose missing fields are read from `source` on first access."""
+    value = object.__new__(kind)
+    vars(value).update({name: _frozen(x) for name, x in values.items()})
+    if len(values) < len(kind.__dataclass_fields__):  # pyright: ignore[reportAttributeAccessIssue]
         vars(value)["_source"] = source, RLock()
     return value
 
 
 def copied(x: Any) -> Any:
-    """A copy of arrays in tuples."""
+    """Copy arrays in tuples."""
     if isinstance(x, tuple):
-        copies = [copied(each) for each in x]
+        copies = [copied(entry) for entry in x]
         return type(x)(*copies) if hasattr(x, "_fields") else tuple(copies)
     return x.copy() if isinstance(x, np.ndarray) else x
 
@@ -158,7 +158,7 @@ def several(value: Any) -> tuple[Any, ...] | None:
 
 
 def _frozen(x: Any) -> Any:
-    """A read-only view of an array, and of those in a dictionary; any other value itself."""
+    """Return a read-only view of an array, or of the arrays in a dictionary; other values unchanged."""
     if isinstance(x, dict):
         return {key: _frozen(entry) for key, entry in x.items()}
     if isinstance(x, np.ndarray):
@@ -168,8 +168,8 @@ def _frozen(x: Any) -> Any:
 
 
 def _arrays(x: Any) -> list[np.ndarray]:
-    """An array, or those of a dictionary."""
-    return [each for each in (x.values() if isinstance(x, dict) else (x,)) if isinstance(each, np.ndarray)]
+    """Return an array, or the arrays of a dictionary, as a list."""
+    return [array for array in (x.values() if isinstance(x, dict) else (x,)) if isinstance(array, np.ndarray)]
 
 
 def _writeable(x: Any) -> bool:
@@ -177,7 +177,7 @@ def _writeable(x: Any) -> bool:
 
 
 class OnFirstUse(dict[Any, Any]):
-    """Values by name, each computed when it is first looked up."""
+    """Values by name, computed on first lookup."""
 
     def __init__(self, compute: Callable[[Any], Any]) -> None:
         super().__init__()
@@ -189,10 +189,10 @@ class OnFirstUse(dict[Any, Any]):
 
 
 def aligned(shape: tuple[int, ...], dtype: Any = float) -> np.ndarray:
-    """An array of zeros in row-major order that begins at a cache line; of objects, at any address."""
+    """Return an array of zeros in row-major order that begins at a cache line; for objects, at any address."""
     if np.dtype(dtype).hasobject:
         return np.zeros(shape, dtype)
     size = prod(shape) * np.dtype(dtype).itemsize
-    room = np.zeros(size + LINE, np.uint8)
-    first = -room.__array_interface__["data"][0] % LINE
-    return room[first : first + size].view(dtype).reshape(shape)
+    buffer = np.zeros(size + LINE, np.uint8)
+    first = -buffer.__array_interface__["data"][0] % LINE
+    return buffer[first : first + size].view(dtype).reshape(shape)

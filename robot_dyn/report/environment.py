@@ -1,4 +1,4 @@
-"""Versions and processor, without which a time says nothing."""
+"""Versions and processor, which a measured time depends on."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _PACKAGES = ("robot-dyn", "pin", "numpy", "scipy", "llvmlite", "casadi", "mujoco
 
 
 def processor_and_versions(packages: Iterable[str] = _PACKAGES) -> dict[str, str]:
-    """Processor and versions by name, of the packages that are installed."""
-    info = Path("/proc/cpuinfo")  # Linux; elsewhere the name of the architecture must do
+    """Return the processor, and the versions of installed packages by name."""
+    info = Path("/proc/cpuinfo")  # Linux; elsewhere the name of the architecture is used
     models = re.findall(r"model name\s*: (.*)", info.read_text() if info.exists() else "")
     versions = {"processor": (models or [platform.processor()])[0], "python": platform.python_version()}
     for name in packages:

@@ -19,7 +19,7 @@ _PAD = 0.08  # [inch] around axes and texts
 Colours = Mapping[str, Any]
 
 PAGE: Colours = {"paper": "none", "ink": INK, "grid": GRID, "veil": "#80808022"} | {
-    "lines": tuple(INK if each == "#000000" else each for each in THEMES["light"]["lines"])
+    "lines": tuple(INK if colour == "#000000" else colour for colour in THEMES["light"]["lines"])
 }
 """Colours for light and dark pages, without paper."""
 
@@ -31,7 +31,7 @@ class ResultError(RobotDynError):
 def sheet(width: float, height: float, sentence: str, caption: str, theme: str) -> tuple[SubFigure, Colours]:
     """Return a figure of a size in [inch], headed by a sentence and a caption, without these, and its colours.
 
-    For the page of a notebook, which has the sentence beside it, there is no heading.
+    For the page of a notebook, which shows the sentence already, there is no heading.
     """
     from robot_dyn.view.plots.shown import Figure
 

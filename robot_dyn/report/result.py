@@ -1,4 +1,4 @@
-"""The base of the results of studies: a sentence, tables, what was left out, versions; in a notebook with a figure."""
+"""Base class of the results of studies: a sentence, tables, omitted parts, versions; in a notebook with a figure."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from robot_dyn.foundations.result import reported
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-INTERRUPTED = "what was to come when it was interrupted"
+INTERRUPTED = "the remaining parts, because of an interruption"
 
 
 class Result(Answer):
-    """A result of a study, a dataclass; `to_json` gives its JSON, and its rows are a CSV table.
+    """A result of a study, a dataclass; `to_json` returns its JSON, and its rows form a CSV table.
 
     Attributes:
-        columns: Of the table; those that a row lacks are empty, and what else it has is left out.
-        diagram: Module whose function `draw(result, theme)` draws it; empty without a figure.
-        left_out: What was left out, and why.
+        columns: Columns of the table; missing values of a row are empty, other values of a row are omitted.
+        diagram: Module whose function `draw(result, theme)` draws the result; empty without a figure.
+        left_out: Omitted parts, with reasons.
         environment: Versions and processor.
     """
 
@@ -33,12 +33,12 @@ class Result(Answer):
 
     @reported
     def interrupted(self) -> bool:
-        """Whether the user ended the study."""
+        """Return True if the user interrupted the study."""
         return INTERRUPTED in self.left_out
 
     @property
     def sentence(self) -> str:
-        """The result in a sentence."""
+        """The result in one sentence."""
         raise NotImplementedError
 
     @property
@@ -47,14 +47,14 @@ class Result(Answer):
         return ()
 
     def tables(self) -> Iterable[Block]:
-        """What is between the sentence and what was left out."""
+        """Return the blocks between the sentence and the omitted parts."""
         raise NotImplementedError
 
     def blocks(self) -> Iterator[Block]:
         yield self.sentence
         yield ""
         yield from self.tables()
-        yield from (f"left out: {each}" for each in self.left_out)
+        yield from (f"left out: {part}" for part in self.left_out)
         yield ", ".join(f"{name} {value}" for name, value in self.environment.items())
 
     @property
@@ -68,7 +68,7 @@ class Result(Answer):
 
 
 def drawn(result: Result, theme: str = "light") -> Figure:
-    """Draw a result by the module that its class names.
+    """Draw a result by the module in `diagram`.
 
     Raises:
         ResultError: If there is nothing to draw.

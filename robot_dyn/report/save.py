@@ -1,4 +1,4 @@
-"""The one writer of results: a figure, a CSV table of the rows, or JSON, by the suffix."""
+"""The writer of results: a figure, a CSV table of the rows, or JSON, by the suffix."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ JSON = files.FileKind("a result", ".json", b'{\n "robot":')
 
 
 def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Path:
-    """Write a result by the suffix of `path`, and by the first of these that it can be if there is none.
+    """Write a result in the format of the suffix of `path`; without a suffix, in the first format it supports.
 
-    PNG, SVG or PDF hold the figure and CSV the table of a certificate, of costs, of work and precision, of two runs
-    or of a budget; JSON holds any result. Another file of that kind under that name is replaced; any other is not.
+    PNG, SVG and PDF contain the figure and CSV the table of a certificate, of costs, of work and precision, of two
+    runs or of a budget; JSON contains any result. An existing file is replaced only if it has the same kind.
 
     Args:
-        result: Of `certify`, `cost`, `stress`, `work_precision`, `compare_runs` or `budget`.
-        path: Where to.
-        theme: For "light" or "dark" paper.
+        result: A result of `certify`, `cost`, `stress`, `work_precision`, `compare_runs` or `budget`.
+        path: Path of the file.
+        theme: "light" or "dark" background.
 
     Raises:
-        QueryError: If an argument is wrong.
-        ResultError: If it cannot be written, or there is nothing to draw.
+        QueryError: If an argument is invalid.
+        ResultError: If the file cannot be written, or there is nothing to draw.
     """
     instance(
         "result",
         result,
         Result,
-        "give one of rd.accuracy (certify, cost, work_precision), of rd.compare_runs, or of a tool",
+        "give a result of rd.accuracy (certify, cost, work_precision), rd.compare_runs or a tool",
     )
     choice("theme", theme, THEMES)
     path = files.target(path, kinds(type(result)), ResultError)
@@ -50,18 +50,19 @@ def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Pa
     return files.save(path, lambda file: file.write(stream.getvalue()), ResultError)
 
 
-def kinds(of: type[Result]) -> tuple[files.FileKind, ...]:
-    """The files that a result of a class can be."""
-    return (*(PICTURES if of.diagram else ()), *((table_kind(of),) if of.columns else ()), JSON)
+def kinds(result_type: type[Result]) -> tuple[files.FileKind, ...]:
+    """Return the kinds of file in which results of a class can be written."""
+    tables = (table_kind(result_type),) if result_type.columns else ()
+    return (*(PICTURES if result_type.diagram else ()), *tables, JSON)
 
 
-def table_kind(of: type[Result]) -> files.FileKind:
-    """The CSV table of a class of results."""
-    return files.FileKind("a table of results", ".csv", ",".join(of.columns[:2]).encode())
+def table_kind(result_type: type[Result]) -> files.FileKind:
+    """Return the kind of the CSV table of a class of results."""
+    return files.FileKind("a table of results", ".csv", ",".join(result_type.columns[:2]).encode())
 
 
 def table(result: Result) -> str:
-    """The rows of a result as CSV."""
+    """Return the rows of a result as CSV."""
     text = io.StringIO()
     writer = csv.DictWriter(text, result.columns, extrasaction="ignore")
     writer.writeheader()

@@ -1,4 +1,4 @@
-"""The time that a measurement may take; compiling, which happens once, is not part of it."""
+"""The time that a measurement may take, without the time for compiling."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import final
 
 
 class OvertimeError(Exception):
-    """Internal: a run that takes longer than it may."""
+    """Internal error: a run exceeds its time."""
 
 
 @final
 class Budget:
-    """Time to spend.
+    """A time budget.
 
     Args:
-        seconds: In [s].
-        on_progress: Called with the time spent, in [s], and with what is being run.
-        clock: Gives the time, in [s].
+        seconds: The time, in [s].
+        on_progress: Function of the elapsed time, in [s], and the name of the current run.
+        clock: Function that returns the time, in [s].
     """
 
     def __init__(
@@ -32,18 +32,18 @@ class Budget:
 
     @property
     def spent(self) -> float:
-        """In [s]."""
+        """Elapsed time without excluded parts, in [s]."""
         return self._clock() - self._began - self._apart
 
     @property
     def left(self) -> float:
-        """In [s]; negative when it is over."""
+        """Remaining time, in [s]; negative if the budget is exceeded."""
         return self.seconds - self.spent
 
-    def report(self, what: str) -> None:
-        """Report what is being run."""
+    def report(self, name: str) -> None:
+        """Report the name of the current run."""
         if self._on_progress is not None:
-            self._on_progress(min(self.spent, self.seconds), what)
+            self._on_progress(min(self.spent, self.seconds), name)
 
     @contextmanager
     def apart(self) -> Iterator[None]:
@@ -55,10 +55,10 @@ class Budget:
             self._apart += self._clock() - began
 
     def within(self, seconds: float) -> Budget:
-        """Return a budget of what is left, and of no more than so many seconds."""
+        """Return a budget of the remaining time, at most `seconds`."""
         return Budget(min(seconds, self.left), clock=self._clock)
 
     def check(self, t: float = 0.0) -> None:
-        """Raise OvertimeError if it is over; can be passed to a run as its `on_progress`."""
+        """Raise an OvertimeError if no time remains; can be passed to a run as `on_progress`."""
         if self.left <= 0:
             raise OvertimeError

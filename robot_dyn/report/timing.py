@@ -1,4 +1,4 @@
-"""Runs timed in turns, so that changes of the machine's speed affect all of them."""
+"""Runs timed alternately, so that changes of the machine's speed affect all of them."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ from robot_dyn.foundations.result import UNREPORTED, reported
 from robot_dyn.report.time_budget import Budget, OvertimeError
 
 TURNS = 5
-_AGREE = 1.05  # ratio of the two least times
-_BRIEF_S, _OFTEN = 1e-3, 20  # shorter runs settle after so many turns: after five, some are 10 % off
+_AGREE = 1.05  # largest ratio of the two smallest times
+_BRIEF_S, _OFTEN = 1e-3, 20  # shorter runs settle after 20 turns: after five, some are 10 % off
 
 
 @dataclass(frozen=True, kw_only=True)
 class Repeated:
-    """The base of what was timed in turns.
+    """Base class of results that were timed in turns.
 
     Attributes:
-        times: Of its turns, in [s]; nothing if it was not timed.
+        times: Times of the turns, in [s]; empty if it was not timed.
     """
 
     times: tuple[float, ...] = field(default=(), metadata=UNREPORTED)
 
     @reported
     def time_s(self) -> float:
-        """Least of its times, in [s]; nan if it was not timed."""
+        """Return the smallest time, in [s]; nan if it was not timed."""
         return min(self.times, default=nan)
 
     @reported
     def repeats(self) -> int:
-        """Number of turns."""
+        """Return the number of turns."""
         return len(self.times)
 
     @reported
     def repeatable(self) -> bool:
-        """Whether there were at least five turns, the two least times of which differ by no more than 5 %."""
+        """Return True if there were at least five turns whose two smallest times differ by at most 5 %."""
         return repeatable(self.times)
 
 
@@ -51,8 +51,8 @@ class Timed:
 
     Attributes:
         name: Name in reports.
-        run: Runs it once and returns the time it took, in [s].
-        times: Times of its turns, in [s].
+        run: Function that runs it once and returns the time, in [s].
+        times: Times of the turns, in [s].
     """
 
     name: str
@@ -61,40 +61,40 @@ class Timed:
 
     @property
     def settled(self) -> bool:
-        """Whether more turns would not change its least time."""
+        """True if more turns would not change the smallest time."""
         return repeatable(self.times) and (len(self.times) >= _OFTEN or self.times[0] >= _BRIEF_S)
 
 
 def repeatable(times: Sequence[float]) -> bool:
-    """Whether a time is known: after at least five turns the two least ones agree to 5 %.
+    """Return True if a time is reliable: after at least five turns, the two smallest times agree to 5 %.
 
-    What else a machine does makes times longer and never shorter, so that the least one is that of the call.
+    Other work of the machine can only make times longer, so the smallest time is the best estimate.
     """
     least = sorted(times)[:2]
     return len(times) >= TURNS and least[-1] <= _AGREE * least[0]
 
 
 def seconds(call: Callable[[], object], at_least: float, clock: Callable[[], float] = perf_counter) -> float:
-    """Time of one call in [s], over a loop of about `at_least` seconds."""
+    """Measure the time of one call in [s], over a loop of about `at_least` seconds."""
     timer, number = timeit.Timer(call, timer=clock), 1
-    while (taken := timer.timeit(number)) < at_least:
-        number = max(2 * number, int(1.2 * number * at_least / max(taken, 1e-9)))
-    return taken / number
+    while (duration := timer.timeit(number)) < at_least:
+        number = max(2 * number, int(1.2 * number * at_least / max(duration, 1e-9)))
+    return duration / number
 
 
 def take_turns(
     runs: Iterable[Timed], turns: int, budget: Budget, kept_s: float = 0.0, until_settled: bool = False
 ) -> dict[str, RobotDynError]:
-    """Time runs one after the other, `turns` times at most; return the errors of those that fail, by name.
+    """Time runs alternately, at most `turns` times; return the errors of failing runs, by name.
 
-    The first run of each, which compiles and loads, is not counted, and is apart from the budget.
+    The first run of each, which compiles and loads, is not counted and excluded from the budget.
 
     Args:
         runs: The runs.
         turns: Number of turns.
-        budget: Of the time.
-        kept_s: Time of the budget that is left over, in [s].
-        until_settled: Whether a run whose time is settled is not run again.
+        budget: Time budget.
+        kept_s: Reserve of the budget, in [s].
+        until_settled: True to stop repeating a run when its time is settled.
     """
     left, failed = list(runs), dict[str, RobotDynError]()
     for turn in range(turns):
@@ -118,10 +118,10 @@ def take_turns(
 
 
 def in_turns(calls: Mapping[str, Callable[[], object]], repeats: int, at_least: float) -> dict[str, list[float]]:
-    """Times of each call in [s], over loops of about `at_least` seconds in so many turns.
+    """Return `repeats` times of each call, in [s], over loops of about `at_least` seconds.
 
     Raises:
-        RobotDynError: If a call does.
+        RobotDynError: If a call raises one.
     """
     runs = [Timed(name, lambda call=call: seconds(call, at_least)) for name, call in calls.items()]
     for error in take_turns(runs, repeats, Budget()).values():

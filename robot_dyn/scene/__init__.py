@@ -1,11 +1,11 @@
-"""Scenes: a TOML file becomes a validated Setup. What a scene does not name does not act, gravity included.
+"""Scenes: a TOML file becomes a validated Setup. Only the effects in the file act; even gravity must be listed.
 
 scene.py         the file: its keys, tables of tools, `read_scene`, and the Setup it describes
 effects.py, control.py, references.py    the tables [[effect]], [control] and [reference]
-declared.py      tables whose keys are the coefficients that classes declare, and those of callables of the caller
+declared.py      tables whose keys are the coefficients of classes, or the arguments of user-defined functions
 schema.py        rules for every table: types of values, units, no unknown key
-messages.py      the lines of keys and tables at the top; errors of pydantic as messages: line, key, value
-explain.py       what a scene integrates, term by term; manual.py writes docs/reference/scenes.md
+messages.py      line numbers of keys and tables; errors of pydantic as messages: line, key, value
+explain.py       the equations of a scene, term by term; manual.py writes docs/reference/scenes.md
 starters/        scenes to start from
 """
 

@@ -1,4 +1,4 @@
-"""The controllers that a scene can name, and the blocks of their digital loop."""
+"""The controllers in a scene, and the blocks of their digital loop."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from robot_dyn.scene.messages import part
 from robot_dyn.scene.references import Reference
 from robot_dyn.scene.schema import NotNegative, Part, PerJoint, Positive, Stated, one_of, per_joint, wrong_key
 
-_BLOCKS: dict[str, tuple[type[Block], ...]] = {  # of each line
+_BLOCKS: dict[str, tuple[type[Block], ...]] = {  # by line
     "position": (Noise, Quantisation, LowPass),
     "velocity": (Differences, Noise, Quantisation, LowPass),
     "actuation": (LowPass, Quantisation, RateLimit, Noise),
@@ -33,7 +33,7 @@ _BLOCKS: dict[str, tuple[type[Block], ...]] = {  # of each line
 _ORDER: dict[type[Block], dict[str, Any]] = {LowPass: {"order": (Literal[1, 2], Field(2, description="Order."))}}
 BLOCKS: dict[str, tuple[type[Declared], ...]] = {
     line: tuple(
-        declared_part(Declared, name_of(each), each, signal=SIGNALS[line], others=_ORDER.get(each)) for each in classes
+        declared_part(Declared, name_of(kind), kind, signal=SIGNALS[line], others=_ORDER.get(kind)) for kind in classes
     )
     for line, classes in _BLOCKS.items()
 }
@@ -41,15 +41,15 @@ PositionBlock, VelocityBlock, ActuationBlock = (one_of(*BLOCKS[line]) for line i
 
 
 class Model(Part):
-    """The controller's model of the arm, where it differs from the plant's; a table of `[control]`."""
+    """The controller's model of the arm, if it differs from the plant; a table of `[control]`."""
 
     mass_scale: Positive = 1.0
     """Factor on mass and inertia of all links, payloads excepted."""
     effects: list[AnyEdit] | None = None  # pyright: ignore[reportInvalidTypeForm]
-    """Its gravity, lock, payload and armature, as of `[[effect]]`, in place of the scene's; those by default."""
+    """Gravity, lock, payload and armature of the model, written like `[[effect]]`; by default the scene's."""
 
     def build(self, loaded: Robot, robot: Robot) -> Robot:
-        """Return the plant's robot, or that of the file with this table's edits alone; masses scaled."""
+        """Return the plant's robot, or the file's robot with the edits of this table only, with scaled masses."""
         if self.effects is not None:
             robot = bare(loaded)
             for edit in self.effects:
@@ -68,7 +68,7 @@ KINDS: dict[str, type[Controller]] = {
 
 
 class Control(Part):
-    """A controller. Its gains are kp and kd, or follow from the frequency ω and the damping ratio ζ of the closed loop.
+    """A controller, with gains kp and kd, or gains from the frequency ω and the damping ratio ζ of the closed loop.
 
     kp = ω² and kd = 2 ζ ω, times the diagonal of M at the start for `pd`, `pid`, `pd_gravity` and `feed_forward`.
     `operational_space` holds the posture of the start with a tenth of the largest kp.
@@ -85,35 +85,35 @@ class Control(Part):
     kd: PerJoint | None = None
     """Damping, in N m s/rad (N s/m for a prismatic joint); in 1/s for computed_torque and operational_space."""
     integral_rate_per_s: Positive = 1.0
-    """Of pid: ki = integral_rate_per_s · kp."""
+    """For pid: ki = integral_rate_per_s · kp."""
     effort_limit_N_m: Stated = "urdf"
-    """Of pid: the greatest torque."""
+    """For pid: the largest torque."""
     period_s: NotNegative = 0.0
     """Time between samples, with the torque constant between them; 0 for continuous control."""
     frame: str | None = None
-    """Of operational_space: the link under control."""
+    """For operational_space: the controlled link."""
     model: Model = Model()
-    """The controller's model of the arm; that of the plant by default."""
+    """The controller's model of the arm; by default the model of the plant."""
     measurement_delay_periods: NotNegative = 0.0
-    """How late position and velocity are measured, in periods."""
+    """Delay of measured positions and velocities, in periods."""
     actuation_delay_periods: NotNegative = 0.0
-    """How late a torque acts, in periods."""
+    """Delay of torques, in periods."""
     position: tuple[PositionBlock, ...] = ()  # pyright: ignore[reportInvalidTypeForm]
-    """Blocks of the measured position, one after the other."""
+    """Blocks of the measured position, in order."""
     velocity: tuple[VelocityBlock, ...] = ()  # pyright: ignore[reportInvalidTypeForm]
-    """Blocks of the measured velocity, one after the other."""
+    """Blocks of the measured velocity, in order."""
     actuation: tuple[ActuationBlock, ...] = ()  # pyright: ignore[reportInvalidTypeForm]
-    """Blocks of the torque, one after the other."""
+    """Blocks of the torque, in order."""
     noise_seed: Annotated[int, Field(ge=0, strict=True)] = 0
-    """Seed of noise; other seeds give other noise of the same kind."""
+    """Seed of the noise."""
 
     @property
     def unused(self) -> dict[str, str]:
-        """Keys that have no effect with this kind, these gains and these blocks, each with the reason."""
+        """Keys without effect for this kind, these gains and these blocks, with the reason."""
         kinds = {key: kind for key, kind in _OF_ONE_KIND.items() if self.kind != kind}
         reasons = {key: f"on {self.kind}, only on {kind}" for key, kind in kinds.items()}
         if self.kp is not None:
-            reasons["damping_ratio"] = "beside kp and kd"
+            reasons["damping_ratio"] = "together with kp and kd"
         if not any(block.factory.random for _, block in self.blocks):  # pyright: ignore[reportFunctionMemberAccess]
             reasons["noise_seed"] = "without a block of kind noise"
         return reasons
@@ -129,15 +129,15 @@ class Control(Part):
 
     @property
     def blocks(self) -> list[tuple[str, Any]]:
-        """The blocks of the loop, each with its line."""
-        return [(line, each) for line in LINES for each in getattr(self, line)]
+        """The blocks of the loop, with their line."""
+        return [(line, block) for line in LINES for block in getattr(self, line)]
 
     def build(self, loaded: Robot, robot: Robot, q0: np.ndarray, reference: Reference) -> Controller:
         """Return the controller for a reference."""
         controller = self._controller(loaded, robot, q0, reference)
         if not (self.measurement_delay_periods or self.actuation_delay_periods or self.blocks):
             return controller
-        lines: Any = {line: [each.call(robot) for each in getattr(self, line)] for line in LINES}
+        lines: Any = {line: [block.call(robot) for block in getattr(self, line)] for line in LINES}
         return Loop(
             controller, **lines, seed=self.noise_seed,
             measurement_delay=self.measurement_delay_periods, actuation_delay=self.actuation_delay_periods,
@@ -163,7 +163,7 @@ class Control(Part):
         return KINDS[self.kind](model, desired, kp, kd, self.period_s)  # pyright: ignore[reportCallIssue]
 
     def _gains(self, model: Robot, q0: np.ndarray) -> tuple[Any, Any]:
-        """Stiffness and damping, as stated or from ω and ζ."""
+        """Return stiffness and damping, as stated or from ω and ζ."""
         names = ("kp", "kd") if self.kp is not None else ("frequency_rad_per_s", "damping_ratio")
         of_frame = self.kind == "operational_space"
         first, second = (
@@ -177,5 +177,5 @@ class Control(Part):
         return gains_from(1.0 if of_frame or self.kind == "computed_torque" else np.diag(model.M(q0)), first, second)
 
 
-# Keys that one kind of control reads.
+# keys that only one kind of control reads
 _OF_ONE_KIND = {"integral_rate_per_s": "pid", "effort_limit_N_m": "pid", "frame": "operational_space"}

@@ -1,4 +1,4 @@
-"""The effects a scene can name: edits of the robot (gravity, lock, payload, armature) and effects of the plant."""
+"""The effects in a scene: edits of the robot (gravity, lock, payload, armature) and effects of the plant."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ class Edit(Part):
     kind: Any
 
     def edit(self, robot: Robot, loaded: Robot) -> Robot:
-        """Return the edited robot; `loaded` has gravity and armature of its file."""
+        """Return the edited robot; `loaded` has the gravity and armature of the file."""
         raise NotImplementedError
 
 
 def bare(loaded: Robot) -> Robot:
-    """The robot without gravity and armature, which a scene names where they act."""
+    """Return the robot without gravity and armature, which act only if a scene lists them."""
     return loaded.with_(gravity=(0.0, 0.0, 0.0), armature={})
 
 
@@ -63,11 +63,11 @@ class Acting(Part):
 
 
 class DeclaredEffect(Declared, Acting):
-    """An effect made of the coefficients that its classes declare."""
+    """An effect with the declared coefficients of its classes."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
-        called = self.call(robot)
-        return called if isinstance(called, tuple) else called.parts
+        effect = self.call(robot)
+        return effect if isinstance(effect, tuple) else effect.parts
 
 
 class Body(Part):
@@ -96,11 +96,11 @@ class Gravity(Edit):
     acceleration_m_s2: Annotated[
         Vector3 | Literal["urdf"], Form("a list of 3 finite numbers, or 'urdf'", 'list of 3 numbers or `"urdf"`')
     ] = STANDARD_GRAVITY
-    """Acceleration of free fall, in base axes; or "urdf", that of a file of MJCF."""
+    """Acceleration of free fall, in base axes; or "urdf" for the value in an MJCF file."""
 
     def edit(self, robot: Robot, loaded: Robot) -> Robot:
-        of_file = self.acceleration_m_s2 == URDF
-        return robot.with_(gravity=loaded.edits.gravity if of_file else self.acceleration_m_s2)
+        is_stated = self.acceleration_m_s2 == URDF
+        return robot.with_(gravity=loaded.edits.gravity if is_stated else self.acceleration_m_s2)
 
 
 class Lock(Edit):
@@ -124,13 +124,13 @@ class Load(Edit, Body):
 
 
 class Armature(Edit):
-    """Inertia of the drives felt at the joints, added to the diagonal of M."""
+    """Inertia of the drives at the joints, added to the diagonal of M."""
 
     kind: Literal["armature"]
     inertia_kg_m2: Stated
-    """Inertia by joint, of the rotor where there is a gear; "urdf" is that of a file of MJCF, as joints feel it."""
+    """Inertia by joint, of the rotor if there is a gear; "urdf" for the values in an MJCF file, after gears."""
     gear_ratio: PerJoint = 1.0
-    """n: the joint feels n² times the inertia of the rotor; joints left out have 1."""
+    """n: n² times the inertia of the rotor acts at the joint; joints left out have 1."""
 
     def edit(self, robot: Robot, loaded: Robot) -> Robot:
         stated = dict(loaded.edits.armature)
@@ -138,7 +138,7 @@ class Armature(Edit):
             if not stated:
                 raise SceneError("inertia_kg_m2: the robot's file states no armature; give it by joint")
             if "gear_ratio" in self.model_fields_set:
-                raise SceneError("gear_ratio: armature of a file is what joints feel, after gears; leave it out")
+                raise SceneError("gear_ratio: the armature of a file already includes gears; remove gear_ratio")
             return robot.with_(armature={name: stated.get(name, 0.0) for name in robot.joint_names})
         inertia = per_joint("armature", self.inertia_kg_m2, robot)
         return robot.with_(armature=per_joint("gear_ratio", self.gear_ratio, robot, elsewhere=1.0) ** 2 * inertia)
@@ -149,11 +149,11 @@ class Carried(Acting, Body):
 
     kind: Literal["carried_payload"]
     start_s: NotNegative = 0.0
-    """When it is picked up; 0 if the arm starts with it."""
+    """Time at which it is picked up; 0 if the arm starts with it."""
     end_s: Positive | None = None
-    """When it is dropped."""
+    """Time at which it is dropped."""
     picked_up: Literal["at_rest", "at_speed_of_link"] = "at_rest"
-    """Whether it rests until it is picked up, an impact that loses energy, or moves with the link by then."""
+    """Motion of the body before it is picked up: at rest, an impact that loses energy, or at the speed of the link."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         end = inf if self.end_s is None else self.end_s
@@ -173,13 +173,13 @@ class Wrench(Acting):
     expressed_in: Literal["world_aligned", "body", "world"] = "world_aligned"
     """At the origin of the link in base axes, or in the axes of the link ("body"); or at the base ("world")."""
     start_s: NotNegative = 0.0
-    """When it starts."""
+    """Time at which it starts."""
     end_s: Positive | None = None
-    """When it ends."""
+    """Time at which it ends."""
 
     def build(self, robot: Robot) -> tuple[Effect, ...]:
         if not any((*self.force_N, *self.torque_N_m)):
-            raise SceneError(f"external_wrench on {self.frame!r}: has no effect; give force_N or torque_N_m")
+            raise SceneError(f"external_wrench on {self.frame!r} has no effect; give force_N or torque_N_m")
         end = inf if self.end_s is None else self.end_s
         return (ExternalWrench(self.frame, [*self.force_N, *self.torque_N_m], self.expressed_in, self.start_s, end),)
 
@@ -193,15 +193,15 @@ _LINE = declared_part(
     DeclaredEffect, "line_spring_damper", LineSpringDamper,
     others={
         "frame": (str, Field(description="A frame of the arm.")),
-        "other_frame": (str | None, Field(None, description="Another one; the world unless given.")),
+        "other_frame": (str | None, Field(None, description="Another frame of the arm; the world by default.")),
     },
 )  # fmt: skip
 _OTHERS: dict[str, type[Acting]] = {kinds_of(part)[0]: part for part in (_JOINT_STOPS, _LINE, Wrench, Carried)}
-"""By kind, the tables that are not made of the coefficients of one class."""
+"""Tables that are not made from one class, by kind."""
 
 
 def _acting() -> Iterator[type[Acting]]:
-    """A table for each effect that `robot_dyn.effects` lists."""
+    """Yield a table for each effect in `robot_dyn.effects`."""
     listed = [getattr(effects, name) for name in effects.__all__]
     classes = [kind for kind in listed if isclass(kind) and issubclass(kind, Effect) and not isabstract(kind)]
     for name, kind in {kind.name: kind for kind in classes if kind is not Effect}.items():

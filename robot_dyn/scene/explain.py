@@ -1,4 +1,4 @@
-"""Explanations: the equation term by term, what is not simulated, and, of a scene, the source of each number."""
+"""Explanations: the equation term by term, effects that are not simulated, and the source of each number of a scene."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ _DELAYS = "measurement_delay_periods", "actuation_delay_periods"
 
 
 def explain(what: Setup | Plant | Dynamics | str | Path) -> Explanation:
-    """The equation of motion that is integrated: each term, what acts with its coefficients, and what is not simulated.
+    """Explain the equation of motion: its terms, the effects with their coefficients, and effects not simulated.
 
-    Its `repr` are the lines that `robot-dyn explain` prints, `to_json()` the document of `robot-dyn explain --json`.
-    Of a scene file it says where each number came from, too.
+    The `repr` of the result are the lines that `robot-dyn explain` prints, `to_json()` is the document of
+    `robot-dyn explain --json`. For a scene file it includes the source of each number.
 
     Args:
         what: A setup, a plant, a robot, or the path of a scene file.
 
     Raises:
         SceneError: If the scene cannot be read.
-        EffectError: If it is none of these.
+        EffectError: If the argument is none of these.
     """
     if isinstance(what, str | Path):
         return of_scene(*read_both(what))
@@ -61,7 +61,7 @@ def explain(what: Setup | Plant | Dynamics | str | Path) -> Explanation:
 
 
 def of_scene(scene: Scene, setup: Setup) -> Explanation:
-    """The explanation of a scene, with the source of each number."""
+    """Explain a scene, with the source of each number."""
     plain, control = explanation_of(setup), scene.control
     return replace(
         _complete(plain, setup.plant, setup, None if control is None else control.kind),
@@ -74,11 +74,11 @@ def of_scene(scene: Scene, setup: Setup) -> Explanation:
     )
 
 
-def _complete(known: Explanation, plant: Plant, setup: Setup | None, kind: str | None = None) -> Explanation:
-    """An explanation with what is absent, and the instructions of machine code."""
-    absent = _absent({each.kind for each in known.effects})
+def _complete(plain: Explanation, plant: Plant, setup: Setup | None, kind: str | None = None) -> Explanation:
+    """Add absent effects, and the instructions of machine code, to an explanation."""
+    absent = _absent({effect.kind for effect in plain.effects})
     code = (*_machine_code(plant, setup), *(() if setup is None else _of_tick(setup, kind)))
-    return replace(known, absent=absent, machine_code=code)
+    return replace(plain, absent=absent, machine_code=code)
 
 
 def _absent(named: set[str]) -> tuple[str, ...]:
@@ -86,13 +86,13 @@ def _absent(named: set[str]) -> tuple[str, ...]:
 
 
 def _terms(scene: Scene, setup: Setup) -> Iterator[Term]:
-    """What a scene names, in its order."""
+    """Yield the edits and effects of a scene, in its order."""
     effects, robot = iter(setup.plant.effects), setup.plant.dynamics
-    edited = {each.kind: each.coefficients for each in edit_terms(robot.edits)}  # pyright: ignore
+    edited = {term.kind: term.coefficients for term in edit_terms(robot.edits)}  # pyright: ignore
     for effect in scene.effect:
         parts = list(islice(effects, len(effect.build(robot)))) if isinstance(effect, Acting) else []  # pyright: ignore
         numbers, acting = _numbers(effect), as_they_act(parts, robot)
-        if isinstance(effect, Edit) and any(each.source == OF_FILE for each in numbers):
+        if isinstance(effect, Edit) and any(number.source == OF_FILE for number in numbers):
             acting = edited.get(effect.kind, ())
         yield Term(effect.kind, term_of(parts) if parts else EDITED[effect.kind], numbers, acting)
 
@@ -106,7 +106,7 @@ def _control(scene: Scene, control: Control, setup: Setup) -> Iterator[str]:
     spans: list[str] = []
     if setup.controller is not None:
         yield from model_lines(setup.controller, setup.plant.dynamics)
-        spans = [span(each) for each in setup.controller.references.values()]
+        spans = [span(reference) for reference in setup.controller.references.values()]
     yield ", ".join([f"reference: {scene.reference.kind}", *dict.fromkeys(spans)])
     yield from _lines(scene.reference, "  ")
 
@@ -117,31 +117,31 @@ def _method(scene: Scene, setup: Setup) -> Iterator[str]:
         method, used = f"chosen for an error of q of at most {scene.accuracy:g}", ("accuracy",)
     yield f"method: {method}, {scene.duration_s:g} s"
     for key in (*used, "record_period_s", "estimate_error", "engine"):
-        taken = shortened(setup) if key == "step_s" else ""
-        yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)}){taken}"
+        note = shortened(setup) if key == "step_s" else ""
+        yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)}){note}"
     yield "start:"
     yield from _lines(scene.start, "  ")
 
 
 def _machine_code(plant: Plant, setup: Setup | None) -> Iterator[str]:
-    """Instructions of the compiled right-hand side, by effect."""
+    """Yield lines on the instructions of the compiled right-hand side, by effect."""
     from robot_dyn.codegen.plant import Compiled
 
     try:
         compiled: Any = Compiled(StateEquation(plant, None).in_a_mode.plant)
-        by_effect, which = compiled.instructions_by_effect, compiled.engine.traces["forward_dynamics"]
+        by_effect, trace = compiled.instructions_by_effect, compiled.engine.traces["forward_dynamics"]
     except RobotDynError as error:
         yield f"machine code: none, {error}"
         return
-    whole = which.counts[which.formulation]
+    whole = trace.counts[trace.formulation]
     parts = ", ".join(f"{name} {count}" for name, count in by_effect.items()) or "none"
-    yield f"machine code of the acceleration, by the {which.formulation}: {whole} instructions; of effects: {parts}"
+    yield f"machine code of the acceleration, by the {trace.formulation}: {whole} instructions; of effects: {parts}"
     if setup is not None and (edits := edits_of_machine_code(setup)):
         yield f"  edited there: {edits['right_angles']}"
 
 
 def _of_tick(setup: Setup, kind: str | None) -> Iterator[str]:
-    """Instructions of a tick, and those of the first controller alone."""
+    """Yield a line on the instructions of a tick, and of the controller inside a loop."""
     from robot_dyn.simulation.compiled.cache import machine_code
 
     inside: Any = setup.controller
@@ -150,17 +150,17 @@ def _of_tick(setup: Setup, kind: str | None) -> Iterator[str]:
     inside = inside.controller if isinstance(inside, Loop) else inside
     try:
         counts = [
-            len(machine_code(StateEquation(setup.plant, each)).code.programs["tick"])
-            for each in dict.fromkeys((setup.controller, inside))
+            len(machine_code(StateEquation(setup.plant, controller)).code.programs["tick"])
+            for controller in dict.fromkeys((setup.controller, inside))
         ]
-    except RobotDynError:  # the reason is given with the acceleration, or the run is interpreted
+    except RobotDynError:  # reported with the acceleration, or the run is interpreted
         return
     more = f"; {kind or inside.name} alone takes {counts[1]}" if len(counts) > 1 else ""
     yield f"machine code of a tick of the control: {counts[0]} instructions{more}"
 
 
 def _ideal(control: Control) -> list[str]:
-    """What a digital loop can have and this one does not."""
+    """Return the features of a digital loop that this control does not have."""
     delays = [key.removesuffix("_periods") for key in _DELAYS if not getattr(control, key)]
     named = {block.kind for _, block in control.blocks}
     kinds = dict.fromkeys(kind for parts in BLOCKS.values() for part in parts for kind in kinds_of(part))
@@ -168,7 +168,7 @@ def _ideal(control: Control) -> list[str]:
 
 
 def _lines(part: Part, indent: str) -> Iterator[str]:
-    return (f"{indent}{each.key} = {each.value}  ({each.source})" for each in _numbers(part))
+    return (f"{indent}{number.key} = {number.value}  ({number.source})" for number in _numbers(part))
 
 
 def _numbers(part: Part) -> tuple[Number, ...]:
@@ -189,5 +189,5 @@ def _source(part: Part, key: str) -> str:
 def _shown(value: Any) -> str:
     if isinstance(value, Part):
         stated = {key: getattr(value, key) for key in type(value).model_fields if getattr(value, key) is not None}
-        return "{" + ", ".join(f"{key} = {_shown(each)}" for key, each in stated.items()) + "}"
+        return "{" + ", ".join(f"{key} = {_shown(x)}" for key, x in stated.items()) + "}"
     return np.array2string(value, precision=6) if isinstance(value, np.ndarray) else str(value)

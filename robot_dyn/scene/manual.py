@@ -19,16 +19,17 @@ from robot_dyn.scene.schema import Part, kinds_of
 
 _OPENING = """# Scenes
 
-A scene is a TOML file that describes one simulation: `robot-dyn simulate scene.toml`. What it does not name does not
-act, gravity included. `robot-dyn scene` prints scenes to start from; `robot-dyn explain scene.toml` says what one
-integrates, and where each number comes from. This page is written from the schema that scenes are checked against.
+A scene is a TOML file that describes one simulation: `robot-dyn simulate scene.toml`. Only the effects in the file act;
+even gravity must be listed. `robot-dyn scene` prints scenes to start from; `robot-dyn explain scene.toml` prints the
+equations of a scene, and the source of each number. This page is generated from the schema that scenes are checked
+against.
 
-- Units are SI and end the names of keys. They are those of a revolute joint: for a prismatic joint read m for rad and
+- Units are SI and end the names of keys. They are for a revolute joint: for a prismatic joint read m for rad and
   N for N m, so N m/rad is N/m, and kg for kg m² of an armature; a frequency is in rad/s for both.
 - *by joint* is one number for all joints, a list of n numbers in the order of `robot-dyn info`, or a table by name
-  such as `{elbow_joint = 0.3}`, in which joints left out have 0 unless said.
-- `"urdf"` takes what the file of the robot states.
-- Numbers are finite. A key that is not listed here is refused.
+  such as `{elbow_joint = 0.3}`, in which joints left out have 0 unless stated otherwise.
+- `"urdf"` is the value in the file of the robot.
+- Numbers must be finite. A key that is not listed here is an error.
 """
 _LINES = {
     "position": "measured position, from the joints to the controller",
@@ -39,7 +40,7 @@ _FORMS = {"boolean": "true or false", "string": "text"}
 
 
 def manual() -> str:
-    """The page, in Markdown."""
+    """Return the page, in Markdown."""
     methods = ", ".join(f"`{name}`" for name in FIXED_STEP)
     adaptive = ", ".join(f"`{name}`" for name in ADAPTIVE)
     parts = [
@@ -48,7 +49,7 @@ def manual() -> str:
         f"Methods with a fixed step: {methods}. Adaptive methods: {adaptive}.\n",
         *_section("`[load]`", _text(Loading), Loading),
         *_section("`[start]`", "The state at the start.", Start),
-        "## `[[effect]]`\n\nWhat acts; one table for each, with its `kind`.\n",
+        "## `[[effect]]`\n\nThe effects; one table for each effect, with its `kind`.\n",
     ]
     parts += _kinds(*EDITS, *ACTING)
     parts += _section("`[control]`", _text(Control), Control)
@@ -59,9 +60,11 @@ def manual() -> str:
     ]
     parts += _section("`[control.model]`", _text(Model), Model)
     for line, blocks in BLOCKS.items():
-        parts += [f"## `[[control.{line}]]`\n\nBlocks of the {_LINES[line]}; one table for each, with its `kind`.\n"]
+        parts += [
+            f"## `[[control.{line}]]`\n\nBlocks of the {_LINES[line]}; one table for each block, with its `kind`.\n"
+        ]
         parts += _kinds(*blocks)
-    parts += ["## `[reference]`\n\nWhat the controller follows; one table, with its `kind`.\n"]
+    parts += ["## `[reference]`\n\nThe reference of the controller; one table, with its `kind`.\n"]
     parts += _kinds(*REFERENCES)
     for name, entry in sorted(tool_tables().items()):
         table = entry.load()
@@ -70,7 +73,7 @@ def manual() -> str:
 
 
 def _kinds(*parts: type[Part]) -> Iterator[str]:
-    """A section for each part."""
+    """Yield a section for each table."""
     for part in parts:
         yield from _section(f'`kind = "{kinds_of(part)[0]}"`', _text(part), part, level=3)
 
@@ -90,8 +93,8 @@ def _row(key: str, field: FieldInfo, schema: dict[str, Any]) -> str:
 
 
 def _form(schema: dict[str, Any]) -> str:
-    """Return what a value may be, by its JSON schema."""
-    if "anyOf" in schema:  # a value, or nothing
+    """Return the form of a value, from its JSON schema."""
+    if "anyOf" in schema:  # an optional value
         return _form(schema["anyOf"][0])
     if "const" in schema or "enum" in schema:
         return " or ".join(f"`{json.dumps(value)}`" for value in schema.get("enum", [schema.get("const")]))
@@ -99,7 +102,7 @@ def _form(schema: dict[str, Any]) -> str:
         return f"list of {_several(_form(schema['items']))}"
     if "additionalProperties" in schema:
         return f"table by name of {_several(_form(schema['additionalProperties']))}"
-    form = str(schema.get("type", "table"))  # a part has no type, but a reference
+    form = str(schema.get("type", "table"))  # a nested table has a $ref instead of a type
     sign = "positive" if "exclusiveMinimum" in schema else "not negative" if "minimum" in schema else ""
     return _FORMS.get(form, form) + (f", {sign}" if sign else "")
 
@@ -119,7 +122,7 @@ def _default(field: FieldInfo) -> str:
 
 
 def _text(part: type[Part]) -> str:
-    """The docstring of a part."""
+    """Return the docstring of a table."""
     return "\n".join(line.strip() for line in (part.__doc__ or "").strip().splitlines())
 
 

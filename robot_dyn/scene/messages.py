@@ -1,4 +1,4 @@
-"""Error messages of scenes: lines of keys and tables at the top, and the errors of pydantic with key and value."""
+"""Error messages of scenes: line numbers of top-level keys and tables, and errors of pydantic with key and value."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _WORDS = {
     "valid dictionary": "table", "a valid string": "text", "a valid boolean": "true or false", "valid number": "number",
     "a valid integer": "an integer", "greater than or equal to": "at least",
 }  # fmt: skip
-_TABLE = re.compile(r"^[ \t]*\[+[ \t]*[A-Za-z_\"']", re.MULTILINE)  # the header of one
+_TABLE = re.compile(r"^[ \t]*\[+[ \t]*[A-Za-z_\"']", re.MULTILINE)  # the header of a table
 
 
 @contextmanager
 def part(*path: str | int) -> Iterator[None]:
-    """Note in errors the path of the part that is built, such as ("effect", 1); that of an inner part stays."""
+    """Add the path of the part that is built, such as ("effect", 1), to errors; the path of an inner part is kept."""
     try:
         yield
     except RobotDynError as error:
@@ -58,19 +58,19 @@ def named_part(paths: Mapping[str, tuple[str | int, ...]], kinds: Sequence[str])
 
 
 def validation_message(error: ValidationError, table: Mapping[str, Any], text: str) -> str:
-    """Return the first error in the table of a scene, and the number of the others.
+    """Return a message about the first error in the table of a scene, with the number of other errors.
 
     Args:
-        error: As pydantic raised it.
-        table: The table that was checked.
-        text: Its TOML text.
+        error: The error of pydantic.
+        table: The checked table.
+        text: TOML text of the table.
     """
     first, *others = error.errors(include_url=False)
     kind, context, path = first["type"], first.get("ctx", {}), first["loc"]
     message = str(context["error"]) if kind == "value_error" else first["msg"]
-    if kind not in ("wrong_key", "value_error"):  # pydantic's own
-        for pydantics, words in _WORDS.items():
-            message = message.replace(pydantics, words)
+    if kind not in ("wrong_key", "value_error"):  # a message of pydantic
+        for original, words in _WORDS.items():
+            message = message.replace(original, words)
         message = re.sub("greater than 0$", "positive", message)
         if kind != "missing":
             message += f", got {shorten(bounded_repr(first['input']))}"
@@ -82,12 +82,12 @@ def validation_message(error: ValidationError, table: Mapping[str, Any], text: s
 
 
 def line(text: str, keys: Container[object], path: Sequence[str | int]) -> str:
-    """Return "line 3: " for the key or table at the top of a scene with which a path begins; "" if there is none.
+    """Return "line 3: " for the top-level key or table of a scene at which a path begins; "" if there is none.
 
     Args:
         text: The TOML text.
-        keys: Those at the top.
-        path: Keys, and indices from 0; ("effect", 1) is the second table of [[effect]].
+        keys: The top-level keys.
+        path: Keys and indices from 0; ("effect", 1) is the second table of [[effect]].
     """
     if not path or path[0] not in keys:
         return ""
@@ -101,7 +101,7 @@ def line(text: str, keys: Container[object], path: Sequence[str | int]) -> str:
 
 
 def _place(table: Any, path: Sequence[str | int]) -> list[str]:
-    """Return the parts of a path as text, such as `effect 2 (spring)`, without the branches that pydantic adds."""
+    """Return the parts of a path as text, such as `effect 2 (spring)`, without the branches added by pydantic."""
     names: list[str] = []
     value = table
     for part in path:

@@ -1,4 +1,4 @@
-"""The references that a scene can name."""
+"""The references in a scene."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class Hold(Reference):
 
     kind: Literal["hold"]
     q: PerJoint | None = None
-    """Position, in rad, or m for a prismatic joint; that of the start by default."""
+    """Position, in rad, or m for a prismatic joint; the initial position by default."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         return hold(q0 if self.q is None else per_joint("q", self.q, robot))
 
 
 class Quintic(Reference):
-    """From the start to q in a given time, by a polynomial of degree 5 at rest at both ends."""
+    """A polynomial of degree 5 from the start to q, at rest at both ends."""
 
     kind: Literal["quintic"]
     q: PerJoint
@@ -49,16 +49,16 @@ class Quintic(Reference):
     duration_s: Positive
     """Time from the start to q."""
     start_s: NotNegative = 0.0
-    """When it starts."""
+    """Time of the start."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         return quintic(q0, per_joint("q", self.q, robot), self.duration_s, start_s=self.start_s)
 
 
 class ViaPoints(Reference):
-    """A spline from the start, at rest, through points; at rest at the end unless v_end is given.
+    """A spline from the start, at rest, through at most 2000 points; at rest at the end unless v_end is given.
 
-    The points are those of times_s and points, or of a file; up to 2000 of them.
+    The points are given by times_s and points, or by a file.
     """
 
     kind: Literal["via_points"]
@@ -67,25 +67,25 @@ class ViaPoints(Reference):
     points: tuple[list[Number], ...] = ()
     """Position at each time, a list of n numbers, in rad, or m for a prismatic joint."""
     file: str | None = None
-    """Path of a CSV file with columns of t and of each joint, from the folder of the scene."""
+    """Path of a CSV file with columns t and one for each joint, relative to the folder of the scene."""
     joints: dict[str, str] | None = None
-    """Heading of the column of each joint, where they are not the names of the joints."""
+    """Headings of columns by joint, if they are not the names of the joints."""
     unit: Literal["rad", "deg"] | None = None
-    """Of angles whose heading states none."""
+    """Unit of angles whose heading states none."""
     v_end: PerJoint = 0.0
     """Velocity at the last point."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
-        times, points = self._given(robot)
+        times, points = self._times_and_points(robot)
         if len(times) != len(points):
-            raise SceneError(f"reference: {len(times)} times_s for {len(points)} points; give one for each")
+            raise SceneError(f"reference: {len(times)} times_s for {len(points)} points; give one time for each point")
         v1 = per_joint("v_end", self.v_end, robot)
         if len(times) and times[0] == 0:
             return via_points(times, points, v1=v1)
         return via_points([0.0, *times], [q0.tolist(), *points], v1=v1)
 
-    def _given(self, robot: Robot) -> tuple[list[float], list[list[float]]]:
-        """Times and points, of the scene or of the file."""
+    def _times_and_points(self, robot: Robot) -> tuple[list[float], list[list[float]]]:
+        """Return times and points from the scene or the file."""
         if (self.file is None) != bool(self.times_s or self.points):
             raise SceneError("reference: give times_s and points, or a file of both")
         if self.file is None:
@@ -93,33 +93,33 @@ class ViaPoints(Reference):
         table = recorded(robot, self.file, joints=self.joints, unit=self.unit, least=1)
         refuse_other_units(table)
         if table.more:
-            raise SceneError(f"{self.file}: columns of v are for kind = 'samples'; leave them out")
+            raise SceneError(f"{self.file}: columns of v are for kind = 'samples'; remove them")
         if table.t[0] < 0:
             raise SceneError(f"{self.file}: the first time is {table.t[0]:g} s; start at 0 s or later")
         turns = joined_turns(table)
-        if said := [each for i in range(robot.n) for each in turned(turns, i)]:
-            warnings.warn(f"{self.file}: {'; '.join(said)}", PlanWarning, stacklevel=2)
+        if findings := [finding for i in range(robot.n) for finding in turned(turns, i)]:
+            warnings.warn(f"{self.file}: {'; '.join(findings)}", PlanWarning, stacklevel=2)
         return table.t.tolist(), turns.table.q.tolist()
 
 
 class Sampled(Reference):
-    """The motion through samples of a file, as rd.control.from_samples makes it, with a warning of doubtful ones."""
+    """The motion through samples of a file by rd.control.from_samples, with a warning about doubtful samples."""
 
     kind: Literal["samples"]
     file: str
-    """Path of a CSV file, or of an MCAP log of ROS 2 (.mcap), from the folder of the scene."""
+    """Path of a CSV file, or of an MCAP log of ROS 2 (.mcap), relative to the folder of the scene."""
     time: str | None = None
-    """Heading of the times; of a log "header" or "log". By default the column t, time or timestamp."""
+    """Heading of the times; for a log "header" or "log". By default the column t, time or timestamp."""
     joints: dict[str, str] | None = None
-    """Heading of the column of each joint, or its name in the log, where they are not the names of the joints."""
+    """Headings of columns, or names in the log, by joint, if they are not the names of the joints."""
     unit: Literal["rad", "deg"] | None = None
-    """Of angles whose heading states none."""
+    """Unit of angles whose heading states none."""
     ends: Literal["rest", "measured"] | None = None
-    """Whether it is at rest at both ends, or moves as the samples do; at rest by default, an error if they move."""
+    """Motion at both ends: at rest, or as measured; "rest" by default, which is an error if the samples move there."""
     start_s: Number | None = None
-    """Time of the first sample; as in the file by default."""
+    """Time of the first sample; by default the time in the file."""
     topic: str | None = None
-    """Topic of a log; by default its only one of joint states, or /joint_states."""
+    """Topic of a log; by default its only topic of joint states, or /joint_states."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> PiecewisePolynomial:
         stated = {key: getattr(self, key) for key in ("time", "joints", "unit", "ends", "start_s", "topic")}
@@ -130,14 +130,14 @@ class Sampled(Reference):
 
 
 def _start(robot: Robot, q0: np.ndarray, frame: str | None, hold: bool) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the position of the frame under control at the start, and its rotation if that is held."""
-    with part("control"):  # which names the frame
+    """Return the initial position of the controlled frame, and its rotation if the orientation is held."""
+    with part("control"):  # the table that names the frame
         g = robot.placement(q0, str(frame))
     return g[:3, 3], g[:3, :3] if hold else None
 
 
 class Line(Reference):
-    """A straight line of the frame under control from where it is at the start; for operational_space."""
+    """A straight line of the controlled frame from its initial position; for operational_space."""
 
     kind: Literal["line"]
     by_m: Vector3
@@ -145,9 +145,9 @@ class Line(Reference):
     duration_s: Positive
     """Time from start to end."""
     start_s: NotNegative = 0.0
-    """When it starts."""
+    """Time of the start."""
     hold_orientation: Truth = True
-    """Whether the orientation of the start is kept; otherwise it is free."""
+    """True to keep the initial orientation; otherwise it is free."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> CartesianReference:
         p, R = _start(robot, q0, frame, self.hold_orientation)
@@ -155,7 +155,7 @@ class Line(Reference):
 
 
 class Circle(Reference):
-    """A circle of the frame under control that begins where it is at the start; for operational_space."""
+    """A circle of the controlled frame from its initial position; for operational_space."""
 
     kind: Literal["circle"]
     radius_m: Positive
@@ -169,13 +169,13 @@ class Circle(Reference):
     turns: Positive = 1.0
     """Number of turns."""
     hold_orientation: Truth = True
-    """Whether the orientation of the start is kept; otherwise it is free."""
+    """True to keep the initial orientation; otherwise it is free."""
 
     def build(self, robot: Robot, q0: np.ndarray, frame: str | None) -> CartesianReference:
         p, R = _start(robot, q0, frame, self.hold_orientation)
         axis, direction = np.array(self.normal), np.array(self.to_centre)
         if not np.linalg.norm(np.cross(axis, direction)) > 0:
-            raise SceneError("reference.to_centre: must not be zero, nor along reference.normal")
+            raise SceneError("reference.to_centre must not be zero or parallel to reference.normal")
         direction = direction - axis * (axis @ direction) / (axis @ axis)  # into the plane of the circle
         direction = direction / np.linalg.norm(direction)
         centre = p + self.radius_m * direction

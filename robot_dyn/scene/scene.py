@@ -1,4 +1,4 @@
-"""Scene files: read, checked and turned into a Setup. Every number is the file's or a stated default."""
+"""Scene files: read, checked and turned into a Setup. Every number comes from the file or is a documented default."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ SCENE = FileKind("a scene", ".toml")
 
 
 class Loading(Part):
-    """How the file of the robot is read. The summary of a run lists what was estimated and what was left out."""
+    """Options for reading the file of the robot. The summary of a run lists estimated values and omitted parts."""
 
     inertia: Literal["stated", "from_shapes"] = "stated"
-    """Inertias as in the file; or those that it lacks from the shapes of links, which opens mesh files."""
+    """Inertias as in the file; "from_shapes" estimates missing ones from the shapes of links, including meshes."""
     mass_kg: dict[str, Positive] | None = None
     """With "from_shapes": masses by link."""
     total_mass_kg: Positive | None = None
-    """With "from_shapes": mass of the whole robot, of which links without a mass share what is left by volume."""
+    """With "from_shapes": mass of the whole robot; links without a mass share the remainder by volume."""
     density_kg_per_m3: Positive | None = None
-    """With "from_shapes", in place of `total_mass_kg`: of links whose mass is not known."""
+    """With "from_shapes", instead of `total_mass_kg`: density of links without a mass."""
     allow_overlap: bool = False
-    """With "from_shapes": count what closed parts of a mesh share as often as they fill it; otherwise refuse it."""
+    """With "from_shapes": count overlaps of closed parts of a mesh several times; otherwise they are errors."""
     without: tuple[Literal["tendon", "equality", "free", "ball"], ...] = ()
-    """Parts of a file of MJCF to leave out."""
+    """Parts of an MJCF file to omit."""
 
     def robot(self, name_or_path: str | Path) -> Robot:
-        """The robot of a name or path."""
+        """Return the robot of a name or path."""
         return load(
             name_or_path, inertia=self.inertia, mass=self.mass_kg, total_mass=self.total_mass_kg,
             density=self.density_kg_per_m3, allow_overlap=self.allow_overlap, without=self.without,
@@ -80,7 +80,7 @@ class Scene(Part):
     robot: str
     """Name of a robot of the catalog, or path of a URDF or MJCF, relative to the folder of the scene."""
     load: Loading = Loading()
-    """How its file is read; as it is by default."""
+    """Options for reading the robot's file; unchanged by default."""
     duration_s: Positive
     """Length of the run."""
     method: Annotated[str, AfterValidator(_known_method)] = Setup.integrator
@@ -92,25 +92,25 @@ class Scene(Part):
     atol: Positive = Adaptive.atol
     """Absolute tolerance of an adaptive method, in rad and rad/s (m and m/s for a prismatic joint)."""
     accuracy: Positive | None = None
-    """Largest error of q to have, in rad and m, for which pilot runs choose method and tolerance."""
+    """Largest error of q, in rad and m; pilot runs choose method and tolerance for it."""
     record_period_s: NotNegative = 0.01
     """Time between samples; 0 for every step."""
     estimate_error: Truth = Setup.estimate_error
-    """Whether the run is repeated with longer steps, to estimate its error."""
+    """True to repeat the run with longer steps, which estimates its error."""
     engine: Literal["auto", "interpreted", "compiled"] = "auto"
-    """Which loop runs; "auto" compiles where that is worthwhile."""
+    """Engine of the run; "auto" compiles if that saves time."""
     start: Start = Start()
     """The state at the start."""
     effect: tuple[AnyEffect, ...] = ()  # pyright: ignore[reportInvalidTypeForm]
-    """What acts, gravity included; nothing by default."""
+    """The effects, gravity included; none by default."""
     control: Control | None = None
-    """What drives the joints; nothing by default."""
+    """The controller; none by default."""
     reference: AnyReference = Hold(kind="hold")  # pyright: ignore[reportInvalidTypeForm]
-    """What the controller follows; rest at the start by default."""
+    """The reference of the controller; rest at the start by default."""
 
     @classmethod
     def valid_keys(cls) -> tuple[str, ...]:
-        """The keys of a scene, tables of tools included."""
+        """Return the keys of a scene, including tables of tools."""
         return (*super().valid_keys(), *tool_tables())
 
     @model_validator(mode="after")
@@ -133,17 +133,17 @@ class Scene(Part):
                 need = "line or circle" if of_frame else "hold, quintic, via_points or samples"
                 raise wrong_key("reference.kind", f"{kind} follows {need}, got {self.reference.kind!r}")
             if of_frame and self.control.frame is None:
-                raise wrong_key("control.frame", "name the link that follows a line or a circle")
-        of_model = None if self.control is None else self.control.model.effects
-        for place, effects in (("effect", self.effect), ("control.model.effects", of_model or ())):
+                raise wrong_key("control.frame", "is missing; name the link that follows the line or circle")
+        model_effects = None if self.control is None else self.control.model.effects
+        for place, effects in (("effect", self.effect), ("control.model.effects", model_effects or ())):
             kinds = [effect.kind for effect in effects]
             for kind in ("gravity", "armature"):
                 if (count := kinds.count(kind)) > 1:
-                    raise wrong_key(place, f"{kind} is named {count} times, and only the last would act; keep one")
+                    raise wrong_key(place, f"{kind} is named {count} times, but only the last would act; keep one")
         return self
 
     def setup(self, folder: Path, about: dict[str, str]) -> Setup:
-        """Return the setup it describes; paths are relative to `folder`."""
+        """Return the setup of the scene; paths are relative to `folder`."""
         with part("robot"):
             file = folder / self.robot
             loaded = self.load.robot(file if os.path.isfile(file) else self.robot)
@@ -179,14 +179,14 @@ class Scene(Part):
             )  # fmt: skip
 
     def integrator(self) -> Integrator | Adaptive:
-        """Return the method by its name."""
+        """Return the integrator with the name `method`."""
         if self.method in ADAPTIVE:
             return Adaptive(self.method, self.rtol, self.atol)
         return method(self.method)
 
 
 def tool_tables() -> dict[str, EntryPoint]:
-    """Return the entry points of the tables of tools, such as [sweep], by name; imported where a scene has them."""
+    """Return the entry points of tables of tools, such as [sweep], by name; they are imported if a scene has them."""
     return {entry.name: entry for entry in entry_points(group="robot_dyn.scene_tables")}
 
 
@@ -195,19 +195,19 @@ def read_scene(path: str | Path, *, effects: Factories | None = None) -> Setup:
 
     Args:
         path: Path of the file.
-        effects: User-defined effects that it may name: a class, or a function that returns an effect, by kind. The
-            keys of such a table are its arguments, those of declared coefficients with their unit, as
-            "damping_N_m_s_per_rad": numbers, arrays from lists, arrays (n,) from tables by joint.
+        effects: User-defined effects for the scene: a class, or a function that returns an effect, by kind. The keys
+            of its table are the arguments, declared coefficients with their unit, such as "damping_N_m_s_per_rad";
+            values are numbers, arrays from lists, or arrays (n,) from tables by joint.
 
     Raises:
-        SceneError: If the file cannot be read, or a key or value of it is not allowed.
+        SceneError: If the file cannot be read, or a key or value is invalid.
     """
     return read_both(path, effects)[1]
 
 
 def read_both(path: str | Path, effects: Factories | None = None) -> tuple[Scene, Setup]:
-    """Return a scene file as it is written, and the setup it describes; SceneError as `read_scene`."""
-    data = read(path, MAX_BYTES, SceneError, "see robot-dyn scene for one to start from")
+    """Return a scene as written, and the setup it describes; for errors, see `read_scene`."""
+    data = read(path, MAX_BYTES, SceneError, "run robot-dyn scene for a scene to start from")
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
@@ -224,10 +224,10 @@ def parse_scene(text: str, source: str, effects: Factories | None = None) -> Sce
     """Return the scene of a TOML text; `source` names it in messages.
 
     Raises:
-        SceneError: If it is not TOML, or a key or value is not allowed.
+        SceneError: If the text is not TOML, or a key or value is invalid.
     """
     try:
-        table = tomllib.loads(text.removeprefix("\ufeff"))  # the mark of some editors for UTF-8
+        table = tomllib.loads(text.removeprefix("\ufeff"))  # some editors write a byte-order mark
     except (ValueError, RecursionError) as error:
         raise SceneError(f"{source}: {_syntax(error)}; correct the file") from None
     tables = tool_tables()
@@ -243,20 +243,21 @@ def parse_scene(text: str, source: str, effects: Factories | None = None) -> Sce
 
 
 def _user_kinds(effects: Any) -> Iterable[str]:
-    """Return the kinds of user-defined effects; SceneError if one is not callable, or has a name of scenes."""
+    """Return the kinds of user-defined effects; raise a SceneError if one is not callable, or its kind is taken."""
     if not isinstance(effects, Mapping) or not all(
         isinstance(kind, str) and callable(effects[kind]) for kind in effects
     ):
-        raise SceneError(f"effects: give classes of effects by kind, as {{'stribeck': Stribeck}}, got {shown(effects)}")
+        example = "{'stribeck': Stribeck}"
+        raise SceneError(f"effects: give classes of effects by kind, such as {example}, got {shown(effects)}")
     if both := BY_KIND.keys() & effects.keys():
-        raise SceneError(f"effects: {min(both)!r} is a kind that scenes have; take another name")
+        raise SceneError(f"effects: the kind {min(both)!r} exists already; choose another name")
     return effects.keys()
 
 
 def _syntax(error: Exception) -> str:
-    """Return the TOML error, after its place."""
+    """Return the message of a TOML error, with its place first."""
     if isinstance(error, RecursionError):
-        return "is not TOML that can be read: its lists or tables are nested too deeply"
+        return "is not readable TOML: lists or tables are nested too deeply"
     message = shorten(error, 200)
     if place := re.fullmatch(r"(.*) \(at (line \d+, column \d+)\)", message):
         return f"{place[2]}: is not TOML: {place[1]}"

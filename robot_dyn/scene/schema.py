@@ -1,4 +1,4 @@
-"""Rules for every part of a scene: no unknown key, finite numbers, units in the names of the keys."""
+"""Rules for all tables of a scene: no unknown keys, finite numbers, units in the names of keys."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class Part(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _table_of_valid_keys(cls, value: Any) -> Any:
-        known = cls.valid_keys()
+        valid = cls.valid_keys()
         for key in _table(value):
-            if key not in known and cls.model_config.get("extra") != "allow":
-                raise wrong_key(key, f"is not a key here; {nearest(key, known)}")
+            if key not in valid and cls.model_config.get("extra") != "allow":
+                raise wrong_key(key, f"is not a key here; {nearest(key, valid)}")
         return value
 
 
@@ -44,17 +44,17 @@ def _table(value: object) -> dict[str, Any]:
 
 
 def wrong_key(key: str, message: str) -> PydanticCustomError:
-    """Return an error of a key of a table, which may be missing."""
+    """Return the error of a key of a table; the key may be missing."""
     return PydanticCustomError("wrong_key", "{message}", {"key": key, "message": message})
 
 
 def kinds_of(part: type[Part]) -> tuple[str, ...]:
-    """The values that the key `kind` of a part may have."""
+    """Return the valid values of the key `kind` of a table."""
     return get_args(part.model_fields["kind"].annotation) if "kind" in part.model_fields else ()
 
 
 def one_of(*parts: type[Part]) -> Any:
-    """Return the type of a table that is one of several parts, by its `kind`."""
+    """Return the type of a table that is one of several kinds."""
     kinds = [kind for part in parts for kind in kinds_of(part)]
 
     def with_kind(value: Any) -> Any:
@@ -69,11 +69,11 @@ def one_of(*parts: type[Part]) -> Any:
 
 @dataclass(frozen=True)
 class Form:
-    """The form of a value that can be written in several ways, in words.
+    """The form, in words, of a value that can be written in several ways.
 
     Attributes:
-        must_be: For messages.
-        on_page: For the page of scenes.
+        must_be: Text for messages.
+        on_page: Text for the documentation of scenes.
     """
 
     must_be: str
@@ -88,7 +88,7 @@ class Form:
         return {"type": self.on_page}
 
 
-# Strict: a text or a truth value is not a number.
+# strict: a text or a truth value is not a number
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Positive = Annotated[float, Field(gt=0, strict=True)]
 NotNegative = Annotated[float, Field(ge=0, strict=True)]
@@ -102,9 +102,9 @@ Stated = Annotated[
 ]
 
 
-def per_joint(what: str, value: Any, robot: Robot, elsewhere: float = 0.0) -> Any:
-    """The (n,) array of a value for all joints, for each, or by name; the effect resolves "urdf" itself."""
+def per_joint(key: str, value: Any, robot: Robot, elsewhere: float = 0.0) -> Any:
+    """Return a value for all joints, for each joint, or by name, as an array (n,); "urdf" is returned unchanged."""
     if value == URDF:
         return URDF
-    values = by_joint(what, value, robot.joint_names)
+    values = by_joint(key, value, robot.joint_names)
     return np.array([values.get(name, elsewhere) for name in robot.joint_names])

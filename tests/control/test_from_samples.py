@@ -101,9 +101,9 @@ def test_the_table_of_a_run_is_read_back(tmp_path: Path) -> None:
 
 def test_samples_that_move_at_an_end_need_a_word() -> None:
     """A stop within one step would take a torque that the motion does not need."""
-    with pytest.raises(PlanError, match=r"moves at .* rad/s at the start: say whether .*ends='measured'.*ends='rest'"):
+    with pytest.raises(PlanError, match=r"moves at .* rad/s at the start.*choose .*ends='measured'.*ends='rest'"):
         rd.control.from_samples(ARM, table(SMOOTH))
-    with pytest.raises(PlanError, match=r"at the end: say whether"):
+    with pytest.raises(PlanError, match=r"at the end of the samples: choose"):
         rd.control.from_samples(ARM, {"t": T[:41]} | {name: x[:41] for name, x in table(REST).items() if name != "t"})
     assert rd.control.from_samples(ARM, REST[::20], time=T[::20]).duration == 2.0  # way points are few
 
@@ -124,7 +124,7 @@ def test_noise_is_told_with_its_deviation_and_the_acceleration_it_makes(deviatio
     (found,) = [
         x for x in rd.control.from_samples(ARM, noisy[kept], time=T[kept], ends="rest").findings if "noise" in x
     ]
-    said = re.search(r"noise or rounding of (\S+) rad, or times that are off, make accelerations of (\S+) rad", found)
+    said = re.search(r"noise or rounding of (\S+) rad, or inexact times, cause accelerations of (\S+) rad", found)
     assert said is not None and float(said[1]) == pytest.approx(deviation, rel=0.5)
     assert not kept.all() or float(said[2]) == pytest.approx(np.sqrt(6) * deviation / T[1] ** 2, rel=0.35)
     assert "noise" not in " ".join(rd.control.from_samples(ARM, REST[kept], time=T[kept], ends="rest").findings)
@@ -133,7 +133,7 @@ def test_noise_is_told_with_its_deviation_and_the_acceleration_it_makes(deviatio
 def test_times_that_are_off_are_told_as_noise_and_uneven_ones_are_not() -> None:
     rng = np.random.default_rng(5)
     off = T + 0.2 * T[1] * rng.uniform(-1, 1, len(T)) * (T > 0)
-    assert "times that are off" in " ".join(rd.control.from_samples(ARM, SMOOTH, time=off, ends="measured").findings)
+    assert "inexact times" in " ".join(rd.control.from_samples(ARM, SMOOTH, time=off, ends="measured").findings)
     there = np.sin(np.outer(off, [0.5, 0.6, 0.7, 0.8, 0.9, 1.0]) + np.arange(6))
     assert not rd.control.from_samples(ARM, there, time=off, ends="measured").findings
 
@@ -169,19 +169,23 @@ def changed(row: int, joint: int, x: float) -> np.ndarray:
             "samples are 90.1 s apart: are the times in ms",
         ),
         (table(changed(40, 0, 0.55 - 7.08)), {}, r"pan_joint jumps: from .*"),
-        ({"t": [0, 0.3]} | dict.fromkeys(NAMES, np.array([0, 0.9])), {}, r"moves at 5\.625 rad/s at 0\.15 s, between"),
+        ({"t": [0, 0.3]} | dict.fromkeys(NAMES, np.array([0, 0.9])), {}, r"moves at 5\.625 rad/s at 0\.15 s, although"),
         (
             {"t": [0, 1, 1.5, 2, 3]} | dict.fromkeys(NAMES, np.array([0, 3.1, 3.1, 3.1, 0])),
             {},
             r"elbow_joint is at 3\.2\d* rad at 1\.\d* s, between samples within its limits",
         ),
-        (table(REST) | {"t": 1.7e9 + T}, {}, "first sample is at 1700000000 s, and runs begin at 0 s; start_s=0"),
-        (table(REST) | {"t": 1000 * T + 0.5}, {}, "no joint reaches 1 % of its speed in 2000 s, .*are the times in ms"),
+        (table(REST) | {"t": 1.7e9 + T}, {}, "first sample is at 1700000000 s, but runs begin at 0 s; pass start_s=0"),
+        (
+            table(REST) | {"t": 1000 * T + 0.5},
+            {},
+            "no joint reaches 1 % of its speed limit in 2000 s, .*are the times in ms",
+        ),
         (table(REST) | {"t": T + (T > 1)}, {}, r"1 gap in time, the longest of 1\.025 s from 1 s"),
         (
             table(SMOOTH),
             {"ends": "rest"},
-            r"moves at .* rad/s at the start, where the motion is at rest; ends='measured'",
+            r"moves at .* rad/s at the start of the samples, although the motion .* at rest; ends='measured'",
         ),
         (
             {name: x for name, x in table(REST).items() if name != "elbow_joint"},
@@ -199,16 +203,20 @@ def test_what_is_doubtful_is_found(source: dict, options: dict[str, Any], messag
 @pytest.mark.parametrize(
     ("source", "options", "message"),
     [
-        (table(np.degrees(SMOOTH)), {}, "angles look like degrees: shoulder_pan_joint is at up to 48"),
+        (table(np.degrees(SMOOTH)), {}, "angles look like degrees: shoulder_pan_joint reaches 48"),
         (
             table(np.where(np.arange(6) == 2, np.degrees(SMOOTH), SMOOTH)),
             {},
-            r"degrees: elbow.* if those of shoulder_pan_joint are, too, else head columns as 'elbow_joint \[deg\]'",
+            r"degrees: elbow.* if those of shoulder_pan_joint are, too, else write .* 'elbow_joint \[deg\]'",
         ),
-        (table(REST, ("elbow", *NAMES[1:])), {}, "column 'elbow' is of no joint; nearest: elbow_joint"),
+        (table(REST, ("elbow", *NAMES[1:])), {}, "column 'elbow' is not a joint; nearest: elbow_joint"),
         ({name: x for name, x in table(REST).items() if name != NAMES[5]}, {}, "no column of wrist_3_joint; nearest:"),
         (table(REST) | {"t": np.where(T == 1, 0.9, T)}, {}, r"times must increase: sample 41 is at 0\.9 s"),
-        (table(REST) | {"t": np.where(T == 1, 0.975, T)}, {}, r"sample 41 is at 0\.975 s, the one before at 0\.975 s"),
+        (
+            table(REST) | {"t": np.where(T == 1, 0.975, T)},
+            {},
+            r"sample 41 is at 0\.975 s, the previous one at 0\.975 s",
+        ),
         (table(changed(7, 1, np.nan)), {}, "column 'shoulder_lift_joint': sample 8 is nan"),
         (dict(zip(NAMES, REST.T, strict=True)), {}, "there is no column of time; known: shoulder"),
         (table(REST), {"joints": {"elbow": "elbow_joint"}}, "no joint 'elbow'; nearest: elbow_joint"),
@@ -220,17 +228,17 @@ def test_what_is_doubtful_is_found(source: dict, options: dict[str, Any], messag
             "the unit must be one of rad, deg",
         ),
         ("missing.csv", {}, "there is no such file"),
-        (table(REST) | {"t": np.round(1000 * T)}, {}, r"times look like ms, µs or ns: whole numbers, 25 apart"),
+        (table(REST) | {"t": np.round(1000 * T)}, {}, r"times may be in ms, µs or ns: they are integers, 25 apart"),
         (table(REST) | {"time": T}, {}, "2 columns may be the time, 't', 'time'"),
-        (table(REST), {"time": T}, "column 't' is of times, and time= gives others"),
+        (table(REST), {"time": T}, "column 't' contains times, but time="),
         ({"t": T, "a": T}, {"joints": {NAMES[0]: "a", NAMES[1]: "a"}}, "column 'a' is given for several joints"),
         ({"t": T}, {"q0": REST[0]}, "there is no column of any joint"),
-        (table(REST) | {NAMES[0]: REST[:, 0].astype(str)}, {}, r"must hold numbers, sample 1 is '0\.3"),
-        ({"t": T[:3]} | dict.fromkeys(NAMES, T), {}, "columns must be of one length, of 2 samples .* 't' 3"),
+        (table(REST) | {NAMES[0]: REST[:, 0].astype(str)}, {}, r"must contain numbers, sample 1 is '0\.3"),
+        ({"t": T[:3]} | dict.fromkeys(NAMES, T), {}, "columns must have equal lengths of at least 2; got .*'t' 3"),
         (
             {"t [s]": T} | {f"q {n} [deg]": T for n in NAMES} | {f"v {n}": T for n in NAMES},
             {},
-            "is not in rad/s or m/s; state that",
+            "must be in rad/s or m/s; state the unit",
         ),
     ],
 )
@@ -248,7 +256,7 @@ def extreme(scale: float = 1.0, head: str = "t", **columns: Any) -> dict[str, An
 @pytest.mark.parametrize(
     ("source", "options", "message"),
     [
-        (extreme(t=[0.0, 1e-300, 1.0, 2.0, 3.0]), {}, "times: sample 2 is 1e-300 s after the one before it"),
+        (extreme(t=[0.0, 1e-300, 1.0, 2.0, 3.0]), {}, "times: sample 2 is 1e-300 s after the previous one"),
         (extreme(1e299), {}, r"times: sample 2 is 1e\+299 s after"),
         (extreme(1e300, "t [ms]"), {}, r"times: sample 2 is 1e\+297 s after"),
         (extreme(t=[-1.7e308, 0.0, 1.0, 2.0, 1.7e308]), {}, "times: sample 2"),
@@ -294,18 +302,18 @@ def test_marks_and_line_ends_of_editors_change_nothing(tmp_path: Path, text: str
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (f"{HEADS}\n{ROWS}".replace(",", ";"), r"log\.csv: has one column, 't;.*pandas\.read_csv"),
-        *((f"{HEADS}\n{ROWS}".replace(",", separator), "has one column") for separator in "\t| "),
-        (f'{HEADS}\n"0,1",0,0,0,0,0,0', "line 2: column 't' holds '0,1', not a number"),
+        (f"{HEADS}\n{ROWS}".replace(",", ";"), r"log\.csv: there is only one column, 't;.*pandas\.read_csv"),
+        *((f"{HEADS}\n{ROWS}".replace(",", separator), "only one column") for separator in "\t| "),
+        (f'{HEADS}\n"0,1",0,0,0,0,0,0', "line 2: column 't': '0,1' is not a number"),
         (f"{HEADS}\n{ROWS}".encode("utf-16"), "is not a CSV file in UTF-8"),
-        ("", "is empty, or its first line is"),
-        ("\n", "is empty, or its first line is"),
+        ("", "the file or its first line is empty"),
+        ("\n", "the file or its first line is empty"),
         (HEADS, "has no samples below its first line"),
-        (f"{HEADS}\n0,1,1,1,1,1,1", "of 2 samples at least"),
-        (ROWS, "its first line holds numbers, 0, 0.3"),
-        (f"{HEADS},{NAMES[0]}\n{ROWS}", f"column '{NAMES[0]}' is there twice"),
-        (f"{HEADS}\n0,1_0,0,0,0,0,0", "line 2: column 'shoulder_pan_joint' holds '1_0', not a number"),
-        (f"{HEADS}\n0,,0,0,0,0,0", "line 2: column 'shoulder_pan_joint' holds '', not a number"),
+        (f"{HEADS}\n0,1,1,1,1,1,1", "equal lengths of at least 2"),
+        (ROWS, "the first line contains numbers, 0, 0.3"),
+        (f"{HEADS},{NAMES[0]}\n{ROWS}", f"column '{NAMES[0]}' appears twice"),
+        (f"{HEADS}\n0,1_0,0,0,0,0,0", "line 2: column 'shoulder_pan_joint': '1_0' is not a number"),
+        (f"{HEADS}\n0,,0,0,0,0,0", "line 2: column 'shoulder_pan_joint': '' is not a number"),
         (f"{HEADS}\n0,0,0,0,0,0", "line 2 has 6 entries for 7 columns"),
         (f"{HEADS}\n{ROWS}\n9,0,0,0,0,0,inf", "column 'wrist_3_joint': sample 82 is inf"),
     ],
@@ -349,7 +357,7 @@ def test_units_may_stand_in_parentheses_and_times_in_the_index() -> None:
         np.testing.assert_allclose(plan.reference.breaks, T, atol=1e-6)  # of stamps since 1970, in float
         np.testing.assert_allclose(plan.reference.at(plan.reference.breaks)[0], REST, atol=1e-12)
     twice = frame.reset_index().set_axis(["t", *NAMES[:5], NAMES[4]], axis=1)
-    with pytest.raises(PlanError, match="column 'wrist_2_joint' is there twice"):
+    with pytest.raises(PlanError, match="column 'wrist_2_joint' appears twice"):
         rd.control.from_samples(ARM, twice)
     missing = zoned.set_index(pandas.Index([*zoned.index[:-1], pandas.NaT], name="stamp"))
     with pytest.raises(PlanError, match="column 'stamp': sample 81 is NaT"):

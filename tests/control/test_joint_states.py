@@ -83,7 +83,7 @@ def test_times_of_the_log_are_those_at_which_it_got_the_messages(tmp_path: Path)
     unstamped = write(tmp_path / "unstamped.mcap", [each._replace(header=0) for each in messages])
     plan = rd.control.from_samples(ARM, unstamped)
     np.testing.assert_allclose(plan.reference.breaks, t, atol=1e-12)
-    assert "times of the log, as the headers have none" in plan.method
+    assert "times of the log (headers have none)" in plan.method
 
 
 def test_other_joints_and_messages_of_others_are_left_out_and_said(tmp_path: Path) -> None:
@@ -126,7 +126,7 @@ def changed(k: int, **fields: Any) -> list[Message]:
 @pytest.mark.parametrize(
     ("messages", "options", "message"),
     [
-        (changed(5, names=list(NAMES[:5]), position=[0.3] * 5), {}, "message 6 of /joint_states has not the joints"),
+        (changed(5, names=list(NAMES[:5]), position=[0.3] * 5), {}, "message 6 of /joint_states has other joints"),
         (changed(5, position=[]), {}, "message 6 of /joint_states has 0 positions for 6 different names"),
         (changed(5, names=[NAMES[0]] * 6), {}, "message 6 of /joint_states has 6 positions for 1 different names"),
         (changed(5, position=[np.nan] * 6), {}, "sample 6 is nan"),
@@ -134,8 +134,8 @@ def changed(k: int, **fields: Any) -> list[Message]:
         ([each._replace(header=0) for each in measured()], {"time": "header"}, "times must increase: sample 2 is at 0"),
         (measured(), {"topic": "/joint_state"}, "/joint_state: there is no such topic .*nearest: /joint_states"),
         (measured(), {"topic": "/x"}, "/x is of std_msgs/msg/Float64, not sensor_msgs/msg/JointState"),
-        (measured(), {"time": "t"}, "time of a log is 'header' or 'log', got 't'"),
-        (measured(), {"time": T}, "time of a log is 'header' or 'log'"),
+        (measured(), {"time": "t"}, "time of a log must be 'header' or 'log', got 't'"),
+        (measured(), {"time": T}, "time of a log must be 'header' or 'log'"),
         ([], {}, "there is no topic of sensor_msgs/msg/JointState; topics: /x"),
     ],
 )
@@ -167,7 +167,7 @@ def test_a_broken_log_is_refused_by_name(tmp_path: Path, change: Any, message: s
 @pytest.mark.parametrize("options", [{"topic": "/joint_states"}, {"time": "header"}])
 def test_options_of_logs_are_refused_for_other_sources(options: dict[str, str]) -> None:
     table = {"t": T} | dict(zip(NAMES, REST.T, strict=True))
-    with pytest.raises(PlanError, match=r"is of an MCAP log, and the samples are not of one"):
+    with pytest.raises(PlanError, match=r"is for MCAP logs, but the samples are not from one"):
         rd.control.from_samples(ARM, table, **options)
 
 
@@ -187,7 +187,5 @@ def test_a_message_of_another_definition_is_refused_by_name(tmp_path: Path, defi
         state = log.register_msgdef("sensor_msgs/msg/JointState", definition)
         for k in range(3):
             log.write_message("/joint_states", state, (header if "header" in definition else {}) | message, k, k, k)
-    with pytest.raises(
-        PlanError, match=r"log\.mcap: message 1 of /joint_states has not the header, names and positions"
-    ):
+    with pytest.raises(PlanError, match=r"log\.mcap: message 1 of /joint_states lacks the header, names or positions"):
         rd.control.from_samples(ARM, path)

@@ -291,7 +291,7 @@ def test_what_is_rounded_shows_no_order() -> None:
 def test_loops_that_have_no_meaning_are_refused() -> None:
     block, hold = rd.control.Quantisation(1e-3), rd.control.hold(TARGET)
     wrong: list[tuple[object, str]] = [
-        (lambda: rd.control.Loop(rd.control.PD(hold, 1.0, 1.0)), "acts continuously"),
+        (lambda: rd.control.Loop(rd.control.PD(hold, 1.0, 1.0)), "is continuous"),
         (lambda: rd.control.Loop(rd.control.Loop(PD)), "must not be a Loop"),
         (lambda: rd.control.Loop(PD, position=rd.control.Differences()), "first block of velocity"),
         (lambda: rd.control.Loop(PD, velocity=[block, rd.control.Differences()]), "first block of velocity"),
@@ -299,7 +299,7 @@ def test_loops_that_have_no_meaning_are_refused() -> None:
         (lambda: rd.control.Loop(PD, velocity=[rd.control.LowPass(1.0, 3)]), "order"),
         (lambda: rd.control.Loop(PD, position=[rd.control.Quantisation([1.0, 2.0, 3.0])]), r"shape \(2,\)"),
         (lambda: rd.control.Loop(PD, measurement_delay=-0.5), "from 0 to 1000"),
-        (lambda: rd.control.Loop(PD, measurement_delay=0.5, actuation_delay=0.5 + 1e-8), "closer together"),
+        (lambda: rd.control.Loop(PD, measurement_delay=0.5, actuation_delay=0.5 + 1e-8), "two instants less than"),
         (lambda: rd.control.Loop(PD, seed=-1), "whole number"),
         (lambda: rd.control.Loop(PD, position=["noise"]), "must be blocks"),  # type: ignore[list-item]
     ]

@@ -229,7 +229,7 @@ def test_references_are_copied_and_frozen() -> None:
         (lambda: via_points([0.0, 1.0], POINTS), r"times_s must have shape \(6,\)"),
         (lambda: via_points(TIMES[::-1], POINTS), "times_s must increase"),
         (lambda: via_points(TIMES, POINTS, kind="linear"), "known: cubic, quintic"),
-        (lambda: via_points([0.0], POINTS[:1]), "points must be 2 at least"),
+        (lambda: via_points([0.0], POINTS[:1]), "at least 2 are needed"),
         (lambda: PiecewisePolynomial([0.0, 1.0], [1.0]), "coefficients must have shape"),
         (lambda: line(Q0, Q1, 1.0, rotation=np.ones((3, 3))), "rotation must be a rotation matrix"),
         (lambda: line(Q0, Q1, 1.0, rotation_end=np.eye(3)), "needs a rotation to start from"),

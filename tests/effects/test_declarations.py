@@ -344,7 +344,7 @@ def test_equations_of_bodies_of_another_class_are_not_those_of_the_robot_in_it()
 def test_a_compiled_plant_is_not_what_is_simulated() -> None:
     compiled: Any = rd.Compiled(rd.Plant(ARM))
     for asked in (rd.simulate, rd.rollouts):
-        with pytest.raises(EffectError, match="got a CompiledPlant for a plant: give the Plant, engine='compiled'"):
+        with pytest.raises(EffectError, match="got a CompiledPlant; pass the Plant itself, with engine='compiled'"):
             asked(compiled, Q)
 
 

@@ -85,7 +85,7 @@ IN_A_PLANT = [
     (lambda: plant(ViscousFriction("file"), arm=CART), "damping must be real numbers"),
     (lambda: rd.Plant(CART, "friction"), "give effects, or 'urdf'"),
     (lambda: plant(3), "3 is neither a Force nor a Bound"),
-    (lambda: rd.Plant(object(), "urdf"), "give a robot, such as rd.load"),
+    (lambda: rd.Plant(object(), "urdf"), "must be a robot, such as rd.load"),
     (lambda: plant(RigidStops(7.0, "urdf"), arm=UR5), "must lie below"),
     (lambda: plant(RigidBacklash(0.0, 0.1)), "rigid_backlash: gap is 0 for all joints"),
     (lambda: plant(SeriesElastic(0.0, 0.1)), "series_elastic: stiffness is 0 for all joints"),

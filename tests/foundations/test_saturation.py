@@ -179,5 +179,5 @@ def test_thresholds_of_the_actuation_are_for_bounds() -> None:
 
     with pytest.raises(EffectError, match="for bounds"):
         rd.simulate(rd.Plant(ARM, [Odd()]), START)
-    with pytest.raises(EffectError, match="not of both"):
+    with pytest.raises(EffectError, match="set only one of"):
         rd.effects.Threshold(0, 1.0, "odd", "up", "down", of_actuation=True, of_velocity=True)

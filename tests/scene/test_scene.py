@@ -200,7 +200,7 @@ length_m = 0.7
 
 
 def test_a_missing_scene_is_told(tmp_path) -> None:
-    with pytest.raises(SceneError, match="there is no such file; see robot-dyn scene"):
+    with pytest.raises(SceneError, match="there is no such file; run robot-dyn scene"):
         rd.read_scene(tmp_path / "none.toml")
     (tmp_path / "latin.toml").write_bytes(b'robot = "\xe9"')
     with pytest.raises(SceneError, match="is not UTF-8 text"):

@@ -73,7 +73,7 @@ def test_what_is_doubtful_is_a_warning(tmp_path: Path) -> None:
         ("t,joint_1,joint_2", (T, np.degrees(3 * Q)), "", "angles look like degrees: joint_1"),
         ("t,joint_1,joint_2", (T, Q), 'joints = {elbow = "joint_2"}\n', "no joint 'elbow'"),
         ("t,joint_1,joint_2", (T, Q), 'unit = "turns"\n', "unit"),
-        ("t,joint_1,joint_2", (T, Q), 'topic = "/joint_states"\n', "is of an MCAP log"),
+        ("t,joint_1,joint_2", (T, Q), 'topic = "/joint_states"\n', "is for MCAP logs"),
     ],
 )
 def test_what_has_no_single_meaning_is_refused(
@@ -126,7 +126,5 @@ def test_points_of_a_file_are_those_of_the_scene(tmp_path) -> None:
 def test_more_points_than_their_equations_can_be_solved_for_are_refused() -> None:
     """1e6 points would ask for 5e13 numbers."""
     t = np.arange(1e6)
-    with pytest.raises(
-        ControlError, match=r"points must be 2000 at most, got 1000000; rd\.control\.Samples takes more"
-    ):
+    with pytest.raises(ControlError, match=r"at most 2000 are allowed, got 1000000; use rd\.control\.Samples"):
         rd.control.via_points(t, np.zeros((len(t), 1)))

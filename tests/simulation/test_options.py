@@ -101,7 +101,7 @@ def test_rollouts_take_the_same() -> None:
         ),
         (lambda: rd.simulate(ARM, Q, integrator="rk4", step_s="1 ms"), "step_s must be a real number"),
         (lambda: rd.simulate(ARM, Q, integrator="Rosenbrock", step_s=1e-3), "step_s has no effect on Rosenbrock"),
-        (lambda: rd.rollouts("ur5", Q), r"dynamics: give a robot, such as rd.load\('ur5'\)"),
+        (lambda: rd.rollouts("ur5", Q), r"dynamics must be a robot, such as rd.load\('ur5'\)"),
     ],
 )
 def test_what_means_nothing_is_refused(ask, message: str) -> None:

@@ -21,7 +21,7 @@ def test_an_effect_that_is_neither_a_torque_nor_a_bound_is_never_evaluated_and_s
         def torque(self, dynamics, t, q, v):
             return np.full_like(v, 7.0)
 
-    with pytest.raises(EffectError, match="neither a Force nor a Bound, so nothing would evaluate it; subclass"):
+    with pytest.raises(EffectError, match="neither a Force nor a Bound and would never be evaluated; subclass"):
         rd.Plant(ARM, [Wind()])
 
     class Gust(Active):

@@ -37,14 +37,14 @@ class Block(Value, ABC):
         s: states of the block, (state_size(n),)
         period_s: period of the loop, in [s]
 
-    and with symbols in place of these when the block is compiled; see `Controller`.
+    and with symbols instead of numbers when the block is compiled; see `Controller`.
 
     Attributes:
         term: Equation in short form.
-        linear: Whether the block affects small signals; if not, linearised loops omit it.
-        rounds: Whether the output may jump where the input does not; a class that omits this makes no claim.
-        random: Whether the states are standard normal deviates, redrawn at each tick.
-        differentiates: Whether the block derives velocity from the measured position if it is the first velocity block.
+        linear: True if the block affects small signals; otherwise linearised loops omit it.
+        rounds: True if the output may jump where the input does not; a class that omits this makes no claim.
+        random: True if the states are standard normal deviates, redrawn at each tick.
+        differentiates: True if it derives the velocity from the measured position, as the first velocity block.
     """
 
     term: ClassVar[str] = ""
@@ -65,11 +65,11 @@ class Block(Value, ABC):
         """Raise a ControlError if the block is not defined for a period."""
 
     def state_size(self, n: int) -> int:
-        """Number of states."""
+        """Return the number of states for a signal of n entries."""
         return 0
 
     def start(self, x: Array, period_s: float) -> Array:
-        """Return the states that a constant signal x leads to, (state_size(n),)."""
+        """Return the states in the steady state of a constant signal x, (state_size(n),)."""
         return x[:0]
 
     @abstractmethod
@@ -82,7 +82,7 @@ class Block(Value, ABC):
 
 
 def name_of(kind: type[Block]) -> str:
-    """The name of a class of blocks in snake case, such as "low_pass"."""
+    """Return the name of a class of blocks in snake case, such as "low_pass"."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", kind.__name__).lower()
 
 
@@ -113,7 +113,7 @@ class Noise(Block):
         deviation: σ, the standard deviation, a scalar or (n,), in the unit of the signal, not negative.
     """
 
-    # the time loop, which knows the tick, draws the deviates ξ from the counter (seed, run, tick, channel)
+    # the time loop draws the deviates ξ from the counter (seed, run, tick, channel)
     term = "y = x + σ ξ"
     linear, rounds, random = False, False, True
 
@@ -129,7 +129,7 @@ class Noise(Block):
 @final
 @dataclass(frozen=True, eq=False)
 class RateLimit(Block):
-    """Follows a signal by at most r T in a period T: y_k = y_{k−1} + min(max(x_k − y_{k−1}, −r T), r T).
+    """Limit on the change of a signal in a period T: y_k = y_{k−1} + min(max(x_k − y_{k−1}, −r T), r T).
 
     Torques start at 0.
 
@@ -161,8 +161,8 @@ class RateLimit(Block):
 class Differences(Block):
     """Backward difference of a signal over the period T: y_k = (x_k − x_{k−1}) / T.
 
-    At the first tick it is 0. As the first block of the velocity of a `Loop` it takes the measured position, after
-    the blocks of that. A quantised position makes it a multiple of Δ/T.
+    The output is 0 at the first tick. As the first velocity block of a `Loop`, its input is the output of the position
+    blocks. For a quantised position, the output is a multiple of Δ/T.
     """
 
     term = "y = (x − x₋)/T"

@@ -1,9 +1,9 @@
-"""The loop of a real controller: measurements are late and rounded, and commands act late and limited.
+"""The loop of a real controller: measurements are delayed and rounded, commands are delayed and limited.
 
     q, v at t_k − τ_m ─ blocks ─► q̂, v̂ ─ controller at t_k ─► blocks ─► u from t_k + τ_u on
 
-All of it is a map of the states z of a sampled controller: z holds the signals in delays, and the states of blocks.
-Whole periods of a delay are a queue of signals; the rest of a period is a second instant in each period:
+The loop is itself a sampled controller: its states z contain the delayed signals and the states of blocks. Whole
+periods of a delay are a queue of signals; the rest of a period is a second instant in each period:
 
     measured at t_k − τ_m: x_{k−d} of the instants t_k − (τ_m mod T);   acts from t_k + τ_u on: at t_{k+d} + (τ_u mod T)
 
@@ -28,15 +28,15 @@ from robot_dyn.foundations.errors import ControlError, shown
 from robot_dyn.foundations.threshold import smooth
 from robot_dyn.foundations.validate import integer, number
 
-SIGNALS = {"position": "rad", "velocity": "rad/s", "actuation": "N m"}  # of each line, the unit of what goes through it
+SIGNALS = {"position": "rad", "velocity": "rad/s", "actuation": "N m"}  # unit of the signal on each line
 LINES = tuple(SIGNALS)
-_LEAST = 1e-6  # of a period, between two instants
-_MOST = 1000  # periods of a delay: each is a state of every joint
-_ROUNDED = 1e-9  # of a period
+_LEAST = 1e-6  # smallest distance of two instants, in periods
+_MOST = 1000  # largest delay, in periods: each period adds a state to every joint
+_ROUNDED = 1e-9  # largest rounding of a delay, in periods
 
 
 class Instant(NamedTuple):
-    """A part of each period at which the loop measures, computes, or lets a torque act."""
+    """A point of each period, as a fraction, at which the loop measures, computes, or applies a torque."""
 
     part: float
     measures: bool
@@ -49,23 +49,23 @@ class Instant(NamedTuple):
 class Loop(Controller):
     """A sampled controller with delays, and blocks between it and the arm.
 
-    Delays are in periods T. The controller computes at t_k = k T, with the reference of that time and what was measured
-    at t_k − measurement_delay · T; its torque acts from t_k + actuation_delay · T on. Before the start the arm is
-    measured at its initial position and velocity, and the torque is 0 until the first one acts. The actuation of a run
-    is the torque that acts.
+    Delays are in periods T. The controller computes at t_k = k T, from the reference at that time and the measurement
+    at t_k − measurement_delay · T; its torque acts from t_k + actuation_delay · T. Measurements before the start are
+    the initial position and velocity, and the torque is 0 until the first command acts. The actuation of a run is the
+    acting torque.
 
     Attributes:
-        controller: A sampled controller, whose period is that of the loop.
+        controller: A sampled controller; its period is the period of the loop.
         position: Blocks of the measured position, in the order from the joints to the controller.
-        velocity: Blocks of the measured velocity; `Differences` as the first takes the position behind its blocks.
+        velocity: Blocks of the measured velocity; if the first is `Differences`, its input is the output of `position`.
         actuation: Blocks of the torque, in the order from the controller to the joints.
-        measurement_delay: Of position and velocity, in periods, not negative.
-        actuation_delay: Of the torque, from the start of its computation, in periods, not negative.
-        seed: Of noise, a whole number.
+        measurement_delay: Delay of position and velocity, in periods, not negative.
+        actuation_delay: Delay of the torque, from the start of its computation, in periods, not negative.
+        seed: Seed of the noise, an integer.
         run: Number of the run, which selects its noise; `rollouts` counts up from it.
 
     Raises:
-        ControlError: If the controller is continuous, or a loop itself, or a block or delay is not allowed.
+        ControlError: If the controller is continuous or a loop itself, or a block or a delay is invalid.
     """
 
     outermost: ClassVar[bool] = True
@@ -93,7 +93,7 @@ class Loop(Controller):
             object.__setattr__(self, name, integer(name, getattr(self, name), most=2**63 - 1, error=ControlError))
         super().__post_init__()
         self._check_blocks(self.period_s)
-        self.places  # noqa: B018  # while the controller in it has numbers: a trace puts symbols in their place
+        self.places  # noqa: B018  # cached now, while the controller has numbers: tracing replaces them by symbols
 
     def _check_blocks(self, period_s: float) -> None:
         for line, i, block in self.blocks:
@@ -110,7 +110,7 @@ class Loop(Controller):
 
     @cached_property
     def n(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Number of joints it drives."""
+        """Number of driven joints."""
         return self.controller.n
 
     @property
@@ -141,11 +141,11 @@ class Loop(Controller):
 
     @property
     def instants(self) -> tuple[float, ...]:
-        return tuple(each.part for each in self.ticks)
+        return tuple(instant.part for instant in self.ticks)
 
     @property
     def acting_instant(self) -> int:
-        return next(i for i, each in enumerate(self.ticks) if each.acts)
+        return next(i for i, instant in enumerate(self.ticks) if instant.acts)
 
     @property
     def deviates(self) -> int:
@@ -160,7 +160,7 @@ class Loop(Controller):
 
     @property
     def state_size(self) -> int:
-        return max((each.stop for each in self.places.values()), default=0)
+        return max((place.stop for place in self.places.values()), default=0)
 
     @cached_property
     def ticks(self) -> tuple[Instant, ...]:
@@ -169,12 +169,12 @@ class Loop(Controller):
 
     @property
     def differs(self) -> bool:
-        """Whether the velocity is derived from the measured position."""
+        """True if the velocity is derived from the measured position."""
         return bool(self.velocity) and self.velocity[0].differentiates
 
     @cached_property
     def places(self) -> dict[str, slice]:
-        """Places of the states in z, by name."""
+        """Slices of the states in z, by name."""
         n, several = self.n, len(self.ticks) > 1
         measured = n if self.differs else 2 * n
         whole = int(self.measurement_delay), int(self.actuation_delay)
@@ -222,23 +222,23 @@ class Loop(Controller):
         return z
 
 
-def _blocks(line: str, given: Any) -> tuple[Block, ...]:
-    """The blocks of a line, given as several or as one."""
-    blocks = (given,) if isinstance(given, Block) else given
-    if not isinstance(blocks, tuple | list) or not all(isinstance(each, Block) for each in blocks):
-        raise ControlError(f"{line} must be blocks, such as [rd.control.Quantisation(1e-4)], got {shown(given)}")
+def _blocks(line: str, value: Any) -> tuple[Block, ...]:
+    """Return the blocks of a line, from one block or a sequence."""
+    blocks = (value,) if isinstance(value, Block) else value
+    if not isinstance(blocks, tuple | list) or not all(isinstance(block, Block) for block in blocks):
+        raise ControlError(f"{line} must be blocks, such as [rd.control.Quantisation(1e-4)], got {shown(value)}")
     return tuple(blocks)
 
 
-# --- a tick: the torque that acts next, and the next states of the controller, delays and blocks
+# --- a tick: the next acting torque, and the next states of controller, delays and blocks
 
 
 def _tick(loop: Loop, t: float, q: Array, v: Array, z: Array) -> tuple[Array, Array]:
-    """Return the torque that acts from a tick on, and z⁺.
+    """Return the torque that acts from a tick onwards, and z⁺.
 
-    Before the first tick z = 0, which stands for q and v measured at all times before, and for no torque.
+    z = 0 means that no tick has happened: all earlier measurements were q and v, and the torque is 0.
     """
-    i, begun = _coming(loop, z), z[loop.places["begun"]]
+    i, begun = _instant_of(loop, z), z[loop.places["begun"]]
     if len(begun) and begun[0] < 0.5:
         z = _at_rest(loop, q, v, z)
     at, fresh = loop.ticks[i], q if loop.differs else np.concatenate([q, v])
@@ -258,8 +258,8 @@ def _tick(loop: Loop, t: float, q: Array, v: Array, z: Array) -> tuple[Array, Ar
     return u, np.concatenate([*states.values()])
 
 
-def _coming(loop: Loop, z: Array) -> int:
-    """Number of the instant of this tick, which z counts if there are several."""
+def _instant_of(loop: Loop, z: Array) -> int:
+    """Return the index of this tick's instant, which z counts if there are several."""
     i = 0
     while i < len(loop.ticks) - 1 and z[loop.places["instant"]][0] > i + 0.5:
         i += 1
@@ -267,7 +267,7 @@ def _coming(loop: Loop, z: Array) -> int:
 
 
 def _computed(loop: Loop, t: float, fresh: Array, states: dict[str, Array]) -> Array:
-    """Return the torque that leaves the whole periods of its delay, and advance `states`."""
+    """Return the torque delayed by the whole periods of its delay, and advance `states`."""
     newest = states["sample"] if len(states["sample"]) else fresh
     measured, states["past"] = shifted(newest, states["past"])
     q = _through(loop, "position", measured[: loop.n], states)
@@ -290,7 +290,7 @@ def _through(loop: Loop, line: str, x: Array, states: dict[str, Array]) -> Array
 
 
 def _at_rest(loop: Loop, q: Array, v: Array, z: Array) -> Array:
-    """Return the states of a loop in which q and v have been measured at all times, without torque."""
+    """Return the states of a loop that has always measured q and v, with zero torque."""
     states = {name: z[place] for name, place in loop.places.items()}
     fresh = q if loop.differs else np.concatenate([q, v])
     for name in ("sample", "past"):
@@ -303,7 +303,7 @@ def _at_rest(loop: Loop, q: Array, v: Array, z: Array) -> Array:
         if not block.random:
             states[name] = block.start(x, loop.period_s)
         elif line == "actuation":
-            continue  # no torque, no noise
+            continue  # zero torque has no noise
         signals[line] = block.output(x, states[name], loop.period_s)
     return np.concatenate([*states.values()])
 
@@ -318,22 +318,22 @@ def instants(measurement_delay: float, actuation_delay: float) -> tuple[Instant,
     parts = sorted({0.0, measured, acted})
     if (np.diff([*parts, 1.0]) < _LEAST).any():
         raise ControlError(
-            f"measurement_delay = {measurement_delay!r} and actuation_delay = {actuation_delay!r} make instants that"
-            f" lie closer together than {_LEAST:g} of a period; make them one, or move them apart"
+            f"measurement_delay = {measurement_delay!r} and actuation_delay = {actuation_delay!r} give two instants"
+            f" less than {_LEAST:g} periods apart; let them coincide, or move them further apart"
         )
     return tuple(Instant(part, part == measured, part == 0.0, part == acted) for part in parts)
 
 
-def delay(name: str, given: Any) -> float:
-    """Return a delay in periods, rounded to a whole number if it is that but for rounding."""
-    periods = number(name, given, error=ControlError)
+def delay(name: str, value: Any) -> float:
+    """Return a delay in periods, as a whole number if it differs from one only by rounding."""
+    periods = number(name, value, error=ControlError)
     if not 0 <= periods <= _MOST:
-        raise ControlError(f"{name} must be from 0 to {_MOST} periods, got {periods:g}; take another period")
+        raise ControlError(f"{name} must be from 0 to {_MOST} periods, got {periods:g}; choose another period")
     return float(round(periods)) if abs(periods - round(periods)) < _ROUNDED else periods
 
 
 def shifted(x: Array, past: Array) -> tuple[Array, Array]:
-    """Return what leaves a delay of whole periods when x enters it, and its content then, the newest first."""
+    """Return the output of a queue when x enters it, and its new content, newest first."""
     if not len(past):
         return x, past
     return past[-len(x) :], np.concatenate([x, past[: -len(x)]])

@@ -22,9 +22,9 @@ from robot_dyn.foundations.errors import ControlError, shown
 @final
 @dataclass(frozen=True, eq=False)
 class LowPass(Block):
-    """Butterworth low-pass filter of order 1 or 2, of gain 1 at rest and 1/√2 at the cutoff.
+    """Butterworth low-pass filter of order 1 or 2, with gain 1 at frequency 0 and 1/√2 at the cutoff.
 
-    It starts with the signal at rest.
+    It starts in the steady state of the first sample.
 
     Attributes:
         cutoff: ω, a scalar or (n,), in [rad/s], positive and less than π/period.
@@ -46,7 +46,7 @@ class LowPass(Block):
         if (np.asarray(self.cutoff) >= np.pi / period_s).any():
             raise ControlError(
                 f"cutoff must be less than π/period = {np.pi / period_s:.4g} rad/s at a period of {period_s:g} s, got"
-                f" {self.cutoff}; take a lower one, or a shorter period"
+                f" {self.cutoff}; lower the cutoff, or shorten the period"
             )
 
     def state_size(self, n: int) -> int:
@@ -70,7 +70,7 @@ class LowPass(Block):
         return np.concatenate([b[1] * x - a[0] * y + s[len(x) :], b[2] * x - a[1] * y])
 
     def _coefficients(self, period_s: float) -> tuple[list[Array], list[Array]]:
-        """Numerator b₀, b₁, … and denominator a₁, … of H in z⁻¹, with a₀ = 1."""
+        """Return numerator b₀, b₁, … and denominator a₁, … of H in z⁻¹, with a₀ = 1."""
         half = np.asarray(self.cutoff) * (period_s / 2)
         K = sin(half) / cos(half)
         if self.order == 1:

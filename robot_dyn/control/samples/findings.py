@@ -1,4 +1,4 @@
-"""What is doubtful in samples: units that are not stated, gaps, jumps, whole turns, limits passed, ends that move."""
+"""Findings about doubtful samples: missing units, gaps, jumps, whole turns, exceeded limits, moving ends, noise."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from robot_dyn.foundations.errors import PlanError
 
 _GAP = 5  # times the median time between samples
 _DEGREE = np.pi / 180
-_FAR = 1.5  # times the limit: beyond, positions may be in degrees
-_TURNS = 4 * np.pi  # the same for joints without limits, [rad]
-_MANY = 0.1  # of the samples: so many faster than their limit may be in degrees
-_SLOW, _SPEED = 0.01, np.pi  # of the velocity limit, or of so much without one: slower, times may be in [ms]
-_WHOLE = 1e-6  # from whole numbers
-_MOVES = 1e-6  # [rad] or [m]
-_LATE_S, _LATE = 1000.0, 10  # a later start, by so many durations, is that of a clock
-_ROUNDING = 1e-9  # of a limit that a sample may pass
-DENSE = 16  # samples from which ends at rest, noise, and an error, can be judged
-_AT_REST = 0.05  # of the largest speed of a joint
-_NOISY = 0.1  # part of the rms acceleration that noise may be
-_ROUNDED = 1e-12  # [rad] or [m]: float64, and no sensor
+_FAR = 1.5  # times the limit: positions beyond may be in degrees
+_TURNS = 4 * np.pi  # [rad]: the same for joints without limits
+_MANY = 0.1  # fraction of samples faster than the limit from which positions may be in degrees
+_SLOW, _SPEED = 0.01, np.pi  # fraction of the velocity limit (by default π) below which times may be in [ms]
+_WHOLE = 1e-6  # largest distance of times from integers
+_MOVES = 1e-6  # [rad] or [m]: a joint with a larger range moves
+_LATE_S, _LATE = 1000.0, 10  # [s] and durations: a later start is probably a clock time
+_ROUNDING = 1e-9  # rounding by which a sample may exceed a limit
+DENSE = 16  # smallest number of samples from which ends at rest, noise and errors can be judged
+_AT_REST = 0.05  # fraction of the largest speed of a joint
+_NOISY = 0.1  # largest fraction of noise in the rms acceleration
+_ROUNDED = 1e-12  # [rad] or [m]: rounding of float64, not noise of a sensor
 
 
 def refuse_other_units(table: Recorded) -> None:
-    """Raise PlanError if angles look like degrees, or times like [ms], and their columns state no unit."""
+    """Raise a PlanError if angles look like degrees, or times like [ms], and their columns state no unit."""
     t = table.t
     if len(t) < 2:
         return
     _refuse_degrees(table)
     if not table.of_time and np.abs(t - np.round(t)).max() <= _WHOLE and _slow(joined_turns(table).table):
         raise PlanError(
-            f"times look like ms, µs or ns: whole numbers, {np.median(table.dt):.6g} apart, and no joint reaches 1 %"
-            " of its speed; state the unit in the heading, as 't [ms]', or 't [s]' if they are not"
+            f"times may be in ms, µs or ns: they are integers, {np.median(table.dt):.6g} apart, and no joint reaches"
+            " 1 % of its speed limit; state the unit in the heading, such as 't [ms]' or 't [s]'"
         )
 
 
 def findings(turns: Turns, reference: PiecewisePolynomial, ends: str) -> Iterator[str]:
-    """Yield what is doubtful, in words, each with its remedy."""
+    """Yield a finding, in words, with its remedy, for each doubtful part of the samples or their spline."""
     table, arm = turns.table, turns.table.arm
     yield from _of_times(table, reference)
     position, velocity = extreme_values(reference), extreme_values(reference, 1)
@@ -60,8 +60,8 @@ def findings(turns: Turns, reference: PiecewisePolynomial, ends: str) -> Iterato
         if not jumps and velocity.largest[i] > (1 + _ROUNDING) * limit:
             at = velocity.at_greatest[i] if velocity.greatest[i] > -velocity.least[i] else velocity.at_least[i]
             yield (
-                f"{name} moves at {velocity.largest[i]:.4g} {unit}/s at {at:.6g} s, between samples that are no faster"
-                f" than its limit, {limit:.4g}; lengthen the times, or give more samples"
+                f"{name} moves at {velocity.largest[i]:.4g} {unit}/s at {at:.6g} s, although its samples are within the"
+                f" limit of {limit:.4g}; lengthen the times, or give more samples"
             )
         if not jumps and not outside:
             for q, t in ((position.least, position.at_least), (position.greatest, position.at_greatest)):
@@ -69,11 +69,12 @@ def findings(turns: Turns, reference: PiecewisePolynomial, ends: str) -> Iterato
                 yield from _outside(table, i, q[i], t[i], where, "give more samples there")
     yield from _noise(turns)
     if ends == "rest":
-        yield from (f"{what}, where the motion is at rest; ends='measured' moves as they do" for what in _ends(table))
+        moving = "although the motion starts and ends at rest; ends='measured' keeps the measured velocity"
+        yield from (f"{end}, {moving}" for end in _ends(table))
 
 
 def _refuse_degrees(table: Recorded) -> None:
-    """PlanError if angles without a stated unit are beyond the limits, and within them as degrees."""
+    """Raise a PlanError if angles without a stated unit are beyond the limits, but within them as degrees."""
     arm, unknown = table.arm, ~table.stated & table.given
     if not unknown.any():
         return
@@ -88,15 +89,15 @@ def _refuse_degrees(table: Recorded) -> None:
         i, others = int(of_degrees.argmax()), np.flatnonzero(unknown & ~of_degrees)
         name, remedy = arm.joint_names[i], "give unit='deg'"
         if len(others):
-            remedy += f" if those of {arm.joint_names[others[0]]} are, too, else head columns as '{name} [deg]'"
+            remedy += f" if those of {arm.joint_names[others[0]]} are, too, else write headings such as '{name} [deg]'"
         raise PlanError(
-            f"angles look like degrees: {name} is at up to {far[i]:.4g}, moving at up to {speed[:, i].max():.4g} a"
-            f" second; {remedy}, or unit='rad' if none are; --unit on the command line"
+            f"angles look like degrees: {name} reaches {far[i]:.4g}, at up to {speed[:, i].max():.4g} per second;"
+            f" {remedy}, or unit='rad' if all are in rad; --unit on the command line"
         )
 
 
 def _slow(table: Recorded) -> bool:
-    """Return True if some joint moves, and none reaches a hundredth of its speed."""
+    """Return True if a joint moves, but no joint reaches 1 % of its speed limit."""
     limit = np.where(np.isfinite(table.limit), table.limit, _SPEED)
     moves = (np.ptp(table.q, axis=0) > _MOVES).any()
     return bool(moves and (np.abs(table.speed).max(axis=0) < _SLOW * limit).all())
@@ -107,21 +108,21 @@ def _of_times(table: Recorded, reference: PiecewisePolynomial) -> Iterator[str]:
     middle, longest = float(np.median(dt)), int(dt.argmax())
     if gaps := int((dt > _GAP * middle).sum()):
         yield (
-            f"{gaps} gap{'s' * (gaps > 1)} in time, the longest of {dt[longest]:.4g} s from {t[longest]:.6g} s, where"
-            f" samples are {middle:.4g} s apart: the spline is a guess there; fill it in"
+            f"{gaps} gap{'s' * (gaps > 1)} in time, the longest of {dt[longest]:.4g} s from {t[longest]:.6g} s, while"
+            f" samples are {middle:.4g} s apart: the spline is a guess there; add samples"
         )
     if not table.of_time and (len(t) >= DENSE or middle > 1) and _slow(table):
         yield (
-            f"no joint reaches 1 % of its speed in {t[-1] - t[0]:.6g} s, samples are {middle:.4g} s apart: are the"
-            f" times in ms? state the unit in the heading, as 't [ms]' or 't [s]'"
+            f"no joint reaches 1 % of its speed limit in {t[-1] - t[0]:.6g} s, samples are {middle:.4g} s apart: are"
+            f" the times in ms? State the unit in the heading, such as 't [ms]' or 't [s]'"
         )
     start, duration = reference.start, reference.end - reference.start
     if start < 0 or start > max(_LATE_S, _LATE * duration):
-        yield f"the first sample is at {start:.10g} s, and runs begin at 0 s; start_s=0 begins there"
+        yield f"the first sample is at {start:.10g} s, but runs begin at 0 s; pass start_s=0 to shift the times"
 
 
 def turned(turns: Turns, i: int) -> Iterator[str]:
-    """Yield what was done about whole turns of a joint recorded within one turn."""
+    """Yield a finding about whole turns of a joint recorded within one turn: unwrapped, or unclear."""
     table, joined = turns.recorded, turns.joined[i]
     steps = (turns.steps if joined else turns.unclear)[:, i]
     if not steps.any():
@@ -132,34 +133,34 @@ def turned(turns: Turns, i: int) -> Iterator[str]:
     if joined:
         yield (
             f"{table.arm.joint_names[i]} jumps by a whole turn in {first}; all its samples lie within one turn, so the"
-            " angles were unwrapped: the joint turns on; give more samples there if it turned back"
+            " angles were unwrapped: the joint keeps turning; give more samples there if it turned back"
         )
     else:
         yield (
-            f"{table.arm.joint_names[i]} moves by more than half a turn in {first}; it may have turned either way, and"
-            " nothing was changed; give more samples there, or unwrap the angles"
+            f"{table.arm.joint_names[i]} moves by more than half a turn in {first}; the direction is ambiguous, so the"
+            " angles were not changed; give more samples there, or unwrap the angles"
         )
 
 
 def _jumps(turns: Turns, i: int) -> Iterator[str]:
-    """Yield the steps of a joint that are too fast: whole turns that were left, and others."""
+    """Yield findings about steps of a joint that are too fast: whole turns that were not joined, and others."""
     table, unit, limit = turns.table, turns.table.unit(i), turns.table.limit[i]
     speed, whole = np.abs(table.speed[:, i]), turns.steps[:, i] & ~turns.joined[i]
-    for steps, what, remedy in (
-        (whole, "jumps by a whole turn", "unwrap the angles if the joint turned on, as numpy.unwrap does"),
+    for steps, jump, remedy in (
+        (whole, "jumps by a whole turn", "unwrap the angles if the joint kept turning, for example by numpy.unwrap"),
         ((speed > limit) & ~whole, "jumps", "correct the sample, or lengthen the times"),
     ):
         if count := int(steps.sum()):
             k = int(np.where(steps, speed, 0).argmax())
             yield (
-                f"{table.arm.joint_names[i]} {what}: from {table.q[k, i]:.5g} to {table.q[k + 1, i]:.5g} {unit} in"
+                f"{table.arm.joint_names[i]} {jump}: from {table.q[k, i]:.5g} to {table.q[k + 1, i]:.5g} {unit} in"
                 f" {table.dt[k]:.4g} s at {table.t[k]:.6g} s, {speed[k]:.4g} {unit}/s of {limit:.4g} allowed, in"
                 f" {count} step{'s' * (count > 1)}; {remedy}"
             )
 
 
 def _outside(table: Recorded, i: int, q: float, t: float, where: str, remedy: str) -> Iterator[str]:
-    """Yield a position that is outside the limits of a joint."""
+    """Yield a finding if a position is outside the limits of a joint."""
     lower, upper = table.arm.lower[i], table.arm.upper[i]
     if max(lower - q, q - upper) > _ROUNDING:
         at = f"{table.arm.joint_names[i]} is at {q:.5g} {table.unit(i)} at {t:.6g} s"
@@ -167,29 +168,29 @@ def _outside(table: Recorded, i: int, q: float, t: float, where: str, remedy: st
 
 
 def refuse_moving_ends(table: Recorded) -> None:
-    """Raise PlanError if joints move at the ends of dense samples: a stop within one step takes torques of its own."""
-    for what in _ends(table):
+    """Raise a PlanError if joints move at the ends of dense samples: stopping in one step would need large torques."""
+    for end in _ends(table):
         raise PlanError(
-            f"{what}: say whether the samples are cut from a longer motion, ends='measured', or the motion stops there,"
-            " ends='rest'; --ends on the command line"
+            f"{end}: choose ends='measured' if the samples are part of a longer motion, ends='rest' if the motion stops"
+            " there; --ends on the command line"
         )
 
 
 def _ends(table: Recorded) -> Iterator[str]:
-    """Of dense samples the joint that moves fastest at the start, and at the end, unless all are nearly at rest."""
+    """Yield the joint that moves fastest at the start, and at the end, of dense samples, unless nearly at rest."""
     speed = np.abs(table.speed)
     for where, k in (("start", 0), ("end", -1)) if len(table.t) >= DENSE else ():
         i = int(speed[k].argmax())
         if speed[k, i] > _AT_REST * speed[:, i].max():
             name, unit = table.arm.joint_names[i], table.unit(i, "rad/s")
-            yield f"by its samples {name} moves at {speed[k, i]:.3g} {unit} at the {where}"
+            yield f"{name} moves at {speed[k, i]:.3g} {unit} at the {where} of the samples"
 
 
 def _noise(turns: Turns) -> Iterator[str]:
-    """The joint whose acceleration noise or rounding determines most; none with whole turns, which are not noise.
+    """Yield a finding about the joint whose acceleration noise affects most, if it does; whole turns are skipped.
 
-    Of a smooth motion fourth divided differences vanish with the step as its fourth power, beside those of independent
-    errors of deviation σ, which are σ times the norm of their weights; second ones are halves of accelerations.
+    Independent errors of deviation σ have fourth divided differences of σ times the norm of the weights, large against
+    those of a smooth motion at small steps. Second divided differences are halves of accelerations.
     """
     table = turns.table
     if len(table.t) < DENSE:
@@ -201,21 +202,21 @@ def _noise(turns: Turns) -> Iterator[str]:
     by_noise = 2 * noise * np.sqrt((norms_of_second**2).mean())
     with np.errstate(invalid="ignore", divide="ignore"):
         part = np.nan_to_num(np.minimum(by_noise / (2 * np.sqrt((second**2).mean(axis=0))), 1.0))
-    part[noise < _ROUNDED] = 0.0  # of joints that rest
+    part[noise < _ROUNDED] = 0.0  # joints at rest
     part[(turns.steps.any(axis=0) & ~turns.joined) | turns.unclear.any(axis=0)] = 0.0
     i = int(part.argmax())
     if part[i] > _NOISY:
         unit, others = table.unit(i), int((part > _NOISY).sum()) - 1
-        also = f" ({others} other joint{'s' * (others > 1)} alike)" * bool(others)
+        also = f" (and {others} other joint{'s' * (others > 1)})" * bool(others)
         yield (
-            f"{table.arm.joint_names[i]}{also}: noise or rounding of {noise[i]:.1g} {unit}, or times that are off, make"
+            f"{table.arm.joint_names[i]}{also}: noise or rounding of {noise[i]:.1g} {unit}, or inexact times, cause"
             f" accelerations of {by_noise[i]:.2g} {unit}/s², {part[i]:.0%} of those of the samples, and torques with"
-            " them; smooth the samples first, as scipy.signal.savgol_filter does"
+            " them; smooth the samples first, for example by scipy.signal.savgol_filter"
         )
 
 
 def _divided(table: Recorded, order: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return divided differences Σ_j w_j q_j of neighbours without gaps, (k, n), and norms of their weights w, (k,)."""
+    """Return divided differences Σ_j w_j q_j of neighbours without gaps, (k, n), and the norms of w, (k,)."""
     t = np.lib.stride_tricks.sliding_window_view(table.t, order + 1)
     t = t[np.diff(t).max(axis=1) <= _GAP * np.median(table.dt)]
     at = np.searchsorted(table.t, t)

@@ -1,4 +1,4 @@
-"""Samples as a motion to follow: the spline of degree 5 through them, and what is doubtful in them."""
+"""A motion from samples: the spline of degree 5 through them, with findings about doubtful samples."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from robot_dyn.foundations.validate import choice, instance, number
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import of_joint
 
-_ROUNDED = 0.01  # of the time between two samples: rounding of the times that is refused
+_ROUNDED = 0.01  # fraction of the time between two samples: larger rounding of the times raises an error
 
 
 def from_samples(
@@ -32,40 +32,40 @@ def from_samples(
     start_s: float | None = None,
     topic: str | None = None,
 ) -> Plan:
-    """The motion through samples of joint positions: a spline of degree 5, with four continuous derivatives.
+    """Return the motion through samples of joint positions: a spline of degree 5, with four continuous derivatives.
 
-    It passes through every sample: noise is not smoothed. How far it may be off between them is said by the spline
-    through every second sample, which misses the others by so much. What is doubtful is found and said: gaps in time,
-    steps faster than the velocity limits, whole turns, positions beyond the limits, noise, ends that are not at rest.
+    The spline passes through every sample: noise is not smoothed. Its error between samples is estimated by a spline
+    through every second sample, evaluated at the others. Findings report gaps in time, steps faster than the velocity
+    limits, whole turns, positions beyond the limits, noise, and ends that are not at rest.
 
     Angles of a continuous joint are unwrapped if all of them lie within one turn and every step of more than half a
-    turn is, without a whole turn, like the steps next to it; a finding names the first such step. Other angles are
-    taken as they are: whole turns of a joint with limits, or recorded over several turns, are findings.
+    turn is, without a whole turn, similar to its neighbours; a finding reports the first such step. Other angles are
+    not changed: whole turns of a joint with limits, or recorded over several turns, are findings.
 
     Args:
         arm: The robot.
         source: Path of a CSV file, a data frame, columns by heading in a dict, or an array (m, n) in the order of q.
-            Headings are names of joints, with or without a unit, as "elbow_joint [deg]", or those of
-            `rd.export`, as "q elbow_joint [rad]". Or path of an MCAP log (.mcap) with ROS 2 messages
-            sensor_msgs/msg/JointState, whose names are those of joints; needs the extra "data".
+            Headings are names of joints, with or without a unit, such as "elbow_joint [deg]", or the headings of
+            `rd.export`, such as "q elbow_joint [rad]". Or the path of an MCAP log (.mcap) with ROS 2 messages
+            sensor_msgs/msg/JointState that name the joints; this needs the extra "data".
         time: Heading of the times, with or without its unit, or the times, (m,), in [s], or the time between samples;
-            by default the column "t", "time" or "timestamp", with a unit of s, ms, µs or ns. Of a log
-            "header" or "log", counted from its first message: when its joints were measured, or it was logged; by
-            default the first if headers have times.
-        joints: Heading, with or without its unit, or name in a log, by joint, where they are not the names: then other
-            columns are left out.
-        unit: "rad" or "deg" of angles whose heading states none; "rad" by default, unless they look like degrees.
-        ends: "rest", with neither velocity nor acceleration at both ends; or "measured", as the samples have it: with
-            the velocities and accelerations of a run's table where it has them, else not-a-knot. By default "rest",
-            an error if 16 samples or more move there.
-        q0: Where joints without a column rest, (n,), in [rad] or [m]; by default each needs one.
-        start_s: Time of the first sample, in [s]; as given by default.
-        topic: Of a log; by default its only one of joint states, or "/joint_states".
+            by default the column "t", "time" or "timestamp", with a unit of s, ms, µs or ns. For a log, "header"
+            (when joints were measured) or "log" (when messages arrived), counted from the first message; by default
+            "header" if headers have times.
+        joints: Heading, with or without its unit, or name in a log, by joint, if these are not the names of joints;
+            other columns are then ignored.
+        unit: "rad" or "deg", for angles without a unit in the heading; "rad" by default, unless they look like degrees.
+        ends: "rest", with zero velocity and acceleration at both ends; or "measured", with the velocities and
+            accelerations of a run's table if it has them, else not-a-knot. By default "rest", which is an error if 16
+            or more samples move there.
+        q0: Rest positions of joints without a column, (n,), in [rad] or [m]; by default each joint needs a column.
+        start_s: Time of the first sample, in [s]; by default unchanged.
+        topic: Topic of a log; by default its only topic of joint states, or "/joint_states".
 
     Raises:
-        PlanError: If a column is missing or unknown, times do not increase, or angles look like degrees, or times like
-            ms, and no unit is given; if joints move at the ends, and `ends` is not given.
-        MissingExtraError: Of a log, without mcap and mcap-ros2-support.
+        PlanError: If a column is missing or unknown, times do not increase, angles look like degrees or times like ms
+            without a unit, or joints move at the ends and `ends` is not passed.
+        MissingExtraError: If a log needs mcap or mcap-ros2-support, and it is not installed.
     """
     instance("arm", arm, Robot, "give a robot, such as rd.load('ur5')", error=PlanError)
     if ends is not None:
@@ -89,18 +89,18 @@ def from_samples(
 
 
 def _shifted(t: np.ndarray, start_s: float) -> np.ndarray:
-    """Times that begin at start_s; PlanError if the steps between them are rounded away there."""
+    """Return times that begin at start_s; raise a PlanError if rounding changes the steps between them."""
     shifted = t - t[0] + start_s
     if (np.abs(np.diff(shifted) - np.diff(t)) > _ROUNDED * np.diff(t)).any():
         raise PlanError(
-            f"start_s is {start_s:g} s, where floating-point times are {np.spacing(abs(start_s)):.2g} s apart and"
-            f" samples {np.diff(t).min():.3g} s; give a smaller one"
+            f"start_s is {start_s:g} s, where floating-point times are {np.spacing(abs(start_s)):.2g} s apart, but"
+            f" samples {np.diff(t).min():.3g} s; give a smaller start_s"
         )
     return shifted
 
 
 def _method(arm: Robot, t: np.ndarray, q: np.ndarray, ends: str) -> str:
-    """How the motion was made, and how far every other sample is from the spline through the rest."""
+    """Describe the motion, and the error of a spline through every second sample at the others."""
     text = f"through {len(t)} samples, ends {'at rest' if ends == 'rest' else 'as measured'}"
     if len(t) < DENSE:
         return text

@@ -17,10 +17,10 @@ from robot_dyn.foundations.validate import choice, instance, number, numbers
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import of_joint
 
-_BESIDE = r"([vau]|tau|power|start|desired|deviation) .*|energy|residual|.* state \d+"
-_OF_A_RUN = re.compile(_BESIDE)  # headings beside t and q in the table of a run
-_LARGEST = 1e12  # [rad] or [m]: far beyond any joint, and no power of it overflows
-_STEPS = 1e-12, 1e15  # [s]: no fifth power of such a step vanishes or overflows
+# headings other than t and q in the table of a run
+_OF_A_RUN = re.compile(r"([vau]|tau|power|start|desired|deviation) .*|energy|residual|.* state \d+")
+_LARGEST = 1e12  # [rad] or [m]: far beyond any joint, and its powers do not overflow
+_STEPS = 1e-12, 1e15  # [s]: fifth powers of such steps neither vanish nor overflow
 _NAME_JOINTS = "joints={joint: column}, --joint JOINT=COLUMN on the command line"
 
 
@@ -32,12 +32,12 @@ class Recorded:
     Attributes:
         arm: The robot.
         t: Times, (m,), in [s].
-        q: Positions, (m, n), in [m], and in [rad] unless they are in degrees.
-        stated: Whether the unit of each joint is known, (n,).
-        given: Whether the table has a column of each joint, (n,); the others rest at q0.
-        of_time: Whether the unit of the times is known.
-        more: v and a, (m, n), if the table is that of a run.
-        note: Topic and times of a log.
+        q: Positions, (m, n), in [m] or [rad]; unconverted where the unit is unknown.
+        stated: True for joints with a known unit, (n,).
+        given: True for joints with a column, (n,); the others rest at q0.
+        of_time: True if the unit of the times is known.
+        more: v and a, (m, n), if the table is the export of a run.
+        note: Topic and origin of the times of a log.
     """
 
     arm: Robot
@@ -61,11 +61,11 @@ class Recorded:
 
     @property
     def limit(self) -> np.ndarray:
-        """Velocity limits of the arm, (n,), inf where its file states none, or 0."""
+        """Velocity limits of the arm, (n,), inf where its file states none or 0."""
         return np.where(self.arm.velocity_limit > 0, self.arm.velocity_limit, np.inf)
 
     def unit(self, joint: int, of: str = "rad") -> str:
-        """Return the unit of a joint, from that of one that turns."""
+        """Return the unit of a quantity of a joint; `of` is its unit for a revolute joint."""
         return of_joint(of, self.arm.joint_types[joint])
 
 
@@ -79,7 +79,7 @@ def recorded(
     topic: Any = None,
     least: int = 2,
 ) -> Recorded:
-    """Return the samples of a source, `least` or more; see `from_samples`."""
+    """Return the samples of a source, at least `least`; see `from_samples`."""
     if unit is not None:
         choice("unit", unit, ("rad", "deg"), error=PlanError)
     if joints is not None:
@@ -89,8 +89,8 @@ def recorded(
     at = _joints(arm, heads, joints)
     absent = [name for name in arm.joint_names if name not in at]
     if absent and (q0 is None or not at):
-        what, where = ("any joint", "") if q0 is not None else (", ".join(absent), ", or say where it rests by q0")
-        raise PlanError(f"there is no column of {what}; {nearest(absent[0], heads)}; name it by {_NAME_JOINTS}{where}")
+        names, rest = ("any joint", "") if q0 is not None else (", ".join(absent), ", or give its rest position in q0")
+        raise PlanError(f"there is no column of {names}; {nearest(absent[0], heads)}; name it by {_NAME_JOINTS}{rest}")
     rests = np.zeros(arm.n) if q0 is None else numbers("q0", q0, (arm.n,), error=PlanError)
     q, stated = np.tile(rests, (len(t), 1)), np.ones(arm.n, bool)
     for i, (name, kind) in enumerate(zip(arm.joint_names, arm.joint_types, strict=True)):
@@ -101,19 +101,19 @@ def recorded(
                 si = of_joint("rad", kind)
                 raise PlanError(
                     f"column {shown(head)}: sample {k + 1} is {q[k, i]:.3g} {si}, beyond {_LARGEST:g} {si};"
-                    " correct it, or leave it out"
+                    " correct or remove it"
                 )
     more = {} if joints is not None else _rates(arm, heads, unit)
     return Recorded(arm, t, q, stated, np.array([name in at for name in arm.joint_names]), of_time, more, table.note)
 
 
 def _times(table: Table, time: Any, least: int) -> tuple[dict[str, np.ndarray], np.ndarray, bool]:
-    """Return the other columns, the times in [s], and whether their unit is known."""
+    """Return the other columns, the times in [s], and True if their unit is known."""
     heads, stated = table.columns, True
     lengths = {len(x) if x.ndim == 1 else 0 for x in heads.values()}
     if len(lengths) != 1 or max(lengths) < least:
         counts = ", ".join(f"{shown(head)} {len(x) if x.ndim else 'no'}" for head, x in list(heads.items())[:4])
-        raise PlanError(f"samples: columns must be of one length, of {least} samples at least; got {counts or 'none'}")
+        raise PlanError(f"samples: columns must have equal lengths of at least {least}; got {counts or 'none'}")
     (m,) = lengths
     if table.t is not None:
         t = table.t
@@ -132,36 +132,36 @@ def _times(table: Table, time: Any, least: int) -> tuple[dict[str, np.ndarray], 
     with np.errstate(over="ignore", invalid="ignore"):
         steps = np.diff(t)
     for k in np.flatnonzero(steps <= 0)[:1]:
-        remedy = "sort them, or leave out what is there twice"
+        remedy = "sort the samples, or remove duplicates"
         if table.t is not None:
-            remedy = "take the other times, time='log' or time='header', or mend the log"
+            remedy = "use the other times, time='log' or time='header', or repair the log"
         raise PlanError(
-            f"times must increase: sample {k + 2} is at {t[k + 1]:.9g} s, the one before at {t[k]:.9g} s; {remedy}"
+            f"times must increase: sample {k + 2} is at {t[k + 1]:.9g} s, the previous one at {t[k]:.9g} s; {remedy}"
         )
     for k in np.flatnonzero(~((steps >= _STEPS[0]) & (steps <= _STEPS[1])))[:1]:
         raise PlanError(
-            f"times: sample {k + 2} is {steps[k]:.3g} s after the one before it; the time between samples must be"
+            f"times: sample {k + 2} is {steps[k]:.3g} s after the previous one; the time between samples must be"
             f" {_STEPS[0]:g} to {_STEPS[1]:g} s; check the unit of the times"
         )
     return heads, t, stated
 
 
 def _time_heading(heads: Mapping[str, np.ndarray], time: str | None) -> str:
-    """Return the requested heading of the times, or the only one that is named as times are."""
+    """Return the requested heading of the times, or the only heading with the name of a time."""
     if time is not None:
         return _heading(time, heads)
     named = [head for head in heads if name_of(head).lower() in TIME_NAMES]
     if len(named) == 1:
         return named[0]
-    what = f"there is no column of time; {nearest('t', heads)}"
+    fault = f"there is no column of time; {nearest('t', heads)}"
     if named:
-        what = f"{len(named)} columns may be the time, {', '.join(map(shown, named))}"
+        fault = f"{len(named)} columns may be the time, {', '.join(map(shown, named))}"
     remedy = "give time=…, a column, times, or a period in s; --time COLUMN or --period SECONDS on the command line"
-    raise PlanError(f"{what}; {remedy}")
+    raise PlanError(f"{fault}; {remedy}")
 
 
 def _heading(name: Any, heads: Mapping[str, np.ndarray]) -> str:
-    """Return the requested heading, given as it is or without its unit."""
+    """Return the requested heading, which may be passed without its unit."""
     without_unit = [head for head in heads if name_of(head) == name]
     if name not in heads and len(without_unit) == 1:
         return without_unit[0]
@@ -169,9 +169,9 @@ def _heading(name: Any, heads: Mapping[str, np.ndarray]) -> str:
 
 
 def _since_first(head: str, t: np.ndarray) -> np.ndarray:
-    """Return stamps, or spans, of any resolution as times in [s] from the first."""
+    """Return stamps or time spans of any resolution as times in [s] since the first."""
     for k in np.flatnonzero(np.isnat(t))[:1]:
-        raise PlanError(f"column {shown(head)}: sample {k + 1} is NaT; fill it in, or leave it out")
+        raise PlanError(f"column {shown(head)}: sample {k + 1} is NaT; fill it in, or remove the sample")
     return (t - t[0]).astype("timedelta64[ns]").astype(float) * 1e-9
 
 
@@ -192,22 +192,22 @@ def _joints(arm: Robot, heads: Mapping[str, np.ndarray], joints: Mapping[str, An
             continue
         name = name.removeprefix("q ").strip() if of_a_run else name
         if name not in arm.joint_names and name.lower() in TIME_NAMES:
-            others = "time= gives others, or --time or --period; leave one of them out"
-            raise PlanError(f"column {shown(head)} is of times, and {others}")
+            others = "time= (--time or --period) gives times, too; remove one of them"
+            raise PlanError(f"column {shown(head)} contains times, but {others}")
         if name not in arm.joint_names:
             close = nearest(name, arm.joint_names)
-            raise PlanError(f"column {shown(head)} is of no joint; {close}; choose columns by {_NAME_JOINTS}")
+            raise PlanError(f"column {shown(head)} is not a joint; {close}; choose columns by {_NAME_JOINTS}")
         if name in by_joint:
-            raise PlanError(f"columns {shown(by_joint[name])} and {shown(head)} are of one joint; keep one")
+            raise PlanError(f"columns {shown(by_joint[name])} and {shown(head)} belong to the same joint; keep one")
         by_joint[name] = head
     return by_joint
 
 
 def _rates(arm: Robot, heads: Mapping[str, np.ndarray], unit: str | None) -> dict[str, np.ndarray]:
-    """Return the rates v and a of a run's table, where it has them of all joints."""
+    """Return the rates v and a of a run's table, if it has them for all joints."""
     by_name = {name_of(head): head for head in heads}
     of_q = {unit_of(head) for name, head in by_name.items() if name.startswith("q ")} | {unit}
-    unknown = (None,) if of_q <= {None, "rad", "m"} else ()  # of rates beside angles in degrees, a unit is asked for
+    unknown = (None,) if of_q <= {None, "rad", "m"} else ()  # rates next to angles in degrees must state a unit
     rates = {}
     for key, units in (("v", ("rad/s", "m/s")), ("a", ("rad/s²", "m/s²"))):
         columns = [by_name[f"{key} {name}"] for name in arm.joint_names if f"{key} {name}" in by_name]
@@ -215,16 +215,16 @@ def _rates(arm: Robot, heads: Mapping[str, np.ndarray], unit: str | None) -> dic
             break
         for head in columns:
             if unit_of(head) not in (*unknown, *units):
-                raise PlanError(f"column {shown(head)}: is not in {' or '.join(units)}; state that, or leave it out")
+                raise PlanError(f"column {shown(head)} must be in {' or '.join(units)}; state the unit, or remove it")
         rates[key] = np.array([_finite(head, heads[head]) for head in columns]).T
     return rates
 
 
 def _finite(head: str, x: np.ndarray) -> np.ndarray:
-    """Return a column of finite numbers; PlanError names the first that is not."""
+    """Return a column of finite numbers; raise a PlanError about the first other entry."""
     if x.dtype.kind not in "fiu":
         odd = next((k for k, entry in enumerate(x.tolist()) if type(entry) not in (int, float)), 0)
-        raise PlanError(f"column {shown(head)} must hold numbers, sample {odd + 1} is {shown(x.tolist()[odd])}")
+        raise PlanError(f"column {shown(head)} must contain numbers, sample {odd + 1} is {shown(x.tolist()[odd])}")
     for k in np.flatnonzero(~np.isfinite(x))[:1]:
-        raise PlanError(f"column {shown(head)}: sample {k + 1} is {x[k]}; fill it in, or leave it out")
+        raise PlanError(f"column {shown(head)}: sample {k + 1} is {x[k]}; fill it in, or remove the sample")
     return x.astype(float)

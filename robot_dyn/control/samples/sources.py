@@ -23,17 +23,17 @@ _REMEDY = "give a CSV file in UTF-8 of at most 256 MiB, with columns t and the j
 
 
 def table_of(source: Any, joint_names: tuple[str, ...], joints: Mapping[str, Any], topic: Any, time: Any) -> Table:
-    """Return the columns of a source; of an array without headings, those of the joints.
+    """Return the columns of a source; the columns of an array without headings are the joints.
 
     Raises:
-        PlanError: If it cannot be read, or a column is there twice.
+        PlanError: If the source cannot be read, or has a column twice.
     """
     is_file, by_name = isinstance(source, str | Path), time is None or isinstance(time, str)
     if is_file and Path(source).suffix.lower() == SUFFIX:
         names = tuple(name for name in joints.values() if isinstance(name, str)) or joint_names
         return read_joint_states(source, names, topic, time)
     if topic is not None:
-        raise PlanError(f"topic={shown(topic)} is of an MCAP log, and the samples are not of one; leave it out")
+        raise PlanError(f"topic={shown(topic)} is for MCAP logs, but the samples are not from one; remove it")
     if is_file:
         return Table(_of_csv(source))
     if hasattr(source, "columns") and hasattr(source, "to_numpy"):
@@ -41,23 +41,23 @@ def table_of(source: Any, joint_names: tuple[str, ...], joints: Mapping[str, Any
     elif isinstance(source, Mapping):
         try:
             columns = {str(head): np.asarray(x) for head, x in source.items()}
-        except Exception:  # a ragged list, or whatever an object's conversion raises
+        except Exception:  # a ragged list, or any error in the conversion of an object
             raise PlanError(f"samples: columns must be arrays of one length, got {shown(source)}") from None
     else:
         rows = numbers("samples", source, ("m", len(joint_names)), error=PlanError)
         columns = dict(zip(joint_names, rows.T, strict=True))
     if by_name and time in TIMES and time not in columns:
-        raise PlanError(f"time={time!r} is of an MCAP log, and the samples are not of one; leave it out")
+        raise PlanError(f"time={time!r} is for MCAP logs, but the samples are not from one; remove it")
     return Table(columns)
 
 
 def _of_frame(frame: Any, *, indexed: bool) -> dict[str, np.ndarray]:
-    """Return the columns of a data frame and, if times are sought, its index if that is named as they are."""
+    """Return the columns of a data frame and, if `indexed`, its index if that has the name of a time."""
     heads = list(map(str, frame.columns))
     if twice := next((head for k, head in enumerate(heads) if head in heads[:k]), None):
-        raise PlanError(f"samples: column {shorten(twice)!r} is there twice; keep one")
+        raise PlanError(f"samples: column {shorten(twice)!r} appears twice; keep one")
     columns = {head: _values(frame[name]) for head, name in zip(heads, frame.columns, strict=True)}
-    index = getattr(frame, "index", None) if indexed else None  # of pandas
+    index = getattr(frame, "index", None) if indexed else None  # only pandas has one
     name = getattr(index, "name", None)
     if name is not None and name_of(str(name)).lower() in TIME_NAMES and str(name) not in columns:
         columns = {str(name): _values(index), **columns}
@@ -65,7 +65,7 @@ def _of_frame(frame: Any, *, indexed: bool) -> dict[str, np.ndarray]:
 
 
 def _values(column: Any) -> np.ndarray:
-    """Return a column as an array; stamps with a time zone, which to_numpy leaves as objects, as stamps of UTC."""
+    """Return a column as an array; stamps with a time zone, which to_numpy returns as objects, become UTC stamps."""
     if str(column.dtype).startswith("datetime64[ns, "):
         return column.to_numpy("datetime64[ns]")
     return column.to_numpy()
@@ -75,7 +75,7 @@ def _of_csv(path: str | Path) -> dict[str, np.ndarray]:
     """Return the columns of a CSV file by heading.
 
     Raises:
-        PlanError: If it cannot be read, has no samples, or an entry is not a number; it names file and line.
+        PlanError: If the file cannot be read, has no samples, or an entry is not a number; with file and line.
     """
     lines, rows = csv_rows(path, _MOST_BYTES, PlanError, _REMEDY), list[list[float | None]]()
     _, heads = next(lines)
@@ -85,31 +85,30 @@ def _of_csv(path: str | Path) -> dict[str, np.ndarray]:
         row = list(map(_number, texts))
         if None in row:
             k = row.index(None)
-            what = f"column {shorten(heads[k])!r} holds {shorten(texts[k])!r}"
-            raise PlanError(f"{where}: {what}, not a number; correct it")
+            raise PlanError(f"{where}: column {shorten(heads[k])!r}: {shorten(texts[k])!r} is not a number; correct it")
         rows.append(row)
     if not rows:
-        raise PlanError(f"{path}: has no samples below its first line")
+        raise PlanError(f"{path}: has no samples below its first line; give at least 2")
     return dict(zip(heads, np.array(rows, float).T, strict=True))
 
 
 def _wrong_headings(heads: list[str]) -> str:
-    """Return why a first line does not name columns that commas separate; empty if it does."""
+    """Return the fault of a first line that should name columns separated by commas; empty without a fault."""
     if not any(map(str.strip, heads)):
-        return f"is empty, or its first line is; {_REMEDY}"
+        return f"the file or its first line is empty; {_REMEDY}"
     if len(heads) == 1 and re.search(r"[;\t| ]", name_of(heads[0]).strip()):
         return (
-            f"has one column, {shorten(heads[0])!r}; separate columns by commas and write decimal points, or give"
-            " the data frame of pandas.read_csv(path, sep=…, decimal=…)"
+            f"there is only one column, {shorten(heads[0])!r}; separate columns by commas and write decimal points, or"
+            " pass the data frame of pandas.read_csv(path, sep=…, decimal=…)"
         )
     if None not in map(_number, heads):
-        return f"its first line holds numbers, {shorten(', '.join(heads))}; name the columns there"
+        return f"the first line contains numbers, {shorten(', '.join(heads))}; name the columns there"
     twice = next((head for k, head in enumerate(heads) if head in heads[:k]), None)
-    return "" if twice is None else f"column {shorten(twice)!r} is there twice; keep one"
+    return "" if twice is None else f"column {shorten(twice)!r} appears twice; keep one"
 
 
 def _number(text: str) -> float | None:
-    """Return the number that a text states, without the underscores that Python allows; None if it states none."""
+    """Return a text as a number; None if it is not one, or contains the underscores that Python allows."""
     try:
         return None if "_" in text else float(text)
     except ValueError:

@@ -1,6 +1,6 @@
-"""References from samples: the piecewise polynomial through positions at given times, and velocities and accelerations.
+"""References from samples: piecewise polynomials through positions, and optionally velocities and accelerations.
 
-    q                quintic spline, not-a-knot: four continuous derivatives, error O(Δ⁶) of smooth motions
+    q                quintic spline, not-a-knot: four continuous derivatives, error O(Δ⁶) for smooth motions
     q, v             Hermite's cubics: acceleration jumps at the samples, error O(Δ⁴)
     q, v, a          Hermite's quintics: acceleration is continuous, error O(Δ⁶)
 
@@ -17,39 +17,39 @@ import numpy as np
 from robot_dyn.control.reference import PiecewisePolynomial, hermite, increasing, numbers
 from robot_dyn.foundations.errors import ControlError
 
-_MISSED = 1e-6  # of the largest sample: rounding of a spline is far below, and one that fails is far off
+_MISSED = 1e-6  # relative to the largest sample: far above rounding, far below the error of a failed spline
 
 
 @final
 class Samples(PiecewisePolynomial):
-    """The motion through samples; it rests before the first and after the last.
+    """The motion through samples; it rests before the first sample and after the last.
 
-    Between samples it is a spline of degree 5 with four continuous derivatives (not-a-knot; through fewer than six
-    samples the one polynomial of least degree) where positions alone are given; Hermite's polynomial of degree 3 with
-    velocities, and of degree 5 with velocities and accelerations. Steps of integration end at its breaks, so that no
-    method loses its order there; they are no longer than the samples lie apart. It begins as fast as the spline does:
-    for a few way points from rest take `via_points`; for files, and for rest at both ends, `rd.control.from_samples`.
+    From positions alone it is a spline of degree 5 with four continuous derivatives (not-a-knot; for fewer than six
+    samples, the single polynomial of lowest degree). With velocities it consists of Hermite polynomials of degree 3,
+    with velocities and accelerations of degree 5. Integration steps end at the breaks, so methods keep their order;
+    steps are therefore at most as long as the time between samples. The velocity at the ends is not zero in general:
+    for a few way points from rest use `via_points`; for files, or rest at both ends, `rd.control.from_samples`.
 
     Args:
         t: Increasing times, shape (m,), m at least 2, in [s].
-        q: Positions, shape (m, n), in [rad] or [m]; unwrapped, since a jump by a whole turn is a motion here.
+        q: Positions, shape (m, n), in [rad] or [m]; unwrapped, because a jump by a whole turn is treated as a motion.
         v: Velocities, shape (m, n), in [rad/s] or [m/s].
-        a: Accelerations, shape (m, n), in [rad/s²] or [m/s²]; with v.
+        a: Accelerations, shape (m, n), in [rad/s²] or [m/s²]; they need v.
 
     Raises:
-        ControlError: If times do not increase, shapes do not match or accelerations are given without velocities; if
-            no spline passes through the samples in floating point, because times nearly coincide.
+        ControlError: If times do not increase, shapes do not match, a is passed without v, or times nearly coincide, so
+            that no spline passes through the samples in floating point.
     """
 
-    @np.errstate(all="ignore")  # what overflows is refused
+    @np.errstate(all="ignore")  # overflow raises an error
     def __init__(self, t: Any, q: Any, v: Any = None, a: Any = None) -> None:
         q = numbers("q", q, ("m", "n"))
         if len(q) < 2:
-            raise ControlError(f"q must be 2 samples at least, got {len(q)}; to rest at one, hold(q)")
+            raise ControlError(f"q: at least 2 samples are needed, got {len(q)}; to rest at one position, use hold(q)")
         t = increasing("t", t, len(q))
         if v is None:
             if a is not None:
-                raise ControlError("a is given without v; give both, or positions alone")
+                raise ControlError("a is given without v; give both, or only positions")
             super().__init__(*spline(t, q))
             return
         data = [q, numbers("v", v, q.shape)] + ([] if a is None else [numbers("a", a, q.shape)])
@@ -57,29 +57,30 @@ class Samples(PiecewisePolynomial):
         super().__init__(t, hermite(np.diff(t), np.concatenate([ends[:-1], ends[1:]], axis=1)))
 
 
-@np.errstate(all="ignore")  # what overflows is refused
+@np.errstate(all="ignore")  # overflow raises an error
 def spline(t: np.ndarray, q: np.ndarray, *, at_rest: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Breaks and coefficients of the spline of degree 5 through samples, or of degree m − 1 if there are fewer.
+    """Return breaks and coefficients of the spline through m samples, of degree 5 or, if m < 6, of degree m − 1.
 
-    Not-a-knot at the ends; or at rest there, with no velocity and no acceleration, which takes 2 samples.
+    The ends are not-a-knot; with `at_rest`, velocity and acceleration are 0 there, the degree is 5, and 2 samples
+    suffice.
 
     Raises:
-        ControlError: If it does not pass through the samples in floating point.
+        ControlError: If the spline does not pass through the samples in floating point.
     """
     from scipy.interpolate import make_interp_spline
 
-    unit = (t[-1] - t[0]) / (len(t) - 1)  # of time: derivatives of one size keep the solve well conditioned
+    unit = (t[-1] - t[0]) / (len(t) - 1)  # time unit: derivatives of similar size keep the solve well conditioned
     s, degree = (t - t[0]) / unit, 5 if at_rest else min(5, len(t) - 1)
     end = [(order, np.zeros(q.shape[1])) for order in (1, 2)]
     try:
         curve = make_interp_spline(s, q, k=degree, bc_type=(end, end) if at_rest else None)
-        inside = np.isin(s, curve.t)  # not-a-knot leaves out two samples next to each end; of even degree it is one
+        inside = np.isin(s, curve.t)  # not-a-knot omits two samples next to each end, for an even degree one
         inside[[0, -1]] = True
         starts = s[inside][:-1]
         terms = [curve.derivative(r)(starts) / factorial(r) if r else curve(starts) for r in range(degree + 1)]
         coefficients = np.stack(terms, axis=1) / unit ** np.arange(degree + 1)[:, None]
         missed = float(np.abs(curve(s) - q).max())
-    except (ValueError, np.linalg.LinAlgError):  # steps or samples that overflow, or vanish next to others
+    except (ValueError, np.linalg.LinAlgError):  # steps or samples overflow, or vanish next to others
         raise _without_spline(t, q, degree) from None
     if not (np.isfinite(coefficients).all() and missed <= _MISSED * float(np.abs(q).max())):
         raise _without_spline(t, q, degree)
@@ -87,10 +88,10 @@ def spline(t: np.ndarray, q: np.ndarray, *, at_rest: bool = False) -> tuple[np.n
 
 
 def _without_spline(t: np.ndarray, q: np.ndarray, degree: int) -> ControlError:
-    """The error of samples that no spline passes through in floating point."""
+    """Return the error for samples that no spline passes through in floating point."""
     steps = np.diff(t)
     return ControlError(
         f"no spline of degree {degree} passes through the samples in floating point: times are {steps.min():.3g} to"
-        f" {steps.max():.3g} s apart, and positions up to {np.abs(q).max():.3g}; leave out samples that nearly"
-        " coincide, and check the units"
+        f" {steps.max():.3g} s apart, and positions up to {np.abs(q).max():.3g}; remove samples that nearly coincide,"
+        " and check the units"
     )

@@ -1,4 +1,4 @@
-"""Tables: columns by heading, a name with a unit in brackets or parentheses, as "elbow_joint [deg]" or "t (ms)"."""
+"""Tables: columns by heading, a name with a unit in brackets or parentheses: "elbow_joint [deg]" or "t (ms)"."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TIME_NAMES = "t", "time", "timestamp", "stamp"
 
 
 class Table(NamedTuple):
-    """Columns by heading; of a log also its times, (m,), in [s], and a note on their origin."""
+    """Columns by heading; for a log also its times, (m,), in [s], and a note on their origin."""
 
     columns: dict[str, np.ndarray]
     t: np.ndarray | None = None
@@ -28,28 +28,28 @@ class Table(NamedTuple):
 
 
 def name_of(heading: str) -> str:
-    """The heading without its unit."""
+    """Return the heading without its unit."""
     match = _HEADING.fullmatch(heading)
     return match[1] if match else heading
 
 
 def unit_of(heading: str) -> str | None:
-    """The unit that a heading states."""
+    """Return the unit that a heading states; None if it states none."""
     match = _HEADING.fullmatch(heading)
     return ((match[2] or match[3] or "").strip() or None) if match else None
 
 
 def size(heading: str, kind: str, unit: str | None = None) -> tuple[float, bool]:
-    """The unit of a column in SI units, and whether it is stated, in the heading or by `unit` for angles.
+    """Return the unit of a column in SI units, and True if the heading, or `unit` for angles, states it.
 
     Raises:
         PlanError: If the unit is unknown, or the heading states another one than `unit`.
     """
-    stated, known = unit_of(heading), UNITS[kind]
+    stated, units = unit_of(heading), UNITS[kind]
     if stated is None:
-        return (known[unit], True) if kind == "angle" and unit else (1.0, kind == "length")
-    if stated not in known:
-        raise PlanError(f"column {shown(heading)}: the unit must be one of {', '.join(known)}")
-    if kind == "angle" and unit and known[unit] != known[stated]:
-        raise PlanError(f"column {shown(heading)} states another unit than unit={unit!r}; leave unit, --unit, out")
-    return known[stated], True
+        return (units[unit], True) if kind == "angle" and unit else (1.0, kind == "length")
+    if stated not in units:
+        raise PlanError(f"column {shown(heading)}: the unit must be one of {', '.join(units)}")
+    if kind == "angle" and unit and units[unit] != units[stated]:
+        raise PlanError(f"column {shown(heading)} states another unit than unit={unit!r}; remove unit (--unit)")
+    return units[stated], True

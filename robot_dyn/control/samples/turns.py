@@ -1,8 +1,8 @@
-"""Whole turns in recorded angles: which steps are one, and angles joined across them.
+"""Whole turns in recorded angles: detection, and angles unwrapped across them.
 
-A driver that reports angles between −π and π subtracts a whole turn where a joint turns on through π. Such a step is
-longer than half a turn, and without the turn it is as long as the steps next to it. Angles are joined only where the
-joint is continuous and all its samples lie within one turn; elsewhere the recorded motion may be meant.
+A driver that reports angles between −π and π subtracts a whole turn when a joint turns through π. Such a step is
+longer than half a turn; without the whole turn it is as long as its neighbours. Angles are unwrapped only if the joint
+is continuous and all its samples lie within one turn; otherwise the recorded motion may be intended.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ import numpy as np
 
 from robot_dyn.control.samples.recorded import Recorded
 
-_WITHIN = 2 * np.pi + 1e-3  # [rad]: one turn, with ends that were rounded to 3 decimals
-_LIKE = 0.1  # [rad], and twice the steps next to it: how far a step without its turn may be from those
-_MOST = np.pi / 2  # [rad], of the same
-_FAST = 1.5  # times the velocity limit: a step without its turn is no faster
+_WITHIN = 2 * np.pi + 1e-3  # [rad]: one turn, with ends rounded to 3 decimals
+_LIKE = 0.1  # [rad]: plus twice the neighbouring steps, the largest difference of a step without its turn from them
+_MOST = np.pi / 2  # [rad]: upper bound of that difference
+_FAST = 1.5  # times the velocity limit: the largest speed of a step without its turn
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """Samples that were searched for whole turns.
+    """Samples after a search for whole turns.
 
     Attributes:
         recorded: The samples as they were recorded.
-        table: The same with joined angles.
-        steps: Whether a step of the recorded samples is off by a whole turn, (m − 1, n).
-        unclear: Whether a step of a joint recorded within one turn may have gone either way, (m − 1, n).
-        joined: Whether the angles of a joint were joined, (n,).
+        table: The samples with unwrapped angles.
+        steps: True for recorded steps that are off by a whole turn, (m − 1, n).
+        unclear: True for steps of ambiguous direction, of joints recorded within one turn, (m − 1, n).
+        joined: True for joints whose angles were unwrapped, (n,).
     """
 
     recorded: Recorded
@@ -41,7 +41,7 @@ class Turns:
 
 
 def joined_turns(recorded: Recorded) -> Turns:
-    """Return the samples with the angles of continuous joints joined across whole turns, where these are certain."""
+    """Return the samples with the angles of continuous joints unwrapped where whole turns are certain."""
     steps, moved = whole_turns(recorded), np.diff(recorded.q, axis=0)
     continuous = np.array([kind == "continuous" for kind in recorded.arm.joint_types])
     within = continuous & (np.ptp(recorded.q, axis=0) <= _WITHIN)
@@ -54,25 +54,25 @@ def joined_turns(recorded: Recorded) -> Turns:
 
 
 def whole_turns(table: Recorded) -> np.ndarray:
-    """Return which steps of angles are off by a whole turn, (m − 1, n).
+    """Return True for steps of angles that are off by a whole turn, (m − 1, n).
 
-    Without the turn such a step is like one of the steps next to it, at their pace, or short if these are; with it, it
-    is not.
+    Without the turn such a step is similar to a neighbouring step at the same pace, or short if its neighbours are
+    short; with the turn it is not.
     """
     moved, dt = np.diff(table.q, axis=0), table.dt[:, None]
     count = np.round(moved / (2 * np.pi))
     short = moved - 2 * np.pi * count
-    left, right = _beside(short, dt)
+    left, right = _neighbours(short, dt)
     pace = np.nan_to_num(np.fmax(np.abs(left), np.abs(right)))
     off = np.fmin(np.abs(short - left), np.abs(short - right))
     off = np.fmin(off, np.where(pace < _MOST, np.abs(short), np.inf))
-    as_recorded = np.fmin(*(np.nan_to_num(np.abs(moved - step), nan=np.inf) for step in _beside(moved, dt)))
+    as_recorded = np.fmin(*(np.nan_to_num(np.abs(moved - step), nan=np.inf) for step in _neighbours(moved, dt)))
     like = (off <= np.minimum(_LIKE + 2 * pace, _MOST)) & (off < as_recorded / 2)
     angles = np.array([kind != "prismatic" for kind in table.arm.joint_types])
     return angles & (np.abs(moved) > np.pi) & (np.abs(count) == 1) & like & (np.abs(short) <= _FAST * table.limit * dt)
 
 
-def _beside(steps: np.ndarray, dt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the steps before and after each one at their pace, (m − 1, n) each; nan where there is none."""
+def _neighbours(steps: np.ndarray, dt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the steps that the previous and the next pace would give, both (m − 1, n); nan at the ends."""
     pace = np.pad(steps / dt, ((1, 1), (0, 0)), constant_values=np.nan)
     return pace[:-2] * dt, pace[2:] * dt
