@@ -1,4 +1,4 @@
-"""What a user notices of a compile: time, a line on stderr while it lasts, and Ctrl-C, which waits until it ends."""
+"""A message on stderr during long compilations, and Ctrl-C, delayed until compilation ends."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Timer
 
-_IN_TERMINAL_S, _IN_NOTEBOOK_S = 1.0, 2.0  # what is kept in a notebook's output should be worth a line
+_IN_TERMINAL_S, _IN_NOTEBOOK_S = 1.0, 2.0  # a notebook keeps the message in its output
 
 
 class _Compiling(threading.local):
-    """Time that this thread has spent on loading and compiling loops, in [s]; a run's first call does so."""
+    """Time that this thread has spent on loading and compiling loops, in [s]."""
 
     seconds = 0.0
 
@@ -22,13 +22,13 @@ COMPILING = _Compiling()
 
 
 @contextmanager
-def announced(what: str) -> Iterator[None]:
-    """Print what a block does if it takes long where a person watches: 1 s in a terminal, 2 s in a notebook."""
+def announced(message: str) -> Iterator[None]:
+    """Print a message if a block takes long and a person can see it: 1 s in a terminal, 2 s in a notebook."""
     after = _patience_s()
     if after is None:
         yield
         return
-    timer = Timer(after, lambda: print(f"robot_dyn: {what}", file=sys.stderr, flush=True))
+    timer = Timer(after, lambda: print(f"robot_dyn: {message}", file=sys.stderr, flush=True))
     timer.daemon = True
     timer.start()
     try:
@@ -38,7 +38,7 @@ def announced(what: str) -> Iterator[None]:
 
 
 def _patience_s() -> float | None:
-    """Time after which a line is printed; None where stderr is neither a terminal nor the output of a notebook."""
+    """Return the time after which a message is printed; None if stderr is neither a terminal nor a notebook."""
     if sys.stderr is None:
         return None
     if sys.stderr.isatty():
@@ -50,7 +50,7 @@ def _patience_s() -> float | None:
 def interrupts_later() -> Iterator[None]:
     """Delay Ctrl-C until the end of a block or function: callbacks from the C code of compilers cannot raise it.
 
-    Python delivers it to the main thread only; in others there is nothing to delay.
+    Python delivers it only to the main thread; other threads have nothing to delay.
     """
     handler = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(handler):

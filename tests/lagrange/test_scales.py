@@ -154,5 +154,5 @@ def test_compare_says_what_it_cannot_compare() -> None:
     )
     robot = rd.Robot(check(f'<robot name="indefinite">{text}</robot>'.encode(), "indefinite"))
     result = rd.compare(robot, samples=6)
-    assert result.notes[0] == "forward dynamics not compared at 4 of 6 states: M is not positive definite there"
+    assert result.notes[0] == "forward dynamics is not compared at 4 of 6 states, where M is not positive definite"
     assert result.ok
