@@ -24,7 +24,7 @@ from robot_dyn.model.robot import Robot
 
 
 def forward_dynamics_derivatives(robot: Robot, q: Array, v: Array, tau: Array) -> np.ndarray:
-    """The three derivatives, (..., 3, n, n).
+    """Return the three derivatives, (..., 3, n, n).
 
     Raises:
         QueryError: If an argument is wrong.
@@ -48,7 +48,7 @@ def _one(robot: Robot, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarra
 
 
 def _by_position(robot: Robot, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """∂ID/∂q of all joints, (N, N)."""
+    """Return ∂ID/∂q of all joints, (N, N)."""
     data, inertia = robot.model.createData(), robot.coriolis.bodies.inertia
     J, earlier = robot.coriolis.bodies.jacobians(data, q), np.tri(len(q), k=-1).T
     parts, base = J * v, _free_fall(robot, data, q)
@@ -64,7 +64,7 @@ def _by_position(robot: Robot, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> n
 
 
 def _free_fall(robot: Robot, data: Any, q: np.ndarray) -> np.ndarray:
-    """The base's acceleration −g as a twist of each body, (N, 6)."""
+    """Return the base's acceleration −g as a twist of each body, (N, 6)."""
     pin.forwardKinematics(robot.model, data, q)
     g = robot.model.gravity.linear
     return np.array([np.concatenate([-g @ placement.rotation, np.zeros(3)]) for placement in data.oMi[1:]])

@@ -1,4 +1,4 @@
-"""Compiled: a robot's equations as machine code, M(q) a + C(q, v) v + N(q) = τ."""
+"""A robot's equations as machine code, M(q) a + C(q, v) v + N(q) = τ."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class CompiledDynamics(Dynamics[np.ndarray], Parametrised):
     """A robot as machine code; each quantity is compiled on first use and checked against Pinocchio.
 
     Attributes:
-        original: The robot as given.
+        original: Robot passed by the user.
         dtype: np.float64 or np.float32, or its name; stored as the name.
         threads: Number of threads for batches; None for all processors.
-        cache: Whether compiled code is stored on disk.
+        cache: Store compiled code on disk.
     """
 
     original: Robot
@@ -45,7 +45,7 @@ class CompiledDynamics(Dynamics[np.ndarray], Parametrised):
     cache: bool = True
 
     def __post_init__(self) -> None:
-        instance("robot", self.original, Robot, "give a Robot, such as rd.load('ur5')")
+        instance("robot", self.original, Robot, "give a Robot, for example rd.load('ur5')")
         object.__setattr__(self, "dtype", _dtype(self.dtype))
         truth("cache", self.cache)
         thread_count(self.threads)
@@ -59,17 +59,17 @@ class CompiledDynamics(Dynamics[np.ndarray], Parametrised):
 
     @property
     def robot(self) -> Robot:
-        """The robot whose equations are compiled: `original`, with right angles given to full precision."""
+        """Robot whose equations are compiled: `original`, with right angles at full precision."""
         return self._completed[0]
 
     @property
     def right_angles(self) -> tuple[str, ...]:
-        """Descriptions of the angles that the file gives with too few digits and that are treated as right angles."""
+        """Angles that the file states with too few digits and that are treated as right angles, as text."""
         return tuple(map(str, self._completed[1]))
 
     @cached_property
     def engine(self) -> Engine:
-        """The kernels."""
+        """Kernels of the robot."""
 
         def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
             return np.asarray(self._otherwise(quantity)(*(state[name] for name in QUANTITIES[quantity].arguments))), 0.0
@@ -90,11 +90,11 @@ class CompiledDynamics(Dynamics[np.ndarray], Parametrised):
 
     @property
     def instructions(self) -> dict[str, dict[str, int]]:
-        """Number of instructions of each quantity used so far, by formulation; the smallest is first and compiled."""
+        """Number of instructions of each quantity used so far, by formulation; the first, smallest one is compiled."""
         return self.engine.instructions
 
     def served_by(self, quantity: str) -> str:
-        """The formulation compiled for a quantity; "Pinocchio" if the code would be too long to compile."""
+        """Return the formulation compiled for a quantity; "Pinocchio" if the code would be too long to compile."""
         if quantity not in QUANTITIES or not self.engine.worthwhile[quantity]:
             return "Pinocchio"
         return self.engine.traces[quantity].formulation
@@ -136,7 +136,7 @@ class CompiledDynamics(Dynamics[np.ndarray], Parametrised):
                 return y
         return self.engine.ask(name, state, out, errors, self._otherwise(name))
 
-    # --- queries of half a microsecond, without the call of `_answer`
+    # --- queries that take half a microsecond and skip `_answer`
 
     def inverse_dynamics(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: np.ndarray | None = None, errors: str = "raise"
@@ -157,22 +157,22 @@ class CompiledDynamics(Dynamics[np.ndarray], Parametrised):
     def forward_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, errors: str = "raise"
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
+        """Return ∂a/∂q, ∂a/∂v, ∂a/∂τ of forward dynamics, each (..., n, n): −M⁻¹ ∂ID/∂q, −M⁻¹ ∂ID/∂v, M⁻¹."""
         three = self._answer(_DERIVATIVES, (q, v, tau), None, errors)
         return three[..., 0, :, :], three[..., 1, :, :], three[..., 2, :, :]
 
     def _otherwise(self, quantity: str) -> Callable[..., Any]:
-        """Pinocchio's method for a quantity."""
+        """Return Pinocchio's method for a quantity."""
         if quantity == _DERIVATIVES:
             return partial(forward_dynamics_derivatives, self.robot)
         return getattr(self.robot, quantity)
 
 
-def _dtype(given: Any) -> str:
-    """Return the name of a NumPy dtype that machine code supports."""
-    name = given
-    if given is not None and not isinstance(given, str):
+def _dtype(dtype: Any) -> str:
+    """Return the name of a NumPy dtype that machine code supports; raise QueryError for any other."""
+    name = dtype
+    if dtype is not None and not isinstance(dtype, str):
         with suppress(Exception):  # a foreign object may raise anything
-            found = np.dtype(given)
-            name = found.name if found.isnative else given
+            resolved = np.dtype(dtype)
+            name = resolved.name if resolved.isnative else dtype
     return choice("dtype", name, ("float64", "float32"))

@@ -1,7 +1,7 @@
-"""The engine of a compiled robot or plant: each quantity is traced, compiled and checked on first use.
+"""Engine of a compiled robot or plant: each quantity is traced, compiled and checked on first use.
 
-A quantity of one state is one call of machine code. `ask` handles everything else: lists, batches, and states for
-which the kernel reports a doubt or an error.
+A quantity at one state is one call of machine code. `ask` handles everything else: lists, batches, and states for
+which the kernel reports doubt or an error.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from robot_dyn.queries.batch import DoubtError, answered, into
 from robot_dyn.queries.quantity import Quantity
 
 # Measured on chains: forward dynamics of 64 joints, 48 875 instructions, takes 8 s to compile; a batch is then 13 times
-# as fast as Pinocchio, one state from Python twice. The time grows as the count: above this, a quarter of a minute.
+# as fast as Pinocchio, one state from Python twice. The time is proportional to the count: 15 s at this limit.
 LARGEST_KERNEL = 100_000
-_FEW = 8  # states; for fewer a batch kernel is not worthwhile
+_FEW = 8  # states; a batch kernel is not worthwhile for fewer
 
 
 class SizeWarning(RobotDynWarning):
-    """Equations too long to be compiled: Pinocchio computes them instead."""
+    """Equations are too long to be compiled; Pinocchio computes them instead."""
 
 
 @final
@@ -43,19 +43,20 @@ class Engine:
     """Kernels by quantity.
 
     Attributes:
-        traced: Returns the trace of a quantity.
-        quantities: Those it computes, by name.
-        self_check: What kernels must agree with; its robot has the joints and the shapes.
-        truth: The independent result: (quantity, states) → (STATES, …), and the torque of effects, a term.
+        traced: Function that returns the trace of a quantity.
+        quantities: Quantities that it computes, by name.
+        self_check: Check of new kernels; its robot defines the joints and the shapes.
+        truth: Function that returns the independent result, (quantity, states) → (STATES, …), and the torque of
+            effects.
         dtype: "float64" or "float32".
-        threads: For batches.
-        store: Where compiled code is stored, or None.
-        parameters: What all states share, the last argument of each trace; none if it is empty.
-        singular: Whether M is singular everywhere: forward dynamics has no result, and `otherwise` raises the error.
-        coupled: Whether joints follow others: then far angles are left to `otherwise`, which knows what rounding
-            of theirs hides.
-        traces, worthwhile, kernels, ones, many: By quantity, on first use: its trace, whether it is small enough to be
-            compiled, its kernel, and that of one state and of batches, checked.
+        threads: Number of threads for batches.
+        store: Store of compiled code, or None.
+        parameters: Values shared by all states, the last argument of each trace unless empty.
+        singular: True if M is singular everywhere: forward dynamics has no result, and `otherwise` raises the error.
+        coupled: True if joints are coupled: angles beyond the range are then left to `otherwise`, which detects where
+            rounding makes positions inexact.
+        traces, worthwhile, kernels, ones, many: By quantity, on first use: its trace, True if it is short enough to be
+            compiled, its kernel, and the checked functions for one state and for batches.
     """
 
     traced: Callable[[str], Traced]
@@ -92,17 +93,17 @@ class Engine:
 
     @property
     def instructions(self) -> dict[str, dict[str, int]]:
-        """Instructions by formulation, of each quantity used so far; the shortest first, which is compiled."""
+        """Number of instructions of each quantity used so far, by formulation; the first, shortest one is compiled."""
         return {
             name: dict(sorted(trace.counts.items(), key=lambda item: item[1])) for name, trace in self.traces.items()
         }
 
     def shape(self, quantity: str) -> tuple[int, ...]:
-        """Shape of a quantity for one state, (1,) of a number."""
+        """Return the shape of a quantity for one state, (1,) for a number."""
         return self.quantities[quantity].shape(self.sizes) or (1,)
 
     def _is_worthwhile(self, quantity: str) -> bool:
-        """Whether a quantity is small enough to be compiled; a SizeWarning if not."""
+        """Return True if a quantity is short enough to be compiled; issue a SizeWarning otherwise."""
         if self.singular and self.quantities[quantity].solves:
             return False
         with log_if_slow(f"tracing {quantity} of {self.self_check.dynamics.name}"):
@@ -110,8 +111,8 @@ class Engine:
         if (count := trace.counts[trace.formulation]) <= LARGEST_KERNEL:
             return True
         warnings.warn(
-            f"{quantity} takes {count} instructions, more than the {LARGEST_KERNEL} that are worth compiling;"
-            f" {self.self_check.name} computes it, at its own speed",
+            f"{quantity} needs {count} instructions, more than the {LARGEST_KERNEL} that are worth compiling;"
+            f" {self.self_check.name} computes it, which is slower",
             SizeWarning,
             stacklevel=2,
         )
@@ -125,10 +126,10 @@ class Engine:
         errors: str,
         otherwise: Callable[..., Any],
     ) -> Any:
-        """A quantity in general: check the arguments, go through the batch, leave doubtful states to `otherwise`.
+        """Evaluate a quantity in general: check arguments, process batches, leave doubtful states to `otherwise`.
 
         Raises:
-            QueryError: If an argument is wrong; and what `otherwise` raises. Then `out` is left as it was.
+            QueryError: If an argument is wrong. Errors of `otherwise` are passed on. In both cases `out` is unchanged.
         """
         if (quick := self._plainly(quantity, arguments, out)) is not None:
             return quick
@@ -136,34 +137,34 @@ class Engine:
         timed = requested.arguments[0] == "t"
         arrays = {name: self._array(name, x) for name, x in zip(requested.arguments, arguments, strict=True)}
 
-        def equation(*given: np.ndarray) -> np.ndarray:
-            batch = np.broadcast_shapes(*(x.shape[:-1] for x in given))
+        def equation(*values: np.ndarray) -> np.ndarray:
+            batch = np.broadcast_shapes(*(x.shape[:-1] for x in values))
             alone = not batch
             if self.worthwhile[quantity]:
-                y = self._computed(quantity, given, batch)
+                y = self._computed(quantity, values, batch)
                 if y is not None:
                     return y
                 if not alone:
                     raise DoubtError
             elif timed and not alone:
-                raise DoubtError  # effects may take one time only
-            state = (float(given[0][0]), *given[1:]) if timed else given
+                raise DoubtError  # effects may accept only one time
+            state = (float(values[0][0]), *values[1:]) if timed else values
             return np.broadcast_to(np.asarray(otherwise(*state), self.dtype), (*batch, *shape))
 
         answer = answered(equation, arrays, shape, self.joint_names, errors, Float(np.dtype(self.dtype)))
         return into(out, answer if requested.axes else answer[..., 0][()])
 
-    def _computed(self, quantity: str, given: tuple[np.ndarray, ...], batch: tuple[int, ...]) -> np.ndarray | None:
-        """The kernel's results for a batch of states, or None if it reports a doubt."""
+    def _computed(self, quantity: str, arguments: tuple[np.ndarray, ...], batch: tuple[int, ...]) -> np.ndarray | None:
+        """Return the kernel's results for a batch of states, or None if it reports doubt."""
         flat = [
             np.ascontiguousarray(np.broadcast_to(x, (*batch, x.shape[-1])), self.dtype).reshape(-1, x.shape[-1])
-            for x in given
+            for x in arguments
         ]
         y = np.empty((*batch, *self.shape(quantity)), self.dtype)
         return y if self._run(quantity, flat, y.reshape(len(flat[0]), -1)) is Status.FINE else None
 
     def _plainly(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
-        """The result for arrays (B, n) that the kernel takes as they are, if it reports no doubt; otherwise None."""
+        """Return the result for plain arrays (B, n) if the kernel reports no doubt; otherwise None."""
         requested, states = self.quantities[quantity], getattr(arguments[-1], "shape", ())[:-1]
         if len(states) != 1 or states[0] <= _FEW or not requested.axes:
             return None
@@ -179,16 +180,16 @@ class Engine:
             arguments = (t, *arguments[1:])
         try:
             if all(type(x) is np.ndarray and x.flags.aligned for x in arguments):
-                # not `out`: a doubt may come after some rows
+                # not `out`: doubt may arise after some rows
                 y = np.empty((states[0], int(np.prod(shape))), self.dtype)
                 if self.many[quantity](arguments, y, self.threads) is Status.FINE:
                     return into(out, y.reshape(*states, *shape))
-        except (AttributeError, TypeError):  # not such arrays
+        except (AttributeError, TypeError):  # other objects
             pass
         return None
 
     def _array(self, name: str, x: Any) -> np.ndarray:
-        """An argument as an array; the kernel checks faster that its numbers are finite."""
+        """Convert an argument to an array; the kernel checks faster that its numbers are finite."""
         if name == "t":
             return times(name, x)[..., None]
         plain = x.__class__ is np.ndarray and x.dtype == self.dtype and x.shape[-1:] == (len(self.joint_names),)
@@ -209,17 +210,25 @@ class Engine:
         return Status(self.kernels[quantity].any_angle(*arguments))
 
     def _kernel(self, quantity: str) -> Kernel:
+        """Return the kernel of a quantity."""
         requested = self.quantities[quantity]
         times = requested.arguments[0] == "t"
         program = program_of(self.traces[quantity].function)
         about = f"{self.self_check.dynamics.name}: {quantity}, {self.dtype}"
         return Kernel(
-            program, self.shape(quantity), self.dtype, times, requested.doubtful, self.store, about, self.parameters,
-            not self.coupled,
-        )  # fmt: skip
+            program,
+            self.shape(quantity),
+            self.dtype,
+            times=times,
+            doubtful=requested.doubtful,
+            store=self.store,
+            about=about,
+            parameters=self.parameters,
+            takes_any_angle=not self.coupled,
+        )
 
     def _one(self, quantity: str) -> Any:
-        """The checked kernel for one state."""
+        """Return the checked kernel for one state."""
         if not self.worthwhile[quantity]:
             return _never
         kernel = self.kernels[quantity]
@@ -227,7 +236,7 @@ class Engine:
         return kernel.call
 
     def _many(self, quantity: str) -> Any:
-        """The checked kernel for batches."""
+        """Return the checked kernel for batches."""
         if not self.worthwhile[quantity]:
             return _never
         kernel = self.kernels[quantity]
@@ -241,9 +250,9 @@ class Engine:
         return kernel.many
 
     def _judge(self, quantity: str, run: Callable[[list[list[Any]], np.ndarray], Any]) -> None:
-        """Compare what `run` writes, which compiles it, with the independent result.
+        """Compare the result of `run`, which compiles the kernel, with the independent result.
 
-        It reports one Status, or one for each state.
+        `run` returns one Status, or one for each state.
         """
         with log_if_slow(f"compiling {quantity} of {self.self_check.dynamics.name}, once for these equations"):
             self._compare(quantity, run)
@@ -255,12 +264,12 @@ class Engine:
             [float(state[n][i]) if n == "t" else state[n][i].astype(self.dtype) for n in requested.arguments]
             for i in range(STATES)
         ]
-        ours = np.full((STATES, *self.shape(quantity)), np.nan, self.dtype)  # a state in doubt is not written
+        ours = np.full((STATES, *self.shape(quantity)), np.nan, self.dtype)  # doubtful states are not written
         answered = np.broadcast_to(np.equal(run(rows, ours), Status.FINE), STATES)
         theirs, effects = self.truth(quantity, state)
         self.self_check.judge(requested, ours.reshape(theirs.shape), theirs, self.dtype, effects, answered)
 
 
 def _never(*_: Any) -> int:
-    """In place of a kernel that is not worthwhile: `ask` takes over."""
+    """Stand in for a kernel that is not worthwhile, so that `ask` takes over."""
     return Status.SHAPE

@@ -1,7 +1,7 @@
-"""Kernels: the machine code of y = f(x₁, x₂, …) for one state, and for many in vectors on one thread or several.
+"""Kernels: machine code of y = f(x₁, x₂, …) for one state, and for many states in vectors and threads.
 
-Shapes, numbers that are not finite and results that are too large are checked in machine code too. A kernel reports a
-`Status`; the slow path finds the message.
+Machine code also checks shapes, finite arguments and the size of results. A kernel reports a `Status`; the slow path
+raises the error.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from robot_dyn.codegen.store.cache import Store
 from robot_dyn.codegen.store.keys import digest, sources_of_the_writer
 from robot_dyn.codegen.threads import shared
 
-# Instructions of vectors that a thread takes at a time, about 50 µs; fewer than _PIECES of these, and to wake a second
-# thread costs what it saves.
+# Vector instructions that a thread executes per piece, about 50 µs; below _PIECES of these, waking a second thread
+# takes as long as it saves.
 _PIECE, _PIECES = 600_000, 6
-_LARGEST = {"float64": 1e100, "float32": 1e18}  # as Robot: below, products do not overflow
+_LARGEST = {"float64": 1e100, "float32": 1e18}  # same as Robot: products of smaller numbers do not overflow
 
 
 @final
@@ -36,15 +36,15 @@ class Kernel:
     """A function of states as machine code, compiled on first use.
 
     Attributes:
-        program: Its instructions; its inputs are x₁, x₂, …, and the parameters if there are any.
+        program: Instructions; the inputs are x₁, x₂, …, and the parameters if there are any.
         shape: Shape of the result for one state.
         dtype: "float64" or "float32".
-        times: Whether the first input is a time: a number in `call`, (B, 1) in `many`.
+        times: True if the first input is a time: a number in `call`, (B, 1) in `many`.
         doubtful: Results whose absolute values sum to more are reported.
-        store: Where compiled code is stored, or None.
-        about: What it computes, shown to a reader of the store.
-        parameters: Numbers that all states share, (P,); two kernels that differ in them alone run the same code.
-        takes_any_angle: Whether `many` computes angles beyond the range of the vectorised sine too; otherwise it
+        store: Store of compiled code, or None.
+        about: Description for readers of the store.
+        parameters: Numbers shared by all states, (P,); kernels that differ only in these run the same code.
+        takes_any_angle: True if `many` also computes angles beyond the range of the vectorised sine; otherwise it
             reports them.
     """
 
@@ -60,7 +60,7 @@ class Kernel:
 
     @cached_property
     def call(self) -> Callable[..., int]:
-        """For one state, (x₁, …, y) → Status: arrays (nᵢ,), y of the shape of the result, C-contiguous.
+        """Function of one state, (x₁, …, y) → Status: C-contiguous arrays (nᵢ,), y of the shape of the result.
 
         It accepts any objects and reports those that are not such arrays.
         """
@@ -68,29 +68,29 @@ class Kernel:
 
     @cached_property
     def any_angle(self) -> Callable[..., int]:
-        """As `call`, with the sine and cosine of the C library, for angles beyond the range of the vectorised ones."""
+        """Same function as `call`, with the C library's sine and cosine, for angles beyond the vectorised range."""
         write = partial(self._write_state, any_angle=True)
         return self._function("one state, any angle", write)
 
     @property
     def state(self) -> int:
-        """Address of the function for one state that other machine code may call: pointers (x₁, …, y) → int64."""
+        """Address of the function of one state for other machine code: pointers (x₁, …, y) → int64."""
         return self._address("state", "one state", self._write_state)
 
     @cached_property
     def batch(self) -> Callable[..., int]:
-        """(x₁, …, y, start, stop) → Status, for states start … stop − 1 of arrays (B, nᵢ) and y (B, m)."""
+        """Function (x₁, …, y, start, stop) → Status, for states start … stop − 1 of arrays (B, nᵢ) and y (B, m)."""
         return self._function("batch", self._write_batch)
 
     @property
     def lanes(self) -> int:
-        """States that are computed side by side."""
+        """Number of states computed in one vector."""
         return lanes(self._kind)
 
     def many(self, inputs: Sequence[np.ndarray], y: np.ndarray, threads: int = 1) -> Status:
-        """Run a batch: inputs (B, nᵢ) and y (B, m), C-contiguous and of the kernel's dtype, else SHAPE is reported."""
+        """Run a batch: inputs (B, nᵢ) and y (B, m), C-contiguous and of the kernel's dtype; otherwise report SHAPE."""
         states, least = len(y), self.lanes
-        if states < least:  # they share one vector
+        if states < least:  # all states fit into one vector
             results = np.empty((least, y.shape[1]), y.dtype)
             status = self._run([np.resize(x, (least, x.shape[1])) for x in inputs], results, 0, least)
             y[:] = results[:states]
@@ -109,7 +109,7 @@ class Kernel:
         return Status(max(self.any_angle(*(x[i] for x in first), shaped[i]) for i in range(start, stop)))
 
     def assembly(self) -> str:
-        """The machine code of the batch, as text."""
+        """Return the machine code of the batch function as text."""
         return machine_code.assembly(self._write_batch, "batch")
 
     @property
@@ -121,13 +121,13 @@ class Kernel:
         return Limits(_LARGEST[self.dtype], self.doubtful)
 
     def _write_state(self, module: Any, name: str, any_angle: bool = False) -> None:
-        given = self.program, self._kind, self._limits, any_angle, self._parametrised
-        state = state_function(module, f"{name}state", *given)
+        settings = self.program, self._kind, self._limits, any_angle, self._parametrised
+        state = state_function(module, f"{name}state", *settings)
         write_state_entry(module, f"{name}call", state, self._of_states, self.shape, self.times, self._parametrised)
 
     def _write_batch(self, module: Any, name: str) -> None:
-        given = self.program, self._kind, self._limits, self._parametrised
-        batch = batch_function(module, f"{name}batch", *given)
+        settings = self.program, self._kind, self._limits, self._parametrised
+        batch = batch_function(module, f"{name}batch", *settings)
         outputs = len(self.program.outputs)
         write_batch_entry(module, f"{name}call", batch, self._of_states, outputs, self._parametrised)
 
@@ -137,13 +137,13 @@ class Kernel:
 
     @property
     def _of_states(self) -> tuple[int, ...]:
-        """Lengths of the inputs that states have."""
+        """Lengths of the inputs that vary between states."""
         return self.program.inputs[: len(self.program.inputs) - self._parametrised]
 
-    def _function(self, what: str, write: Callable[[Any, str], None]) -> Callable[..., int]:
-        return python_function(self._address("call", what, write), np.array(self.parameters, self.dtype).tobytes())
+    def _function(self, form: str, write: Callable[[Any, str], None]) -> Callable[..., int]:
+        return python_function(self._address("call", form, write), np.array(self.parameters, self.dtype).tobytes())
 
-    def _address(self, function: str, what: str, write: Callable[[Any, str], None]) -> int:
-        form = str(self.shape), self.dtype, str(self.times), repr(self.doubtful), str(self._parametrised)
-        key = digest([what, sources_of_the_writer(), str(self.program), *form])
-        return machine_code.addresses((function,), key, write, self.store, f"{self.about}, {what}")[0]
+    def _address(self, function: str, form: str, write: Callable[[Any, str], None]) -> int:
+        settings = str(self.shape), self.dtype, str(self.times), repr(self.doubtful), str(self._parametrised)
+        key = digest([form, sources_of_the_writer(), str(self.program), *settings])
+        return machine_code.addresses((function,), key, write, self.store, f"{self.about}, {form}")[0]

@@ -1,8 +1,8 @@
-"""The parameters of a plant and its controller: numbers that machine code takes as inputs, p, not as constants.
+"""Parameters of a plant and its controller: values that are inputs p of machine code, not constants.
 
-Coefficients of effects, gains, coefficients of references other than polynomials, gravity and payloads: changing one
-compiles nothing, and each may differ from run to run. Armature and the factor on all masses are inputs where they are
-swept, and so are mass and inertia of a single link; lengths are constants of the code.
+They are coefficients of effects, gains, coefficients of references other than polynomials, gravity and payloads.
+Changing one requires no compilation, and each may differ between runs. Armature, the scale of all masses, and mass and
+inertia of a single link are inputs only if they are swept; lengths are constants of the code.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ _PAYLOAD = {
 @final
 @dataclass(frozen=True, eq=False)
 class Parameter:
-    """One of the numbers, or one for each joint.
+    """A value, or one value for each joint.
 
     Attributes:
-        part: What it belongs to.
-        key: Its attribute there.
-        name: As users call it, such as "viscous_friction.damping", "kp" or "payload_mass:tool0".
-        value: As the part has it, one for each joint where it is of joints.
+        part: Part that it belongs to.
+        key: Attribute of the part.
+        name: Public name, such as "kp" or "payload_mass:tool0".
+        value: Value in the part, for each joint if it is a coefficient of joints.
         declared: Unit, sign and shape.
-        entries: Which of its entries, row by row, are inputs; the others are 0.
+        entries: Indices of the entries, row by row, that are inputs; the others are 0.
     """
 
     part: Part
@@ -58,12 +58,12 @@ class Parameter:
 
     @property
     def place(self) -> tuple[Any, ...]:
-        """Its place in machine code: two with the same one are the same input."""
+        """Key of its input in machine code: parameters with equal keys share the input."""
         return self.part, self.key, self.entries
 
     @property
     def size(self) -> int:
-        """Number of its entries that are inputs."""
+        """Number of entries that are inputs."""
         return len(self.entries)
 
 
@@ -73,9 +73,9 @@ class Numbered:
     """A robot with other numbers, of any arithmetic.
 
     Attributes:
-        description: Its file.
-        edits: Its edits, gravity and payloads of these numbers among them.
-        joint_names: In the order of q.
+        description: File of the robot.
+        edits: Edits of the robot, with gravity and payloads in these numbers.
+        joint_names: Names of the joints, in the order of q.
     """
 
     description: Description
@@ -86,39 +86,39 @@ class Numbered:
 def parameters(
     dynamics: Any, effects: Iterable[Effect], controller: Controller | None, swept: Collection[str] = ()
 ) -> tuple[Parameter, ...]:
-    """All parameters of a plant and its controller; of those that are swept, all entries are inputs.
+    """Return all parameters of a plant and its controller; all entries of swept ones are inputs.
 
-    Zeros of gravity and of payloads are constants otherwise: with gravity along z, the angle of a vertical first joint
+    Otherwise zeros of gravity and payloads are constants: with gravity along z, the angle of a vertical first joint
     does not matter, and its sine is not computed.
     """
     n = dynamics.n
-    known = [*_of_robot(dynamics, ROBOT, "", swept)]
+    result = [*_of_robot(dynamics, ROBOT, "", swept)]
     effects = tuple(effects)
     for i, name in enumerate(names_of(effects)):
-        known += _of_part(effects[i], ("effect", i), f"{name}.", n)
+        result += _of_part(effects[i], ("effect", i), f"{name}.", n)
     if controller is not None:
-        known += _of_part(controller, CONTROLLER, "", n)
+        result += _of_part(controller, CONTROLLER, "", n)
         for path, label, part in controller.parts:
-            known += _of_part(part, CONTROLLER, label, n, f"{path}.")
+            result += _of_part(part, CONTROLLER, label, n, f"{path}.")
         for name, reference in controller.references.items():
-            known += _of_part(reference, ("reference", name), f"{_named(name)}.", n)
+            result += _of_part(reference, ("reference", name), f"{_named(name)}.", n)
         for name, model in controller.models.items():
-            known += _of_robot(model, ("model", name), f"{_named(name)}.", swept)
-    return tuple(known)
+            result += _of_robot(model, ("model", name), f"{_named(name)}.", swept)
+    return tuple(result)
 
 
 def _named(path: str) -> str:
-    """The name in sweeps of what a controller holds: without that of a controller in a loop."""
+    """Return the name in sweeps of an attribute of a controller, without the prefix of a controller in a loop."""
     return path.removeprefix("controller.")
 
 
 def _of_part(part: Any, place: Part, prefix: str, n: int, path: str = "") -> Iterator[Parameter]:
-    for key, each in declared(type(part)).items():
+    for key, coefficient in declared(type(part)).items():
         value = getattr(part, key)
         if value is not None:
             value = np.asarray(value, dtype=float)
-            value = np.broadcast_to(value, (n,)) if each.of_joints else value
-            yield Parameter(place, path + key, prefix + key, value, each, tuple(range(value.size)))
+            value = np.broadcast_to(value, (n,)) if coefficient.of_joints else value
+            yield Parameter(place, path + key, prefix + key, value, coefficient, tuple(range(value.size)))
 
 
 def _of_robot(dynamics: Any, place: Part, prefix: str, swept: Collection[str]) -> Iterator[Parameter]:
@@ -126,40 +126,42 @@ def _of_robot(dynamics: Any, place: Part, prefix: str, swept: Collection[str]) -
     if not isinstance(robot, Robot):
         return
 
-    def parameter(key: str, name: str, value: Any, each: Coefficient) -> Parameter:
+    def parameter(key: str, name: str, value: Any, coefficient: Coefficient) -> Parameter:
         value = np.asarray(value, dtype=float)
         varies = name in swept or not value.ndim
-        return Parameter(place, key, name, value, each, tuple(i for i, x in enumerate(value.flat) if varies or x != 0))
+        return Parameter(
+            place, key, name, value, coefficient, tuple(i for i, x in enumerate(value.flat) if varies or x != 0)
+        )
 
     yield parameter("gravity", f"{prefix}gravity", robot.edits.gravity, _GRAVITY)
     for i, payload in enumerate(robot.edits.payloads):
-        for key, each in _PAYLOAD.items():
+        for key, coefficient in _PAYLOAD.items():
             name = f"{prefix}payload_{key}:{payload.frame}"
-            yield parameter(f"{i} {key}", name, getattr(payload, key), each)
+            yield parameter(f"{i} {key}", name, getattr(payload, key), coefficient)
     drives = dict(robot.edits.armature)
-    given = {"armature": [drives.get(joint, 0.0) for joint in robot.joint_names], "mass_scale": robot.edits.mass_scale}
-    for key, each in _WHEN_SWEPT.items():
+    values = {"armature": [drives.get(joint, 0.0) for joint in robot.joint_names], "mass_scale": robot.edits.mass_scale}
+    for key, coefficient in _WHEN_SWEPT.items():
         if f"{prefix}{key}" in swept:
-            yield parameter(key, f"{prefix}{key}", given[key], each)
-    named = {name for name in swept if name.startswith(prefix) and name.rpartition(".")[2] in _OF_LINK}
-    links = _of_links(robot) if named else {}
-    for name in sorted(named):
+            yield parameter(key, f"{prefix}{key}", values[key], coefficient)
+    selected = {name for name in swept if name.startswith(prefix) and name.rpartition(".")[2] in _OF_LINK}
+    links = _of_links(robot) if selected else {}
+    for name in sorted(selected):
         link, _, key = name.removeprefix(prefix).rpartition(".")
         if link in links:
             yield parameter(f"{key} {link}", name, links[link][key], _OF_LINK[key])
 
 
 def names_of(effects: Sequence[Effect]) -> list[str]:
-    """Their names, those of a kind numbered: "spring 1" and "spring 2"; both parts of an effect share one."""
-    kinds = [(type(each), each.name) for each in effects]
+    """Return the names of effects, numbered within a kind, as in "spring 1"; both parts of an effect share one."""
+    kinds = [(type(effect), effect.name) for effect in effects]
     return [
-        f"{each.name} {kinds[: i + 1].count(kind)}" if kinds.count(kind) > 1 else each.name
-        for i, (each, kind) in enumerate(zip(effects, kinds, strict=True))
+        f"{effect.name} {kinds[: i + 1].count(kind)}" if kinds.count(kind) > 1 else effect.name
+        for i, (effect, kind) in enumerate(zip(effects, kinds, strict=True))
     ]
 
 
 def link_parameters(dynamics: Any) -> tuple[str, ...]:
-    """Names of the masses and inertias of its links, as "panda_link3.mass"; they are parameters where swept."""
+    """Return the names of masses and inertias of all links, such as "panda_link3.mass": parameters if swept."""
     robot = getattr(dynamics, "robot", dynamics)
     if not isinstance(robot, Robot):
         return ()
@@ -169,15 +171,15 @@ def link_parameters(dynamics: Any) -> tuple[str, ...]:
 def sweepable_parameters(
     dynamics: Any, effects: Iterable[Effect], controller: Controller | None
 ) -> tuple[Parameter, ...]:
-    """The parameters that may be swept, those of links and of the controller's models included."""
+    """Return the parameters that may be swept, including those of links and of the controller's models."""
     prefixed = [("", dynamics)]
     prefixed += [(f"{_named(name)}.", model) for name, model in (controller.models if controller else {}).items()]
-    swept = [f"{prefix}{name}" for prefix, of in prefixed for name in (*_WHEN_SWEPT, *link_parameters(of))]
-    return tuple(each for each in parameters(dynamics, effects, controller, swept) if each.declared.swept)
+    swept = [f"{prefix}{name}" for prefix, arm in prefixed for name in (*_WHEN_SWEPT, *link_parameters(arm))]
+    return tuple(x for x in parameters(dynamics, effects, controller, swept) if x.declared.swept)
 
 
 def _of_links(robot: Robot) -> dict[str, dict[str, Any]]:
-    """Mass and inertia of each link that states some, by link, edited."""
+    """Return the edited mass and inertia of each link that states them, by link."""
     inertias = {}
     for link in tree_of(robot.description, replace(robot.edits, payloads=(), mass_scale="1")).links:
         for body in link.inertials:
@@ -189,29 +191,33 @@ def _of_links(robot: Robot) -> dict[str, dict[str, Any]]:
 Values = Mapping[Part, Mapping[str, Any]]
 
 
-def split(known: Iterable[Parameter], values: Any) -> dict[Part, dict[str, Any]]:
-    """The values of parameters, one row after the other, by part and attribute."""
+def split(parameters: Iterable[Parameter], values: Any) -> dict[Part, dict[str, Any]]:
+    """Split values of parameters, row after row, into values by part and attribute."""
     parts: dict[Part, dict[str, Any]] = {}
     start = 0
-    for each in known:
-        inputs = values[start : start + each.size]
-        own = np.zeros(each.value.size, dtype=inputs.dtype).view(type(inputs))
-        own[list(each.entries)] = inputs
-        parts.setdefault(each.part, {})[each.key] = own.reshape(each.value.shape) if each.value.ndim else own[0]
-        start += each.size
+    for parameter in parameters:
+        inputs = values[start : start + parameter.size]
+        own = np.zeros(parameter.value.size, dtype=inputs.dtype).view(type(inputs))
+        own[list(parameter.entries)] = inputs
+        parts.setdefault(parameter.part, {})[parameter.key] = (
+            own.reshape(parameter.value.shape) if parameter.value.ndim else own[0]
+        )
+        start += parameter.size
     return parts
 
 
-def joined(known: Iterable[Parameter]) -> np.ndarray:
-    """The values of all parameters, one row after the other."""
-    return np.concatenate([*(each.value.ravel()[list(each.entries)] for each in known), np.zeros(0)])
+def joined(parameters: Iterable[Parameter]) -> np.ndarray:
+    """Return the values of all parameters, row after row."""
+    return np.concatenate(
+        [*(parameter.value.ravel()[list(parameter.entries)] for parameter in parameters), np.zeros(0)]
+    )
 
 
 def described(robot: Described, values: Mapping[str, Any]) -> Numbered:
-    """A robot with other gravity, payloads, armature, factor on its masses, and masses and inertias of links."""
+    """Return a robot with other gravity, payloads, armature, mass scale, and masses and inertias of links."""
     payloads = tuple(
-        with_values(each, {key: _literal(values[f"{i} {key}"]) for key in _PAYLOAD if f"{i} {key}" in values})
-        for i, each in enumerate(robot.edits.payloads)
+        with_values(payload, {key: _literal(values[f"{i} {key}"]) for key in _PAYLOAD if f"{i} {key}" in values})
+        for i, payload in enumerate(robot.edits.payloads)
     )
     edits = {"payloads": payloads} | {key: _literal(values[key]) for key in ("gravity", "mass_scale") if key in values}
     if "armature" in values:
@@ -224,45 +230,47 @@ def described(robot: Described, values: Mapping[str, Any]) -> Numbered:
 
 
 def _literal(values: Any) -> Any:
-    """A number, or nested tuples of an array."""
+    """Return a number, or the nested tuples of an array."""
     return tuple(map(_literal, values)) if np.ndim(values) else values
 
 
 def with_numbers(dynamics: Any, values: Mapping[str, Any]) -> Any:
-    """The robot of a dynamics with other gravity and payloads; itself without any."""
+    """Return the robot of a dynamics with other numbers; the dynamics itself without any."""
     if not values:
         return dynamics
     robot = getattr(dynamics, "robot", dynamics)
     return Robot(robot.description, described(robot, values).edits)
 
 
-def rows(known: Iterable[Parameter], name: str) -> np.ndarray:
-    """The rows of the parameters of a name, those of one after those of the other, (k, size)."""
-    ends = np.cumsum([0, *(each.size for each in known)])
-    return np.array([np.arange(a, a + each.size) for each, a in zip(known, ends, strict=False) if each.name == name])
+def rows(parameters: Iterable[Parameter], name: str) -> np.ndarray:
+    """Return the rows of the parameters of one name, one parameter per line, (k, size)."""
+    ends = np.cumsum([0, *(parameter.size for parameter in parameters)])
+    pairs = zip(parameters, ends, strict=False)
+    return np.array([np.arange(a, a + parameter.size) for parameter, a in pairs if parameter.name == name])
 
 
-def with_parameters(plant: Plant, controller: Controller | None, given: Mapping[str, Any]) -> tuple[Plant, Any]:
-    """A plant and its controller with other values of parameters, each (size,) by name; numbers that were checked."""
-    known = parameters(plant.dynamics, plant.effects, controller, given)
-    values = joined(known)
-    for name, value in given.items():
-        values[rows(known, name)] = value
-    changed = {each.part for each in known if each.name in given}
-    of = {part: each for part, each in split(known, values).items() if part in changed}
-    effects = [with_values(each, of.get(("effect", i), {})) for i, each in enumerate(plant.effects)]
+def with_parameters(plant: Plant, controller: Controller | None, new_values: Mapping[str, Any]) -> tuple[Plant, Any]:
+    """Return a plant and its controller with other values of parameters, each (size,) by name; not checked here."""
+    declared_parameters = parameters(plant.dynamics, plant.effects, controller, new_values)
+    values = joined(declared_parameters)
+    for name, value in new_values.items():
+        values[rows(declared_parameters, name)] = value
+    changed = {parameter.part for parameter in declared_parameters if parameter.name in new_values}
+    by_part = {part: attributes for part, attributes in split(declared_parameters, values).items() if part in changed}
+    effects = [with_values(effect, by_part.get(("effect", i), {})) for i, effect in enumerate(plant.effects)]
     if controller is not None:
-        replaced = dict(of.get(CONTROLLER, {}))
-        replaced |= {name: with_numbers(each, of.get(("model", name), {})) for name, each in controller.models.items()}
+        replaced = dict(by_part.get(CONTROLLER, {}))
+        models = controller.models.items()
+        replaced |= {name: with_numbers(model, by_part.get(("model", name), {})) for name, model in models}
         controller = with_values(controller, replaced)
-    return Plant(with_numbers(plant.dynamics, of.get(ROBOT, {})), effects), controller
+    return Plant(with_numbers(plant.dynamics, by_part.get(ROBOT, {})), effects), controller
 
 
-def over_runs(plant: Plant, controller: Controller | None, given: Mapping[str, Any]) -> tuple[tuple[Effect, ...], Any]:
-    """Effects and controller with arrays over runs, (B, size) by name, as their coefficients: to read, not to run."""
-    of: dict[Part, dict[str, Any]] = {}
-    for each in parameters(plant.dynamics, plant.effects, controller):
-        if each.name in given:
-            of.setdefault(each.part, {})[each.key] = given[each.name]
-    effects = tuple(with_values(each, of.get(("effect", i), {})) for i, each in enumerate(plant.effects))
-    return effects, None if controller is None else with_values(controller, of.get(CONTROLLER, {}))
+def over_runs(plant: Plant, controller: Controller | None, values: Mapping[str, Any]) -> tuple[tuple[Effect, ...], Any]:
+    """Return effects and controller whose coefficients are arrays over runs, (B, size) by name; for reading only."""
+    by_part: dict[Part, dict[str, Any]] = {}
+    for parameter in parameters(plant.dynamics, plant.effects, controller):
+        if parameter.name in values:
+            by_part.setdefault(parameter.part, {})[parameter.key] = values[parameter.name]
+    effects = tuple(with_values(effect, by_part.get(("effect", i), {})) for i, effect in enumerate(plant.effects))
+    return effects, None if controller is None else with_values(controller, by_part.get(CONTROLLER, {}))

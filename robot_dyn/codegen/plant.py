@@ -1,7 +1,7 @@
-"""CompiledPlant: a plant as machine code, M(q) a + C(q, v) v + N(t, q, v) = τ, effects and bounds in the kernel.
+"""A plant as machine code, M(q) a + C(q, v) v + N(t, q, v) = τ, with effects and bounds in the kernel.
 
-The effects are traced from the code that the interpreted plant runs; other effects are not in the kernel.
-Coefficients, gravity and payloads are inputs of the kernel: plants that differ only in these share compiled code.
+Effects are traced from the code of the interpreted plant. Coefficients, gravity and payloads are inputs of the kernel:
+plants that differ only in these share compiled code.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.model.robot import Robot
 from robot_dyn.queries.dynamics import PLANT
 
-_TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.ask` handles others
+_TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.ask` handles all others
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class CompiledPlant:
     """A plant as machine code; each quantity is compiled on first use and checked against the interpreted plant.
 
     Attributes:
-        plant: The plant.
+        plant: Plant passed by the user.
         dynamics: Compiled rigid-body dynamics of the plant.
     """
 
@@ -50,19 +50,17 @@ class CompiledPlant:
 
     @cached_property
     def interpreted(self) -> Plant:
-        """The plant whose equations are compiled: `plant`, with right angles given to full precision."""
+        """Plant whose equations are compiled: `plant`, with right angles at full precision."""
         return Plant(self.dynamics.robot, self.plant.effects)
 
     @cached_property
     def engine(self) -> Engine:
-        """The kernels."""
+        """Kernels of the plant."""
 
         def truth(quantity: str, state: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
             rows = [[state[name][i] for name in PLANT[quantity].arguments] for i in range(len(state["t"]))]
             times = zip(state["t"], state["q"], state["v"], strict=True)
-            effects = np.array(
-                [np.broadcast_to(self.interpreted.torque(*each), state["q"].shape[1:]) for each in times]
-            )
+            effects = np.array([np.broadcast_to(self.interpreted.torque(*x), state["q"].shape[1:]) for x in times])
             method = getattr(self.interpreted, quantity)
             return np.array([np.broadcast_to(method(*row), state["q"].shape[1:]) for row in rows]), effects
 
@@ -74,7 +72,7 @@ class CompiledPlant:
             self.dynamics.dtype,
             self.dynamics.engine.threads,
             self.dynamics.engine.store,
-            joined(self._known),
+            joined(self._parameters),
         )
 
     @property
@@ -86,11 +84,11 @@ class CompiledPlant:
     def instructions_by_effect(self) -> dict[str, int]:
         """Number of instructions of each effect, compiled separately."""
         (t, ts), (q, qs), (v, vs), _ = self._inputs
-        given = [t, q, v, *self._numbers[0]]
+        arguments = [t, q, v, *self._numbers[0]]
         counts: dict[str, int] = {}
         torques = self._symbolic.equation_of_motion.torques(ts[0], qs, vs)
         for effect, torque in zip(self.plant.forces, torques, strict=True):
-            function = ca.Function("f", given, [ca.cse(ca.densify(column(torque)))])
+            function = ca.Function("f", arguments, [ca.cse(ca.densify(column(torque)))])
             counts[effect.name] = counts.get(effect.name, 0) + instructions(function)
         return counts
 
@@ -105,31 +103,31 @@ class CompiledPlant:
         return self.dynamics.joint_names
 
     def M(self, q: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        """Mass matrix, (..., n, n)."""
+        """Return the mass matrix, (..., n, n)."""
         return self.dynamics.M(q, out=out, errors=errors)
 
     def C(self, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        """Coriolis matrix, (..., n, n)."""
+        """Return the Coriolis matrix, (..., n, n)."""
         return self.dynamics.C(q, v, out=out, errors=errors)
 
     def N(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        """Forces that actuation must overcome: N = ∂V/∂q − Σ τ_effect, (..., n)."""
+        """Return the forces that actuation must overcome, N = ∂V/∂q − Σ τ_effect, (..., n)."""
         return self._ask("N", (t, q, v), out, errors)
 
     def torque(self, t: Any, q: Array, v: Array, *, out: np.ndarray | None = None, errors: str = "raise") -> Any:
-        """Σ τ_effect, (..., n)."""
+        """Return Σ τ_effect, (..., n)."""
         return self._ask("torque", (t, q, v), out, errors)
 
     def inverse_dynamics(
         self, t: Any, q: Array, v: Array, a: Array, *, out: np.ndarray | None = None, errors: str = "raise"
     ) -> Any:
-        """Actuation τ = M a + C v + N that gives the acceleration a, (..., n)."""
+        """Return the actuation τ = M a + C v + N for the acceleration a, (..., n)."""
         return self._ask("inverse_dynamics", (t, q, v, a), out, errors)
 
     def forward_dynamics(
         self, t: Any, q: Array, v: Array, u: Array, *, out: np.ndarray | None = None, errors: str = "raise"
     ) -> Any:
-        """Acceleration under the actuation u, (..., n)."""
+        """Return the acceleration under the actuation u, (..., n)."""
         return self._ask("forward_dynamics", (t, q, v, u), out, errors)
 
     def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
@@ -148,26 +146,26 @@ class CompiledPlant:
         return tuple((vector, array.view(Symbols)) for vector, array in pairs)
 
     @cached_property
-    def _known(self) -> tuple[Parameter, ...]:
-        """The coefficients of the effects, gravity and payloads, as inputs: changing one requires no recompilation."""
+    def _parameters(self) -> tuple[Parameter, ...]:
+        """Coefficients of the effects, gravity and payloads, as inputs: changing one requires no compilation."""
         return parameters(self.dynamics.robot, self.plant.effects, None)
 
     @cached_property
     def _numbers(self) -> tuple[tuple[Any, ...], Any]:
-        """The parameters as a CasADi vector, if there are any, and as an array of symbols."""
-        vector, array = inputs("p", sum(each.size for each in self._known))
+        """Parameters as a CasADi vector, if there are any, and as an array of symbols."""
+        vector, array = inputs("p", sum(parameter.size for parameter in self._parameters))
         return (vector,) if len(array) else (), array.view(Symbols)
 
     @cached_property
     def _bodies(self) -> SymbolicDynamics:
-        """The rigid bodies, with symbolic parameters."""
-        known = [each for each in self._known if each.part == ROBOT]
-        return SymbolicDynamics(self.dynamics.robot, known).of(split(self._known, self._numbers[1]).get(ROBOT, {}))
+        """Rigid bodies with symbolic parameters."""
+        own = [parameter for parameter in self._parameters if parameter.part == ROBOT]
+        return SymbolicDynamics(self.dynamics.robot, own).of(split(self._parameters, self._numbers[1]).get(ROBOT, {}))
 
     @cached_property
     def _symbolic(self) -> Plant:
-        """The plant, with symbolic parameters."""
-        return symbolic_plant(self.plant, self._bodies, split(self._known, self._numbers[1]))
+        """Plant with symbolic parameters."""
+        return symbolic_plant(self.plant, self._bodies, split(self._parameters, self._numbers[1]))
 
     @interrupts_later()
     def _traced(self, quantity: str) -> Traced:
@@ -184,20 +182,20 @@ class CompiledPlant:
                 ),
             }
             answer = column(formulas[quantity]())
-        given = [*[t, q, v, u][: len(PLANT[quantity].arguments)], *self._numbers[0]]
-        function = ca.Function("f", given, [ca.cse(ca.densify(answer))])
+        arguments = [*[t, q, v, u][: len(PLANT[quantity].arguments)], *self._numbers[0]]
+        function = ca.Function("f", arguments, [ca.cse(ca.densify(answer))])
         formulation = "effects" if quantity == "torque" else self._bodies.formulation(quantity)
         return Traced(function, formulation, {formulation: instructions(function)})
 
 
-class Compiled(ABC):  # noqa: B024  its instances are those of the two classes registered below
+class Compiled(ABC):  # noqa: B024  its instances belong to the two classes registered below
     """Compile a robot or a plant to machine code, for one state (n,) and batches (..., n).
 
     Args:
         robot_or_plant: A Robot, or a Plant whose dynamics is a Robot (or the Lagrangian of one).
         dtype: np.float64 or np.float32, or its name.
         threads: Number of threads for batches; None for all processors.
-        cache: Whether compiled code is stored on disk.
+        cache: Store compiled code on disk.
 
     Returns:
         A `CompiledDynamics` or a `CompiledPlant`; both are instances of `Compiled`.

@@ -1,7 +1,7 @@
-"""The primitives of steps as machine code; `integrate.primitives` documents what they compute.
+"""The primitives of steps as machine code; `integrate.primitives` documents their results.
 
-They are functions of the subset, which Python can call too, over operations on whole arrays. Sums have the order of
-NumPy's, entry by entry. Each checks the sizes of its arguments; the code inside is not checked.
+They are functions of the subset, which Python can call too, built from operations on whole arrays. Sums have the same
+order as in NumPy, entry by entry. Each function checks the sizes of its arguments; its code is not checked further.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 def combination(x: Array, y: Array, h: Any, weights: Array, K: Array, count: int) -> None:
-    """See `integrate.primitives`, as of the others."""
+    """Same as `integrate.primitives.combination`."""
     require(
         count <= len(weights) and count <= len(K) and len(x) == len(y) and len(y) <= K.shape[1]
         and x.shape[1] == y.shape[1] and y.shape[1] == K.shape[2], "arrays of a combination have other sizes",
@@ -51,19 +51,19 @@ def combination(x: Array, y: Array, h: Any, weights: Array, K: Array, count: int
 
 
 def sizes(x: Array, out: Array) -> None:
-    """As of NumPy."""
+    """Same as `integrate.primitives.sizes`."""
     require(x.shape[1] == len(out), "a sum for other runs")
     sum_sizes(x, out)
 
 
 def norm(x: Array, y: Array, after: Array, rtol: float, atol: float) -> float:
-    """As of NumPy."""
+    """Same as `integrate.primitives.norm`, for one run."""
     require(x.shape[1] == 1, "a norm of several runs")
     require(len(x) == len(y) and len(x) == len(after), "arrays of a norm have other sizes")
     total = 0.0
     for e in range(len(x)):
-        before, behind = abs(y[e, 0]), abs(after[e, 0])
-        larger = before if before > behind or before != before else behind
+        before, now = abs(y[e, 0]), abs(after[e, 0])
+        larger = before if before > now or before != before else now
         ratio = x[e, 0] / (atol + rtol * larger)
         total += ratio * ratio
     total = total / len(x)
@@ -71,7 +71,7 @@ def norm(x: Array, y: Array, after: Array, rtol: float, atol: float) -> float:
 
 
 def between(y: Array, F: Array, theta: float, out: Array) -> None:
-    """As of NumPy."""
+    """Same as `integrate.primitives.between`."""
     require(
         F.shape[1] == len(y) and len(out) == len(y) and y.shape[1] == F.shape[2] and y.shape[1] == out.shape[1],
         "arrays of a polynomial have other sizes",
@@ -85,14 +85,14 @@ def between(y: Array, F: Array, theta: float, out: Array) -> None:
 
 
 def settle(Z: Array, new: Array, y: Array, least: Array, stale: Array, state: Array, epsilon: float) -> int:
-    """As of NumPy."""
+    """Same as `integrate.primitives.settle`."""
     m, W = y.shape
     require(
         len(Z) == len(new) and Z.shape[1] == m and new.shape[1] == m and len(least) == m and Z.shape[2] == W
         and new.shape[2] == W and least.shape[1] == W and len(stale) == W and len(state) == W,
         "arrays of an iteration have other sizes",
     )  # fmt: skip
-    going, some = 0, epsilon ** (2 / 3)
+    active, small = 0, epsilon ** (2 / 3)
     for b in range(W):
         if state[b] != GOING:
             continue
@@ -108,7 +108,7 @@ def settle(Z: Array, new: Array, y: Array, least: Array, stale: Array, state: Ar
             shrinks |= (change < least[e, b]) & (change > epsilon * own)
             if change < least[e, b] or change != change:
                 least[e, b] = change
-            rounding &= change <= NOISE * epsilon * slack + some * (abs(y[e, b]) + own)
+            rounding &= change <= NOISE * epsilon * slack + small * (abs(y[e, b]) + own)
             largest = larger(largest, change)
         stale[b] = 0 if shrinks else stale[b] + 1
         if not largest < np.inf:
@@ -116,17 +116,17 @@ def settle(Z: Array, new: Array, y: Array, least: Array, stale: Array, state: Ar
         elif largest == 0.0 or (stale[b] >= PATIENCE and rounding):
             state[b] = SETTLED
         else:
-            going += 1
-    return going
+            active += 1
+    return active
 
 
 def larger(x: float, y: float) -> float:
-    """The larger one, nan if one is nan, as NumPy's."""
+    """Return the larger number; nan if one is nan, as in NumPy."""
     return y if y > x or y != y else x
 
 
 def factor(A: Array, J: Array, scale: float, rows: Array, lost: Array) -> None:
-    """As of NumPy, along columns or across the runs."""
+    """Same as `integrate.primitives.factor`, along columns or across the runs."""
     m, W = rows.shape
     require(
         len(A) == m and A.shape[1] == m and A.shape[2] == W and len(J) >= m and J.shape[1] == m and J.shape[2] == W
@@ -155,7 +155,7 @@ def factor(A: Array, J: Array, scale: float, rows: Array, lost: Array) -> None:
 
 
 def eliminate(A: Array, k: int) -> None:
-    """Divide column k by its pivot, and take its multiples off the columns behind it."""
+    """Divide column k by its pivot, and subtract its multiples from the columns after it."""
     m, W = A.shape[1], A.shape[2]
     rest = m - k - 1
     if W == 1:  # a vector along the column
@@ -172,7 +172,7 @@ def eliminate(A: Array, k: int) -> None:
 
 
 def solve(A: Array, rows: Array, x: Array) -> None:
-    """As of NumPy."""
+    """Same as `integrate.primitives.solve`."""
     m, W = rows.shape
     require(
         len(A) == m and A.shape[1] == m and A.shape[2] == W and len(x) == m and x.shape[1] == W,
@@ -192,7 +192,7 @@ def solve(A: Array, rows: Array, x: Array) -> None:
 
 
 def take_off(x: Array, column: Array, k: int, low: int, high: int) -> None:
-    """x_i ← x_i − A_ik x_k for rows i from `low` to before `high`."""
+    """Set x_i ← x_i − A_ik x_k for rows i from `low` to before `high`."""
     if x.shape[1] == 1:
         subtract_multiple(part(x, low, high - low), part(column, low, high - low), x[k, 0])
         return
@@ -208,6 +208,6 @@ INSTEAD: Mapping[Any, Callable[..., Any]] = MappingProxyType(
         primitives.combination: combination, primitives.sizes: sizes, primitives.norm: norm,
         primitives.enclose: enclosure, primitives.below: limitation,
         primitives.between: between, primitives.settle: settle, primitives.factor: factor, primitives.solve: solve,
-        **{each: each for each in (larger, eliminate, take_off)},
+        **{function: function for function in (larger, eliminate, take_off)},
     }
 )  # fmt: skip

@@ -1,6 +1,6 @@
 """Programs: y = f(x₁, x₂, …) as a list of typed instructions without branches, each value computed once.
 
-Values are numbered: the inputs one after the other, then the constants, then the results of the instructions.
+Values are numbered: inputs in sequence, then constants, then the results of the instructions.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import final
 
 
 class Kind(Enum):
-    """What an instruction computes of one value x or two, x and y; conditions are 1 or 0.
+    """Kinds of instructions with one operand x or two, x and y; conditions are 1 or 0.
 
-    The values are the names that the C library and CasADi have for it.
+    The values are the names in the C library and CasADi.
     """
 
     ADD = "add"
@@ -28,7 +28,7 @@ class Kind(Enum):
     TWICE = "twice"
     RECIPROCAL = "inv"
     ABSOLUTE = "fabs"
-    SIGN = "sign"  # x itself where it is 0 or NaN
+    SIGN = "sign"  # x itself if it is 0 or NaN
     FLOOR = "floor"
     CEILING = "ceil"
     MINIMUM = "fmin"
@@ -65,9 +65,9 @@ class Op:
     """One instruction.
 
     Attributes:
-        kind: What it computes.
-        results: Numbers of the values it computes: one, or the sine and the cosine of an angle.
-        operands: Numbers of the values it computes them from.
+        kind: Kind of instruction.
+        results: Numbers of its results: one value, or the sine and the cosine of an angle.
+        operands: Numbers of its operands.
     """
 
     kind: Kind
@@ -81,12 +81,12 @@ class Op:
 @final
 @dataclass(frozen=True)
 class Program:
-    """The instructions of a function.
+    """Instructions of a function.
 
     Attributes:
         inputs: Length of each input.
-        constants: Their values.
-        ops: The instructions, each after those that compute its operands.
+        constants: Values of the constants.
+        ops: Instructions, each after those that compute its operands.
         outputs: Numbers of the values that are results of the program.
     """
 
@@ -123,7 +123,7 @@ class Program:
 
 @final
 class Programs(Mapping[str, Program]):
-    """Programs by name; those read from a text are parsed on first use."""
+    """Programs by name; those read from text are parsed on first use."""
 
     def __init__(self, programs: Mapping[str, Program]) -> None:
         self._programs = dict(programs)
@@ -131,7 +131,7 @@ class Programs(Mapping[str, Program]):
 
     @classmethod
     def read(cls, text: str) -> Programs:
-        """The programs of a text that `str` returned."""
+        """Return the programs of a text that `str` returned."""
         programs = cls({})
         programs._texts = {name: program for name, _, program in (part.partition("\n") for part in text.split("\n\n"))}
         return programs
@@ -154,7 +154,7 @@ class Programs(Mapping[str, Program]):
         return len(self._texts)
 
     def results(self, name: str) -> int:
-        """Number of results of a program."""
+        """Return the number of results of a program."""
         return self._texts[name].rpartition("\noutputs")[2].count(" v")
 
     @cached_property
@@ -167,13 +167,13 @@ _KINDS = {kind.name.lower(): kind for kind in Kind}
 
 
 def _instructions(text: str) -> int:
-    """Operations of a program: the lines between its constants, each a number alone, and its outputs."""
+    """Return the number of operations of a program: the lines between its constants and its outputs."""
     lines = text.split("\n")[1:-1]
     return len(lines) - sum(1 for _ in takewhile(lambda line: " " not in line.partition(" = ")[2], lines))
 
 
 def _numbers(text: str) -> tuple[int, ...]:
-    return tuple(int(each[1:]) for each in text.split(" ") if each)
+    return tuple(int(word[1:]) for word in text.split(" ") if word)
 
 
 def _list(values: tuple[int, ...]) -> str:

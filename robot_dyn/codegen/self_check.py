@@ -1,8 +1,8 @@
-"""The self check: a new kernel must agree with an independent implementation at random states.
+"""The self-check: a new kernel must agree with an independent implementation at random states.
 
     |x_kernel − x_independent| ≤ tolerance · (Σ of the absolute values of the terms added into x)
 
-Accelerations are compared in the units d_i = √M_ii of the joints, with the terms of the torque that they follow from.
+Accelerations are compared in the joint units d_i = √M_ii, with the terms of the torque that causes them.
 """
 
 from __future__ import annotations
@@ -27,30 +27,33 @@ from robot_dyn.lagrange.scale import (
 from robot_dyn.queries.quantity import Quantity
 
 STATES = 16
-_LEAST = {"float64": 1e-12, "float32": 2e-5}  # the library's tolerance; its rounding times that of float32 over float64
+_LEAST = {
+    "float64": 1e-12,
+    "float32": 2e-5,
+}  # the library's tolerance; for float32 scaled by the ratio of rounding units
 
 
 class SelfCheckError(RobotDynError):
-    """A compiled kernel fails its self check; none of it is used."""
+    """A compiled kernel fails its self-check and is not used."""
 
 
 @final
 @dataclass(frozen=True)
 class SelfCheck:
-    """An implementation that kernels must agree with.
+    """An independent implementation with which kernels must agree.
 
     Attributes:
-        dynamics: Rigid bodies in gravity: Pinocchio's Robot.
-        name: Its name in messages.
+        dynamics: Robot, computed by Pinocchio.
+        name: Name in messages.
     """
 
     dynamics: Any
     name: str
 
     def states(self) -> dict[str, np.ndarray]:
-        """Random states without zeros, (STATES, n) each, and times t (STATES,).
+        """Return random states without zeros, (STATES, n) each, and times t (STATES,).
 
-        Torques are those of random accelerations: random torques would give a light link an acceleration out of range.
+        Torques are computed from random accelerations: random torques could accelerate a light link out of range.
         """
         rng, n = np.random.default_rng(20), self.dynamics.n
         q = rng.uniform(-np.pi, np.pi, (STATES, n))
@@ -67,21 +70,21 @@ class SelfCheck:
         effects: np.ndarray | float = 0.0,
         answered: np.ndarray | None = None,
     ) -> None:
-        """Compare results at `states()` with the independent ones.
+        """Compare results at `states()` with independent results.
 
         Args:
             quantity: The quantity.
             ours: Results of the kernel, (STATES, …).
-            theirs: The independent ones.
+            theirs: Independent results.
             dtype: The dtype of the kernel.
-            effects: Torques of effects, terms of the sum.
-            answered: At which states the kernel returns a result rather than reporting a doubt, (STATES,).
+            effects: Torques of effects, which are terms of the sum.
+            answered: True at states where the kernel returns a result instead of reporting doubt, (STATES,).
 
         Raises:
             SelfCheckError: If they differ by more than rounding, or there are no results.
         """
         if answered is not None and not answered.any():
-            raise SelfCheckError(f"compiled {quantity.name} gives no result at any of {STATES} random states")
+            raise SelfCheckError(f"compiled {quantity.name} has no result at any of {STATES} random states")
         scale = self._scale(quantity, theirs, effects)
         error = scaled(np.asarray(ours, dtype=float) - theirs, np.broadcast_to(scale, theirs.shape))
         error = np.where(np.isnan(error), np.inf, error)
@@ -102,15 +105,15 @@ class SelfCheck:
         return [magnitudes(linkage, q) for q in self.states()["q"]]
 
     def _scale(self, quantity: Quantity, theirs: np.ndarray, effects: np.ndarray | float) -> np.ndarray:
-        """Of each entry: the largest over all states, for at some its terms may happen to vanish."""
+        """Return the scale of each entry, the largest over all states, because its terms may vanish at some states."""
         state, d = self.states(), joint_units(self._M)
         rows = [{name: np.abs(x[i]) for name, x in state.items()} for i in range(STATES)]
         terms = [np.asarray(quantity.terms(size, row)) for size, row in zip(self._sizes, rows, strict=True)]
         if quantity.solves:
-            of_torque = np.array(terms) + np.abs(effects)
+            torque_terms = np.array(terms) + np.abs(effects)
             entries = acceleration_entries if len(quantity.axes) == 1 else derivative_entries
-            return entries(d, of_torque, theirs)
-        own = np.max([floored(each) for each in terms], axis=0)
+            return entries(d, torque_terms, theirs)
+        own = np.max([floored(term) for term in terms], axis=0)
         return own + d * np.max(np.abs(effects) / d) if np.ndim(effects) else own
 
     def _tolerance(self, quantity: Quantity, dtype: str) -> float:

@@ -1,4 +1,4 @@
-"""Work shared out over threads: a free thread takes the next piece, so that a late one delays no other."""
+"""Work shared by threads: a free thread takes the next piece, so that a slow one delays no other."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MOST_THREADS = 4096
 
 
 def thread_count(threads: int | None) -> int:
-    """A number of threads; None for all processors.
+    """Return a number of threads; None means all processors.
 
     Raises:
         QueryError: If it is not positive.
@@ -25,16 +25,16 @@ def thread_count(threads: int | None) -> int:
 
 
 def shared(work: Callable[[int, int], int], count: int, piece: int, threads: int) -> int:
-    """The largest result of work(start, stop) over pieces of 0 … count − 1, none shorter than `piece`.
+    """Return the largest result of work(start, stop) over pieces of 0 … count − 1, each of at least `piece` items.
 
     Args:
-        work: Releases the interpreter's lock while it computes.
-        count: How much there is, at least `piece`.
-        piece: How much a thread takes at a time; each starts at a multiple of it.
-        threads: The most that take part, including the caller.
+        work: Function that releases the interpreter's lock while it computes.
+        count: Number of items, at least `piece`.
+        piece: Number of items that a thread takes at a time; each piece starts at a multiple of it.
+        threads: Maximum number of threads, including the caller.
     """
     pieces = max(1, count // piece)
-    left = iter(range(pieces))  # `next` of it is atomic
+    left = iter(range(pieces))  # calling next() on it is atomic
 
     def take() -> int:
         return max((work(i * piece, count if i == pieces - 1 else (i + 1) * piece) for i in left), default=0)
@@ -45,16 +45,16 @@ def shared(work: Callable[[int, int], int], count: int, piece: int, threads: int
 
 @final
 class _Pool:
-    """Threads that wait for work, as many as were ever needed together; starting one costs a thousand states."""
+    """Pool of waiting threads, as many as were ever needed at once; starting one takes as long as a thousand states."""
 
     def __init__(self) -> None:
         self._lock, self._size, self._threads = threading.Lock(), 0, ThreadPoolExecutor(1)
 
     def submit(self, work: Callable[[], int], count: int) -> list[Future[int]]:
-        """Give the work to so many threads."""
+        """Submit the work to `count` threads."""
         with self._lock:
             if count > self._size:
-                self._threads.shutdown(wait=False)  # those that are at work finish it
+                self._threads.shutdown(wait=False)  # busy threads finish their work
                 self._size, self._threads = count, ThreadPoolExecutor(count, "robot_dyn")
             return [self._threads.submit(work) for _ in range(count)]
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 
 class _Compiling(threading.local):
-    """Time that this thread has spent on loading and compiling loops, in [s]; a run's first call does so."""
+    """Time that this thread has spent on loading and compiling loops, in [s]."""
 
     seconds = 0.0
 
@@ -21,7 +21,7 @@ COMPILING = _Compiling()
 def interrupts_later() -> Iterator[None]:
     """Delay Ctrl-C until the end of a block or function: callbacks from the C code of compilers cannot raise it.
 
-    Python delivers it to the main thread only; in others there is nothing to delay.
+    Python delivers it only to the main thread; other threads have nothing to delay.
     """
     handler = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(handler):

@@ -1,6 +1,7 @@
-"""The cross-check: one robot by Pinocchio and by the library's own Lagrangian, and its file by a second reader.
+"""The cross-check: a robot computed by Pinocchio and by the library's Lagrangian, and its file read by a second reader.
 
-compare: `compare` at random states · agreement: the largest difference on its scale · second_reading: by yourdfpy
+compare: `compare` at random states · agreement: the largest differences on their scales
+second_reading: by yourdfpy
 """
 
 from robot_dyn.foundations.public import public_names

@@ -1,4 +1,4 @@
-"""Agreements: how far two values of one quantity differ on its scale, the worst with its entry and its state."""
+"""Agreements: difference of two values of one quantity relative to its scale, at the worst entry and state."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from robot_dyn.queries.units import numbers_row
 @final
 @dataclass(frozen=True)
 class Agreement:
-    """How well Pinocchio and the library's Lagrangian agree on one quantity, at the worst of all states and entries.
+    """Agreement of Pinocchio and the library's Lagrangian on one quantity, at the worst of all states and entries.
 
     Attributes:
-        quantity: Its name among the queries of `Dynamics`, or the identity that was checked.
-        error: Difference on its scale.
-        tolerance: What is allowed.
+        quantity: Name of a query of `Dynamics`, or the identity that was checked.
+        error: Difference relative to its scale.
+        tolerance: Allowed error.
         entry: Joints or frame of the entry.
-        pinocchio, own: The two values; of the file, the number that both implementations are given, and yourdfpy's.
-        state: q, v, a, tau, by name; nothing for what stands in the file.
+        pinocchio, own: The two values; for numbers of the file, that of both implementations, and yourdfpy's.
+        state: q, v, a, tau, by name; empty for numbers of the file.
     """
 
     quantity: str
@@ -39,26 +39,26 @@ class Agreement:
 
     @reported
     def ok(self) -> bool:
-        """Whether the error is within the tolerance."""
+        """True if the error is within the tolerance."""
         return bool(self.error <= self.tolerance)
 
     @property
     def share(self) -> float:
-        """The error as a part of the tolerance."""
+        """Error as a fraction of the tolerance."""
         return self.error / self.tolerance
 
 
 @final
 @dataclass(frozen=True, repr=False)
 class Comparison(Answer):
-    """The outcome of `compare`.
+    """Result of `compare`.
 
     Attributes:
-        robot: Its name.
+        robot: Name of the robot.
         n: Number of its degrees of freedom.
         samples: Number of random states.
-        agreements: One for each quantity.
-        notes: What could not be compared, and why.
+        agreements: Agreements, one for each quantity.
+        notes: Quantities that could not be compared, with reasons, and findings on the robot.
     """
 
     robot: str
@@ -69,21 +69,21 @@ class Comparison(Answer):
 
     @reported
     def ok(self) -> bool:
-        """Whether both agree on every quantity."""
+        """True if both agree on every quantity."""
         return all(agreement.ok for agreement in self.agreements)
 
     @reported
     def quantities(self) -> dict[str, Agreement]:
-        """The agreements by the names of their quantities."""
-        return {each.quantity: each for each in self.agreements}
+        """Agreements by the names of their quantities."""
+        return {agreement.quantity: agreement for agreement in self.agreements}
 
     @property
     def worst(self) -> Agreement:
-        """The quantity with the largest share of its tolerance."""
+        """Agreement with the largest error as a fraction of its tolerance."""
         return max(self.agreements, key=lambda agreement: agreement.share)
 
     def blocks(self) -> Iterator[Block]:
-        agreed = f"{sum(each.ok for each in self.agreements)} of {len(self.agreements)} quantities agree"
+        agreed = f"{sum(x.ok for x in self.agreements)} of {len(self.agreements)} quantities agree"
         yield f"{self.robot}: Pinocchio and the own Lagrangian at {self.samples} random states: {agreed}"
         headings = ("quantity", "worst error", "allowed", "where", "Pinocchio", "own")
         yield Table(headings, tuple(map(_row, self.agreements)), right=(*headings[1:3], *headings[4:]))
@@ -97,24 +97,24 @@ class Comparison(Answer):
     def drawing(self) -> str:
         from robot_dyn.foundations.display import levels
 
-        shares = {each.quantity: each.share for each in self.agreements}
+        shares = {agreement.quantity: agreement.share for agreement in self.agreements}
         return levels("worst error / allowed; exact agreement is left out", shares, 1.0)
 
 
 def _row(x: Agreement) -> tuple[str, ...]:
-    numbers = (f"{each:.16g}" if abs(each) < float(UNBOUNDED) else "none" for each in (x.pinocchio, x.own))
+    numbers = (f"{value:.16g}" if abs(value) < float(UNBOUNDED) else "none" for value in (x.pinocchio, x.own))
     return x.quantity, marked(x.ok, x.error), f"{x.tolerance:.1e}", x.entry, *numbers
 
 
 def marked(ok: bool, error: float) -> str:
-    """An error, and whether it is too large."""
+    """Format an error, marked if it is too large."""
     return f"{error:.1e}" if ok else f"{error:.1e}  DISAGREE"
 
 
 @final
 @dataclass(frozen=True)
 class Pair:
-    """One quantity twice at one state; `scale` of the shape of the values."""
+    """Two values of one quantity at one state; `scale` has the shape of the values."""
 
     quantity: str
     pinocchio: Any
@@ -125,7 +125,7 @@ class Pair:
     frame: str = ""
 
     def worst(self, state: dict[str, np.ndarray]) -> Agreement:
-        """The entry where the two differ most on their scale."""
+        """Return the agreement at the entry with the largest difference relative to its scale."""
         errors = scaled(np.asarray(self.pinocchio) - self.own, floored(np.asarray(self.scale)))
         errors = np.where(np.isnan(errors), np.inf, errors)
         index = np.unravel_index(np.argmax(errors), errors.shape)
@@ -142,10 +142,10 @@ class Pair:
 
 
 def worst_by_quantity(agreements: Iterable[Agreement]) -> tuple[Agreement, ...]:
-    """Of each quantity the agreement with the largest share of its tolerance."""
+    """Return for each quantity the agreement with the largest fraction of its tolerance."""
     worst: dict[str, Agreement] = {}
-    for each in agreements:
-        known = worst.get(each.quantity)
-        if known is None or each.share > known.share:
-            worst[each.quantity] = each
+    for agreement in agreements:
+        current = worst.get(agreement.quantity)
+        if current is None or agreement.share > current.share:
+            worst[agreement.quantity] = agreement
     return tuple(worst.values())

@@ -1,11 +1,11 @@
-"""The cross-check: one robot by Pinocchio and by the library's own Lagrangian, and its file by a second reader.
+"""The cross-check: a robot computed by Pinocchio and by the library's Lagrangian, and its file read by a second reader.
 
     |x_Pinocchio − x_own| ≤ 1e-12 · (Σ of the absolute values of the terms added into x)
 
-M_ij is held to √(M_ii M_jj), and forward dynamics to max(1e-12, 8 n u κ) of its terms M⁻¹τ, M⁻¹C v, M⁻¹N in the norm of
-M, or of the terms of τ, C v and N if these are more, with κ the condition number of M scaled to a unit diagonal. An
-entry that has no terms is held to the largest scale in its row and column. The numbers that both implementations take
-from the file are compared with those that yourdfpy reads there (`second_reading`).
+The scale of M_ij is √(M_ii M_jj). Forward dynamics must agree to max(1e-12, 8 n u κ) of its terms M⁻¹τ, M⁻¹C v, M⁻¹N in
+the norm of M, or of the terms of τ, C v and N if these are larger, with κ the condition number of M scaled to a unit
+diagonal. An entry without terms uses the largest scale in its row and column. The numbers that both implementations
+take from the file are compared with those that yourdfpy reads there (`second_reading`).
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ def compare(
     tolerance: float = TOLERANCE,
     on_sample: Callable[[], object] | None = None,
 ) -> Comparison:
-    """Cross-check a robot at random states within its joint limits, and its file by the numbers that yourdfpy reads.
+    """Cross-check a robot at random states within its joint limits, and the numbers of its file against yourdfpy's.
 
     Args:
-        robot: The robot; its joints are matched by name.
+        robot: Robot to check.
         samples: Number of states.
         seed: Seed of the random generator.
-        tolerance: Allowed error on each quantity's scale.
-        on_sample: Called after each state.
+        tolerance: Allowed error relative to the scale of each quantity.
+        on_sample: Function called after each state, for example to show progress.
 
     Raises:
         QueryError: If samples is not positive.
     """
-    instance("robot", robot, Robot, "give one, such as rd.load('ur5')")
+    instance("robot", robot, Robot, "give a robot, for example rd.load('ur5')")
     samples, seed = integer("samples", samples, least=1, most=10**6), integer("seed", seed, most=2**128 - 1)
     function("on_sample", on_sample, "no argument")
     tolerance = number("tolerance", tolerance, above=0)
@@ -69,13 +69,13 @@ def compare(
         worst = worst_by_quantity((*worst, *(pair.worst(state) for pair in pairs)))
         if on_sample is not None:
             on_sample()
-    of_file, unread = second_reading(robot.description, tolerance)
-    worst = worst_by_quantity((*worst, *(pair.worst({}) for pair in of_file)))
+    file_pairs, unread = second_reading(robot.description, tolerance)
+    worst = worst_by_quantity((*worst, *(pair.worst({}) for pair in file_pairs)))
     return Comparison(robot.name, robot.n, samples, worst, (*unread, *_notes(robot, unsolved, samples)))
 
 
 def random_state(robot: Robot, rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """A general state: q of `random_configuration`; v, a and tau without zeros."""
+    """Return a general state: q from `random_configuration`; v, a and tau without zeros."""
     q = robot.random_configuration(rng)
     v, a, tau = rng.normal(size=(3, robot.n))
     return {"q": q, "v": v, "a": a, "tau": tau * (1 + np.abs(robot.N(q)))}
@@ -84,20 +84,20 @@ def random_state(robot: Robot, rng: np.random.Generator) -> dict[str, np.ndarray
 def _pairs(
     robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], frames: tuple[str, ...], tolerance: float
 ) -> Iterator[Pair]:
-    """Every query of the table, except forward dynamics, and two identities."""
+    """Return both values of every query except forward dynamics, and of two identities."""
     q, v, a = (state[name] for name in ("q", "v", "a"))
     size, absolute = magnitudes(own.linkage, q), {name: np.abs(x) for name, x in state.items()}
     names = _TWIST | {"n": robot.joint_names, "p": parameter_names(robot.body_names)}
-    known: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    values: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for quantity in QUANTITIES.values():
         if quantity.solves:
             continue
         for frame, options in _frames(quantity, frames):
             one, two = (quantity.ask(engine, state, *frame, **options) for engine in (robot, own))
             scale = diagonal_scale(two) if quantity.definite else quantity.terms(size, absolute, *frame)
-            known[quantity.name], where = (one, two), "".join((*frame, *(f" ({axes})" for axes in options.values())))
+            values[quantity.name], where = (one, two), "".join((*frame, *(f" ({axes})" for axes in options.values())))
             yield Pair(quantity.name, one, two, scale, tolerance, tuple(names[x] for x in quantity.axes), where)
-    (M, C, N), pin_C, ID = (known[name][1] for name in "MCN"), known["C"][0], known[INVERSE_DYNAMICS.name][0]
+    (M, C, N), pin_C, ID = (values[name][1] for name in "MCN"), values["C"][0], values[INVERSE_DYNAMICS.name][0]
     rate, both = own.mass_matrix_derivative(q) @ v, size.C(v) + size.C(v).T
     yield Pair("Ṁ = C + Cᵀ", pin_C + pin_C.T, rate, both, tolerance, (robot.joint_names,) * 2)
     terms = INVERSE_DYNAMICS.terms(size, absolute)
@@ -112,7 +112,7 @@ def _frames(quantity: Quantity, frames: tuple[str, ...]) -> Iterator[tuple[tuple
 
 
 def _forward_pairs(robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], tolerance: float) -> list[Pair]:
-    """Forward dynamics by three algorithms, and there and back; nothing where M is not positive definite."""
+    """Return forward dynamics by three algorithms and its inverse; nothing where M is not positive definite."""
     q, v, tau = (state[name] for name in ("q", "v", "tau"))
     size, pairs = magnitudes(own.linkage, q), []
     try:
@@ -124,11 +124,11 @@ def _forward_pairs(robot: Robot, own: Lagrangian, state: dict[str, np.ndarray], 
     M = own.M(q)
     tolerance = solved_tolerance(tolerance, M)
     a, C, N = robot.forward_dynamics(q, v, tau), own.C(q, v), own.N(q)
-    of_torque = FORWARD_DYNAMICS.terms(size, {"v": np.abs(v), "tau": np.abs(tau)})
-    terms = acceleration_norm(M, (tau, C @ v, N), of_torque)
+    torque_terms = FORWARD_DYNAMICS.terms(size, {"v": np.abs(v), "tau": np.abs(tau)})
+    terms = acceleration_norm(M, (tau, C @ v, N), torque_terms)
     for quantity, b in implementations.items():
         weight = np.abs(a - b) * np.sqrt(np.diagonal(M))
-        joint = int(np.argmax(weight))  # names the joint; the error is that of the whole vector, in the norm of M
+        joint = int(np.argmax(weight))  # to name a joint; the error is the norm of the whole vector
         error = mass_norm(M, a - b)
         scale = terms * np.abs(a - b)[joint] / error if error else 1.0
         where = ((robot.joint_names[joint],),)
@@ -142,7 +142,7 @@ def _notes(robot: Robot, unsolved: int, samples: int) -> tuple[str, ...]:
     notes = []
     if unsolved:
         notes.append(
-            f"forward dynamics not compared at {unsolved} of {samples} states: M is not positive definite there"
+            f"forward dynamics is not compared at {unsolved} of {samples} states, where M is not positive definite"
         )
     if robot.joint_without_inertia is not None:
         notes.append(f"no forward dynamics: joint {robot.joint_without_inertia!r} carries no inertia")

@@ -1,8 +1,8 @@
-"""The second reading: a robot's file as read by yourdfpy, compared with the numbers that both implementations use.
+"""The second reading: a robot's file as read by yourdfpy, compared with the numbers of both implementations.
 
-Pinocchio and the library's own implementation both use the output of the hardened reader, so a fault of that reader
+Pinocchio and the library's own implementation both use the output of the checked reader, so an error of that reader
 affects both, and comparing M, C and N does not reveal it. yourdfpy reads the bytes of the file. The two readings share
-only the XML parser (libxml2) and `float`, not the code that looks up elements, attributes, defaults or names.
+only the XML parser (libxml2) and `float`, not the code for elements, attributes, defaults or names.
 [URDF: wiki.ros.org/urdf/XML]
 """
 
@@ -35,14 +35,16 @@ def second_reading(description: Description, tolerance: float) -> tuple[list[Pai
     try:
         robot = _by_yourdfpy(description.text)
         stated, elements = dict(_stated(robot)), set(_elements_stated(robot))
-    except Exception as error:  # whatever yourdfpy raises
-        message = getattr(error, "msg", f"{type(error).__name__}: {error}")  # for a syntax error, without the position
+    except Exception as error:  # yourdfpy can raise anything
+        message = getattr(
+            error, "msg", f"{type(error).__name__}: {error}"
+        )  # the message of a syntax error, without its position
         why = shorten(" ".join(str(message).split()), 200)
-        return [], (f"the file is not read a second time: yourdfpy cannot read it ({why})",)
-    taken, known = dict(_taken(description)), set(_elements_taken(description))
+        return [], (f"no second reading of the file: yourdfpy cannot read it ({why})",)
+    taken, names = dict(_taken(description)), set(_elements_taken(description))
     pairs = [
-        Pair("file: links and joints", float(each in known), float(each in elements), 1.0, tolerance, frame=each)
-        for each in sorted(known | elements)
+        Pair("file: links and joints", float(name in names), float(name in elements), 1.0, tolerance, frame=name)
+        for name in sorted(names | elements)
     ]
     for key in sorted(taken.keys() | stated.keys()):
         one, two = (side.get(key, np.array(np.nan)) for side in (taken, stated))
@@ -51,11 +53,11 @@ def second_reading(description: Description, tolerance: float) -> tuple[list[Pai
     return pairs, ()
 
 
-@np.errstate(all="ignore")  # infinities in visuals are not compared
+@np.errstate(all="ignore")  # ignores infinities in visuals, which are not compared
 def _by_yourdfpy(text: bytes) -> Any:
     from yourdfpy import URDF  # heavy: imports trimesh
 
-    root = etree.fromstring(text)  # raises where yourdfpy would continue with what the parser can recover
+    root = etree.fromstring(text)  # raises where yourdfpy would use the recovered part
     if None in root.nsmap:
         raise ValueError("it takes no element of a default namespace")
     return URDF.load(BytesIO(text), build_scene_graph=False, load_meshes=False).robot
@@ -105,9 +107,9 @@ def _stated(robot: Any) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
 
 
 def _connected(robot: Any) -> list[Any]:
-    """The links that joints connect, all of them without joints: a link beside the arm is left out, with a finding."""
-    named = {name for joint in robot.joints for name in (joint.parent, joint.child)}
-    return [link for link in robot.links if not named or link.name in named]
+    """Return the links that joints connect, or all links of a robot without joints."""
+    connected = {name for joint in robot.joints for name in (joint.parent, joint.child)}
+    return [link for link in robot.links if not connected or link.name in connected]
 
 
 def _or_identity(origin: np.ndarray | None) -> np.ndarray:
@@ -115,7 +117,7 @@ def _or_identity(origin: np.ndarray | None) -> np.ndarray:
 
 
 def _limits(joint: Any) -> np.ndarray:
-    """Lower, upper, effort and velocity limits; docs/reference/findings.md lists the stated limits that are ignored."""
+    """Return lower, upper, effort and velocity limits; docs/reference/findings.md lists limits that are ignored."""
     lower, upper, *rates = (
         joint.limit and getattr(joint.limit, key) for key in ("lower", "upper", "effort", "velocity")
     )
@@ -125,7 +127,7 @@ def _limits(joint: Any) -> np.ndarray:
 
 
 def _taken(description: Description) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
-    """The same numbers from the description, as both implementations use them."""
+    """Return the same numbers from the description, as both implementations use them."""
     taken = tree_of(description, Edits())
     for link in taken.links:
         where = f"link {link.name!r}"

@@ -220,7 +220,11 @@ def _why_no_coriolis(K: Any, p: Any, M: Any, t: Any, v: Any) -> str:
     if ca.depends_on(K, t):
         return "K depends on t"
     at_rest = ca.substitute(ca.vertcat(K, p), v, ca.SX.zeros(v.shape))
-    return "" if at_rest.is_zero() else "K has terms of order 0 or 1 in v, for example from a moving constraint"
+    return (
+        ""
+        if at_rest.is_zero()
+        else "K has terms that are constant or linear in v, for example from a moving constraint"
+    )
 
 
 def _christoffel(M: Any, q: Any, v: Any) -> Any:

@@ -97,7 +97,7 @@ def inertias_beyond_reach(robot: Structure) -> Iterator[str]:
         tiny = link.mass < LIGHTEST  # reported separately
         if name not in robot.base and not tiny and (radius := robot.radius_beyond_reach(link.mass, link.inertia)):
             yield (
-                f"link {name!r}: its inertia of {link.mass:g} kg needs mass at least {radius:.3g} m from the centre,"
+                f"link {name!r}: for {link.mass:g} kg, its inertia needs mass at least {radius:.3g} m from the centre,"
                 f" but neighbouring joints of this robot are at most {robot.longest_link:.3g} m apart; correct"
                 " the inertia or its unit"
             )

@@ -121,7 +121,7 @@ def proven(tmp_path: Path) -> Path:
 def test_prove_says_the_theorem_and_which_numbers_are_meant(proven: Path) -> None:
     done = run("prove", proven)
     assert done.returncode == 0, done.stderr
-    assert "planar_2r: the motion exists and is the only one for 0 ≤ t ≤ 0.05 s" in done.stdout
+    assert "planar_2r: the motion exists and is unique for 0 ≤ t ≤ 0.05 s" in done.stdout
     assert re.search(r"joint_1 +\[-?0\.\d{18,} \+/- \d\.\d+e-2\d\]", done.stdout)
     assert "q(0) [0.3, -0.4] as float64" in done.stdout and "Trusted: " in done.stdout
 
@@ -135,6 +135,6 @@ def test_document_of_prove_has_the_keys_that_are_promised(proven: Path) -> None:
 def test_what_is_not_proven_is_told_by_the_exit_code(proven: Path) -> None:
     done = run("prove", proven, "--until", "100", "--budget", "0.2")
     assert done.returncode == 1
-    assert re.search(r"Not proven beyond t = 0\.\d+ s, because the budget of 0\.2 s is spent\.", done.stdout)
+    assert re.search(r"Not proven beyond t = 0\.\d+ s, because the budget of 0\.2 s is used up\.", done.stdout)
     proven.write_text(PROVEN + '[[effect]]\nkind = "dry_friction"\nlevel_N_m = 1.0\n', encoding="utf-8")
     assert "effect dry_friction switches" in refusal(["prove", str(proven)])

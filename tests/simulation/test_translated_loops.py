@@ -275,7 +275,10 @@ def test_a_step_of_the_users_own_is_machine_code_or_the_summary_says_why_not() -
     said = made[1].statistics.engine
     line = heun_by_arrays.__code__.co_firstlineno + 3
     assert "the equation of motion; steps in Python" in said
-    assert f"line {line}, in heun_by_arrays: an operation on what is not a number is not translated; write it" in said
+    assert (
+        f"line {line}, in heun_by_arrays: an operation on a value that is not a number is not translated; write it"
+        in said
+    )
     assert said in made[1].summary
     with pytest.raises(SubsetError, match=f"line {line}, in heun_by_arrays"):
         rd.rollouts(

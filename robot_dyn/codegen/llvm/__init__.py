@@ -1,7 +1,7 @@
 """The writer of machine code: programs as LLVM instructions on numbers or vectors, compiled and loaded.
 
 writer            from a program to instructions, by the tables of operations; sine_groups: several sines at once
-vectors           numbers side by side; elementary: sine, cosine and tanh of them
+vectors           vectors of numbers; elementary: their sine, cosine and tanh
 one_state, batch, lock_step    functions of one state, of arrays of states, of runs in lock step
 rows              rows of arrays to vectors and back
 entries           functions that Python calls, by python_function (its C API) and numpy_array (its fields)

@@ -1,7 +1,7 @@
 """Batches as machine code: batch(x₁, …, y, start, stop) → Status, for states start … stop − 1 of arrays (B, n).
 
-L states at a time go from memory through all instructions and back: intermediate values stay in registers as far as
-LLVM can, and loads and shuffles fill the gaps that long chains of products leave.
+L states at a time pass from memory through all instructions and back: intermediate values stay in registers where
+possible, and loads and shuffles fill the gaps in long chains of products.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ REGISTER = 64  # bytes: a 512-bit register, or two or four smaller ones
 
 
 def lanes(kind: Any) -> int:
-    """L: the states of a vector."""
+    """Return L, the number of states in a vector."""
     return REGISTER // (4 if kind is F32 else 8)
 
 
 def batch_function(module: Any, name: str, program: Program, kind: Any, limits: Limits, parameters: bool) -> Any:
-    """The function for a batch of at least L states; the last vector may overlap the one before.
+    """Write the function for a batch of at least L states; the last vector may overlap the previous one.
 
     With `parameters` the last input is one row, the same for all states.
     """
@@ -33,12 +33,12 @@ def batch_function(module: Any, name: str, program: Program, kind: Any, limits: 
     function = ir.Function(module, ir.FunctionType(I64, [*pointers, I64, I64]), name)
     align_stack(function)
     *arrays, start, stop = function.args
-    opening, loop, end = (function.append_basic_block(each) for each in ("opening", "loop", "end"))
+    opening, loop, end = (function.append_basic_block(block) for block in ("opening", "loop", "end"))
     ir.IRBuilder(opening).branch(loop)
     builder = ir.IRBuilder(loop)
     writer = Writer(builder, kind, lanes(kind))
     vectors, step = writer.vectors, ir.Constant(I64, lanes(kind))
-    base, *before = seen = [builder.phi(each) for each in (I64, vectors.type, vectors.type, vectors.none.type)]
+    base, *before = seen = [builder.phi(kind_) for kind_ in (I64, vectors.type, vectors.type, vectors.none.type)]
     for phi, value in zip(seen, (start, vectors.constant(0.0), vectors.constant(0.0), vectors.none), strict=True):
         phi.add_incoming(value, opening)
     last, after = builder.sub(stop, step), builder.add(base, step)
@@ -59,17 +59,17 @@ def batch_function(module: Any, name: str, program: Program, kind: Any, limits: 
 def _group(
     writer: Writer, program: Program, arrays: list[Any], at: Any, before: list[Any], parameters: bool
 ) -> tuple[Any, Any, Any]:
-    """L states from `at` on: loaded, computed, stored; Σ |x|, Σ |y| and angles beyond the range, with those before."""
+    """Load, compute and store L states from `at` on; return Σ |x|, Σ |y| and the mask of far angles, accumulated."""
     vectors, (*inputs, y) = writer.vectors, arrays
-    given = list(zip(inputs, program.inputs, strict=True))
-    of_states, alike = (given[:-1], given[-1:]) if parameters else (given, [])
-    for array, n in of_states:
+    pairs = list(zip(inputs, program.inputs, strict=True))
+    varying, alike = (pairs[:-1], pairs[-1:]) if parameters else (pairs, [])
+    for array, n in varying:
         prefetch(vectors, array, at, n, False)
     prefetch(vectors, y, at, len(program.outputs), True)
-    columns = [loaded(vectors, array, at, n) for array, n in of_states]
-    rows = [[vectors.of([x] * vectors.count) for x in numbers(vectors.builder, *each)] for each in alike]
+    columns = [loaded(vectors, array, at, n) for array, n in varying]
+    rows = [[vectors.of([x] * vectors.count) for x in numbers(vectors.builder, *pair)] for pair in alike]
     written = writer.write(program, [*columns, *rows])
     store(vectors, y, at, written.results)
-    arguments = vectors.absolute_sum((x for each in columns for x in each), before[0])
+    arguments = vectors.absolute_sum((x for column in columns for x in column), before[0])
     results = vectors.absolute_sum(distinct(program, written.results), before[1])
     return arguments, results, vectors.builder.or_(before[2], written.out_of_range)

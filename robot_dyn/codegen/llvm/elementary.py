@@ -40,7 +40,7 @@ _C = (
 # Coefficients for float32: Cephes, sinf.c [Moshier 1992], rounded to float32.
 _S32 = (-1.66666552424430847168e-1, 8.33216123282909393311e-3, -1.95152956992387771606e-4)
 _C32 = (4.16666455566883087158e-2, -1.38873164542019367218e-3, 2.44331568944575637579e-5)
-# tanh: below _SMALL it uses P / Q, since 1 − 2/(…) would lose digits to cancellation; above _LARGE the result is 1
+# tanh: below _SMALL it uses P / Q, because 1 − 2/(…) would lose digits to cancellation; above _LARGE the result is 1
 _SMALL, _LARGE = 0.625, 22.0
 _P = (-1.61468768441708447952e3, -9.92877231001918586564e1, -9.64399179425052238628e-1)
 _Q = (4.84406305325125486048e3, 2.23548839060100448583e3, 1.12811678491632931402e2, 1.0)
@@ -51,7 +51,7 @@ _EQ = (2.00000000000000000009e0, 2.27265548208155028766e-1, 2.524483403496841041
 
 
 def sincos(x: Lanes) -> tuple[Lanes, Lanes]:
-    """Sine and cosine of float64 or float32 lanes; the range reduction runs in float64."""
+    """Return the sine and cosine of float64 or float32 lanes; the range reduction runs in float64."""
     narrow = x.vectors.kind is F32
     x = x.cast("fpext", F64) if narrow else x
     shifted = x * _TURN + _MAGIC
@@ -83,7 +83,7 @@ def _signed(x: Lanes, turns: Lanes, narrow: bool) -> Lanes:
 
 
 def _exp(u: Lanes) -> Lanes:
-    """e^u for 0 ≤ u ≤ 50."""
+    """Return e^u for 0 ≤ u ≤ 50."""
     shifted = u * _LOG2E + _MAGIC
     k = shifted - _MAGIC
     r = (u - k * _LN2_HIGH) - k * _LN2_LOW
@@ -94,7 +94,7 @@ def _exp(u: Lanes) -> Lanes:
 
 
 def tanh(x: Lanes) -> Lanes:
-    """Hyperbolic tangent of float64 or float32 lanes, computed in float64."""
+    """Return the hyperbolic tangent of float64 or float32 lanes, computed in float64."""
     narrow = x.vectors.kind is F32
     x = x.cast("fpext", F64) if narrow else x
     negative = x.below(0.0)

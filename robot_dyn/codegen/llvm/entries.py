@@ -1,7 +1,7 @@
-"""Entries for Python: (x₁, …, y) → Status, of NumPy's arrays without conversion.
+"""Entries for Python: (x₁, …, y) → Status, with NumPy's arrays and without conversion.
 
 They accept any objects and report those that are not arrays of the right form, without a Python error. The `self` of
-the function is bytes: the parameters, if there are any.
+the function is a bytes object with the parameters, if there are any.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ _LARGEST_NARROW = LEAST_EXACT / float(np.finfo(np.float32).eps)
 def write_state_entry(
     module: Any, name: str, state: Any, inputs: tuple[int, ...], shape: tuple[int, ...], timed: bool, parameters: bool
 ) -> None:
-    """The entry (x₁, …, y) of a function for one state: arrays (nᵢ,), y of `shape`; x₁ a number if it is a time.
+    """Write the entry (x₁, …, y) of a function of one state: arrays (nᵢ,), y of `shape`; x₁ a number if it is a time.
 
-    With `parameters` the function takes the numbers of `self` before y.
+    With `parameters` the function receives the numbers of `self` before y.
     """
     shapes, kind = [*((n,) for n in inputs[timed:]), shape], state.args[0].type.pointee
     builder, own, objects, views, status = _entry(module, name, len(inputs) + 1, len(shapes))
     times = [_number(builder, objects[0], kind, status)] if timed else []  # first, as it may run Python code
     pointers = _data(builder, objects[timed:], views, kind, list(map(len, shapes)), status)
-    expected = [[ir.Constant(I64, length) for length in each] for each in shapes]
+    expected = [[ir.Constant(I64, length) for length in lengths] for lengths in shapes]
     _require(builder, [arrays.has_lengths(builder, *pair) for pair in zip(views, expected, strict=True)], status)
     for t in times:
         pointers.insert(0, builder.alloca(kind))
@@ -42,7 +42,7 @@ def write_state_entry(
 def write_batch_entry(
     module: Any, name: str, batch: Any, inputs: tuple[int, ...], outputs: int, parameters: bool
 ) -> None:
-    """The entry (x₁, …, y, start, stop) of a function for batches: arrays (B, nᵢ), y (B, m), that do not overlap it."""
+    """Write the entry (x₁, …, y, start, stop) of a function of batches: arrays (B, nᵢ), y (B, m), not overlapping."""
     kind, widths = batch.args[0].type.pointee, [ir.Constant(I64, n) for n in (*inputs, outputs)]
     builder, own, (*objects, start, stop), views, status = _entry(module, name, len(widths) + 2, len(widths))
     pointers = _data(builder, objects, views, kind, [2] * len(views), status)
@@ -54,20 +54,20 @@ def write_batch_entry(
         for pointer, end in zip(pointers[:-1], ends[:-1], strict=True)
     ]
     _require(builder, [*right, *apart], status)
-    bounds = [api(builder, "PyLong_AsLongLong", each) for each in (start, stop)]
+    bounds = [api(builder, "PyLong_AsLongLong", bound) for bound in (start, stop)]
     thread = api(builder, "PyEval_SaveThread")  # other threads may run Python meanwhile
-    found = builder.call(batch, [*_with_own(builder, pointers, own, parameters), *bounds])
+    result = builder.call(batch, [*_with_own(builder, pointers, own, parameters), *bounds])
     api(builder, "PyEval_RestoreThread", thread)
-    _answer(builder, found, status)
+    _answer(builder, result, status)
 
 
 def _entry(module: Any, name: str, count: int, arrays_: int) -> tuple[Any, Any, list[Any], list[Any], Any]:
-    """A function of Python: its builder, `self`, the arguments, views, and the status.
+    """Write the frame of a Python function: return its builder, `self`, the arguments, views, and the status.
 
     The block of the status releases the views, also those still empty, and returns the status.
     """
     function = function_of(module, name)
-    builder, end = (ir.IRBuilder(function.append_basic_block(each)) for each in ("entry", "end"))
+    builder, end = (ir.IRBuilder(function.append_basic_block(block)) for block in ("entry", "end"))
     views, status = [arrays.empty_view(builder) for _ in range(arrays_)], end.phi(I64)
     for view in views:
         api(end, "PyBuffer_Release", view)
@@ -79,7 +79,7 @@ def _entry(module: Any, name: str, count: int, arrays_: int) -> tuple[Any, Any, 
 
 
 def _data(builder: Any, objects: list[Any], views: list[Any], kind: Any, axes: list[int], status: Any) -> list[Any]:
-    """Pointers to the numbers of C-contiguous arrays with these numbers of axes; the last is writeable."""
+    """Return pointers to the numbers of C-contiguous arrays with these numbers of axes; the last is writeable."""
     for value, view, count in zip(objects, views, axes, strict=True):
         _require(builder, [arrays.is_array(builder, value)], status)
         request = arrays.C_CONTIGUOUS | arrays.FORMAT | (arrays.WRITABLE if view is views[-1] else 0)
@@ -91,7 +91,7 @@ def _data(builder: Any, objects: list[Any], views: list[Any], kind: Any, axes: l
 
 
 def _with_own(builder: Any, pointers: list[Any], own: Any, parameters: bool) -> list[Any]:
-    """The pointers to x₁, …, y, and before y that to the parameters."""
+    """Return the pointers to x₁, …, y, with that to the parameters before y."""
     if not parameters:
         return pointers
     return [*pointers[:-1], builder.bitcast(api(builder, "PyBytes_AsString", own), pointers[-1].type), pointers[-1]]
@@ -112,7 +112,7 @@ def _answer(builder: Any, found: Any, status: Any) -> None:
 
 
 def _number(builder: Any, value: Any, kind: Any, status: Any) -> Any:
-    """A Python number; anything else is refused, and so is what `validate.converted` refuses to round to float32."""
+    """Return a Python number as float; refuse other objects, and numbers too large to be rounded to float32."""
     x = api(builder, "PyFloat_AsDouble", value)
     with builder.if_then(builder.fcmp_ordered("==", x, ir.Constant(F64, -1.0)), likely=False):
         error = api(builder, "PyErr_Occurred")
@@ -123,7 +123,7 @@ def _number(builder: Any, value: Any, kind: Any, status: Any) -> Any:
         return x
     narrow = builder.fptrunc(x, kind)
     magnitude = builder.call(builder.module.declare_intrinsic("llvm.fabs", [F64]), [x])
-    known = builder.fcmp_unordered("<=", magnitude, ir.Constant(F64, _LARGEST_NARROW))
+    is_small = builder.fcmp_unordered("<=", magnitude, ir.Constant(F64, _LARGEST_NARROW))
     exact = builder.fcmp_unordered("==", builder.fpext(narrow, F64), x)
-    _require(builder, [builder.or_(known, exact)], status)
+    _require(builder, [builder.or_(is_small, exact)], status)
     return narrow

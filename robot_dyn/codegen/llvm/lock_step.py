@@ -1,8 +1,8 @@
-"""Functions (t, y, p, run_parameters, out) of a state equation as machine code, of one run or of W in lock step.
+"""Functions (t, y, p, run_parameters, out) of a state equation as machine code, for one run or W runs in lock step.
 
-Number k of run b is y[k W + b]; t and p are shared, and so are those of `run_parameters` that are one number for all
-runs. A run with an angle beyond the range of the vectorised sine and cosine is computed again with those of the C
-library, so that runs do not depend on each other.
+Number k of run b is y[k W + b]; t, p and some of `run_parameters` are shared by all runs. A run with an angle beyond
+the range of the vectorised sine and cosine is computed again with the C library, so that runs do not depend on each
+other.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from robot_dyn.codegen.llvm.writer import Writer
 from robot_dyn.codegen.program import Program
 
 SIDE = 8  # runs in a vector: a 512-bit register, or two or four smaller ones
-Own = Mapping[int, tuple[int, bool]]  # of each number of `run_parameters`: its row, or where it stands once
+Own = Mapping[int, tuple[int, bool]]  # for each of `run_parameters`: its row, or its index if shared
 _NOTHING: Mapping[int, int] = MappingProxyType({})
 _ARGUMENTS = [F64, *[F64.as_pointer()] * 4]
 
 
 class Computed(NamedTuple):
-    """What a function computes of a vector of runs.
+    """Results of a function for a vector of runs.
 
     Attributes:
-        results: A vector of each.
-        out_of_range: As of `Written`.
-        seldom: Numbers of the results that are stored only where `doubt` holds for some run.
-        doubt: The mask of these runs; None if all are stored.
+        results: Vectors of the results.
+        out_of_range: Mask of runs with an angle beyond the range.
+        seldom: Indices of results that are stored only if `doubt` holds for some run.
+        doubt: Mask of these runs; None if all results are stored.
     """
 
     results: list[Any]
@@ -43,19 +43,19 @@ Body = Callable[[Writer, list[list[Any]]], Computed]  # (writer, the vectors of 
 
 
 def write_function(module: Any, name: str, program: Program, runs: int, shared: Mapping[int, int] = _NOTHING) -> None:
-    """A function of a program with the inputs t (1,), y, p and own.
+    """Write the function of a program with the inputs t (1,), y, p and run_parameters.
 
     Args:
-        module: LLVM's.
-        name: Of the function.
-        program: What it computes.
+        module: LLVM module.
+        name: Name of the function.
+        program: Program of the function.
         runs: 1 or a multiple of SIDE.
-        shared: Of those numbers of `run_parameters` that are the same for all runs, where in it each stands once; the
-            others come row by row in their order.
+        shared: Index in `run_parameters` of each number that is the same for all runs; the others follow row by row in
+            their order.
     """
 
-    def body(writer: Writer, given: list[list[Any]]) -> Computed:
-        written = writer.write(program, given)
+    def body(writer: Writer, inputs: list[list[Any]]) -> Computed:
+        written = writer.write(program, inputs)
         return Computed(written.results, written.out_of_range)
 
     _write(module, name, program.inputs, body, runs, shared)
@@ -69,28 +69,28 @@ def write_step(
     shared: Mapping[int, int],
     passes: int,
 ) -> None:
-    """A step as three programs in one function, so that values between them stay in registers or cache.
+    """Write a step as three programs in one function, so that intermediate values stay in registers or cache.
 
-        known = first(t, x, p, own),   found = second(t, known, own = places) until nothing changes,
-        after = third(t, x, own = found and known)
+        fixed = first(t, x, p, own),   solved = second(t, fixed, own = places) until nothing changes,
+        after = third(t, x, own = solved and fixed)
 
-    y is x and the places, where the second one starts; it is repeated for the runs of a vector until its last result is
-    0 for all of them, `passes` times at most, the results before that one being its places then. What comes out is
-    after, found and known; the last, of runs in lock step, only of vectors in which a run has not settled.
+    y contains x and the start of the places. The second program is repeated for a vector of runs until its last result
+    is 0 for all of them, but at most `passes` times; its other results are the next places. The results are after,
+    solved and fixed; in lock step, fixed is stored only for vectors in which a run has not converged.
     """
     first, second, third = programs
     n = second.inputs[-1]
     m = first.inputs[1]
 
-    def body(writer: Writer, given: list[list[Any]]) -> Computed:
-        t, y, p, run_parameters = given
-        known = writer.write(first, [t, y[:m], p, run_parameters])
-        found = _repeated(writer, second, [t, known.results, [], y[m:]], passes)
-        after = writer.write(third, [t, y[:m], [], [*found, *known.results]])
-        doubt = writer.builder.fcmp_ordered(">", found[-1], writer.vectors.constant(0.0))
-        results = [*after.results, *found, *known.results]
-        seldom = len(after.results) + len(found) if runs > 1 else len(results)
-        return Computed(results, known.out_of_range, range(seldom, len(results)), doubt)
+    def body(writer: Writer, inputs: list[list[Any]]) -> Computed:
+        t, y, p, run_parameters = inputs
+        fixed = writer.write(first, [t, y[:m], p, run_parameters])
+        solved = _repeated(writer, second, [t, fixed.results, [], y[m:]], passes)
+        after = writer.write(third, [t, y[:m], [], [*solved, *fixed.results]])
+        doubt = writer.builder.fcmp_ordered(">", solved[-1], writer.vectors.constant(0.0))
+        results = [*after.results, *solved, *fixed.results]
+        seldom = len(after.results) + len(solved) if runs > 1 else len(results)
+        return Computed(results, fixed.out_of_range, range(seldom, len(results)), doubt)
 
     _write(module, name, (1, m + n, *first.inputs[2:]), body, runs, shared)
 
@@ -130,34 +130,34 @@ def _write(
     builder.ret_void()
 
 
-def _repeated(writer: Writer, program: Program, given: list[list[Any]], passes: int) -> list[Any]:
-    """The results of a program of one vector of runs, pass after pass."""
+def _repeated(writer: Writer, program: Program, inputs: list[list[Any]], passes: int) -> list[Any]:
+    """Return the results of a program for one vector of runs, repeated until they converge."""
     builder, vectors = writer.builder, writer.vectors
     before, again, done = builder.block, builder.append_basic_block(), builder.append_basic_block()
     builder.branch(again)
     builder.position_at_end(again)
-    count, run_parameters = builder.phi(I64), [builder.phi(vectors.type) for _ in given[-1]]
-    results = writer.write(program, [*given[:-1], run_parameters]).results
+    count, run_parameters = builder.phi(I64), [builder.phi(vectors.type) for _ in inputs[-1]]
+    results = writer.write(program, [*inputs[:-1], run_parameters]).results
     after = builder.add(count, ir.Constant(I64, 1))
-    first, following = [ir.Constant(I64, 0), *given[-1]], [after, *results[-1 - len(run_parameters) : -1]]
+    first, following = [ir.Constant(I64, 0), *inputs[-1]], [after, *results[-1 - len(run_parameters) : -1]]
     for phi, start, value in zip([count, *run_parameters], first, following, strict=True):
         phi.add_incoming(start, before)
         phi.add_incoming(value, builder.block)
-    goes_on = vectors.any(builder.fcmp_ordered(">", results[-1], vectors.constant(0.0)))
+    continues = vectors.any(builder.fcmp_ordered(">", results[-1], vectors.constant(0.0)))
     less = builder.icmp_signed("<", after, ir.Constant(I64, passes))
-    builder.cbranch(builder.and_(goes_on, less), again, done)
+    builder.cbranch(builder.and_(continues, less), again, done)
     builder.position_at_end(done)
     return results
 
 
 def _any_angle(module: Any, name: str, inputs: tuple[int, ...], body: Body, runs: int, run_parameters: Own) -> Any:
-    """The same for the runs that share a vector, stored only for those whose bit is set."""
+    """Write the same function with the C library's sine, which stores results only for runs whose bit is set."""
     side = min(SIDE, runs)
     shape = ir.FunctionType(ir.VoidType(), [*_ARGUMENTS, I64, ir.IntType(side)])
     function = ir.Function(module, shape, name)
     function.linkage = "internal"
     function.attributes.add("noinline")
-    function.attributes.add("optnone")  # it is rarely called, and compiled faster so
+    function.attributes.add("optnone")  # rarely called; this shortens compilation
     builder = ir.IRBuilder(function.append_basic_block())
     *arguments, at, bits = function.args
     writer = Writer(builder, F64, side, any_angle=True)
@@ -173,33 +173,33 @@ def _any_angle(module: Any, name: str, inputs: tuple[int, ...], body: Body, runs
 def _inputs(
     vectors: Vectors, arguments: Any, inputs: tuple[int, ...], runs: int, at: Any, run_parameters: Own
 ) -> list[list[Any]]:
-    """The vectors of t, y, p and own, of the runs from `at` on."""
+    """Return the vectors of t, y, p and run_parameters, for the runs from `at` on."""
     t, y, p, numbers, _ = arguments
-    _, m, shared, each = inputs
+    _, m, shared, count = inputs
     builder = vectors.builder
 
     def one(array: Any, k: int) -> Any:
-        """A number that all runs share."""
+        """Return a number shared by all runs."""
         return _spread(vectors, builder.load(builder.gep(array, [ir.Constant(I64, k)])))
 
-    def of_each(array: Any, k: int) -> Any:
+    def of_runs(array: Any, k: int) -> Any:
         return builder.load(_place(vectors, array, k, runs, at), align=8)
 
     return [
         [_spread(vectors, t)],
-        [of_each(y, k) for k in range(m)],
+        [of_runs(y, k) for k in range(m)],
         [one(p, k) for k in range(shared)],
-        [(one if run_parameters[k][1] else of_each)(numbers, run_parameters[k][0]) for k in range(each)],
+        [(one if run_parameters[k][1] else of_runs)(numbers, run_parameters[k][0]) for k in range(count)],
     ]
 
 
 def _place(vectors: Vectors, array: Any, k: int, runs: int, at: Any) -> Any:
-    """Where the numbers k of the runs from `at` on stand."""
+    """Return the address of the numbers k of the runs from `at` on."""
     builder = vectors.builder
     place = builder.gep(array, [builder.add(at, ir.Constant(I64, k * runs))])
     return builder.bitcast(place, vectors.type.as_pointer())
 
 
 def _spread(vectors: Vectors, x: Any) -> Any:
-    """A number in each lane."""
+    """Return a vector with a number in each lane."""
     return vectors.of([x] * vectors.count) if vectors.count > 1 else x

@@ -20,7 +20,7 @@ from robot_dyn.codegen.llvm import python_function
 if TYPE_CHECKING:
     from robot_dyn.codegen.store.cache import Store
 
-# Lines. Less effort compiles 15 000 lines in 0.4 s instead of 0.8 s, for 2 % slower code; 31 000 in 4 s, not 12 s.
+# Lines. Lower effort compiles 15 000 lines in 0.4 s instead of 0.8 s, with 2 % slower code; 31 000 in 4 s, not 12 s.
 _LONG = 10_000
 _lock = threading.RLock()
 _loaded: dict[str, bytes] = {}  # object files by key
@@ -53,8 +53,8 @@ def addresses(
     Args:
         functions: Names of the functions, without the prefix of the module.
         key: The `digest` of everything that determines the module.
-        write: Writes the functions into a module, each name preceded by a prefix.
-        store: Where machine code is stored, or None.
+        write: Function that writes the functions into a module, with a prefix before each name.
+        store: Store of machine code, or None.
         about: Description of what the module computes, saved in the store.
         passes: Optimisation levels.
     """
@@ -68,7 +68,7 @@ def addresses(
             _loaded[key] = code
         if store is not None and stored is None:
             store.save(key, _sealed(_loaded[key]), about)
-        return tuple(_engine().get_function_address(name + each) for each in functions)
+        return tuple(_engine().get_function_address(name + function) for function in functions)
 
 
 def object_file(write: Callable[[Any, str], None], name: str, passes: Passes = _ALL) -> bytes:
@@ -124,7 +124,7 @@ def _machine(effort: int = 3) -> Any:
 
 @cache
 def _engine() -> Any:
-    """Return the execution engine that holds the machine code of this process."""
+    """Return the execution engine of the machine code of this process."""
     for name, location in python_function.addresses().items():
         binding.add_symbol(name, location)
     return binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())

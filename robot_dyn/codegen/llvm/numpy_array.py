@@ -29,7 +29,7 @@ def field(builder: ir.IRBuilder, view: Any, name: str) -> Any:
 def is_array(builder: ir.IRBuilder, value: Any) -> Any:
     """Return whether the class of an object is `numpy.ndarray`, not a subclass."""
     kind = api(builder, "PyObject_Type", value)
-    api(builder, "Py_DecRef", kind)  # its object keeps it
+    api(builder, "Py_DecRef", kind)  # the object still references it
     ndarray = builder.module.globals.get(NDARRAY) or ir.GlobalVariable(builder.module, ir.IntType(8), NDARRAY)
     return builder.icmp_unsigned("==", kind, ndarray)
 
@@ -41,12 +41,12 @@ def acquired(builder: ir.IRBuilder, value: Any, view: Any, request: int) -> Any:
 
 
 def has_form(builder: ir.IRBuilder, view: Any, kind: Any, axes: int) -> Any:
-    """Return whether a view holds aligned numbers of `kind` in the byte order of the machine, along so many axes."""
+    """Return whether a view contains aligned numbers of `kind` in native byte order, along `axes` axes."""
     conditions = [builder.icmp_signed("==", field(builder, view, "axes"), ir.Constant(I32, axes))]
     text = field(builder, view, "format")
     for i, letter in enumerate(b"d\0" if kind is F64 else b"f\0"):
-        found = builder.load(builder.gep(text, [ir.Constant(I64, i)]))
-        conditions.append(builder.icmp_unsigned("==", found, ir.Constant(found.type, letter)))
+        character = builder.load(builder.gep(text, [ir.Constant(I64, i)]))
+        conditions.append(builder.icmp_unsigned("==", character, ir.Constant(character.type, letter)))
     below = builder.ptrtoint(field(builder, view, "data"), I64)
     below = builder.and_(below, ir.Constant(I64, 7 if kind is F64 else 3))
     return all_of(builder, [*conditions, builder.icmp_signed("==", below, ir.Constant(I64, 0))])
@@ -56,8 +56,8 @@ def has_lengths(builder: ir.IRBuilder, view: Any, expected: Sequence[Any]) -> An
     """Return whether a view of len(expected) axes has these lengths."""
     lengths, conditions = field(builder, view, "lengths"), []
     for axis, length in enumerate(expected):
-        found = builder.load(builder.gep(lengths, [ir.Constant(I64, axis)]))
-        conditions.append(builder.icmp_signed("==", found, length))
+        actual = builder.load(builder.gep(lengths, [ir.Constant(I64, axis)]))
+        conditions.append(builder.icmp_signed("==", actual, length))
     return all_of(builder, conditions)
 
 

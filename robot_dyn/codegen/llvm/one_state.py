@@ -1,7 +1,7 @@
-"""One state as machine code: state(x₁, …, y) → Status, of pointers to the numbers of each input and to the results.
+"""One state as machine code: state(x₁, …, y) → Status, with pointers to the numbers of each input and to the results.
 
-The sums of absolute values detect numbers that are not finite or too large. Results are written if nothing is in
-doubt, after all inputs are read: y may be an input. Parameters, the last input if any, were checked before.
+Sums of absolute values detect non-finite and large numbers. Results are written if there is no doubt, after all inputs
+are read: y may be an input. Parameters, the last input if any, were checked before.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from robot_dyn.codegen.program import Program
 
 
 class Status(IntEnum):
-    """What a kernel reports of its arguments and results; of several states the largest counts.
+    """Report of a kernel on its arguments and results; the largest value of several states counts.
 
-    The slow path finds the message.
+    The slow path raises the error.
     """
 
     FINE = 0
@@ -33,7 +33,7 @@ class Status(IntEnum):
 @final
 @dataclass(frozen=True)
 class Limits:
-    """Upper bounds of Σ |x| of the arguments, and of the results of one state."""
+    """Upper bounds of Σ |x| of the arguments and of the results of one state."""
 
     arguments: float
     results: float
@@ -42,7 +42,7 @@ class Limits:
 def state_function(
     module: Any, name: str, program: Program, kind: Any, limits: Limits, any_angle: bool, parameters: bool
 ) -> Any:
-    """The function for one state; with `any_angle`, sine and cosine are those of the C library, for any angle."""
+    """Write the function of one state; with `any_angle` it uses the C library's sine and cosine, for any angle."""
     pointers = [kind.as_pointer()] * (len(program.inputs) + 1)
     function = ir.Function(module, ir.FunctionType(I64, pointers), name)
     builder = ir.IRBuilder(function.append_basic_block())
@@ -66,19 +66,19 @@ def state_function(
 
 
 def numbers(builder: Any, array: Any, n: int) -> list[Any]:
-    """The n numbers behind a pointer."""
+    """Load the n numbers at a pointer."""
     return [builder.load(builder.gep(array, [ir.Constant(I64, k)])) for k in range(n)]
 
 
 def distinct(program: Program, results: list[Any]) -> list[Any]:
-    """Each result once; of M half of them."""
+    """Return each result once; half of the entries of M."""
     return list(dict(zip(program.outputs, results, strict=True)).values())
 
 
 def judged(
     builder: Any, arguments: Any, results: Any, out_of_range: Any, most: float, doubtful: Any
 ) -> tuple[Any, Any]:
-    """The Status of the sums of absolute values and of the angles, and whether it is FINE."""
+    """Return the Status for the sums of absolute values and the angles, and the condition that it is FINE."""
     passed = builder.fcmp_ordered("<", arguments, ir.Constant(arguments.type, most))
     small = builder.fcmp_ordered("<", results, doubtful)
     status = builder.select(small, *(ir.Constant(I64, int(x)) for x in (Status.FINE, Status.RESULT)))
@@ -88,7 +88,7 @@ def judged(
 
 
 def _add_absolute(vectors: Vectors, array: Any, n: int, total: Any) -> Any:
-    """Add Σ |x| of n numbers, read again in vectors: one by one it would be one instruction in twenty."""
+    """Add Σ |x| of n numbers, loaded again as vectors: one by one they would be 5 % of all instructions."""
     builder, at = vectors.builder, 0
     for count in (8, 4, 2, 1):
         wider = Vectors(builder, vectors.kind, count)

@@ -33,12 +33,12 @@ def _chosen(sign: str) -> Operation:
 
 
 def _ordered(vectors: Vectors, sign: str, x: Any, y: Any) -> Any:
-    """The mask of a comparison; false if an operand is NaN."""
+    """Return the mask of a comparison; false if an operand is NaN."""
     return vectors.builder.fcmp_ordered(sign, x, y)
 
 
 def _holds(vectors: Vectors, x: Any) -> Any:
-    """The mask of a condition: true for any value other than 0, including NaN."""
+    """Return the mask of a condition: true for any value other than 0, including NaN."""
     return vectors.builder.fcmp_unordered("!=", x, vectors.constant(0.0))
 
 

@@ -1,4 +1,4 @@
-"""Machine code as a function of Python, of the form METH_FASTCALL, and Python's stable C API in machine code."""
+"""Machine code as a Python function of the form METH_FASTCALL, and Python's stable C API in machine code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows of an array (B, n) as vectors: number k of L states side by side, read, written and prefetched.
+"""Rows of an array (B, n) as vectors with number k of L states, loaded, stored and prefetched.
 
     8 rows of 8 numbers → transposed in registers by shuffles → 8 vectors of one number of 8 states
 
@@ -14,12 +14,12 @@ from llvmlite import ir
 from robot_dyn.codegen.llvm.vectors import I1, I32, I64, Vectors, wide
 
 SIDE = 8
-_LINE = 64  # bytes of a cache line, of most processors
-_AHEAD = 2  # groups of L states: a quarter of a microsecond, as long as memory takes to answer
+_LINE = 64  # bytes of a cache line on most processors
+_AHEAD = 2  # groups of L states: a quarter of a microsecond, the latency of memory
 
 
 def loaded(vectors: Vectors, array: Any, at: Any, n: int) -> list[Any]:
-    """The n numbers of L states, rows of an array from `at` on, each a vector."""
+    """Return the n numbers of L states, rows of an array from `at` on, each as a vector."""
     columns = []
     for k in range(0, n, SIDE):
         width, blocks = min(SIDE, n - k), []
@@ -46,7 +46,7 @@ def prefetch(vectors: Vectors, array: Any, at: Any, n: int, written: bool) -> No
     """Prefetch the cache lines of the states that are computed AHEAD groups later; past the end this is harmless."""
     builder = vectors.builder
     start = builder.bitcast(builder.gep(array, [builder.mul(at, ir.Constant(I64, n))]), ir.IntType(8).as_pointer())
-    flags = [ir.Constant(I32, x) for x in (int(written), 3, 1)]  # to write; to keep; data
+    flags = [ir.Constant(I32, x) for x in (int(written), 3, 1)]  # for writing; keep in cache; data
     shape = ir.FunctionType(ir.VoidType(), [start.type, *(x.type for x in flags)])
     function = builder.module.declare_intrinsic("llvm.prefetch.p0", fnty=shape)
     length = vectors.count * n * vectors.size
@@ -55,7 +55,7 @@ def prefetch(vectors: Vectors, array: Any, at: Any, n: int, written: bool) -> No
 
 
 def transposed(builder: Any, rows: list[Any]) -> list[Any]:
-    """Eight vectors of eight, transposed by exchanging blocks of 1, 2 and 4."""
+    """Transpose eight vectors of eight by exchanging blocks of 1, 2 and 4."""
     for size in (1, 2, 4):
         new = list(rows)
         for i in range(SIDE):
@@ -74,14 +74,14 @@ def _read(vectors: Vectors, array: Any, at: Any, i: int, n: int, k: int, width: 
     return _masked(vectors, "load", vector, *place, ir.Constant(vector, ir.Undefined))
 
 
-def _masked(vectors: Vectors, what: str, result: Any, *arguments: Any) -> Any:
+def _masked(vectors: Vectors, operation: str, result: Any, *arguments: Any) -> Any:
     shape = ir.FunctionType(result, [x.type for x in arguments])
-    name = f"llvm.masked.{what}.v{SIDE}f{8 * vectors.size}.p0"
+    name = f"llvm.masked.{operation}.v{SIDE}f{8 * vectors.size}.p0"
     return vectors.builder.call(vectors.builder.module.declare_intrinsic(name, fnty=shape), arguments)
 
 
 def _place(vectors: Vectors, array: Any, at: Any, i: int, n: int, k: int, width: int) -> tuple[Any, Any, Any]:
-    """Where numbers k … of row at + i of an array (B, n) stand, their alignment, and the mask of so many."""
+    """Return the address of numbers k … of row at + i of an array (B, n), the alignment, and the mask of the width."""
     builder = vectors.builder
     offset = builder.add(builder.mul(at, ir.Constant(I64, n)), ir.Constant(I64, i * n + k))
     pointer = builder.bitcast(builder.gep(array, [offset]), wide(vectors.kind, SIDE).as_pointer())
@@ -90,7 +90,7 @@ def _place(vectors: Vectors, array: Any, at: Any, i: int, n: int, k: int, width:
 
 
 def _part(vectors: Vectors, vector: Any, first: int) -> Any:
-    """Eight numbers of a vector."""
+    """Return eight numbers of a vector."""
     if vectors.count == SIDE:
         return vector
     return vectors.builder.shuffle_vector(vector, vector, _order(range(first, first + SIDE)))
@@ -101,5 +101,5 @@ def _joined(vectors: Vectors, low: Any, high: Any) -> Any:
 
 
 def _order(places: Any) -> Any:
-    """The mask of a shuffle."""
+    """Return the mask of a shuffle."""
     return ir.Constant(ir.VectorType(I32, len(places)), list(places))

@@ -1,4 +1,4 @@
-"""Vectorised sines and cosines of one state: angles that depend on no other sine share a vector."""
+"""Vectorised sines and cosines of one state: angles that do not depend on another sine share a vector."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def in_groups(program: Program) -> Iterator[tuple[Op, ...]]:
 
 
 def _independent_sines(program: Program) -> list[Op]:
-    """Sines of angles that depend on no sine or cosine."""
+    """Return the sines of angles that do not depend on another sine or cosine."""
     dependent: set[int] = set()
     sines = []
     for op in program.ops:
@@ -34,7 +34,7 @@ def _independent_sines(program: Program) -> list[Op]:
 
 
 def _needed(program: Program, values: list[int]) -> set[int]:
-    """The given values and all values they depend on, as far as instructions compute them."""
+    """Return these values and all they depend on, except inputs and constants."""
     needed = set(values)
     for op in reversed(program.ops):
         if not needed.isdisjoint(op.results):

@@ -1,8 +1,8 @@
-"""Vectors of numbers, one for each state, and what LLVM and the C library compute of them.
+"""Vectors of numbers, one number for each state, with operations of LLVM and the C library.
 
-Of one state, a vector is a number. Two levels of exactness: `Vectors` writes instructions whose sums may be reordered
-and whose products may be contracted, with NaN and infinities preserved; `Lanes` gives vectors Python's operators for
-formulas in which only contraction is allowed (a·b + c rounded once).
+For one state, a vector is a number. There are two levels of exactness: `Vectors` writes instructions whose sums may be
+reordered and whose products may be contracted, with NaN and infinities preserved; `Lanes` gives vectors Python's
+operators for formulas in which only contraction is allowed (a·b + c rounded once).
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from llvmlite import ir
 
 from robot_dyn.foundations.values import LINE
 
-FLAGS = ("afn", "arcp", "contract", "nsz", "reassoc")  # of LLVM's fast-math flags, all but nnan and ninf
+FLAGS = ("afn", "arcp", "contract", "nsz", "reassoc")  # LLVM's fast-math flags except nnan and ninf
 I1, I32, I64 = ir.IntType(1), ir.IntType(32), ir.IntType(64)
 F32, F64 = ir.FloatType(), ir.DoubleType()
 
 
 def wide(kind: Any, count: int) -> Any:
-    """The type of a vector of `count` numbers; for one, the type of the number itself."""
+    """Return the type of a vector of `count` numbers; for one, the type of the number."""
     return kind if count == 1 else ir.VectorType(kind, count)
 
 
@@ -31,9 +31,9 @@ class Vectors:
     """Vectors of one length and type.
 
     Attributes:
-        builder: Where instructions go.
-        kind: LLVM's type of a number.
-        count: Numbers in a vector.
+        builder: Builder of the instructions.
+        kind: LLVM type of a number.
+        count: Number of numbers in a vector.
     """
 
     builder: Any
@@ -42,7 +42,7 @@ class Vectors:
 
     @property
     def type(self) -> Any:
-        """LLVM's type of a vector."""
+        """LLVM type of a vector."""
         return wide(self.kind, self.count)
 
     @property
@@ -51,18 +51,18 @@ class Vectors:
         return 8 if self.kind is F64 else 4
 
     def constant(self, x: float) -> Any:
-        """A vector of equal numbers."""
+        """Return a vector of equal numbers."""
         return ir.Constant(self.type, x if self.count == 1 else [x] * self.count)
 
     def intrinsic(self, name: str, *operands: Any) -> Any:
-        """One of LLVM's own functions of vectors, such as "sqrt"."""
+        """Call one of LLVM's vector functions, such as "sqrt"."""
         lanes = "" if self.count == 1 else f"v{self.count}"
         shape = ir.FunctionType(self.type, [self.type] * len(operands))
         name = f"llvm.{name}.{lanes}f{8 * self.size}"
         return self.builder.call(self.builder.module.declare_intrinsic(name, fnty=shape), operands)
 
     def library(self, name: str, *operands: Any) -> Any:
-        """A function of the C library, lane by lane in float64."""
+        """Call a function of the C library, lane by lane in float64."""
         if self.count == 1:
             return self._library(name, *operands)
         result = ir.Constant(self.type, ir.Undefined)
@@ -79,11 +79,11 @@ class Vectors:
         return self.builder.fptrunc(result, self.kind)
 
     def lane(self, vector: Any, i: int) -> Any:
-        """One number of a vector."""
+        """Return one number of a vector."""
         return vector if self.count == 1 else self.builder.extract_element(vector, ir.Constant(I32, i))
 
     def of(self, numbers: Iterable[Any]) -> Any:
-        """The vector of these numbers, filled up with zeros."""
+        """Return the vector of these numbers, padded with zeros."""
         result = self.constant(0.0)
         for i, x in enumerate(numbers):
             result = self._set(result, x, i)
@@ -93,7 +93,7 @@ class Vectors:
         return x if self.count == 1 else self.builder.insert_element(vector, x, ir.Constant(I32, i))
 
     def any(self, mask: Any) -> Any:
-        """Whether a mask holds in some lane."""
+        """Return the condition that a mask holds in some lane."""
         if self.count == 1:
             return mask
         bits = ir.IntType(self.count)
@@ -101,17 +101,17 @@ class Vectors:
 
     @property
     def none(self) -> Any:
-        """The mask that holds in no lane."""
+        """Mask that holds in no lane."""
         return Vectors(self.builder, I1, self.count).constant(0)
 
     def absolute_sum(self, vectors: Iterable[Any], total: Any) -> Any:
-        """A total plus Σ |x| of vectors, lane by lane."""
+        """Return a total plus Σ |x| of vectors, lane by lane."""
         for x in vectors:
             total = self.builder.fadd(total, self.intrinsic("fabs", x), flags=FLAGS)
         return total
 
     def sum(self, vector: Any) -> Any:
-        """The sum of the numbers of a vector."""
+        """Return the sum of the numbers of a vector."""
         if self.count == 1:
             return vector
         shape = ir.FunctionType(self.kind, [self.kind, self.type])
@@ -121,10 +121,10 @@ class Vectors:
 
 
 def _operator(instruction: str, *flags: str, reflected: bool = False) -> Callable[[Any, Any], Lanes]:
-    """An operator of `Lanes`: one instruction of two values."""
+    """Return an operator of `Lanes`: one instruction with two operands."""
 
     def operator(self: Lanes, other: Any) -> Lanes:
-        """The instruction on two vectors, lane by lane."""
+        """Apply the instruction to two vectors, lane by lane."""
         x, y = self.value, self.of(other)
         return self.like(getattr(self.vectors.builder, instruction)(*((y, x) if reflected else (x, y)), flags=flags))
 
@@ -137,7 +137,7 @@ class Lanes:
 
     Attributes:
         vectors: Length and type.
-        value: The LLVM value.
+        value: LLVM value.
     """
 
     __slots__ = ("value", "vectors")
@@ -154,29 +154,29 @@ class Lanes:
     plus, __and__, __lshift__, __xor__ = map(_operator, ("add", "and_", "shl", "xor"))  # of integers
 
     def of(self, x: Any) -> Any:
-        """A constant, or other lanes, as an LLVM value of this type."""
+        """Return a constant, or other lanes, as an LLVM value of this type."""
         return x.value if isinstance(x, Lanes) else self.vectors.constant(x)
 
     def like(self, value: Any, kind: Any = None) -> Lanes:
-        """Lanes of as many numbers, of this type or another."""
+        """Return lanes of the same length, of this type or another."""
         vectors = self.vectors
         return Lanes(vectors if kind is None else Vectors(vectors.builder, kind, vectors.count), value)
 
     def cast(self, instruction: str, kind: Any) -> Lanes:
-        """The lanes as another type: "bitcast" keeps the bits, "fpext" and "fptrunc" the numbers."""
+        """Convert the lanes to another type: "bitcast" keeps the bits, "fpext" and "fptrunc" the numbers."""
         return self.like(getattr(self.vectors.builder, instruction)(self.value, wide(kind, self.vectors.count)), kind)
 
     def below(self, other: Any) -> Any:
-        """The mask of the lanes that are less than the other."""
+        """Return the mask of lanes that are less than the other."""
         return self.vectors.builder.fcmp_ordered("<", self.value, self.of(other))
 
     def choose(self, mask: Any, other: Any) -> Lanes:
-        """This value where the mask holds, otherwise the other."""
+        """Return this value where the mask holds, otherwise the other."""
         return self.like(self.vectors.builder.select(mask, self.value, self.of(other)))
 
 
 def polynomial(z: Lanes, coefficients: tuple[float, ...]) -> Any:
-    """c₀ + c₁ z + c₂ z² + …, by Horner's rule."""
+    """Return c₀ + c₁ z + c₂ z² + …, by Horner's rule."""
     value: Any = coefficients[-1]
     for c in coefficients[-2::-1]:
         value = c + z * value
@@ -184,6 +184,6 @@ def polynomial(z: Lanes, coefficients: tuple[float, ...]) -> Any:
 
 
 def align_stack(function: Any) -> None:
-    """Align the vectors that a function keeps on the stack to cache lines, from wherever it is called."""
-    function.attributes.add("nounwind")  # llvmlite writes no alignment where there is no other attribute
+    """Align the vectors that a function stores on the stack to cache lines, for any caller."""
+    function.attributes.add("nounwind")  # llvmlite omits the alignment without another attribute
     function.attributes.alignstack = LINE

@@ -1,7 +1,6 @@
-"""From a program to LLVM: each of its instructions on numbers, or on vectors of one number for each state.
+"""From a program to LLVM instructions on numbers, or on vectors with one number for each state.
 
-The sine and cosine hold for |x| ≤ RANGE; the results report farther angles, for which a writer with `any_angle` calls
-the C library.
+Sine and cosine are valid for |x| ≤ RANGE. Larger angles are reported; a writer with `any_angle` calls the C library.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ from robot_dyn.codegen.program import Kind, Op, Program
 @final
 @dataclass(frozen=True)
 class Written:
-    """The results of the instructions of a program.
+    """Results of the instructions of a program.
 
     Attributes:
-        results: A vector of each.
-        out_of_range: The mask of states with an angle beyond RANGE.
+        results: Vectors of the results.
+        out_of_range: Mask of states with an angle beyond RANGE.
     """
 
     results: list[Any]
@@ -35,13 +34,13 @@ class Written:
 @final
 @dataclass(frozen=True)
 class Writer:
-    """Writes programs.
+    """Writer of programs.
 
     Attributes:
-        builder: LLVM's, where the instructions go.
-        kind: LLVM's type of a number, F64 or F32.
-        count: States side by side; the numbers of a vector.
-        any_angle: Whether sines and cosines are the C library's.
+        builder: Builder of the instructions.
+        kind: LLVM type of a number, F64 or F32.
+        count: Number of states in a vector.
+        any_angle: Use the C library's sine and cosine.
     """
 
     builder: Any
@@ -51,11 +50,11 @@ class Writer:
 
     @property
     def vectors(self) -> Vectors:
-        """The numbers of the states side by side."""
+        """Vectors of the states."""
         return Vectors(self.builder, self.kind, self.count)
 
     def write(self, program: Program, inputs: Sequence[Sequence[Any]]) -> Written:
-        """The instructions of a program, given the vectors of each input."""
+        """Write the instructions of a program for vectors of each input."""
         vectors = self.vectors
         values = dict(enumerate(chain(*inputs, map(vectors.constant, program.constants))))
         out_of_range = vectors.none
@@ -73,7 +72,7 @@ class Writer:
         return Written([values[i] for i in program.outputs], out_of_range)
 
     def _sines(self, ops: tuple[Op, ...], values: dict[int, Any]) -> Any:
-        """Sines and cosines, of several angles of one state in one vector; the mask of angles beyond RANGE."""
+        """Write sines and cosines, several angles of one state in one vector; return the mask of far angles."""
         together = Vectors(self.builder, self.kind, self.count if len(ops) == 1 else GROUP)
         angles = [values[op.operands[0]] for op in ops]
         vector = angles[0] if len(ops) == 1 else together.of(angles)

@@ -15,38 +15,38 @@ from robot_dyn.codegen.loops.values import ONE, ArrayValue, Scalar, Value, numbe
 if TYPE_CHECKING:
     from robot_dyn.codegen.loops.function import Function
 
-Place = Scalar | tuple[Scalar, Scalar, bool]  # an index; or a slice, from and to, and whether it is all
+Place = Scalar | tuple[Scalar, Scalar, bool]  # an index; or a slice: start, stop, and True for a full axis
 
 
 def subscript(f: Function, x: ArrayValue, node: ast.Subscript) -> Value:
-    """An entry, or a view."""
+    """Return an entry or a view."""
     places = _places(f, x, node)
-    if all(isinstance(each, Scalar) for each in places):
-        return load(f, x, [each for each in places if isinstance(each, Scalar)])
+    if all(isinstance(place, Scalar) for place in places):
+        return load(f, x, [place for place in places if isinstance(place, Scalar)])
     return _view(f, x, places)
 
 
 def store_at(f: Function, x: ArrayValue, node: ast.Subscript, value: Value) -> None:
     """Write an entry, or one number into all entries of a view."""
     if x.kind.frozen:
-        raise f.refused(node, "a write into an array that is read-only", "pass one that may be written")
-    places, number_ = _places(f, x, node), converted(f, scalar(f, value, node), x.kind.of, node)
-    if all(isinstance(each, Scalar) for each in places):
-        store(f, x, [each for each in places if isinstance(each, Scalar)], number_)
+        raise f.refused(node, "a write into an array that is read-only", "pass a writable one")
+    places, converted_value = _places(f, x, node), converted(f, scalar(f, value, node), x.kind.of, node)
+    if all(isinstance(place, Scalar) for place in places):
+        store(f, x, [place for place in places if isinstance(place, Scalar)], converted_value)
     else:
-        fill(f, _view(f, x, places), number_)
+        fill(f, _view(f, x, places), converted_value)
 
 
 def indices(f: Function, x: ArrayValue, node: ast.Subscript) -> list[Scalar]:
-    """The indices of an entry."""
+    """Return the indices of an entry."""
     places = _places(f, x, node)
-    if not all(isinstance(each, Scalar) for each in places):
+    if not all(isinstance(place, Scalar) for place in places):
         raise f.refused(node, "an operation on a part of an array", "write a loop over its entries")
-    return [each for each in places if isinstance(each, Scalar)]
+    return [place for place in places if isinstance(place, Scalar)]
 
 
 def load(f: Function, x: ArrayValue, indices: list[Scalar]) -> Scalar:
-    """An entry."""
+    """Load an entry."""
     value = f.builder.load(address(f, x, indices))
     return Scalar(x.kind.of, f.builder.icmp_unsigned("!=", value, ir.Constant(I8, 0)) if x.kind.of == BOOL else value)
 
@@ -58,7 +58,7 @@ def store(f: Function, x: ArrayValue, indices: list[Scalar], value: Scalar) -> N
 
 
 def address(f: Function, x: ArrayValue, indices: list[Scalar]) -> Any:
-    """The address of an entry, or of the first one of a view, by its leading indices."""
+    """Return the address of an entry, or of the first entry of a view, from its leading indices."""
     at, b = number(0), f.builder
     for index, stride in zip(indices, x.strides(b), strict=False):
         term = times(index, stride, b)
@@ -71,24 +71,26 @@ def address(f: Function, x: ArrayValue, indices: list[Scalar]) -> Any:
 
 def fill(f: Function, x: ArrayValue, value: Scalar, indices: list[Scalar] | None = None) -> None:
     """Write a number into all entries."""
-    known = indices or []
-    if len(known) == x.kind.ndim:
-        store(f, x, known, value)
+    leading = indices or []
+    if len(leading) == x.kind.ndim:
+        store(f, x, leading, value)
         return
-    with f.loop(x.shape[len(known)]) as index:
-        fill(f, x, value, [*known, index])
+    with f.loop(x.shape[len(leading)]) as index:
+        fill(f, x, value, [*leading, index])
 
 
 def _places(f: Function, x: ArrayValue, node: ast.Subscript) -> list[Place]:
-    """An index or a slice of each axis."""
+    """Return an index or a slice for each axis."""
     parts = list(node.slice.elts) if isinstance(node.slice, ast.Tuple) else [node.slice]
-    if any(isinstance(each, ast.Constant) and each.value is ... for each in parts):
+    if any(isinstance(item, ast.Constant) and item.value is ... for item in parts):
         if len(parts) > 1:
             raise f.refused(node, "an ellipsis among indices", "write a colon for each axis")
         parts = []
     if len(parts) > x.kind.ndim:
-        raise f.refused(node, f"{len(parts)} indices of an array with {x.kind.ndim} axes", "take as many as axes")
-    places: list[Place] = [_place(f, each, length) for each, length in zip(parts, x.shape, strict=False)]
+        raise f.refused(
+            node, f"{len(parts)} indices of an array with {x.kind.ndim} axes", "give at most one for each axis"
+        )
+    places: list[Place] = [_place(f, item, length) for item, length in zip(parts, x.shape, strict=False)]
     return places + [(number(0), length, True) for length in x.shape[len(parts) :]]
 
 
@@ -103,7 +105,7 @@ def _place(f: Function, node: ast.expr, length: Scalar) -> Place:
 
 
 def index_within(f: Function, index: Scalar, length: Scalar, node: ast.AST) -> Scalar:
-    """An index that is checked to be within an axis; a negative one counts from the end."""
+    """Return an index that is checked against the length of an axis; a negative one counts from the end."""
     index, b = converted(f, index, INT, node), f.builder
     if index.const is not None and length.const is not None and -length.const <= index.const < length.const:
         return number(index.const % length.const)
@@ -118,7 +120,7 @@ def index_within(f: Function, index: Scalar, length: Scalar, node: ast.AST) -> S
 
 
 def _bound(f: Function, node: ast.expr, length: Scalar) -> Scalar:
-    """A bound of a slice, clipped to the axis."""
+    """Return a bound of a slice, clipped to the axis."""
     bound, b, zero = converted(f, scalar(f, f.expression(node), node), INT, node), f.builder, ir.Constant(I64, 0)
     if bound.const == 0 or (not f.checks and (bound.const is None or bound.const > 0)):
         return bound
@@ -131,20 +133,21 @@ def _bound(f: Function, node: ast.expr, length: Scalar) -> Scalar:
 
 
 def _view(f: Function, x: ArrayValue, places: list[Place]) -> ArrayValue:
-    strides, firsts, shape, apart, kept = x.strides(f.builder), [], [], [], []
+    """Return a view of an array."""
+    strides, starts, shape, apart, remaining = x.strides(f.builder), [], [], [], []
     for axis, (place, stride) in enumerate(zip(places, strides, strict=True)):
         if isinstance(place, Scalar):
-            firsts.append(place)
+            starts.append(place)
             continue
         low, high, whole = place
-        firsts.append(low)
+        starts.append(low)
         shape.append(high if low.const == 0 else _length(f, low, high))
         apart.append(stride)
-        kept.append((axis, whole))
-    single = x.kind.single and len(kept) > 1 and kept[-1] == (x.kind.ndim - 1, True)
-    contiguous = x.kind.contiguous and _is_contiguous(x, kept)
-    kind = replace(x.kind, ndim=len(kept), contiguous=contiguous, single=single)
-    return ArrayValue(kind, address(f, x, firsts), tuple(shape), () if contiguous else tuple(apart))
+        remaining.append((axis, whole))
+    single = x.kind.single and len(remaining) > 1 and remaining[-1] == (x.kind.ndim - 1, True)
+    contiguous = x.kind.contiguous and _is_contiguous(x, remaining)
+    kind = replace(x.kind, ndim=len(remaining), contiguous=contiguous, single=single)
+    return ArrayValue(kind, address(f, x, starts), tuple(shape), () if contiguous else tuple(apart))
 
 
 def _length(f: Function, low: Scalar, high: Scalar) -> Scalar:
@@ -153,18 +156,18 @@ def _length(f: Function, low: Scalar, high: Scalar) -> Scalar:
     return Scalar(INT, b.select(b.icmp_signed(">", length, ir.Constant(I64, 0)), length, ir.Constant(I64, 0)))
 
 
-def _is_contiguous(x: ArrayValue, kept: list[tuple[int, bool]]) -> bool:
-    """Whether the remaining axes come after all others, and all but the first of them are whole."""
+def _is_contiguous(x: ArrayValue, remaining: list[tuple[int, bool]]) -> bool:
+    """Return True if the remaining axes follow all others, and all but the first of them are full."""
     axes = [axis for axis in range(x.kind.ndim) if not (x.kind.single and axis == x.kind.ndim - 1)]
-    of = [(axis, whole) for axis, whole in kept if axis in axes]
-    return [axis for axis, _ in of] == axes[len(axes) - len(of) :] and all(whole for _, whole in of[1:])
+    leading = [(axis, whole) for axis, whole in remaining if axis in axes]
+    return [axis for axis, _ in leading] == axes[len(axes) - len(leading) :] and all(whole for _, whole in leading[1:])
 
 
 def reshaped(f: Function, x: ArrayValue, shape: list[Scalar], node: ast.AST) -> ArrayValue:
-    """A contiguous array in another shape."""
+    """Return a contiguous array in another shape."""
     if not x.kind.contiguous:
         raise f.refused(node, "the reshape of an array that is not contiguous", "copy it first")
-    shape, b = [converted(f, each, INT, node) for each in shape], f.builder
+    shape, b = [converted(f, length, INT, node) for length in shape], f.builder
     single = len(shape) > 1 and shape[-1].const == 1
     f.check(
         b.icmp_signed("==", size(f, x).ir, _product(f, shape).ir), node, "a shape has a different number of entries"
@@ -173,20 +176,20 @@ def reshaped(f: Function, x: ArrayValue, shape: list[Scalar], node: ast.AST) -> 
 
 
 def part(f: Function, x: ArrayValue, first: Scalar, count: Scalar, node: ast.AST) -> ArrayValue:
-    """A one-dimensional view of `count` entries of a contiguous array."""
+    """Return a one-dimensional view of `count` entries of a contiguous array."""
     if not x.kind.contiguous:
-        raise f.refused(node, "a primitive of an array that is not contiguous", "copy it into one that is")
+        raise f.refused(node, "a primitive of an array that is not contiguous", "copy it first")
     kind = replace(x.kind, ndim=1, single=False)
     return ArrayValue(kind, f.builder.gep(x.data, [first.ir], inbounds=True), (count,))
 
 
 def size(f: Function, x: ArrayValue) -> Scalar:
-    """Number of entries."""
+    """Return the number of entries."""
     return _product(f, x.shape)
 
 
 def _product(f: Function, lengths: Any) -> Scalar:
     product = ONE
-    for each in lengths:
-        product = times(product, each, f.builder)
+    for length in lengths:
+        product = times(product, length, f.builder)
     return product

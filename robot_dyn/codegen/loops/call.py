@@ -1,6 +1,6 @@
 """A plain function as machine code: compiled for the types of its arguments, or restored from a store.
 
-Arguments are passed as words, such as the addresses of arrays; a call packs only those that changed since the last.
+Arguments are passed as words, such as the addresses of arrays; a call packs only arguments that changed.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from robot_dyn.foundations.waiting import log_if_slow
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p)
 _LETTERS: Mapping[str, str] = {"float": "f", "int": "i", "uint": "u", "bool": "b"}
 _NUMBERS = {letter: Number(name) for name, letter in _LETTERS.items()}
-QUICK = Passes(level=1, effort=1)  # the work is behind addresses
+QUICK = Passes(level=1, effort=1)  # most work is in called functions
 
 
 @final
 class MachineFunction:
-    """A function as machine code, for any types that it is called with; `calls` returns a caller of it.
+    """A function as machine code for any argument types; `calls` returns a caller.
 
     Args:
         function: A plain function.
-        instead: See `Program`.
-        store: Returns where machine code is stored, or None.
-        about: What it computes, shown to a reader of the store.
-        passes: How hard LLVM works.
+        instead: Substitutes for functions, see `Program`.
+        store: Function that returns the store of machine code, or None.
+        about: Description for readers of the store.
+        passes: Optimisation levels of LLVM.
     """
 
     def __init__(
@@ -48,41 +48,41 @@ class MachineFunction:
     ) -> None:  # fmt: skip
         self.function, self.about, self._passes = function, about, passes
         self.store, self._instead, self._lock = store, instead, threading.Lock()
-        self._known: dict[Any, tuple[Any, Kind]] = {}
+        self._entries: dict[Any, tuple[Any, Kind]] = {}
 
     def calls(self) -> Call:
-        """A caller of it, for one thread at a time."""
+        """Return a caller, for one thread at a time."""
         return Call(self)
 
-    def check(self, *given: Any) -> None:
-        """Translate it for such arguments, without compiling it.
+    def check(self, *arguments: Any) -> None:
+        """Translate the function for such arguments, without compiling it.
 
         Raises:
             SubsetError: If it is outside the subset.
         """
         from robot_dyn.codegen.loops.program import translated
 
-        translated(self.function, pack(given, self.store).kinds, self._instead)
+        translated(self.function, pack(arguments, self.store).kinds, self._instead)
 
     def key(self, kinds: tuple[Kind, ...]) -> str:
-        """The key of its machine code in a store."""
+        """Return the key of its machine code in a store."""
         return self._key(kinds, dependencies(self.function, self._instead))
 
     def _key(self, kinds: tuple[Kind, ...], texts: list[str]) -> str:
         return digest(["loop", str(self._passes), sources_of_the_translator(), *map(repr, kinds), *texts])
 
     def is_kept(self) -> bool:
-        """Whether its machine code, for some types of arguments, is in memory or in the store."""
+        """Return True if its machine code, for some argument types, is in memory or in the store."""
         store = self.store()
-        return bool(self._known) or (store is not None and store.load(self._note) is not None)
+        return bool(self._entries) or (store is not None and store.load(self._note) is not None)
 
     @cached_property
     def _note(self) -> str:
-        """The key of the note that its machine code is stored; compiling takes the code and values of that moment."""
+        """Key of the note that its machine code is stored; compilation uses the code and values of that moment."""
         return self.key(())
 
     def entry(self, place: Any, kinds: Sequence[Kind]) -> tuple[Any, Kind]:
-        """The function that takes words, and the type of its result.
+        """Return the function that takes words, and the type of its result.
 
         Args:
             place: A key for the types, or their number.
@@ -91,16 +91,16 @@ class MachineFunction:
         Raises:
             SubsetError: If it is outside the subset.
         """
-        if place in self._known:
-            return self._known[place]
-        began, known = perf_counter(), tuple(kinds)
+        if place in self._entries:
+            return self._entries[place]
+        began, types = perf_counter(), tuple(kinds)
         with self._lock, interrupts_later():
-            if known not in self._known:
+            if types not in self._entries:
                 with log_if_slow(f"compiling {self.about}, once for this version"):
-                    self._known[known] = self._compiled(known)
-            self._known[place] = self._known[known]
+                    self._entries[types] = self._compiled(types)
+            self._entries[place] = self._entries[types]
         COMPILING.seconds += perf_counter() - began
-        return self._known[place]
+        return self._entries[place]
 
     def _compiled(self, kinds: tuple[Kind, ...]) -> tuple[Any, Kind]:
         def write(module: Any, prefix: str) -> None:
@@ -125,10 +125,10 @@ class MachineFunction:
 
 @final
 class Call:
-    """A caller of machine code whose arguments change little from one call to the next.
+    """A caller of machine code whose arguments change little between calls.
 
     Raises:
-        MachineCodeError: If it fails, with the line.
+        MachineCodeError: If the code fails; the message names the line.
     """
 
     def __init__(self, function: MachineFunction) -> None:
@@ -138,31 +138,31 @@ class Call:
         self._packed: dict[tuple[int, ...], Packed] = {}  # by the indices of their arguments
         self._entry: Any = None
 
-    def __call__(self, *given: Any) -> Any:
-        """The result for these arguments."""
+    def __call__(self, *arguments: Any) -> Any:
+        """Return the result for these arguments."""
         before = self._given
-        if len(before) != len(given):
-            self._given, self._packed, self._kinds = [None] * len(given), {}, [Static.of(None)] * len(given)
-            self._block = array("q", bytes(8 * len(given)))
-            self._take(tuple(range(len(given))), given)
+        if len(before) != len(arguments):
+            self._given, self._packed, self._kinds = [None] * len(arguments), {}, [Static.of(None)] * len(arguments)
+            self._block = array("q", bytes(8 * len(arguments)))
+            self._take(tuple(range(len(arguments))), arguments)
         else:
-            others = tuple([i for i, each in enumerate(given) if each is not before[i]])
+            others = tuple([i for i, argument in enumerate(arguments) if argument is not before[i]])
             if others:
-                self._take(others, given)
+                self._take(others, arguments)
         text = self._entry(self._addresses, self._out_address)
         if text is not None:
             raise MachineCodeError(text.decode())
         return self._result()
 
-    def _take(self, others: tuple[int, ...], given: tuple[Any, ...]) -> None:
+    def _take(self, others: tuple[int, ...], arguments: tuple[Any, ...]) -> None:
         """Pack the arguments that differ from those of the previous call."""
-        packed, same = pack(tuple([given[i] for i in others]), self._function.store), True
+        packed, same = pack(tuple([arguments[i] for i in others]), self._function.store), True
         self._packed[others] = packed
         for i, start, kind in zip(others, packed.starts, packed.kinds, strict=True):
             same &= self._kinds[i] is kind
-            self._given[i], self._block[i], self._kinds[i] = given[i], start, kind
+            self._given[i], self._block[i], self._kinds[i] = arguments[i], start, kind
         if not same:
-            whole = packed.number if len(others) == len(given) else tuple(self._kinds)
+            whole = packed.number if len(others) == len(arguments) else tuple(self._kinds)
             self._entry, self._kind = self._function.entry(whole, self._kinds)
             self._out = array("q", bytes(8 * max(1, words(self._kind))))
             self._addresses, self._out_address = self._block.buffer_info()[0], self._out.buffer_info()[0]
@@ -178,7 +178,7 @@ def _written(kind: Kind) -> str:
 
 
 def _read(text: str) -> Kind:
-    """The type of a text that `_written` returned."""
+    """Return the type of a text that `_written` returned."""
     stack: list[list[Kind]] = [[]]
     for letter in text:
         if letter == "(":

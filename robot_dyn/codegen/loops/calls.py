@@ -1,4 +1,4 @@
-"""Calls: of functions that are translated too, of their substitutes, and of some functions of Python and NumPy."""
+"""Calls: of functions that are also translated, of substitutes, and of some functions of Python and NumPy."""
 
 from __future__ import annotations
 
@@ -33,44 +33,46 @@ Handler = Callable[..., Value]  # (f, node, arguments) → value
 
 
 def called(f: Function, node: ast.Call) -> Value:
-    """The result of a call."""
-    if node.keywords or any(isinstance(each, ast.Starred) for each in node.args):
-        raise f.refused(node, "an argument by name, or with a star", "give arguments by their places")
+    """Return the result of a call."""
+    if node.keywords or any(isinstance(argument, ast.Starred) for argument in node.args):
+        raise f.refused(node, "an argument by name, or with a star", "pass arguments by position")
     if isinstance(node.func, ast.Attribute) and node.func.attr == "reshape":
         return _reshape(f, node, node.func.value)
-    function, given = f.expression(node.func), [f.expression(each) for each in node.args]
-    of = function.value if isinstance(function, StaticValue) else None
-    handler = f.program.instead.get(of) if callable(of) else None
+    function, arguments = f.expression(node.func), [f.expression(argument) for argument in node.args]
+    callee = function.value if isinstance(function, StaticValue) else None
+    handler = f.program.instead.get(callee) if callable(callee) else None
     if isinstance(handler, FunctionType) and not hasattr(handler, "emits"):
-        return _translated(f, node, handler, given)
-    handler = handler or _KNOWN.get(of) if callable(of) else None
+        return _translated(f, node, handler, arguments)
+    handler = handler or _HANDLERS.get(callee) if callable(callee) else None
     if handler is not None:
         try:
-            return handler(f, node, *given)
+            return handler(f, node, *arguments)
         except TypeError as error:
             raise f.refused(
                 node, f"the call {ast.unparse(node)} ({error})", "see docs/developers/extending.md"
             ) from None
-    if isinstance(of, FunctionType):
-        return _translated(f, node, of, given)
-    known = "plain functions, abs, min, max, len, float, int, np.sqrt, np.sign, np.spacing, np.nextafter, math.frexp"
-    raise f.refused(node, f"the call {ast.unparse(node)}", f"call {known}, or a primitive")
+    if isinstance(callee, FunctionType):
+        return _translated(f, node, callee, arguments)
+    callables = (
+        "plain functions, abs, min, max, len, float, int, np.sqrt, np.sign, np.spacing, np.nextafter, math.frexp"
+    )
+    raise f.refused(node, f"the call {ast.unparse(node)}", f"call {callables}, or a primitive")
 
 
-def _translated(f: Function, node: ast.Call, function: Any, given: list[Value]) -> Value:
-    """The result of another function, which is translated for these types."""
-    written = f.program.written(function, tuple(each.kind for each in given), partial(f.refuse, node))
+def _translated(f: Function, node: ast.Call, function: Any, arguments: list[Value]) -> Value:
+    """Return the result of another function, which is translated for these types."""
+    written = f.program.written(function, tuple(argument.kind for argument in arguments), partial(f.refuse, node))
     f.may_fail |= written.may_fail
     parts = leaf_types(written.result)
     if f.silent:
         return of_leaves(written.result, [None] * len(parts))
     b = f.builder
-    returned = b.call(written.ir, [leaf for each in given for leaf in leaves(each)])
+    returned = b.call(written.ir, [leaf for argument in arguments for leaf in leaves(argument)])
     count = written.may_fail + len(parts)
-    found = [returned] if count == 1 else [b.extract_value(returned, i) for i in range(count)]
+    results = [returned] if count == 1 else [b.extract_value(returned, i) for i in range(count)]
     if written.may_fail:
-        f.fail_unless(b.icmp_unsigned("==", found[0], ir.Constant(TEXT, None)), found[0])
-    return of_leaves(written.result, found[written.may_fail :])
+        f.fail_unless(b.icmp_unsigned("==", results[0], ir.Constant(TEXT, None)), results[0])
+    return of_leaves(written.result, results[written.may_fail :])
 
 
 def _reshape(f: Function, node: ast.Call, of: ast.expr) -> Value:
@@ -80,7 +82,7 @@ def _reshape(f: Function, node: ast.Call, of: ast.expr) -> Value:
         shape = TupleValue((shape,))
     if not isinstance(x, ArrayValue) or not isinstance(shape, TupleValue):
         raise f.refused(node, f"the call {ast.unparse(node)}", "reshape an array to a tuple of lengths")
-    return arrays.reshaped(f, x, [numbers.scalar(f, each, node) for each in shape.items], node)
+    return arrays.reshaped(f, x, [numbers.scalar(f, length, node) for length in shape.items], node)
 
 
 def _abs(f: Function, node: ast.AST, x: Value) -> Value:
@@ -92,13 +94,13 @@ def _abs(f: Function, node: ast.AST, x: Value) -> Value:
 
 
 def _extreme(sign: str) -> Handler:
-    """The first of the largest, or smallest, numbers as in Python: nan is neither above nor below."""
+    """Return a handler of min or max: the first extreme number as in Python; nan is neither above nor below."""
     relation = ast.Gt if sign == ">" else ast.Lt
 
-    def extreme(f: Function, node: ast.AST, *given: Value) -> Value:
-        if len(given) < 2:
+    def extreme(f: Function, node: ast.AST, *values: Value) -> Value:
+        if len(values) < 2:
             raise f.refused(node, "min or max of one argument", "give two or more numbers")
-        best, *others = (numbers.scalar(f, each, node) for each in given)
+        best, *others = (numbers.scalar(f, value, node) for value in values)
         for other in others:
             best, other = numbers.together(f, best, other, node)
             better = numbers.compared(f, relation, other, best, node)
@@ -123,7 +125,7 @@ def _float(f: Function, node: ast.AST, x: Value) -> Value:
 
 
 def _int(f: Function, node: ast.AST, x: Value) -> Value:
-    """A number rounded towards 0, if 64 bits hold it."""
+    """Round a number towards 0; check that it fits 64 bits."""
     x, b = numbers.scalar(f, x, node), f.builder
     if x.kind == FLOAT:
         size = f.intrinsic("fabs", x.ir)
@@ -150,7 +152,7 @@ def _sqrt(f: Function, node: ast.AST, x: Value) -> Value:
 
 
 def _sign(f: Function, node: ast.AST, x: Value) -> Value:
-    """The sign of a float: 0 for ±0, nan for nan."""
+    """Return the sign of a float: 0 for ±0, nan for nan."""
     x, b, zero = numbers.real(f, x, node), f.builder, ir.Constant(F64, 0.0)
     sign = b.select(b.fcmp_ordered("<", x.ir, zero), ir.Constant(F64, -1.0), x.ir)
     sign = b.select(b.fcmp_ordered(">", x.ir, zero), ir.Constant(F64, 1.0), sign)
@@ -158,12 +160,12 @@ def _sign(f: Function, node: ast.AST, x: Value) -> Value:
 
 
 def _nextafter(f: Function, node: ast.AST, x: Value, y: Value) -> Value:
-    given = [numbers.real(f, each, node).ir for each in (x, y)]
-    return Scalar(FLOAT, f.builder.call(f.external("nextafter", F64, F64, F64), given))
+    both = [numbers.real(f, value, node).ir for value in (x, y)]
+    return Scalar(FLOAT, f.builder.call(f.external("nextafter", F64, F64, F64), both))
 
 
 def _spacing(f: Function, node: ast.AST, x: Value) -> Value:
-    """The distance to the next float away from 0."""
+    """Return the distance to the next float away from 0."""
     x, b = numbers.real(f, x, node), f.builder
     size = f.intrinsic("fabs", x.ir)
     following = b.call(f.external("nextafter", F64, F64, F64), [size, ir.Constant(F64, math.inf)])
@@ -171,7 +173,7 @@ def _spacing(f: Function, node: ast.AST, x: Value) -> Value:
 
 
 def _frexp(f: Function, node: ast.AST, x: Value) -> Value:
-    """M and e of x = m 2ᵉ."""
+    """Return m and e of x = m 2ᵉ."""
     x, b = numbers.real(f, x, node), f.builder
     if f.silent:
         return TupleValue((Scalar(FLOAT, None), Scalar(INT, None)))
@@ -182,7 +184,7 @@ def _frexp(f: Function, node: ast.AST, x: Value) -> Value:
     return TupleValue((Scalar(FLOAT, m), Scalar(INT, b.sext(b.load(slot), I64))))
 
 
-_KNOWN: Mapping[Any, Handler] = MappingProxyType(
+_HANDLERS: Mapping[Any, Handler] = MappingProxyType(
     {
         abs: _abs, min: _extreme("<"), max: _extreme(">"), len: _len, float: _float, int: _int, np.uint64: _word,
         np.sqrt: _sqrt, np.sign: _sign, np.spacing: _spacing, np.nextafter: _nextafter, math.frexp: _frexp,

@@ -1,9 +1,8 @@
-"""What the machine code of a function depends on, as texts: the code of all that it reaches, and constants.
+"""Dependencies of the machine code of a function, as texts: the code of all functions it reaches, and constants.
 
     function → its code, and the values of the names in it → …
 
-The code is Python's, against which the syntax tree was checked; so nothing has to be parsed to look for machine code
-in a store.
+The code is Python's bytecode, against which the syntax tree was checked; so a store can be searched without parsing.
 """
 
 from __future__ import annotations
@@ -20,34 +19,34 @@ from robot_dyn.codegen.store.definition import code_parts
 
 
 def reached(function: Callable[..., Any], instead: Mapping[Any, Callable[..., Any]]) -> list[FunctionType]:
-    """A function and all that it calls, by the names in them, or their substitutes."""
-    found: dict[FunctionType, None] = {}
+    """Return a function and all functions it calls by the names in it, or their substitutes."""
+    functions: dict[FunctionType, None] = {}
 
     def visit(candidate: Any) -> None:
         candidate = instead.get(candidate, candidate)
-        if isinstance(candidate, FunctionType) and candidate not in found and not hasattr(candidate, "emits"):
-            found[candidate] = None
+        if isinstance(candidate, FunctionType) and candidate not in functions and not hasattr(candidate, "emits"):
+            functions[candidate] = None
             for value in _named(candidate).values():
                 if callable(value):
                     visit(value)
 
     visit(function)
-    return list(found)
+    return list(functions)
 
 
 def dependencies(function: Callable[..., Any], instead: Mapping[Any, Callable[..., Any]]) -> list[str]:
-    """Texts that determine what a function does, for arguments of given types."""
+    """Return texts that determine the behaviour of a function, for arguments of given types."""
     texts = []
-    for each in reached(function, instead):
-        code = each.__code__
-        values = (f"{name} = {_described(value, instead)}" for name, value in sorted(_named(each).items()))
+    for dependency in reached(function, instead):
+        code = dependency.__code__
+        values = (f"{name} = {_described(value, instead)}" for name, value in sorted(_named(dependency).items()))
         lines = code.co_firstlineno, code.co_linetable.hex()  # messages name them
-        texts += [f"{each.__module__}.{each.__qualname__}", repr((code_parts(code), lines)), *values]
+        texts += [f"{dependency.__module__}.{dependency.__qualname__}", repr((code_parts(code), lines)), *values]
     return texts
 
 
 def _named(function: FunctionType) -> dict[str, Any]:
-    """The values of names that a function takes from elsewhere."""
+    """Return the values of names that a function takes from elsewhere."""
     values, code = names_of(function), function.__code__
     return {name: values[name] for name in (*code.co_names, *code.co_freevars) if name in values}
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def value(f: Function, node: ast.expr) -> Value:
-    """The value of an expression."""
+    """Return the value of an expression."""
     if type(node) not in EXPRESSIONS:
         raise f.refused(
             node, f"the expression {ast.unparse(node)} ({type(node).__name__})", "write it with plain loops"
@@ -42,68 +42,68 @@ def _constant(f: Function, node: ast.Constant) -> Value:
 
 
 def _tuple(f: Function, node: ast.Tuple) -> Value:
-    return TupleValue(tuple(value(f, each) for each in node.elts))
+    return TupleValue(tuple(value(f, item) for item in node.elts))
 
 
 def _attribute(f: Function, node: ast.Attribute) -> Value:
-    of = value(f, node.value)
-    if isinstance(of, StaticValue) and hasattr(of.value, node.attr):
-        return f.constant(getattr(of.value, node.attr), node)
-    if isinstance(of, RecordValue) and node.attr in of.kind.names:
-        return field(f, of, node.attr)
-    if isinstance(of, ArrayValue):
+    owner = value(f, node.value)
+    if isinstance(owner, StaticValue) and hasattr(owner.value, node.attr):
+        return f.constant(getattr(owner.value, node.attr), node)
+    if isinstance(owner, RecordValue) and node.attr in owner.kind.names:
+        return field(f, owner, node.attr)
+    if isinstance(owner, ArrayValue):
         if node.attr == "shape":
-            return TupleValue(of.shape)
+            return TupleValue(owner.shape)
         if node.attr == "size":
-            return arrays.size(f, of)
+            return arrays.size(f, owner)
         if node.attr == "ndim":
-            return number(of.kind.ndim)
-    raise f.refused(node, f"the attribute {ast.unparse(node)}", "take fields of named tuples, or shape, size and ndim")
+            return number(owner.kind.ndim)
+    raise f.refused(node, f"the attribute {ast.unparse(node)}", "use fields of named tuples, or shape, size and ndim")
 
 
 def field(f: Function, record: RecordValue, name: str) -> Value:
-    """A field of a named tuple; its words do not change while machine code runs."""
+    """Return a field of a named tuple; its words do not change while machine code runs."""
     kind, first = record.kind.kinds[record.kind.names.index(name)], record.kind.first(name)
     if isinstance(kind, RecordKind):
         return RecordValue(kind, f.builder.gep(record.pointer, [ir.Constant(I64, first)]))
     if isinstance(kind, TupleKind):
-        raise f.refused(f.tree, f"the tuple {name!r} in a named tuple", "take a named tuple")
+        raise f.refused(f.tree, f"the tuple {name!r} in a named tuple", "use a named tuple")
     if f.silent or isinstance(kind, Static):
         return of_leaves(kind, [None] * len(leaf_types(kind)))
     return f.program.read(f.builder, record.pointer, kind, first)
 
 
 def _subscript(f: Function, node: ast.Subscript) -> Value:
-    of = value(f, node.value)
-    if isinstance(of, ArrayValue):
-        return arrays.subscript(f, of, node)
-    if isinstance(of, StaticValue) and isinstance(of.value, tuple):
-        of = TupleValue(tuple(f.constant(each, node) for each in of.value))
-    if isinstance(of, TupleValue) and not isinstance(node.slice, ast.Slice):
-        return _item(f, of, numbers.scalar(f, value(f, node.slice), node), node)
-    raise f.refused(node, f"the subscript {ast.unparse(node)}", "take entries of arrays and tuples")
+    owner = value(f, node.value)
+    if isinstance(owner, ArrayValue):
+        return arrays.subscript(f, owner, node)
+    if isinstance(owner, StaticValue) and isinstance(owner.value, tuple):
+        owner = TupleValue(tuple(f.constant(item, node) for item in owner.value))
+    if isinstance(owner, TupleValue) and not isinstance(node.slice, ast.Slice):
+        return _item(f, owner, numbers.scalar(f, value(f, node.slice), node), node)
+    raise f.refused(node, f"the subscript {ast.unparse(node)}", "use entries of arrays and tuples")
 
 
-def _item(f: Function, of: TupleValue, index: Scalar, node: ast.AST) -> Value:
-    """An item of a tuple; if the index is not constant, all items must be of one type."""
-    count = len(of.items)
+def _item(f: Function, values: TupleValue, index: Scalar, node: ast.AST) -> Value:
+    """Return an item of a tuple; if the index is not constant, all items must have one type."""
+    count = len(values.items)
     if index.const is not None:
         if not -count <= index.const < count:
-            raise f.refused(node, f"the item {index.const} of {count}", "take one that is there")
-        return of.items[index.const]
-    if len({each.kind for each in of.items}) != 1 or not isinstance(of.items[0], Scalar):
-        raise f.refused(node, "an item of a tuple by a number that varies", "take a tuple of numbers of one type")
+            raise f.refused(node, f"the item {index.const} of {count}", "use an existing item")
+        return values.items[index.const]
+    if len({item.kind for item in values.items}) != 1 or not isinstance(values.items[0], Scalar):
+        raise f.refused(node, "an item of a tuple by a variable index", "use a tuple of numbers of one type")
     index = arrays.index_within(f, index, number(count), node)
-    first, *others = of.items
+    first, *others = values.items
     chosen = first.ir  # pyright: ignore
-    for i, each in enumerate(others, 1):
+    for i, item in enumerate(others, 1):
         here = f.builder.icmp_signed("==", index.ir, ir.Constant(I64, i))
-        chosen = f.builder.select(here, each.ir, chosen)  # pyright: ignore
+        chosen = f.builder.select(here, item.ir, chosen)  # pyright: ignore
     return Scalar(first.kind, chosen)  # pyright: ignore
 
 
 def _binary(f: Function, node: ast.BinOp) -> Value:
-    x, y = (numbers.scalar(f, value(f, each), node) for each in (node.left, node.right))
+    x, y = (numbers.scalar(f, value(f, operand), node) for operand in (node.left, node.right))
     return numbers.binary(f, type(node.op), x, y, node)
 
 
@@ -117,30 +117,30 @@ def _unary(f: Function, node: ast.UnaryOp) -> Value:
 
 
 def _logic(f: Function, node: ast.BoolOp) -> Value:
-    """`and` and `or` of truth values; the later ones are computed only where they matter."""
+    """Return the value of `and` or `or`; later operands are computed only if they matter."""
 
     def item(operand: ast.expr) -> Any:
         x = numbers.scalar(f, value(f, operand), operand)
         if x.kind != BOOL:
-            raise f.refused(operand, "and, or of something other than truth values", "compare it, as x != 0")
+            raise f.refused(operand, "and, or of values that are not truth values", "compare them, as in x != 0")
         return x.ir
 
     return Scalar(BOOL, _shortened(f, node.values, isinstance(node.op, ast.And), item))
 
 
 def _shortened(f: Function, nodes: list[ast.expr], all_: bool, item: Callable[[ast.expr], Any]) -> Any:
-    """Whether all or any of the operands hold, computed one after the other until the result is known."""
+    """Return whether all or any of the operands hold, computed in sequence until the result is decided."""
     b, b0 = f.builder, ir.Constant(BOOL.llvm, int(not all_))
-    behind = b.append_basic_block()
+    done = b.append_basic_block()
     ends = []
-    for each in nodes[:-1]:
-        holds, more = item(each), b.append_basic_block()
+    for operand in nodes[:-1]:
+        holds, more = item(operand), b.append_basic_block()
         ends.append((b0, b.block))
-        b.cbranch(holds, *((more, behind) if all_ else (behind, more)))
+        b.cbranch(holds, *((more, done) if all_ else (done, more)))
         b.position_at_end(more)
     ends.append((item(nodes[-1]), b.block))
-    b.branch(behind)
-    b.position_at_end(behind)
+    b.branch(done)
+    b.position_at_end(done)
     return _merged(f, BOOL.llvm, ends)
 
 
@@ -148,31 +148,31 @@ def _merged(f: Function, kind: Any, ends: list[tuple[Any, Any]]) -> Any:
     if f.silent:
         return None
     phi = f.builder.phi(kind)
-    for each, block in ends:
-        phi.add_incoming(each, block)
+    for value_, block in ends:
+        phi.add_incoming(value_, block)
     return phi
 
 
 def test(f: Function, node: ast.expr) -> Any:
-    """Whether an expression holds, as LLVM's I1: numbers hold unless they are 0."""
+    """Return whether an expression holds, as LLVM's I1: numbers hold unless they are 0."""
     if isinstance(node, ast.BoolOp):
-        return _shortened(f, node.values, isinstance(node.op, ast.And), lambda each: test(f, each))
+        return _shortened(f, node.values, isinstance(node.op, ast.And), lambda operand: test(f, operand))
     return numbers.truth(f, numbers.scalar(f, value(f, node), node))
 
 
 def _comparison(f: Function, node: ast.Compare) -> Value:
-    """A chain of relations, each computed only if those before it hold."""
+    """Return the value of a chain of relations, each computed only if those before it hold."""
     left, ends, b = numbers.scalar(f, value(f, node.left), node), [], f.builder
-    behind = b.append_basic_block() if len(node.ops) > 1 else None
-    for i, (op, each) in enumerate(zip(node.ops, node.comparators, strict=True)):
-        right = numbers.scalar(f, value(f, each), node)
+    done = b.append_basic_block() if len(node.ops) > 1 else None
+    for i, (op, operand) in enumerate(zip(node.ops, node.comparators, strict=True)):
+        right = numbers.scalar(f, value(f, operand), node)
         holds = numbers.compared(f, type(op), left, right, node)
-        if behind is None and len(node.ops) == 1:
+        if done is None and len(node.ops) == 1:
             return holds
         last = i == len(node.ops) - 1
-        more = behind if last else b.append_basic_block()
+        more = done if last else b.append_basic_block()
         ends.append((holds.ir if last else ir.Constant(BOOL.llvm, 0), b.block))
-        b.branch(more) if last else b.cbranch(holds.ir, more, behind)
+        b.branch(more) if last else b.cbranch(holds.ir, more, done)
         b.position_at_end(more)
         left = right
     return Scalar(BOOL, _merged(f, BOOL.llvm, ends))
@@ -180,25 +180,25 @@ def _comparison(f: Function, node: ast.Compare) -> Value:
 
 def _conditional(f: Function, node: ast.IfExp) -> Value:
     b = f.builder
-    yes, no, behind = (b.append_basic_block() for _ in range(3))
+    yes, no, done = (b.append_basic_block() for _ in range(3))
     b.cbranch(test(f, node.test), yes, no)
     values, ends = [], []
-    for block, each in ((yes, node.body), (no, node.orelse)):
+    for block, branch in ((yes, node.body), (no, node.orelse)):
         b.position_at_end(block)
-        values.append(value(f, each))
+        values.append(value(f, branch))
         ends.append(b.block)
-    return _either(f, node, values, ends, behind)
+    return _either(f, node, values, ends, done)
 
 
-def _either(f: Function, node: ast.AST, values: list[Value], ends: list[Any], behind: Any) -> Value:
-    """One of two values, by where the translation comes from."""
+def _either(f: Function, node: ast.AST, values: list[Value], ends: list[Any], done: Any) -> Value:
+    """Return one of two values, depending on the preceding block."""
     kind, b = f.common(values[0].kind, values[1].kind, node), f.builder
     parts = []
-    for each, block in zip(values, ends, strict=True):
+    for option, block in zip(values, ends, strict=True):
         b.position_at_end(block)
-        parts.append(leaves(f.fitted(each, kind, node)))
-        b.branch(behind)
-    b.position_at_end(behind)
+        parts.append(leaves(f.fitted(option, kind, node)))
+        b.branch(done)
+    b.position_at_end(done)
     if f.silent:
         return of_leaves(kind, [None] * len(leaf_types(kind)))
     columns = zip(*parts, strict=True)

@@ -1,7 +1,7 @@
-"""One function being translated: its names, its blocks, and where it may fail.
+"""One function being translated: its names, its blocks, and the places where it may fail.
 
-It is translated without writing anything until its types no longer change, and then written. A function that may fail
-returns the text of its failure, or null, before its result.
+It is translated without output until its types no longer change, and then written. A function that may fail returns the
+text of its failure, or null, before its result.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _PASSES = 8
 
 
 class _Silent:
-    """A substitute for LLVM's builder that writes nothing, while types are found."""
+    """Substitute for LLVM's builder that writes nothing, while types are inferred."""
 
     block = None
 
@@ -56,17 +56,18 @@ class Function:
     """A function being translated.
 
     Args:
-        program: The module that it belongs to.
-        function: Python's.
-        kinds: The types of its arguments.
-        checks: Whether indices and integers are checked; not in primitives, which check their arguments themselves.
+        program: Module of the function.
+        function: Python function.
+        kinds: Types of its arguments.
+        checks: Check indices and integers; False in primitives, which check their arguments themselves.
 
     Attributes:
-        builder: LLVM's, or one that writes nothing.
+        builder: LLVM builder, or a substitute that writes nothing.
         assigned: Names that have a value at the current point.
-        result: The type of its result, as far as it is known.
-        may_fail: Whether something in it may fail.
-        leaving: For each enclosing loop: the blocks of its next round and after it, and the names assigned at breaks.
+        result: Type of the result, or None if not yet inferred.
+        may_fail: True if the function can fail.
+        leaving: For each enclosing loop: the block of the next iteration, the block after the loop, and the names
+            assigned at breaks.
     """
 
     def __init__(self, program: Program, function: Callable[..., Any], kinds: Sequence[Kind], checks: bool) -> None:
@@ -74,11 +75,11 @@ class Function:
         self.tree = syntax(function)
         self.builder: Any = _Silent()
         self.arguments = dict(zip(self._parameters(len(kinds)), kinds, strict=True))
-        self.known = names_of(function)
+        self.globals = names_of(function)
         self._times = Counter(self.arguments.keys()) + stores(self.tree)
         self._kinds: dict[str, Kind] = dict(self.arguments)
-        self._values: dict[str, Value] = {}  # of names that are assigned at one place
-        self._slots: dict[str, list[Any]] = {}  # of the others
+        self._values: dict[str, Value] = {}  # of names assigned at one place
+        self._slots: dict[str, list[Any]] = {}  # of other names
         self.assigned: set[str] = set()
         self.result: Kind | None = None
         self.may_fail = False
@@ -88,57 +89,59 @@ class Function:
 
     @property
     def silent(self) -> bool:
-        """Whether only types are being found."""
+        """True while types are inferred and nothing is written."""
         return isinstance(self.builder, _Silent)
 
     def _parameters(self, count: int) -> list[str]:
-        of = self.tree.args
-        if of.vararg or of.kwarg or of.kwonlyargs or of.defaults:
-            raise self.refused(self.tree, "a parameter with a default, * or **", "take plain parameters")
-        names = [each.arg for each in (*of.posonlyargs, *of.args)]
+        parameters = self.tree.args
+        if parameters.vararg or parameters.kwarg or parameters.kwonlyargs or parameters.defaults:
+            raise self.refused(self.tree, "a parameter with a default, * or **", "use plain parameters")
+        names = [argument.arg for argument in (*parameters.posonlyargs, *parameters.args)]
         if len(names) != count:
-            raise self.refused(self.tree, f"a call with {count} arguments of {len(names)}", "give each parameter one")
+            raise self.refused(
+                self.tree, f"a call with {count} arguments of {len(names)}", "pass one for each parameter"
+            )
         return names
 
-    def refused(self, node: ast.AST, what: str, remedy: str) -> SubsetError:
-        """The error of a construct of this function."""
-        return refused(self.function, getattr(node, "lineno", self.tree.lineno), what, remedy)
+    def refused(self, node: ast.AST, construct: str, remedy: str) -> SubsetError:
+        """Return the error of a construct of this function."""
+        return refused(self.function, getattr(node, "lineno", self.tree.lineno), construct, remedy)
 
-    # What is done in two passes
+    # Translation in two passes
 
     def written(self) -> Written:
-        """The function, written into the module of its program."""
+        """Write the function into the module of its program."""
         for _ in range(_PASSES):
             self._settled = True
-            self._body([None] * sum(len(leaf_types(each)) for each in self.arguments.values()))
+            self._body([None] * sum(len(leaf_types(kind)) for kind in self.arguments.values()))
             if self._settled:
                 break
         else:
             raise self.refused(self.tree, "a function whose types do not settle", "give each name one type")
         result: Any = Static.of(None) if self.result is None else self.result
-        given = [leaf for each in self.arguments.values() for leaf in leaf_types(each)]
+        argument_types = [leaf for kind in self.arguments.values() for leaf in leaf_types(kind)]
         function = ir.Function(
-            self.program.module, ir.FunctionType(_llvm_result(result, self.may_fail), given),
+            self.program.module, ir.FunctionType(_llvm_result(result, self.may_fail), argument_types),
             self.program.name(self.function.__name__),
         )  # fmt: skip
         function.linkage = "internal"
-        inlined = hasattr(self.function, "inlined")  # otherwise LLVM takes twice as long; the work is behind addresses
+        inlined = hasattr(self.function, "inlined")  # inlining more takes LLVM twice as long, for little gain
         function.attributes.add("alwaysinline" if inlined else "noinline")
         function.attributes.add("nounwind")
         self.builder = ir.IRBuilder(function.append_basic_block())
         self._body(list(function.args))
         return Written(function, result, self.may_fail)
 
-    def _body(self, given: list[Any]) -> None:
+    def _body(self, values: list[Any]) -> None:
         self.assigned, self.leaving, self._failure = set(self.arguments), [], None
         if not self.silent:
             self._slots = {
-                name: [self.builder.alloca(each) for each in leaf_types(kind)]
+                name: [self.builder.alloca(kind_) for kind_ in leaf_types(kind)]
                 for name, kind in self._kinds.items() if self._times[name] > 1
             }  # fmt: skip
         for name, kind in self.arguments.items():
             count = len(leaf_types(kind))
-            value, given = of_leaves(kind, given[:count]), given[count:]
+            value, values = of_leaves(kind, values[:count]), values[count:]
             self._bind(name, self.fitted(value, self._kinds[name], self.tree))
         if not statements.block(self, self.tree.body):
             if self.result not in (None, Static.of(None)):
@@ -147,7 +150,7 @@ class Function:
         if self._failure is not None and not self.silent:
             block, text = self._failure
             self.builder.position_at_end(block)
-            self._leave(text, [ir.Constant(each, ir.Undefined) for each in leaf_types(_known(self.result))])
+            self._leave(text, [ir.Constant(kind_, ir.Undefined) for kind_ in leaf_types(_or_none(self.result))])
 
     # Names
 
@@ -156,7 +159,7 @@ class Function:
         kind = self._kinds.get(name)
         if kind is None or (self.silent and kind != value.kind):
             self._kinds[name] = value.kind if kind is None else self.common(kind, value.kind, node)
-            self._settled &= kind is None  # otherwise what follows from the first type is translated again
+            self._settled &= kind is None  # otherwise types inferred from the first one are outdated
         self._bind(name, self.fitted(value, self._kinds[name], node))
         self.assigned.add(name)
 
@@ -168,7 +171,7 @@ class Function:
                 self.builder.store(leaf, slot)
 
     def common(self, x: Kind, y: Kind, node: ast.AST) -> Kind:
-        """The type that holds values of two."""
+        """Return the type that includes values of two types."""
         kind: Kind | None = None
         if x == y:
             return x
@@ -181,17 +184,17 @@ class Function:
             pairs = zip(x.items, y.items, strict=True)
             kind = TupleKind(tuple(self.common(a, b, node) for a, b in pairs))
         if kind is None:
-            raise self.refused(node, "a name, or a result, of different types", "give each type a name of its own")
+            raise self.refused(node, "a name, or a result, of different types", "use one name for each type")
         return kind
 
     def fitted(self, value: Value, kind: Kind, node: ast.AST) -> Value:
-        """A value converted to a type that holds it."""
+        """Convert a value to a type that includes it."""
         if value.kind == kind:
             return value
         if isinstance(value, Scalar) and isinstance(kind, Number):
             if kind.name == "float" and value.const is None:
-                remedy = "begin with a float, as 0.0, or convert it with float"
-                raise self.refused(node, "an integer where a float is elsewhere", remedy)
+                remedy = "start with a float such as 0.0, or convert it with float"
+                raise self.refused(node, "an integer where another branch has a float", remedy)
             return converted(self, value, kind, node)
         if isinstance(value, TupleValue) and isinstance(kind, TupleKind):
             pairs = zip(value.items, kind.items, strict=True)
@@ -200,13 +203,13 @@ class Function:
         return replace(value, kind=kind, apart=() if kind.contiguous else apart)  # pyright: ignore
 
     def name(self, node: ast.Name) -> Value:
-        """The value of a name."""
+        """Return the value of a name."""
         if node.id not in self._times:
-            if node.id not in self.known:
-                self.refuse(node, f"the name {node.id!r}, which has no value,", "define it before")
-            return self.constant(self.known[node.id], node)
+            if node.id not in self.globals:
+                self.refuse(node, f"the undefined name {node.id!r}", "define it before")
+            return self.constant(self.globals[node.id], node)
         if node.id not in self.assigned:
-            remedy = "give it one before the branch or loop that does"
+            remedy = "assign it before the branch or loop"
             raise self.refused(node, f"{node.id!r}, which may have no value here,", remedy)
         if self._times[node.id] == 1:
             return self._values[node.id]
@@ -214,16 +217,16 @@ class Function:
         parts = [None] * len(leaf_types(kind)) if self.silent else [self.builder.load(x) for x in self._slots[node.id]]
         return of_leaves(kind, parts)
 
-    def refuse(self, node: ast.AST, what: str, remedy: str) -> NoReturn:
+    def refuse(self, node: ast.AST, construct: str, remedy: str) -> NoReturn:
         """Raise the error of a construct."""
-        raise self.refused(node, what, remedy)
+        raise self.refused(node, construct, remedy)
 
     def constant(self, value: Any, node: ast.AST) -> Value:
-        """A value that is known when the function is translated."""
+        """Return a value that is fixed when the function is translated."""
         return self.program.constant(value, partial(self.refuse, node))
 
     def expression(self, node: ast.expr) -> Value:
-        """The value of an expression."""
+        """Return the value of an expression."""
         return expressions.value(self, node)
 
     # Blocks
@@ -241,17 +244,17 @@ class Function:
         if len(parts) < 2:
             self.builder.ret(parts[0]) if parts else self.builder.ret_void()
             return
-        returned = ir.Constant(_llvm_result(_known(self.result), self.may_fail), ir.Undefined)
-        for i, each in enumerate(parts):
-            returned = self.builder.insert_value(returned, each, i)
+        returned = ir.Constant(_llvm_result(_or_none(self.result), self.may_fail), ir.Undefined)
+        for i, part in enumerate(parts):
+            returned = self.builder.insert_value(returned, part, i)
         self.builder.ret(returned)
 
-    def check(self, holds: Any, node: ast.AST, what: str) -> None:
+    def check(self, holds: Any, node: ast.AST, message: str) -> None:
         """Fail unless a condition holds."""
         self.may_fail = True
         if not self.silent:
             where = f"{self.function.__module__}.{self.function.__qualname__}, line {getattr(node, 'lineno', 0)}"
-            self.fail_unless(holds, self.program.text(f"{where}: {what}"))
+            self.fail_unless(holds, self.program.text(f"{where}: {message}"))
 
     def fail_unless(self, holds: Any, text: Any) -> None:
         """Fail with a text unless a condition holds."""
@@ -264,24 +267,24 @@ class Function:
             block.instructions.append(self._failure[1])
         block, phi = self._failure
         phi.add_incoming(text, self.builder.block)
-        going_on = self.builder.append_basic_block()
-        self.builder.cbranch(holds, going_on, block)
-        self.builder.position_at_end(going_on)
+        success = self.builder.append_basic_block()
+        self.builder.cbranch(holds, success, block)
+        self.builder.position_at_end(success)
 
-    def external(self, name: str, result: Any, *given: Any) -> Any:
-        """A function of the C library, unknown to LLVM's optimiser."""
-        return None if self.silent else self.program.external(name, result, *given)
+    def external(self, name: str, result: Any, *arguments: Any) -> Any:
+        """Return a function of the C library that LLVM's optimiser does not recognise."""
+        return None if self.silent else self.program.external(name, result, *arguments)
 
-    def intrinsic(self, name: str, *given: Any) -> Any:
-        """A function of LLVM."""
+    def intrinsic(self, name: str, *arguments: Any) -> Any:
+        """Call an LLVM intrinsic."""
         if self.silent:
             return None
-        shape = ir.FunctionType(F64, [F64] * len(given))
-        return self.builder.call(self.program.module.declare_intrinsic(f"llvm.{name}", [F64], shape), list(given))
+        shape = ir.FunctionType(F64, [F64] * len(arguments))
+        return self.builder.call(self.program.module.declare_intrinsic(f"llvm.{name}", [F64], shape), list(arguments))
 
     @contextmanager
     def loop(self, count: Scalar) -> Iterator[Scalar]:
-        """A loop over the indices below a count."""
+        """Write a loop over the indices below a count."""
         with statements.counted(self, number(0), count, 1) as (index, _):
             yield index
 
@@ -291,5 +294,5 @@ def _llvm_result(kind: Kind, may_fail: bool) -> Any:
     return ir.LiteralStructType(parts) if len(parts) > 1 else parts[0] if parts else ir.VoidType()
 
 
-def _known(kind: Kind | None) -> Kind:
+def _or_none(kind: Kind | None) -> Kind:
     return Static.of(None) if kind is None else kind

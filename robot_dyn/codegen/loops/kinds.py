@@ -1,4 +1,4 @@
-"""The types of the subset: numbers, arrays of them, named tuples by reference, tuples, and constants."""
+"""Types of the subset: numbers, arrays of them, named tuples by reference, tuples, and constants."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ class Number:
 
     @property
     def llvm(self) -> ir.Type:
-        """LLVM's type of it."""
+        """LLVM type."""
         return {"float": F64, "bool": I1}.get(self.name, I64)
 
     @property
     def stored(self) -> ir.Type:
-        """LLVM's type of an entry of an array."""
+        """LLVM type of an array entry."""
         return I8 if self.name == "bool" else self.llvm
 
 
@@ -46,11 +46,11 @@ class ArrayKind:
     """An array.
 
     Attributes:
-        of: Its numbers.
+        of: Type of its numbers.
         ndim: Number of axes.
-        contiguous: Whether it is contiguous in C order; otherwise strides are known only at run time.
-        single: Whether the last of several axes is known to be of length 1, as that of a single run.
-        frozen: Whether it is read-only.
+        contiguous: True if contiguous in C order; otherwise strides are determined at run time.
+        single: True if the last of several axes has length 1 at compile time, for example for a single run.
+        frozen: True if read-only.
     """
 
     of: Number
@@ -61,18 +61,18 @@ class ArrayKind:
 
     @property
     def words(self) -> int:
-        """Words of its description: address, lengths, and strides in bytes."""
+        """Number of words of its description: address, lengths, and strides in bytes."""
         return 1 + 2 * self.ndim
 
 
 @final
 @dataclass(frozen=True)
 class RecordKind:
-    """A named tuple, by the address of the words of its fields.
+    """A named tuple, referenced by the address of the words of its fields.
 
     Attributes:
-        name: Of its class.
-        names, kinds: Its fields.
+        name: Name of the class.
+        names, kinds: Names and types of the fields.
     """
 
     name: str
@@ -81,11 +81,11 @@ class RecordKind:
 
     @property
     def words(self) -> int:
-        """Words of all fields."""
+        """Number of words of all fields."""
         return sum(map(words, self.kinds))
 
     def first(self, name: str) -> int:
-        """The first word of a field."""
+        """Return the first word of a field."""
         return sum(map(words, self.kinds[: self.names.index(name)]))
 
 
@@ -100,11 +100,11 @@ class TupleKind:
 @final
 @dataclass(frozen=True)
 class Static:
-    """A value known when the function is translated: a function, a module, a class, a tuple of constants.
+    """A value fixed when the function is translated: a function, a module, a class, a tuple of constants.
 
     Attributes:
         value: The value.
-        token: Distinguishes it from others; 1, 1.0 and True differ.
+        token: Text that distinguishes values; 1, 1.0 and True differ.
     """
 
     value: Any = field(compare=False)
@@ -112,7 +112,7 @@ class Static:
 
     @staticmethod
     def of(value: Any) -> Static:
-        """The type of a value."""
+        """Return the type of a value."""
         return Static(value, f"{id(value)}" if callable(value) else repr(value))
 
 
@@ -120,7 +120,7 @@ Kind = Number | ArrayKind | RecordKind | TupleKind | Static
 
 
 def words(kind: Kind) -> int:
-    """Number of 64-bit words that a value takes."""
+    """Return the number of 64-bit words of a value."""
     if isinstance(kind, Number):
         return 1
     if isinstance(kind, TupleKind):
@@ -129,15 +129,15 @@ def words(kind: Kind) -> int:
 
 
 def is_record(value: Any) -> bool:
-    """Whether it is a named tuple."""
+    """Return True for a named tuple."""
     return isinstance(value, tuple) and hasattr(value, "_fields")
 
 
 def kind_of(value: Any) -> Kind:
-    """The type of an argument.
+    """Return the type of an argument.
 
     Raises:
-        TraceError: If machine code cannot take it.
+        TraceError: If machine code does not support it.
     """
     if isinstance(value, np.ndarray):
         return _kind_of_array(value)
@@ -150,26 +150,28 @@ def kind_of(value: Any) -> Kind:
             return number
     if value is None:
         return Static.of(value)
-    raise TraceError(f"machine code takes numbers, arrays and named tuples of them, got a {type(value).__name__}")
+    raise TraceError(
+        f"machine code supports numbers, arrays and named tuples of them, got a {type(value).__name__}; convert it"
+    )
 
 
 def _kind_of_array(x: np.ndarray) -> ArrayKind:
-    if x.dtype not in _OF_DTYPE or not x.ndim or any(each % x.itemsize for each in (x.ctypes.data, *x.strides)):
+    if x.dtype not in _OF_DTYPE or not x.ndim or any(offset % x.itemsize for offset in (x.ctypes.data, *x.strides)):
         raise TraceError(
-            f"machine code takes arrays of float64, int64, uint64 or bool with an axis at least, got {x.dtype} of shape"
-            f" {x.shape}: convert it"
+            "machine code supports aligned arrays of float64, int64, uint64 or bool with at least one axis, got"
+            f" {x.dtype} of shape {x.shape}; convert it"
         )
     single, frozen = x.ndim > 1 and x.shape[-1] == 1, x.data.readonly
     return ArrayKind(_OF_DTYPE[x.dtype], x.ndim, x.flags.c_contiguous, single, frozen)
 
 
-def unpacked(found: list[int], kind: Kind) -> Any:
-    """The value of words of numbers, or of tuples of them."""
+def unpacked(values: list[int], kind: Kind) -> Any:
+    """Return the value of words of a number, or of a tuple of numbers."""
     if isinstance(kind, TupleKind):
         ends = np.cumsum([0, *map(words, kind.items)])
-        return tuple(unpacked(found[a:b], each) for a, b, each in zip(ends, ends[1:], kind.items, strict=False))
+        return tuple(unpacked(values[a:b], item) for a, b, item in zip(ends, ends[1:], kind.items, strict=False))
     if kind == FLOAT:
-        return struct.unpack("d", struct.pack("q", found[0]))[0]
+        return struct.unpack("d", struct.pack("q", values[0]))[0]
     if kind == UINT:
-        return np.uint64(found[0] % 2**64)
-    return None if isinstance(kind, Static) else bool(found[0]) if kind == BOOL else found[0]
+        return np.uint64(values[0] % 2**64)
+    return None if isinstance(kind, Static) else bool(values[0]) if kind == BOOL else values[0]

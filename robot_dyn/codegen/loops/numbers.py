@@ -1,4 +1,4 @@
-"""Arithmetic of numbers as in Python and NumPy: floats by IEEE 754, integers of 64 bits that may not overflow.
+"""Arithmetic of numbers as in Python and NumPy: floats by IEEE 754, integers of 64 bits with overflow checks.
 
 Nothing is contracted or reordered. Integer overflow and integer division by zero end the call with an error; a float
 divided by zero is inf or nan, as in NumPy. Unsigned integers wrap.
@@ -40,14 +40,16 @@ _RELATIONS: Mapping[type[ast.cmpop], str] = MappingProxyType(
 
 
 def scalar(f: Function, value: Value, node: ast.AST) -> Scalar:
-    """A value that is a number."""
+    """Return a value that is a number; refuse any other."""
     if not isinstance(value, Scalar):
-        raise f.refused(node, "an operation on what is not a number", "write it entry by entry, or with a primitive")
+        raise f.refused(
+            node, "an operation on a value that is not a number", "write it entry by entry, or with a primitive"
+        )
     return value
 
 
 def converted(f: Function, x: Scalar, kind: Kind, node: ast.AST) -> Scalar:
-    """A number converted to another type without loss: truth value to integer to float, constants to unsigned."""
+    """Convert a number to another type without loss: truth value to integer to float, constants to unsigned."""
     if x.kind == kind:
         return x
     if kind == FLOAT and x.kind in (INT, BOOL):
@@ -66,12 +68,12 @@ def converted(f: Function, x: Scalar, kind: Kind, node: ast.AST) -> Scalar:
 
 
 def real(f: Function, value: Value, node: ast.AST) -> Scalar:
-    """A value that is a number, as a float."""
+    """Convert a value that is a number to a float."""
     return converted(f, scalar(f, value, node), FLOAT, node)
 
 
 def together(f: Function, x: Scalar, y: Scalar, node: ast.AST) -> tuple[Scalar, Scalar]:
-    """Two numbers converted to the type that holds both."""
+    """Convert two numbers to their common type."""
     kinds = {x.kind, y.kind}
     if len(kinds) == 1:
         return x, y
@@ -80,7 +82,7 @@ def together(f: Function, x: Scalar, y: Scalar, node: ast.AST) -> tuple[Scalar, 
 
 
 def binary(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
-    """An operation on two numbers."""
+    """Return the result of an operation on two numbers."""
     if x.const is not None and y.const is not None and UINT not in (x.kind, y.kind):
         return _of_constants(f, of, x, y, node)
     if of in _BITS and x.kind == y.kind and x.kind != FLOAT:
@@ -107,7 +109,7 @@ def _of_constants(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, nod
     except (ArithmeticError, TypeError, KeyError, ValueError) as error:
         raise f.refused(node, f"an operation on constants ({error})", "correct it") from None
     if not isinstance(value, bool | float) and not (isinstance(value, int) and _LEAST <= value < -_LEAST):
-        raise f.refused(node, f"the constant {value}", "take one of 64 bits")
+        raise f.refused(node, f"the constant {value}", "use one of 64 bits")
     return number(value)
 
 
@@ -125,7 +127,7 @@ def _of_integers(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node
 
 
 def _divided(f: Function, of: type[ast.operator], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
-    """⌊x / y⌋ or its remainder, which has the sign of y."""
+    """Return ⌊x / y⌋ or its remainder, which has the sign of y."""
     b, zero, one = f.builder, ir.Constant(I64, 0), ir.Constant(I64, 1)
     if y.const is None or y.const == 0:
         f.check(b.icmp_signed("!=", y.ir, zero), node, "an integer is divided by zero")
@@ -145,20 +147,20 @@ def _of_words(f: Function, of: type[ast.operator], x: Scalar, y: Scalar) -> Scal
     b = f.builder
     if of in _PLAIN:
         return Scalar(UINT, getattr(b, _PLAIN[of])(x.ir, y.ir))
-    small = b.icmp_unsigned("<", y.ir, ir.Constant(I64, 64))  # beyond, LLVM's shift has no value
+    small = b.icmp_unsigned("<", y.ir, ir.Constant(I64, 64))  # LLVM's shift is undefined beyond this
     shifted = (b.shl if of is ast.LShift else b.lshr)(x.ir, b.select(small, y.ir, ir.Constant(I64, 0)))
     return Scalar(UINT, b.select(small, shifted, ir.Constant(I64, 0)))
 
 
 def _power(f: Function, x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
-    """A power by the C library, which Python and NumPy use."""
+    """Return a power by the C library, which Python and NumPy use."""
     if x.kind != FLOAT:
         raise f.refused(node, "a power of an integer", "convert it with float, or multiply")
     return Scalar(FLOAT, f.builder.call(f.external("pow", F64, F64, F64), [x.ir, converted(f, y, FLOAT, node).ir]))
 
 
 def compared(f: Function, of: type[ast.cmpop], x: Scalar, y: Scalar, node: ast.AST) -> Scalar:
-    """A relation of two numbers; those with nan hold for != alone."""
+    """Return a relation of two numbers; with nan only != holds."""
     if of not in _RELATIONS:
         raise f.refused(node, f"the relation {of.__name__}", "compare numbers with ==, !=, <, <=, > or >=")
     sign = _RELATIONS[of]
@@ -170,7 +172,7 @@ def compared(f: Function, of: type[ast.cmpop], x: Scalar, y: Scalar, node: ast.A
 
 
 def truth(f: Function, x: Scalar) -> Any:
-    """Whether a number is not 0, as LLVM's I1."""
+    """Return whether a number is not 0, as LLVM's I1."""
     if x.kind == BOOL:
         return x.ir
     zero = ir.Constant(x.kind.llvm, 0)
@@ -180,7 +182,7 @@ def truth(f: Function, x: Scalar) -> Any:
 
 
 def negated(f: Function, x: Scalar, node: ast.AST) -> Scalar:
-    """−x."""
+    """Return −x."""
     if x.const is not None and x.kind != BOOL:
         return number(-x.const)
     if x.kind == FLOAT:
@@ -191,7 +193,7 @@ def negated(f: Function, x: Scalar, node: ast.AST) -> Scalar:
 
 
 def joined(x: Number, y: Number) -> Number | None:
-    """The type of a variable that holds both; None if there is none."""
+    """Return the type of a variable that includes both; None if there is none."""
     if x == y:
         return x
     return FLOAT if {x, y} == {INT, FLOAT} else None

@@ -1,6 +1,6 @@
-"""The words of arguments: numbers, and the addresses, lengths and strides of arrays, read from their `Py_buffer`.
+"""The words of arguments: numbers, and addresses, lengths and strides of arrays, read from their `Py_buffer`.
 
-A loop takes some eighty arrays. Python takes 1 µs to look up one address; machine code reads all in 5 µs.
+A loop has about eighty arrays. Python needs 1 µs for one address; machine code reads all of them in 5 µs.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ _ONE = ir.Constant(I64, 1)
 @final
 @dataclass(frozen=True)
 class Packed:
-    """The words of values.
+    """Words of values.
 
     Attributes:
-        kinds: Their types.
-        number: A number for these types, which is quick to compare.
-        words: Valid as long as the values live.
-        starts: The address of the first word of each value.
+        kinds: Types of the values.
+        number: Number that identifies these types, quick to compare.
+        words: All words, valid as long as the values exist.
+        starts: Address of the first word of each value.
     """
 
     kinds: tuple[Kind, ...]
@@ -45,14 +45,14 @@ class Packed:
 
 @final
 class _Layout:
-    """Word positions of values that share a form, and their types by the forms of their arrays.
+    """Word positions of values with a common form, and their types by the forms of their arrays.
 
     Attributes:
-        starts: The first word of each value.
+        starts: First word of each value.
         size: Number of words.
-        firsts: The first word of each array.
-        numbers: The word of each number.
-        kinds: A number for the types, and the types.
+        firsts: First word of each array.
+        numbers: Word of each number.
+        kinds: Number that identifies the types, and the types, by array forms.
     """
 
     def __init__(self, values: tuple[Any, ...]) -> None:
@@ -75,20 +75,20 @@ class _Layout:
             self.size += 1
 
 
-_one: dict[Kind, Kind] = {}  # one object for equal types, which is quick to compare
-_numbers = count()  # runs may start in several threads
+_one: dict[Kind, Kind] = {}  # one object for equal types, so that comparison is quick
+_numbers = count()  # thread-safe
 _layouts: dict[tuple[Any, ...], _Layout] = {}
 
 
 def pack(values: tuple[Any, ...], store: Callable[[], Store | None]) -> Packed:
-    """The words of arguments.
+    """Return the words of arguments.
 
     Args:
         values: The arguments.
-        store: Returns where machine code is stored, or None.
+        store: Function that returns the store of machine code, or None.
 
     Raises:
-        TraceError: If machine code cannot take one.
+        TraceError: If machine code does not support an argument.
     """
     form: list[Any] = []
     arrays: list[np.ndarray] = []
@@ -102,11 +102,13 @@ def pack(values: tuple[Any, ...], store: Callable[[], Store | None]) -> Packed:
     start = block.buffer_info()[0]
     if arrays:
         _reader(store)(layout.firsts.buffer_info()[0], start, forms.buffer_info()[0], *arrays)
-    known = forms.tobytes()
-    found = layout.kinds.get(known)
-    if found is None:
+    array_forms = forms.tobytes()
+    typed = layout.kinds.get(array_forms)
+    if typed is None:
         kinds = (kind_of(value) for value in values)
-        found = layout.kinds.setdefault(known, (next(_numbers), tuple([_one.setdefault(kind, kind) for kind in kinds])))
+        typed = layout.kinds.setdefault(
+            array_forms, (next(_numbers), tuple([_one.setdefault(kind, kind) for kind in kinds]))
+        )
     floats = memoryview(block).cast("B").cast("d")
     for at, number in zip(layout.numbers, numbers, strict=True):
         if isinstance(number, float):
@@ -115,11 +117,11 @@ def pack(values: tuple[Any, ...], store: Callable[[], Store | None]) -> Packed:
             struct.pack_into("Q", block, 8 * at, int(number))
         else:
             block[at] = int(number)
-    return Packed(found[1], found[0], block, tuple([start + 8 * at for at in layout.starts]))
+    return Packed(typed[1], typed[0], block, tuple([start + 8 * at for at in layout.starts]))
 
 
 def _flatten(values: tuple[Any, ...], form: list[Any], arrays: list[np.ndarray], numbers: list[Any]) -> None:
-    """Append the arrays and numbers that values consist of."""
+    """Append the arrays and numbers contained in values."""
     for value in values:
         kind = type(value)
         if kind is np.ndarray:
@@ -133,7 +135,7 @@ def _flatten(values: tuple[Any, ...], form: list[Any], arrays: list[np.ndarray],
         if isinstance(value, tuple):
             form.append(len(value))
             _flatten(value, form, arrays, numbers)
-        elif isinstance(value, np.ndarray):  # of a subclass
+        elif isinstance(value, np.ndarray):  # an instance of a subclass
             _flatten((np.asarray(value),), form, arrays, numbers)
         elif value is not None:
             numbers.append(value)
@@ -143,7 +145,7 @@ _readers: list[Any] = []
 
 
 def _reader(store: Callable[[], Store | None]) -> Any:
-    """The function (addresses of first words, words and forms, array, array, …) that reads arrays."""
+    """Return the function (addresses of first words, words and forms, array, array, …) that reads arrays."""
     if not _readers:
         key = digest(["arrays", sources_of_the_translator()])
         address = machine_code.addresses(("read",), key, _write, store(), "the arrays of arguments")[0]
@@ -152,15 +154,15 @@ def _reader(store: Callable[[], Store | None]) -> Any:
 
 
 def _write(module: Any, prefix: str) -> None:
-    """Write the reader. The form of an array is four bits: contiguous, misaligned, read-only, last axis of length 1."""
+    """Write the reader. An array's form has four bits: contiguous, misaligned, read-only, last axis of length 1."""
     function = function_of(module, f"{prefix}read")
     b = ir.IRBuilder(function.append_basic_block())
-    _, given, total = function.args
+    _, arguments, total = function.args
     view, bits, last = numpy_array.empty_view(b), b.alloca(I64), b.alloca(I64)
-    places = [api(b, "PyLong_AsLongLong", b.load(b.gep(given, [ir.Constant(I64, i)]))) for i in range(3)]
+    places = [api(b, "PyLong_AsLongLong", b.load(b.gep(arguments, [ir.Constant(I64, i)]))) for i in range(3)]
     firsts, block, forms = (b.inttoptr(place, WORDS) for place in places)
     with steps(b, ir.Constant(I64, len(places)), total, 1) as k:
-        value, index = b.load(b.gep(given, [k])), b.sub(k, ir.Constant(I64, len(places)))
+        value, index = b.load(b.gep(arguments, [k])), b.sub(k, ir.Constant(I64, len(places)))
         with b.if_then(b.not_(numpy_array.acquired(b, value, view, numpy_array.STRIDES)), likely=False):
             b.ret(ir.Constant(OBJECT, None))  # Python raises the error
         data, lengths, strides = (numpy_array.field(b, view, name) for name in ("data", "lengths", "strides"))

@@ -1,4 +1,4 @@
-"""A module of LLVM of a function and all that it calls, each translated once for the types of its arguments."""
+"""An LLVM module with a function and all that it calls, each translated once for the types of its arguments."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Instead = Mapping[Any, Callable[..., Any]]
 _WORDS: Any = np.uint64
 _TRUTHS: Any = (bool, np.bool_)
 _INTEGERS: Any = (int, np.integer)
-_KNOWN: Any = (str, tuple, ModuleType, type, Enum)
+_STATIC: Any = (str, tuple, ModuleType, type, Enum)
 
 
 @final
@@ -53,22 +53,22 @@ class Program:
     """A module being written.
 
     Args:
-        module: LLVM's.
+        module: LLVM module.
         prefix: Prefix of the names of its functions.
-        instead: Substitutes for functions: one of the subset, translated without checks; or one marked by `emits`,
-            (f, node, arguments) → value, which writes instructions.
+        instead: Substitutes for functions: either functions of the subset, translated without checks; or functions
+            marked by `emits`, (f, node, arguments) → value, which write instructions.
     """
 
     def __init__(self, module: Any, prefix: str, instead: Instead) -> None:
         self.module, self.prefix, self.instead = module, prefix, instead
-        self._unchecked = {each for each in instead.values() if not hasattr(each, "emits")}
+        self._unchecked = {function for function in instead.values() if not hasattr(function, "emits")}
         self._done: dict[tuple[Callable[..., Any], tuple[Kind, ...]], Written | None] = {}
         self._texts: dict[str, Any] = {}
         self._arrays: dict[int, tuple[np.ndarray, Any]] = {}
-        self._known = module.add_metadata([])
+        self._invariant = module.add_metadata([])
 
     def written(self, function: FunctionType, kinds: tuple[Kind, ...], refuse: Refuse) -> Written:
-        """A function for arguments of these types."""
+        """Return a function for arguments of these types, written on first use."""
         place = function, kinds
         if place not in self._done:
             self._done[place] = None
@@ -76,64 +76,64 @@ class Program:
             self._done[place] = Function(self, function, kinds, checks).written()
         written = self._done[place]
         if written is None:
-            refuse(f"{function.__name__!r}, which calls itself,", "write a loop")
+            refuse(f"the recursive function {function.__name__!r}", "write a loop")
         return written
 
-    def name(self, of: str) -> str:
-        """A unique name for a function of the module."""
-        return f"{self.prefix}{of}_{len(self._done)}"
+    def name(self, name: str) -> str:
+        """Return a unique name for a function of the module."""
+        return f"{self.prefix}{name}_{len(self._done)}"
 
     def entry(self, function: FunctionType, kinds: tuple[Kind, ...], name: str) -> Kind:
-        """Write the function that others call; the type of its result.
+        """Write the function that other code calls; return the type of its result.
 
-        It takes the addresses of the words of each argument, and the address where it writes the words of the result;
-        it returns the text of its failure, or null.
+        Its arguments are the addresses of the words of each argument, and the address for the words of the result. It
+        returns the text of its failure, or null.
         """
         written = self.written(function, kinds, self._alone)
         shape = ir.FunctionType(TEXT, [WORDS.as_pointer(), WORDS])
         entry = ir.Function(self.module, shape, f"{self.prefix}{name}")
         b = ir.IRBuilder(entry.append_basic_block())
-        given, out = entry.args
+        addresses, out = entry.args
         parts: list[Any] = []
         for i, kind in enumerate(kinds):
-            pointer = self.known_load(b, b.gep(given, [ir.Constant(I64, i)]))
+            pointer = self.invariant_load(b, b.gep(addresses, [ir.Constant(I64, i)]))
             parts += self._loaded(b, pointer, kind)
         result = b.call(written.ir, parts)
         count = written.may_fail + len(leaves(self._nothing(written.result)))
-        found = [result] if count == 1 else [b.extract_value(result, i) for i in range(count)]
-        text, found = (found[0], found[1:]) if written.may_fail else (ir.Constant(TEXT, None), found)
-        for i, each in enumerate(found):
-            b.store(_word(b, each), b.gep(out, [ir.Constant(I64, i)]))
+        results = [result] if count == 1 else [b.extract_value(result, i) for i in range(count)]
+        text, results = (results[0], results[1:]) if written.may_fail else (ir.Constant(TEXT, None), results)
+        for i, value in enumerate(results):
+            b.store(_word(b, value), b.gep(out, [ir.Constant(I64, i)]))
         b.ret(text)
         return written.result
 
     @staticmethod
-    def _alone(what: str, remedy: str) -> NoReturn:
-        raise SubsetError(f"{what} is not translated; {remedy}")
+    def _alone(construct: str, remedy: str) -> NoReturn:
+        raise SubsetError(f"{construct} is not translated; {remedy}")
 
     @staticmethod
     def _nothing(kind: Kind) -> Value:
         if not _only_numbers(kind):
-            raise SubsetError("a function that returns an array is not called from Python; write into an argument")
+            raise SubsetError("a function that returns an array cannot be called from Python; write into an argument")
         return of_leaves(kind, [None] * words(kind))
 
     def _loaded(self, b: Any, pointer: Any, kind: Kind) -> list[Any]:
-        """The parts of an argument, from its words."""
+        """Return the parts of an argument, loaded from its words."""
         if isinstance(kind, RecordKind):
             return [pointer]
         if isinstance(kind, TupleKind):
             parts, at = [], 0
-            for each in kind.items:
-                parts += self._loaded(b, b.gep(pointer, [ir.Constant(I64, at)]), each)
-                at += words(each)
+            for item in kind.items:
+                parts += self._loaded(b, b.gep(pointer, [ir.Constant(I64, at)]), item)
+                at += words(item)
             return parts
         if isinstance(kind, Static):
             return []
         return leaves(self.read(b, pointer, kind, 0))
 
     def read(self, b: Any, pointer: Any, kind: Number | ArrayKind, first: int) -> Value:
-        """A number or an array, from its words."""
-        loaded = [self.known_load(b, b.gep(pointer, [ir.Constant(I64, first + i)])) for i in range(words(kind))]
+        """Return a number or an array, loaded from its words."""
+        loaded = [self.invariant_load(b, b.gep(pointer, [ir.Constant(I64, first + i)])) for i in range(words(kind))]
         if isinstance(kind, Number):
             of_word = loaded[0] if kind.llvm == I64 else None
             of_word = b.trunc(loaded[0], kind.llvm) if kind == BOOL else of_word
@@ -141,25 +141,25 @@ class Program:
         n = kind.ndim
         lengths, apart = loaded[1 : 1 + n - kind.single], loaded[1 + n : 1 + 2 * n - kind.single]
         bytes_ = ir.Constant(I64, 1 if kind.of == BOOL else 8)
-        apart = [] if kind.contiguous else [b.sdiv(each, bytes_, flags=("exact",)) for each in apart]
+        apart = [] if kind.contiguous else [b.sdiv(stride, bytes_, flags=("exact",)) for stride in apart]
         return of_leaves(kind, [b.inttoptr(loaded[0], kind.of.stored.as_pointer()), *lengths, *apart])
 
-    def known_load(self, b: Any, pointer: Any) -> Any:
+    def invariant_load(self, b: Any, pointer: Any) -> Any:
         """Load a value that does not change while machine code runs."""
         loaded = b.load(pointer)
-        loaded.set_metadata("invariant.load", self._known)
+        loaded.set_metadata("invariant.load", self._invariant)
         return loaded
 
-    def external(self, name: str, result: Any, *given: Any) -> Any:
-        """A function of the C library."""
+    def external(self, name: str, result: Any, *arguments: Any) -> Any:
+        """Return a function of the C library."""
         if name in self.module.globals:
             return self.module.globals[name]
-        function = ir.Function(self.module, ir.FunctionType(result, given), name)
-        function.attributes.add("nobuiltin")  # LLVM has a square root, or a product, for some powers
+        function = ir.Function(self.module, ir.FunctionType(result, arguments), name)
+        function.attributes.add("nobuiltin")  # LLVM would replace some powers by a square root or a product
         return function
 
     def text(self, text: str) -> Any:
-        """The address of a text."""
+        """Return the address of a text."""
         if text not in self._texts:
             data = bytearray(text.encode() + b"\0")
             kind = ir.ArrayType(I8, len(data))
@@ -172,7 +172,7 @@ class Program:
         return variable
 
     def constant(self, value: Any, refuse: Refuse) -> Value:
-        """A value known when the function is translated."""
+        """Return a value that is fixed when the function is translated."""
         if isinstance(value, _WORDS):
             return word(int(value))
         if isinstance(value, _TRUTHS):
@@ -183,19 +183,19 @@ class Program:
             return number(int(value))
         if isinstance(value, np.ndarray):
             return self._constant_array(value)
-        if isinstance(value, _KNOWN) or value is None or callable(value):
+        if isinstance(value, _STATIC) or value is None or callable(value):
             return StaticValue(value)
-        return refuse(f"a value of type {type(value).__name__}", "take numbers, arrays, tuples and functions")
+        return refuse(f"a value of type {type(value).__name__}", "use numbers, arrays, tuples and functions")
 
     def _constant_array(self, x: np.ndarray) -> ArrayValue:
         kind = kind_of(x)
         assert isinstance(kind, ArrayKind)
         if id(x) not in self._arrays:
             stored = ir.ArrayType(kind.of.stored, x.size)
-            entries = [each if kind.of == FLOAT else int(each) for each in x.ravel().tolist()]
+            entries = [entry if kind.of == FLOAT else int(entry) for entry in x.ravel().tolist()]
             self._arrays[id(x)] = x, self._global(stored, entries).bitcast(kind.of.stored.as_pointer())
         kind = ArrayKind(kind.of, kind.ndim, True, kind.single, True)
-        return ArrayValue(kind, self._arrays[id(x)][1], tuple(number(each) for each in x.shape))
+        return ArrayValue(kind, self._arrays[id(x)][1], tuple(number(length) for length in x.shape))
 
 
 def _word(b: Any, value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The syntax tree of a plain function, that of the code which Python runs; errors of untranslatable constructs."""
+"""The syntax tree of a plain function, checked against its bytecode; errors of untranslatable constructs."""
 
 from __future__ import annotations
 
@@ -20,17 +20,19 @@ class SubsetError(TraceError):
     """A construct that is not translated to machine code."""
 
 
-def refused(function: Callable[..., Any], line: int, what: str, remedy: str) -> SubsetError:
-    """The error of a construct: its line, and what to write instead."""
+def refused(function: Callable[..., Any], line: int, construct: str, remedy: str) -> SubsetError:
+    """Return the error of a construct, with its line and a remedy."""
     code = function.__code__
-    return SubsetError(f"{code.co_filename}, line {line}, in {code.co_qualname}: {what} is not translated; {remedy}")
+    return SubsetError(
+        f"{code.co_filename}, line {line}, in {code.co_qualname}: {construct} is not translated; {remedy}"
+    )
 
 
 def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
-    """The syntax tree of a function.
+    """Return the syntax tree of a function.
 
     Raises:
-        SubsetError: If the source is missing, or has changed since the function was read.
+        SubsetError: If the source is missing, or has changed since the function was defined.
     """
     if not isinstance(function, FunctionType):
         raise SubsetError(f"{function!r} is not translated; call plain functions")
@@ -49,10 +51,10 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
 
 
 def names_of(function: FunctionType | Callable[..., Any]) -> Mapping[str, Any]:
-    """The values of names that a function does not assign: of its closure, its module, and Python's."""
+    """Return the values of names that a function does not assign: from its closure, its module, and Python."""
     closure = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
-        with suppress(ValueError):  # it has no value yet
+        with suppress(ValueError):  # unassigned so far
             closure[name] = cell.cell_contents
     maps: list[Any] = [closure, function.__globals__, vars(builtins)]
     return ChainMap(*maps)
@@ -60,40 +62,40 @@ def names_of(function: FunctionType | Callable[..., Any]) -> Mapping[str, Any]:
 
 @lru_cache(maxsize=64)
 def _module(text: str, file: str) -> tuple[dict[tuple[str, int], ast.FunctionDef], dict[tuple[str, int], CodeType]]:
-    """The functions of a module by name and first line: their trees, and their code."""
+    """Return the syntax trees and the code of all functions of a module, by name and first line."""
     try:
         tree = ast.parse(text)
         code = compile(tree, file, "exec", dont_inherit=True)
     except (SyntaxError, ValueError):
         return {}, {}
-    codes = {(each.co_qualname, each.co_firstlineno): each for each in _codes(code)}
+    codes = {(inner.co_qualname, inner.co_firstlineno): inner for inner in _codes(code)}
     places = {(name.rpartition(".")[2], line): (name, line) for name, line in codes}
-    found = {}
+    trees = {}
     for node in _functions(tree):
-        place = places.get((node.name, min(each.lineno for each in (node, *node.decorator_list))))
+        place = places.get((node.name, min(part.lineno for part in (node, *node.decorator_list))))
         if place is not None:
-            found[place] = node
-    return found, codes
+            trees[place] = node
+    return trees, codes
 
 
 def _functions(node: ast.AST) -> Iterator[ast.FunctionDef]:
-    """The functions in a module, in its classes, branches and other functions."""
+    """Return the functions in a module, in its classes, branches and other functions."""
     for name in ("body", "orelse", "finalbody", "handlers"):
-        for each in getattr(node, name, []):
-            if isinstance(each, ast.FunctionDef):
-                yield each
-            if isinstance(each, ast.stmt | ast.excepthandler):
-                yield from _functions(each)
+        for child in getattr(node, name, []):
+            if isinstance(child, ast.FunctionDef):
+                yield child
+            if isinstance(child, ast.stmt | ast.excepthandler):
+                yield from _functions(child)
 
 
 @lru_cache(maxsize=1024)
 def stores(tree: ast.FunctionDef) -> Counter[str]:
-    """How many assignments there are to each name of a function."""
+    """Return the number of assignments to each name of a function."""
     return Counter(x.id for x in ast.walk(tree) if isinstance(x, ast.Name) and isinstance(x.ctx, ast.Store))
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
     yield code
-    for each in code.co_consts:
-        if isinstance(each, CodeType):
-            yield from _codes(each)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)

@@ -1,4 +1,4 @@
-"""Statements of the subset. Each function returns whether the code after the statement is unreachable."""
+"""Statements of the subset. Each function returns True if the code after the statement is unreachable."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def block(f: Function, nodes: list[ast.stmt]) -> bool:
     """Compile statements in sequence."""
     for node in nodes:
         if type(node) not in STATEMENTS:
-            what = f"the statement {type(node).__name__}"
-            raise f.refused(node, what, "take assignments, if, for over range or an array, while and return")
+            statement = f"the statement {type(node).__name__}"
+            raise f.refused(node, statement, "use assignments, if, for over range or an array, while and return")
         if STATEMENTS[type(node)](f, node):
             return True
     return False
@@ -45,7 +45,7 @@ def _assign(f: Function, node: ast.Assign) -> bool:
 
 def _annotated(f: Function, node: ast.AnnAssign) -> bool:
     if node.value is None:
-        raise f.refused(node, "an annotation without a value", "give it one")
+        raise f.refused(node, "an annotation without a value", "assign a value")
     _store(f, node.target, f.expression(node.value), node)
     return False
 
@@ -55,11 +55,11 @@ def _store(f: Function, target: ast.expr, value: Value, node: ast.AST) -> None:
         f.assign(target.id, value, node)
     elif isinstance(target, ast.Tuple | ast.List):
         if not isinstance(value, TupleValue) or len(value.items) != len(target.elts):
-            raise f.refused(node, "taking apart what is not as many values", "give a tuple of as many")
-        for each, item in zip(target.elts, value.items, strict=True):
-            _store(f, each, item, node)
-    elif isinstance(target, ast.Subscript) and isinstance(of := f.expression(target.value), ArrayValue):
-        arrays.store_at(f, of, target, value)
+            raise f.refused(node, "unpacking of a value of another length", "use a tuple of that length")
+        for part, item in zip(target.elts, value.items, strict=True):
+            _store(f, part, item, node)
+    elif isinstance(target, ast.Subscript) and isinstance(x := f.expression(target.value), ArrayValue):
+        arrays.store_at(f, x, target, value)
     else:
         raise f.refused(node, f"an assignment to {ast.unparse(target)}", "assign to names and entries of arrays")
 
@@ -72,21 +72,21 @@ def _augmented(f: Function, node: ast.AugAssign) -> bool:
         new = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
         f.assign(target.id, new, node)
         return False
-    of = f.expression(target.value) if isinstance(target, ast.Subscript) else None
-    if not isinstance(of, ArrayValue) or not isinstance(target, ast.Subscript):
+    array = f.expression(target.value) if isinstance(target, ast.Subscript) else None
+    if not isinstance(array, ArrayValue) or not isinstance(target, ast.Subscript):
         raise f.refused(node, f"an assignment to {ast.unparse(target)}", "assign to names and entries of arrays")
-    if of.kind.frozen:
-        raise f.refused(node, "a write into an array that is read-only", "pass one that may be written")
-    places = arrays.indices(f, of, target)
-    x = arrays.load(f, of, places)
+    if array.kind.frozen:
+        raise f.refused(node, "a write into an array that is read-only", "pass a writable one")
+    places = arrays.indices(f, array, target)
+    x = arrays.load(f, array, places)
     new = numbers.binary(f, op, x, numbers.scalar(f, f.expression(node.value), node), node)
-    arrays.store(f, of, places, numbers.converted(f, new, of.kind.of, node))
+    arrays.store(f, array, places, numbers.converted(f, new, array.kind.of, node))
     return False
 
 
 def _if(f: Function, node: ast.If) -> bool:
     b = f.builder
-    yes, no, behind = (b.append_basic_block() for _ in range(3))
+    yes, no, done = (b.append_basic_block() for _ in range(3))
     b.cbranch(expressions.test(f, node.test), yes, no)
     before, ends = set(f.assigned), []
     for start, nodes in ((yes, node.body), (no, node.orelse)):
@@ -95,13 +95,13 @@ def _if(f: Function, node: ast.If) -> bool:
         ended = block(f, nodes)
         if not ended:
             ends.append(f.assigned)
-            b.branch(behind)
+            b.branch(done)
     if not ends:
         if not f.silent:
-            b.function.blocks.remove(behind)
+            b.function.blocks.remove(done)
         return True
     f.assigned = set.intersection(*ends)
-    b.position_at_end(behind)
+    b.position_at_end(done)
     return False
 
 
@@ -109,86 +109,88 @@ def _while(f: Function, node: ast.While) -> bool:
     _no_else(f, node)
     b = f.builder
     endless = isinstance(node.test, ast.Constant) and node.test.value is True
-    look, behind = b.append_basic_block(), b.append_basic_block()
-    b.branch(look)
-    b.position_at_end(look)
+    head, done = b.append_basic_block(), b.append_basic_block()
+    b.branch(head)
+    b.position_at_end(head)
     if not endless:
         body = b.append_basic_block()
-        b.cbranch(expressions.test(f, node.test), body, behind)
+        b.cbranch(expressions.test(f, node.test), body, done)
         b.position_at_end(body)
     before = set(f.assigned)
-    breaks = _body(f, node.body, look, behind)
+    breaks = _body(f, node.body, head, done)
     f.assigned = before if not endless else set.intersection(*breaks) if breaks else before
     if endless and not breaks:
         if not f.silent:
-            b.function.blocks.remove(behind)
+            b.function.blocks.remove(done)
         return True
-    b.position_at_end(behind)
+    b.position_at_end(done)
     return False
 
 
 def _for(f: Function, node: ast.For) -> bool:
     _no_else(f, node)
     over = _range(f, node.iter)
-    of = None if over else f.expression(node.iter)
-    if over is None and not (isinstance(of, ArrayValue) and of.kind.ndim == 1):
-        raise f.refused(node, f"a loop over {ast.unparse(node.iter)}", "take a range, or an array with one axis")
-    start, stop, step = over or (number(0), of.shape[0], 1)  # pyright: ignore
+    array = None if over else f.expression(node.iter)
+    if over is None and not (isinstance(array, ArrayValue) and array.kind.ndim == 1):
+        raise f.refused(node, f"a loop over {ast.unparse(node.iter)}", "use a range, or an array with one axis")
+    start, stop, step = over or (number(0), array.shape[0], 1)  # pyright: ignore
     before = set(f.assigned)
-    with counted(f, start, stop, step) as (index, (following, behind)):
-        item = index if of is None else arrays.load(f, of, [index])  # pyright: ignore
+    with counted(f, start, stop, step) as (index, (following, done)):
+        item = index if array is None else arrays.load(f, array, [index])  # pyright: ignore
         _store(f, node.target, item, node)
-        _body(f, node.body, following, behind)
+        _body(f, node.body, following, done)
     f.assigned = before
     return False
 
 
 @contextmanager
 def counted(f: Function, start: Scalar, stop: Scalar, step: int) -> Iterator[tuple[Scalar, Any]]:
-    """A loop over a range: its index, and the blocks of the next iteration and after the loop."""
+    """Write a loop over a range: yield its index, and the blocks of the next iteration and after the loop."""
     b = f.builder
     slot = None if f.silent else _slot(b)
     b.store(start.ir, slot)
-    look, body, following, behind = (b.append_basic_block(each) for each in ("look", "body", "next", "behind"))
-    b.branch(look)
-    b.position_at_end(look)
+    head, body, following, done = (b.append_basic_block(name) for name in ("head", "body", "next", "done"))
+    b.branch(head)
+    b.position_at_end(head)
     index = b.load(slot)
-    b.cbranch(b.icmp_signed("<" if step > 0 else ">", index, stop.ir), body, behind)
+    b.cbranch(b.icmp_signed("<" if step > 0 else ">", index, stop.ir), body, done)
     b.position_at_end(body)
-    yield Scalar(INT, index), (following, behind)
+    yield Scalar(INT, index), (following, done)
     if not f.silent and not b.block.is_terminated:
         b.branch(following)
     b.position_at_end(following)
     b.store(b.add(index, ir.Constant(I64, step), flags=("nsw",)), slot)
-    b.branch(look)
-    b.position_at_end(behind)
+    b.branch(head)
+    b.position_at_end(done)
 
 
 def _slot(b: Any) -> Any:
-    """Room for a counter, at the start of the function, so that loops do not use up the stack."""
+    """Reserve memory for a counter at the start of the function, so that loops do not exhaust the stack."""
     with b.goto_entry_block():
         return b.alloca(I64)
 
 
 def _range(f: Function, node: ast.expr) -> tuple[Scalar, Scalar, int] | None:
-    """Start, end and step of a range."""
+    """Return start, end and step of a range."""
     if not isinstance(node, ast.Call):
         return None
     function = f.expression(node.func)
     if not (isinstance(function, StaticValue) and function.value is range) or node.keywords:
         return None
-    given = [numbers.converted(f, numbers.scalar(f, f.expression(each), node), INT, node) for each in node.args]
-    start, stop = (number(0), given[0]) if len(given) == 1 else given[:2]
-    step = given[2] if len(given) == 3 else number(1)
+    bounds = [
+        numbers.converted(f, numbers.scalar(f, f.expression(argument), node), INT, node) for argument in node.args
+    ]
+    start, stop = (number(0), bounds[0]) if len(bounds) == 1 else bounds[:2]
+    step = bounds[2] if len(bounds) == 3 else number(1)
     if not step.const:
         raise f.refused(node, "a range whose step is not a constant other than 0", "write a while loop")
     return start, stop, step.const
 
 
-def _body(f: Function, nodes: list[ast.stmt], following: Any, behind: Any) -> list[set[str]]:
-    """The body of a loop; the names that are assigned at each of its breaks."""
+def _body(f: Function, nodes: list[ast.stmt], following: Any, done: Any) -> list[set[str]]:
+    """Write the body of a loop; return the names assigned at each of its breaks."""
     breaks: list[set[str]] = []
-    f.leaving.append((following, behind, breaks))
+    f.leaving.append((following, done, breaks))
     if not block(f, nodes):
         f.builder.branch(following)
     f.leaving.pop()
@@ -201,9 +203,9 @@ def _no_else(f: Function, node: ast.While | ast.For) -> None:
 
 
 def _break(f: Function, node: ast.Break) -> bool:
-    _, behind, breaks = f.leaving[-1]
+    _, done, breaks = f.leaving[-1]
     breaks.append(set(f.assigned))
-    f.builder.branch(behind)
+    f.builder.branch(done)
     return True
 
 
@@ -218,7 +220,7 @@ def _return(f: Function, node: ast.Return) -> bool:
 
 
 def _expression(f: Function, node: ast.Expr) -> bool:
-    if not isinstance(node.value, ast.Constant):  # a text about it
+    if not isinstance(node.value, ast.Constant):  # a docstring
         f.expression(node.value)
     return False
 

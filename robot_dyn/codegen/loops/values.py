@@ -1,4 +1,4 @@
-"""Values while a function is translated: LLVM's, each with its type in the subset."""
+"""Values while a function is translated: LLVM values with their types in the subset."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class Scalar:
     """A number.
 
     Attributes:
-        kind: Its type.
-        ir: LLVM's value.
-        const: Python's value, where it is known.
+        kind: Type.
+        ir: LLVM value.
+        const: Python value, or None if it is not constant.
     """
 
     kind: Number
@@ -51,7 +51,7 @@ class ArrayValue:
     apart: tuple[Scalar, ...] = ()
 
     def strides(self, builder: Any) -> tuple[Scalar, ...]:
-        """The strides."""
+        """Return the strides, in entries."""
         if not self.kind.contiguous:
             return self.apart
         strides = [ONE]
@@ -63,7 +63,7 @@ class ArrayValue:
 @final
 @dataclass(frozen=True, eq=False)
 class RecordValue:
-    """A named tuple, by the address of its words."""
+    """A named tuple, referenced by the address of its words."""
 
     kind: RecordKind
     pointer: Any
@@ -78,20 +78,20 @@ class TupleValue:
 
     @property
     def kind(self) -> TupleKind:
-        """Its type."""
-        return TupleKind(tuple(each.kind for each in self.items))
+        """Type of the tuple."""
+        return TupleKind(tuple(item.kind for item in self.items))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class StaticValue:
-    """A value known when the function is translated."""
+    """A value fixed when the function is translated."""
 
     value: Any
 
     @property
     def kind(self) -> Static:
-        """Its type."""
+        """Type of the value."""
         return Static.of(self.value)
 
 
@@ -101,9 +101,9 @@ class Written:
     """A function of a module.
 
     Attributes:
-        ir: LLVM's function.
-        result: The type of its result.
-        may_fail: Whether it returns the text of a failure first.
+        ir: LLVM function.
+        result: Type of the result.
+        may_fail: True if it returns the text of a failure first.
     """
 
     ir: Any
@@ -115,13 +115,13 @@ Value = Scalar | ArrayValue | RecordValue | TupleValue | StaticValue
 
 
 def number(value: float) -> Scalar:
-    """A constant."""
+    """Return a constant."""
     kind = BOOL if isinstance(value, bool) else INT if isinstance(value, int) else FLOAT
     return Scalar(kind, ir.Constant(kind.llvm, value), value)
 
 
 def word(value: int) -> Scalar:
-    """An unsigned constant."""
+    """Return an unsigned constant."""
     return Scalar(UINT, ir.Constant(I64, value), value)
 
 
@@ -129,52 +129,52 @@ ONE = number(1)
 
 
 def leaf_types(kind: Kind) -> list[ir.Type]:
-    """LLVM's types of the parts of a value, as they are passed and stored in variables."""
+    """Return the LLVM types of the parts of a value, as they are passed and stored in variables."""
     if isinstance(kind, Number):
         return [kind.llvm]
     if isinstance(kind, ArrayKind):
-        known = kind.ndim - kind.single
-        return [kind.of.stored.as_pointer(), *[I64] * (known if kind.contiguous else 2 * known)]
+        axes = kind.ndim - kind.single
+        return [kind.of.stored.as_pointer(), *[I64] * (axes if kind.contiguous else 2 * axes)]
     if isinstance(kind, RecordKind):
         return [WORDS]
-    return [] if isinstance(kind, Static) else [leaf for each in kind.items for leaf in leaf_types(each)]
+    return [] if isinstance(kind, Static) else [leaf for item in kind.items for leaf in leaf_types(item)]
 
 
 def leaves(value: Value) -> list[Any]:
-    """LLVM's values of the parts."""
+    """Return the LLVM values of the parts."""
     if isinstance(value, Scalar):
         return [value.ir]
     if isinstance(value, ArrayValue):
-        known = value.kind.ndim - value.kind.single
-        return [value.data, *(each.ir for each in (*value.shape[:known], *value.apart[:known]))]
+        axes = value.kind.ndim - value.kind.single
+        return [value.data, *(length.ir for length in (*value.shape[:axes], *value.apart[:axes]))]
     if isinstance(value, RecordValue):
         return [value.pointer]
-    return [] if isinstance(value, StaticValue) else [leaf for each in value.items for leaf in leaves(each)]
+    return [] if isinstance(value, StaticValue) else [leaf for item in value.items for leaf in leaves(item)]
 
 
 def of_leaves(kind: Kind, parts: Sequence[Any]) -> Value:
-    """The value that consists of these parts."""
+    """Return the value that consists of these parts."""
     if isinstance(kind, Number):
         return Scalar(kind, parts[0])
     if isinstance(kind, ArrayKind):
-        known = kind.ndim - kind.single
-        lengths = tuple(Scalar(INT, each) for each in parts[1:])
+        axes = kind.ndim - kind.single
+        lengths = tuple(Scalar(INT, part) for part in parts[1:])
         last = (ONE,) * kind.single
-        return ArrayValue(kind, parts[0], lengths[:known] + last, () if kind.contiguous else lengths[known:] + last)
+        return ArrayValue(kind, parts[0], lengths[:axes] + last, () if kind.contiguous else lengths[axes:] + last)
     if isinstance(kind, RecordKind):
         return RecordValue(kind, parts[0])
     if isinstance(kind, Static):
         return StaticValue(kind.value)
     items, at = [], 0
-    for each in kind.items:
-        count = len(leaf_types(each))
-        items.append(of_leaves(each, parts[at : at + count]))
+    for item in kind.items:
+        count = len(leaf_types(item))
+        items.append(of_leaves(item, parts[at : at + count]))
         at += count
     return TupleValue(tuple(items))
 
 
 def times(x: Scalar, y: Scalar, builder: Any) -> Scalar:
-    """A product of lengths, which does not overflow."""
+    """Return a product of lengths, which does not overflow."""
     if x.const is not None and y.const is not None:
         return number(x.const * y.const)
     if x.const == 1 or y.const == 1:

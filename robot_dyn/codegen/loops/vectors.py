@@ -21,34 +21,36 @@ ZERO = ir.Constant(I64, 0)
 Rule = Callable[..., Any]  # (builder, numbers or vectors of them) → the same
 
 
-def each(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value], rule: Rule) -> None:
-    """Write rule(operands) into the entries of a contiguous array, from those of others and from numbers."""
+def elementwise(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value], rule: Rule) -> None:
+    """Write rule(operands) into the entries of a contiguous array, from entries of others and from numbers."""
     check(f, node, to, operands)
     if f.silent:
         return
     b, of = f.builder, to.kind.of
     for width, e in chunks(f, arrays.size(f, to), WIDTHS):
-        given = [
+        values = [
             loaded(b, x.data, e, width, of) if isinstance(x, ArrayValue) else spread(b, x.ir, width, of)
             for x in operands if isinstance(x, ArrayValue | Scalar)
         ]  # fmt: skip
-        stored(b, rule(b, *given), to.data, e, width, of)
+        stored(b, rule(b, *values), to.data, e, width, of)
 
 
 def check(f: Function, node: ast.AST, to: ArrayValue, operands: list[Value]) -> None:
-    """An array that may be written, and others like it: contiguous, of one size and type."""
+    """Check that an array is writable, and others match it: contiguous, of one size and type."""
     for x in operands:
         if isinstance(x, ArrayValue):
             same = f.builder.icmp_signed("==", arrays.size(f, x).ir, arrays.size(f, to).ir)
             f.check(same, node, "arrays of a primitive have different sizes")
             if not (x.kind.contiguous and to.kind.contiguous) or x.kind.of != to.kind.of:
-                raise f.refused(node, "a primitive of arrays that are not contiguous, or not alike", "copy them first")
+                raise f.refused(
+                    node, "a primitive of arrays that are not contiguous or differ in type", "copy them first"
+                )
     if to.kind.frozen:
-        raise f.refused(node, "a write into an array that is read-only", "pass one that may be written")
+        raise f.refused(node, "a write into an array that is read-only", "pass a writable one")
 
 
 def chunks(f: Function, count: Scalar, widths: tuple[int, ...]) -> Iterator[tuple[int, Any]]:
-    """Loops over entries by vectors: first of the largest width, then of smaller ones for the rest."""
+    """Yield loops over entries by vectors: first of the largest width, then of smaller ones for the remainder."""
     b, first = f.builder, ZERO
     for width in widths:
         last = b.and_(count.ir, ir.Constant(I64, -width))
@@ -59,38 +61,38 @@ def chunks(f: Function, count: Scalar, widths: tuple[int, ...]) -> Iterator[tupl
 
 @contextmanager
 def steps(b: Any, start: Any, stop: Any, step: int) -> Iterator[Any]:
-    """A loop in steps, by a phi instead of a variable."""
-    before, look, body, behind = b.block, *(b.append_basic_block() for _ in range(3))
-    b.branch(look)
-    b.position_at_end(look)
+    """Write a loop in steps, with a phi instead of a variable."""
+    before, head, body, done = b.block, *(b.append_basic_block() for _ in range(3))
+    b.branch(head)
+    b.position_at_end(head)
     index = b.phi(I64)
     index.add_incoming(start, before)
-    b.cbranch(b.icmp_signed("<", index, stop), body, behind)
+    b.cbranch(b.icmp_signed("<", index, stop), body, done)
     b.position_at_end(body)
     yield index
     index.add_incoming(b.add(index, ir.Constant(I64, step), flags=("nsw",)), b.block)
-    b.branch(look)
-    b.position_at_end(behind)
+    b.branch(head)
+    b.position_at_end(done)
 
 
 def kind(width: int, of: Number) -> Any:
-    """LLVM's type of a vector of numbers."""
+    """Return the LLVM type of a vector of numbers."""
     return of.stored if width == 1 else ir.VectorType(of.stored, width)
 
 
 def loaded(b: Any, data: Any, at: Any, width: int, of: Number) -> Any:
-    """A vector of entries."""
+    """Load a vector of entries."""
     return b.load(b.bitcast(b.gep(data, [at], inbounds=True), kind(width, of).as_pointer()), align=_bytes(of))
 
 
 def stored(b: Any, value: Any, data: Any, at: Any, width: int, of: Number) -> None:
-    """Write a vector of entries."""
+    """Store a vector of entries."""
     pointer = b.bitcast(b.gep(data, [at], inbounds=True), kind(width, of).as_pointer())
     b.store(value, pointer, align=_bytes(of))
 
 
 def spread(b: Any, x: Any, width: int, of: Number) -> Any:
-    """A vector of one number."""
+    """Return a vector with copies of one number."""
     if width == 1:
         return x
     vector, i32 = kind(width, of), ir.IntType(32)

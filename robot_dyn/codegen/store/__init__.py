@@ -1,1 +1,1 @@
-"""Stored machine code: keys of all that it depends on, the definition of user code in them, the folder (cache)."""
+"""Stored machine code: keys of all its dependencies, the definition of user code in them, and the folder (cache)."""

@@ -1,4 +1,4 @@
-"""The definition of user-defined code: one digest of everything its functions and classes reach by name.
+"""The definition of user code: one digest of everything that its functions and classes reach by name.
 
     function → its code, defaults, closure, attributes, globals → …      class → its bases and the values in it → …
 
@@ -45,7 +45,7 @@ _IMPURE = {
 }  # fmt: skip
 _SPECIAL = {"__call__", "__class__", "__delattr__", "__init__", "__len__", "__name__", "__post_init__", "__setattr__"}
 _FIELDS = "__dataclass_fields__"
-# Class attributes that follow from the rest or do not affect numbers.
+# Class attributes that are derived from others or do not affect numbers.
 _FOLLOWS = {
     _FIELDS, "__abstractmethods__", "__annotate__", "__annotate_func__", "__annotations__", "__annotations_cache__",
     "__dataclass_params__", "__dict__", "__doc__", "__firstlineno__", "__hash__", "__match_args__", "__module__",
@@ -59,7 +59,7 @@ class _UndefinedError(Exception):
 
 
 def definition(value: Any) -> str | None:
-    """SHA-256 of everything a value depends on; None if that may differ in another process."""
+    """Return the SHA-256 of everything a value depends on; None if that may differ in another process."""
     reader = _Reader()
     try:
         parts = [reader.text(value), *reader.texts()]
@@ -77,7 +77,7 @@ class _Reader:
         self._numbers: dict[int, int] = {}  # index in `_reached`, by identity
 
     def text(self, value: Any) -> str:
-        """Text that, together with `texts`, distinguishes a value from all others."""
+        """Return a text that, together with `texts`, distinguishes a value from all others."""
         kind: Any = type(value)
         if kind in _NUMBERS:
             return f"{kind.__name__} {value!r}"
@@ -101,7 +101,7 @@ class _Reader:
         raise _UndefinedError
 
     def texts(self) -> Iterator[str]:
-        """Texts of the functions and classes reached."""
+        """Return the texts of the functions and classes reached."""
         for value in self._reached:  # the list grows during the loop
             yield self._of_function(value) if isinstance(value, FunctionType) else self._of_class(value)
 
@@ -134,16 +134,16 @@ class _Reader:
     def _of_class(self, kind: type) -> str:
         if type(kind) not in (type, ABCMeta):
             raise _UndefinedError
-        bases, fields = [self.text(each) for each in kind.__bases__], self._of_fields(vars(kind).get(_FIELDS, {}))
+        bases, fields = [self.text(base) for base in kind.__bases__], self._of_fields(vars(kind).get(_FIELDS, {}))
         own = {name: self._of_attribute(value) for name, value in sorted(vars(kind).items()) if name not in _FOLLOWS}
         return f"class {kind.__qualname__} {bases} {fields} {own}"
 
     def _of_attribute(self, value: Any) -> str:
-        """Text of a class attribute."""
+        """Return the text of a class attribute."""
         if isinstance(value, staticmethod | classmethod):
             return f"{type(value).__name__} {self.text(value.__func__)}"
         if type(value) is property:
-            return f"property {[self.text(each) for each in (value.fget, value.fset, value.fdel)]}"
+            return f"property {[self.text(accessor) for accessor in (value.fget, value.fset, value.fdel)]}"
         if type(value) is cached_property:
             return f"cached {self.text(value.func)}"
         if isinstance(value, MemberDescriptorType | GetSetDescriptorType):
@@ -151,31 +151,31 @@ class _Reader:
         return self.text(value)
 
     def _of_fields(self, fields: Mapping[str, Field[Any]]) -> str:
-        """Text of dataclass fields, whose defaults are in the methods."""
-        return str([(name, each.init, self._of_metadata(each.metadata)) for name, each in fields.items()])
+        """Return the text of dataclass fields, whose defaults are in the methods."""
+        return str([(name, item.init, self._of_metadata(item.metadata)) for name, item in fields.items()])
 
     def _of_metadata(self, metadata: Mapping[Any, Any]) -> list[tuple[str, str]]:
         return [(str(k), repr(x) if type(x) is Coefficient else self.text(x)) for k, x in metadata.items()]
 
 
 def _is_pure(value: Any) -> bool:
-    """Whether a value is a function or class that its name identifies, in a module of constant behaviour."""
+    """Return True for a function or class that its name identifies, in a module of constant behaviour."""
     module, name = getattr(value, "__module__", None), getattr(value, "__qualname__", None)
     if not isinstance(module, str) or not isinstance(name, str) or isinstance(value, ModuleType):
         return False
     if module == "builtins":
-        known = name in _BUILTIN or (isinstance(value, type) and issubclass(value, BaseException))
-        return known and getattr(builtins, name, None) is value
+        is_known = name in _BUILTIN or (isinstance(value, type) and issubclass(value, BaseException))
+        return is_known and getattr(builtins, name, None) is value
     package, _, rest = module.partition(".")
-    of_library = package == "robot_dyn" and rest.partition(".")[0] in _PURE_ROOMS
-    found: Any = sys.modules.get(module) if of_library or (module in _PURE and name not in _IMPURE) else None
-    for each in name.split("."):
-        found = getattr(found, each, None)
-    return found is value
+    is_own = package == "robot_dyn" and rest.partition(".")[0] in _PURE_ROOMS
+    owner: Any = sys.modules.get(module) if is_own or (module in _PURE and name not in _IMPURE) else None
+    for attribute in name.split("."):
+        owner = getattr(owner, attribute, None)
+    return owner is value
 
 
 def _at(names: Mapping[str, Any], path: tuple[str, ...]) -> Any:
-    """Value of a global name, or of an attribute path in a module."""
+    """Return the value of a global name, or of an attribute path in a module."""
     value = names[path[0]] if path[0] in names else getattr(builtins, path[0], _at)
     for name in path[1:]:
         if not isinstance(value, ModuleType):
@@ -188,36 +188,36 @@ def _at(names: Mapping[str, Any], path: tuple[str, ...]) -> Any:
 
 @lru_cache(maxsize=1024)
 def _globals(code: CodeType) -> frozenset[tuple[str, ...]]:
-    """Paths to what a code object takes from its module, such as (np, linalg, norm): a name, then attributes.
+    """Return the paths to all a code object uses of its module, such as (np, linalg, norm): a name, then attributes.
 
     Raises:
-        _UndefinedError: If the code assigns to anything but its own variables, imports, or inspects what it calls.
+        _UndefinedError: If the code assigns to variables of other scopes, imports, or inspects the functions it calls.
     """
-    found: list[list[str]] = []
-    follows = False
-    for each in dis.get_instructions(code):
-        does, name = each.opname, str(each.argval)
-        takes_attribute = does in ("LOAD_ATTR", "LOAD_METHOD")
-        if does in ("LOAD_GLOBAL", "LOAD_NAME"):
-            found.append([name])
-        elif takes_attribute and follows:
-            found[-1].append(name)
-        elif does != "KW_NAMES" and any(
-            word in does for word in ("GLOBAL", "NAME", "IMPORT", "STORE_ATTR", "DELETE_ATTR")
+    paths: list[list[str]] = []
+    continues = False
+    for instruction in dis.get_instructions(code):
+        operation, name = instruction.opname, str(instruction.argval)
+        takes_attribute = operation in ("LOAD_ATTR", "LOAD_METHOD")
+        if operation in ("LOAD_GLOBAL", "LOAD_NAME"):
+            paths.append([name])
+        elif takes_attribute and continues:
+            paths[-1].append(name)
+        elif operation != "KW_NAMES" and any(
+            word in operation for word in ("GLOBAL", "NAME", "IMPORT", "STORE_ATTR", "DELETE_ATTR")
         ):
             raise _UndefinedError
-        if does in ("STORE_DEREF", "DELETE_DEREF") and name in code.co_freevars:
+        if operation in ("STORE_DEREF", "DELETE_DEREF") and name in code.co_freevars:
             raise _UndefinedError
         if takes_attribute and name.startswith("__") and name not in _SPECIAL:
             raise _UndefinedError
-        follows = does in ("LOAD_GLOBAL", "LOAD_NAME") or (takes_attribute and follows)
-    inside = (_globals(each) for each in code.co_consts if isinstance(each, CodeType))
-    return frozenset(map(tuple, found)).union(*inside)
+        continues = operation in ("LOAD_GLOBAL", "LOAD_NAME") or (takes_attribute and continues)
+    inside = (_globals(constant) for constant in code.co_consts if isinstance(constant, CodeType))
+    return frozenset(map(tuple, paths)).union(*inside)
 
 
 @lru_cache(maxsize=1024)
 def code_parts(code: CodeType) -> tuple[Any, ...]:
-    """Everything that determines what a code object does, as strings and numbers, without its file and lines."""
+    """Return everything that determines what a code object does, as strings and numbers, without file and lines."""
     names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
     counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount
     kind = code.co_flags & 0xFFFF  # without __future__ flags, which a notebook cell may inherit from another

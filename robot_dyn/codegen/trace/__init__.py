@@ -1,8 +1,8 @@
-"""From the lines of the library to a program: the formulations run on symbols.
+"""From the code of the library to a program: the formulations run on symbols.
 
 origins, base_parameters    the same motion with fewer numbers: frames, inertias
-symbol, condition, symbolic    numbers of a trace, their comparisons, and both ways of a branch
-trace             each quantity by its formulations, and the shortest
+symbol, condition, symbolic    numbers of a trace, their comparisons, and both outcomes of a branch
+trace             formulations of each quantity, and the shortest one
 symbolic_dynamics, symbolic_plant    robots, plants and controllers of symbols
 from_casadi       from a CasADi Function to a program
 """

@@ -11,11 +11,11 @@ import casadi as ca
 
 from robot_dyn.foundations.linear_algebra import judging_regularity
 
-Node = Any  # casadi.SX, 1 × 1
+Node = ca.SX  # 1 × 1
 
 
 def _undecided(condition: Node) -> bool:
-    raise TypeError("the truth of a comparison depends on the state")
+    raise TypeError("the truth of this comparison depends on the state")
 
 
 _decision: ContextVar[Callable[[Node], bool]] = ContextVar("decision", default=_undecided)
@@ -23,7 +23,7 @@ _decision: ContextVar[Callable[[Node], bool]] = ContextVar("decision", default=_
 
 @contextmanager
 def deciding(decision: Callable[[Node], bool]) -> Iterator[None]:
-    """Within, conditions take their truth from this decision."""
+    """Let a function decide the truth of conditions in this context."""
     token = _decision.set(decision)
     try:
         yield
@@ -33,7 +33,7 @@ def deciding(decision: Callable[[Node], bool]) -> Iterator[None]:
 
 @final
 class Condition:
-    """A comparison whose outcome depends on the state; its truth is the decision in force."""
+    """A comparison whose outcome depends on the state; the current decision determines its truth."""
 
     __slots__ = ("node",)
 
@@ -56,5 +56,5 @@ class Condition:
 
 
 def truth(condition: Any) -> Node:
-    """0 or 1: the node of a condition, or of a known truth value."""
+    """Return the node of a condition, or 0 or 1 for a plain truth value."""
     return condition.node if isinstance(condition, Condition) else ca.SX(bool(condition))

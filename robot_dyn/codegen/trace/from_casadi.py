@@ -28,7 +28,7 @@ def program_of(function: ca.Function) -> Program:
         OperationError: If an operation has no machine code, or a result is sparse.
     """
     if not all(function.sparsity_out(i).is_dense() for i in range(function.n_out())):
-        raise OperationError("a result is sparse: its instructions would number what is stored; densify it")
+        raise OperationError("a result is sparse: its instructions would number only the stored entries; densify it")
     inputs = tuple(function.numel_in(i) for i in range(function.n_in()))
     starts = [0, *accumulate(inputs)]
     firsts = [0, *accumulate(function.numel_out(i) for i in range(function.n_out()))]
@@ -37,7 +37,7 @@ def program_of(function: ca.Function) -> Program:
     ops: list[Op] = []
     outputs = [0] * firsts[-1]
     sines: dict[int, tuple[int, int]] = {}  # sine and cosine by angle
-    at: dict[int, int] = {}  # value that each element of CasADi's work vector holds now
+    at: dict[int, int] = {}  # value in each element of CasADi's work vector
     for index in range(function.n_instructions()):
         operation = function.instruction_id(index)
         read, written = function.instruction_input(index), function.instruction_output(index)
@@ -64,7 +64,7 @@ def program_of(function: ca.Function) -> Program:
 
 
 def _constants(function: ca.Function, first: int) -> dict[str, int]:
-    """Index of each constant by its text, which distinguishes −0 from 0 and is the same for every NaN."""
+    """Return the index of each constant by its text, which distinguishes −0 from 0 and is equal for every NaN."""
     indices = (i for i in range(function.n_instructions()) if function.instruction_id(i) == ca.OP_CONST)
     texts = dict.fromkeys(repr(function.instruction_constant(i)) for i in indices)
     return {text: first + k for k, text in enumerate(texts)}
@@ -75,10 +75,10 @@ def _kind(operation: int) -> Kind:
         return _KINDS[operation]
     except KeyError:
         raise OperationError(
-            f"CasADi operation {operation} has no machine code here; write the function without it"
+            f"CasADi operation {operation} cannot be translated to machine code; write the function without it"
         ) from None
 
 
 def instructions(function: ca.Function) -> int:
-    """Number of operations of a Function, excluding loads and stores."""
+    """Return the number of operations of a Function, excluding loads and stores."""
     return sum(function.instruction_id(i) not in _MOVES for i in range(function.n_instructions()))

@@ -1,7 +1,7 @@
 """Symbols: the numbers of a trace, x = c ± s with a constant c and a CasADi node s, so that 0 and 1 stay exact.
 
-A formulation run on them writes down its instructions. Constants fold, signs are carried along, and 1 − (1 − cos θ) is
-cos θ again: what is zero for every state costs nothing in the kernel.
+A formulation that runs on symbols records its instructions. Constants are folded, signs are kept, and 1 − (1 − cos θ)
+becomes cos θ: terms that vanish in every state add nothing to the kernel.
 """
 
 from __future__ import annotations
@@ -19,25 +19,26 @@ _NOISE = 4 * 2.0**-53  # a sine or cosine of a constant angle below this is roun
 
 @final
 class Symbol:
-    """A number c + sign · node; node None means the constant c.
+    """A number c + sign · node; without a node, the constant c.
 
     Attributes:
-        constant: c.
+        constant: The constant c.
         sign: 1 or −1.
-        node: The CasADi expression, or None.
+        node: CasADi expression, or None.
     """
 
     __slots__ = ("constant", "node", "sign")
 
-    def __init__(self, constant: float, sign: int = 1, node: Node = None) -> None:
-        self.constant, self.sign, self.node = constant, sign, node
+    def __init__(self, constant: float, sign: int = 1, node: Node | None = None) -> None:
+        self.constant, self.sign = constant, sign
+        self.node: Any = node
 
     def __repr__(self) -> str:
         return f"Symbol({self.constant!r}, {self.sign}, {self.node})"
 
     @property
     def expression(self) -> Node:
-        """It as one CasADi expression."""
+        """Symbol as one CasADi expression."""
         if self.node is None:
             return ca.SX(self.constant)
         if self.constant == 0:
@@ -55,8 +56,8 @@ class Symbol:
         if self.sign == x.sign:
             return Symbol(c, self.sign, self.node + x.node)
         if self.sign > 0:
-            return _made(c, 1, self.node - x.node)
-        return _made(c, 1, x.node - self.node)
+            return _simplified(c, 1, self.node - x.node)
+        return _simplified(c, 1, x.node - self.node)
 
     __radd__ = __add__
 
@@ -86,7 +87,7 @@ class Symbol:
     __rmul__ = __mul__
 
     def _times(self, k: float) -> Symbol:
-        """Multiplied by a constant, which goes into both parts."""
+        """Return the product with a constant, applied to both parts."""
         if k == 0:
             return ZERO
         sign, size = (1, k) if k > 0 else (-1, -k)
@@ -110,45 +111,45 @@ class Symbol:
         if (x := _symbol(exponent)) is None:
             return NotImplemented
         if x.node is not None:
-            return _made(0.0, 1, self.expression**x.expression)
+            return _simplified(0.0, 1, self.expression**x.expression)
         if self.node is None:
             return Symbol(self.constant**x.constant)
         if x.constant == 2:
             return self * self
-        return _made(0.0, 1, self.expression**x.constant)
+        return _simplified(0.0, 1, self.expression**x.constant)
 
     def __abs__(self) -> Symbol:
         return self._unary(ca.fabs, abs)
 
     # NumPy calls these for sin(x), … of an object array
     def sin(self) -> Symbol:
-        """Its sine."""
+        """Return the sine."""
         return self._unary(ca.sin, lambda x: _snapped(math.sin(x)))
 
     def cos(self) -> Symbol:
-        """Its cosine."""
+        """Return the cosine."""
         return self._unary(ca.cos, lambda x: _snapped(math.cos(x)))
 
     def sqrt(self) -> Symbol:
-        """Its square root."""
+        """Return the square root."""
         return self._unary(ca.sqrt, math.sqrt)
 
     def tanh(self) -> Symbol:
-        """Its hyperbolic tangent."""
+        """Return the hyperbolic tangent."""
         return self._unary(ca.tanh, math.tanh)
 
     def exp(self) -> Symbol:
-        """Its exponential."""
+        """Return the exponential."""
         return self._unary(ca.exp, math.exp)
 
     def conjugate(self) -> Symbol:
-        """Itself: it is real."""
+        """Return the symbol itself, because it is real."""
         return self
 
     def _unary(self, symbolic: Callable[[Node], Node], exact: Callable[[float], float]) -> Symbol:
         if self.node is None:
             return Symbol(float(exact(self.constant)))
-        return _made(0.0, 1, symbolic(self.expression))
+        return _simplified(0.0, 1, symbolic(self.expression))
 
     def __lt__(self, other: Any) -> Any:
         return _compared(self, other, ca.lt)
@@ -175,23 +176,23 @@ ZERO = Symbol(0.0)
 
 
 def select(condition: Any, yes: Any, no: Any) -> Symbol:
-    """`yes` where the condition holds, else `no`."""
+    """Return `yes` where the condition holds, else `no`."""
     yes, no = symbol(yes), symbol(no)
     if not isinstance(condition, Condition):
         return yes if condition else no
-    return _made(0.0, 1, ca.if_else(condition.node, yes.expression, no.expression))
+    return _simplified(0.0, 1, ca.if_else(condition.node, yes.expression, no.expression))
 
 
 def symbol(x: Any) -> Symbol:
-    """A number or symbol as a symbol; TypeError if it is not a number."""
-    if (known := _symbol(x)) is None:
+    """Convert a number or symbol to a symbol; raise TypeError if it is not a number."""
+    if (converted := _symbol(x)) is None:
         raise TypeError(f"not a number: {x!r}")
-    return known
+    return converted
 
 
 def node(expression: Node) -> Symbol:
-    """The symbol of a CasADi expression."""
-    return _made(0.0, 1, expression)
+    """Return the symbol of a CasADi expression."""
+    return _simplified(0.0, 1, expression)
 
 
 def _symbol(x: Any) -> Symbol | None:
@@ -203,15 +204,15 @@ def _symbol(x: Any) -> Symbol | None:
         return None
 
 
-def _made(constant: float, sign: int, expression: Node) -> Symbol:
-    """The symbol of an expression, or of a constant if it is one."""
+def _simplified(constant: float, sign: int, expression: Node) -> Symbol:
+    """Return the symbol of an expression, or of a constant if it is one."""
     if expression.is_constant():
         return Symbol(constant + sign * float(expression))
     return Symbol(constant, sign, expression)
 
 
 def _snapped(x: float) -> float:
-    """A sine or cosine of a constant angle without the rounding of its exact values 0 and ±1."""
+    """Return a sine or cosine of a constant angle, rounded to its exact values 0 and ±1 if close."""
     nearest = round(x)
     return float(nearest) if abs(x - nearest) < _NOISE else x
 

@@ -1,7 +1,7 @@
-"""Symbolic arithmetic: the formulations run on symbols, and both branches of an `if` in an effect are followed.
+"""Symbolic arithmetic: the formulations run on symbols, and both branches of an `if` in an effect are traced.
 
-A comparison of symbols has no truth value while tracing. `every_branch` runs a function once for each way its
-comparisons can turn out, and joins the results: x = if_else(c₁, if_else(c₂, x₁₁, x₁₀), x₀).
+A comparison of symbols has no truth value while tracing. `every_branch` runs a function once for each combination of
+outcomes and joins the results: x = if_else(c₁, if_else(c₂, x₁₁, x₁₀), x₀).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _MOST_BRANCHES = 64  # each is a copy of the function in the kernel
 @final
 @dataclass(frozen=True)
 class Symbolic(Arithmetic):
-    """Symbols; within its scope the comparisons of a formulation, which ask whether M is regular, are taken as true."""
+    """Symbols; within its scope, comparisons of a formulation that test whether M is regular count as true."""
 
     dtype: np.dtype = field(default_factory=lambda: np.dtype(object), init=False, repr=False)
 
@@ -69,8 +69,8 @@ class Symbols(np.ndarray):
             if getattr(function, "__module__", "") != "numpy.linalg":
                 raise
             raise TypeError(
-                f"np.linalg.{function.__name__} is not traced; take np.linalg.solve or inv of a matrix (m, m), or"
-                " compute it once when the object is built"
+                f"np.linalg.{function.__name__} cannot be traced; use np.linalg.solve or inv of a matrix (m, m), or"
+                " compute the result once when the object is built"
             ) from error
 
 
@@ -113,7 +113,7 @@ _OF_SYMBOLS: dict[Any, tuple[Callable[..., Any], int]] = {
 
 
 def inputs(name: str, n: int) -> tuple[Node, Array]:
-    """A CasADi vector of n inputs, and the same as an array of symbols."""
+    """Return a CasADi vector of n inputs, and the same as an array of symbols."""
     vector = ca.SX.sym(name, n)
     array = np.empty(n, dtype=object)
     array[:] = [node(vector[i]) for i in range(n)]
@@ -121,12 +121,12 @@ def inputs(name: str, n: int) -> tuple[Node, Array]:
 
 
 def column(array: Any) -> Node:
-    """The entries of an array, row by row, as one CasADi column."""
+    """Return the entries of an array, row by row, as one CasADi column."""
     return ca.vertcat(*(symbol(x).expression for x in np.asarray(array, dtype=object).flat))
 
 
 def array_of(expression: Node) -> Array:
-    """A CasADi matrix as an array of symbols."""
+    """Return a CasADi matrix as an array of symbols."""
     rows, columns = expression.shape
     array = np.empty((rows, columns), dtype=object)
     for i in range(rows):
@@ -136,10 +136,10 @@ def array_of(expression: Node) -> Array:
 
 
 def every_branch(function: Callable[[], Array]) -> Array:
-    """The value of a function that compares symbols, whichever way its comparisons turn out.
+    """Return the value of a function that compares symbols, for every outcome of its comparisons.
 
     Raises:
-        TraceError: If there are more than 64 ways.
+        TraceError: If there are more than 64 combinations of outcomes.
     """
     left = _MOST_BRANCHES
 
@@ -159,9 +159,8 @@ def every_branch(function: Callable[[], Array]) -> Array:
                 f"more than {_MOST_BRANCHES} branches; write it with np.where or np.clip, without if, min or max"
             )
         result = yes
-        for depth in reversed(
-            range(len(decided), len(conditions))
-        ):  # the last condition was taken as true: now as false
+        # each condition was taken as true above; now as false, from the last one on
+        for depth in reversed(range(len(decided), len(conditions))):
             no = follow([*decided, *[True] * (depth - len(decided)), False])
             result = _joined(Condition(conditions[depth]), result, no)
         return result

@@ -22,16 +22,16 @@ class SymbolicDynamics(Dynamics[Symbols]):
 
     Args:
         robot: File and edits of the robot.
-        known: Numbers of the robot that are inputs (gravity and payloads); all others are constants.
+        parameters: Values of the robot that are inputs (gravity and payloads); all others are constants.
     """
 
-    def __init__(self, robot: Described, known: Sequence[Parameter] = ()) -> None:
-        vector, symbols = inputs("numbers", sum(each.size for each in known))
-        values = {key: x for own in split(known, symbols).values() for key, x in own.items()}
-        self._trace = Trace(described(robot, values) if known else robot, (vector,) if known else ())
+    def __init__(self, robot: Described, parameters: Sequence[Parameter] = ()) -> None:
+        vector, symbols = inputs("numbers", sum(parameter.size for parameter in parameters))
+        values = {key: x for own in split(parameters, symbols).values() for key, x in own.items()}
+        self._trace = Trace(described(robot, values) if parameters else robot, (vector,) if parameters else ())
         self._traced: dict[str, Traced] = {}
         self._given: tuple[Any, ...] = self._trace.given
-        self._known = known
+        self._parameters = parameters
 
     @property
     def n(self) -> int:
@@ -43,20 +43,20 @@ class SymbolicDynamics(Dynamics[Symbols]):
 
     @property
     def arithmetic(self) -> Symbolic:
-        """The numbers it runs in."""
+        """Arithmetic of all numbers."""
         return self._trace.arithmetic
 
     def of(self, values: Mapping[str, Any]) -> SymbolicDynamics:
-        """Return a copy whose inputs take these values, in the order of `known`."""
+        """Return a copy whose inputs have these values."""
         if not values:
             return self
         other = copy(self)
-        inputs = (np.ravel(values[each.key])[list(each.entries)] for each in self._known)
+        inputs = (np.ravel(values[x.key])[list(x.entries)] for x in self._parameters)
         other._given = (ca.vertcat(*map(column, inputs)),)
         return other
 
     def formulation(self, quantity: str) -> str:
-        """Formulation used for a quantity, the one with the fewest instructions."""
+        """Return the formulation used for a quantity, the one with the fewest instructions."""
         return self._quantity(quantity).formulation
 
     def _quantity(self, name: str) -> Traced:
@@ -65,7 +65,7 @@ class SymbolicDynamics(Dynamics[Symbols]):
         return self._traced[name]
 
     def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
-        if frame:  # no inertia is needed
+        if frame:  # queries of frames do not need inertias
             return self._trace.lagrangian._answer(name, state, out, errors, frame).view(Symbols)
         value = array_of(self._quantity(name).function(*map(column, state), *self._given))
         shape = self._trace.shape(name)

@@ -1,7 +1,7 @@
-"""A plant and its controller in symbols: effects, bounds and control laws, whichever way they branch.
+"""A plant and its controller in symbols: effects, bounds and control laws, for every outcome of their branches.
 
-Each part is wrapped in one of its own kind, which traces what it computes and names it where that fails. References
-and models of a controller are found by their types, whatever its attributes are called.
+Each part is wrapped in a part of the same kind, which traces its results and names it in errors. References and models
+of a controller are identified by their types, not by the names of its attributes.
 """
 
 from __future__ import annotations
@@ -24,88 +24,88 @@ from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import QueryError, because
 
-_INTERPRETED = "ask the plant itself, or simulate it"
-REMEDY = "write it in robot_dyn.foundations.arithmetic and NumPy's operators, or take engine='interpreted'"
-_ARM_INSIDE = "an arm inside a function cannot be traced; take engine='interpreted'"
+_INTERPRETED = "use the plant itself, or simulate it"
+REMEDY = "write it with robot_dyn.foundations.arithmetic and NumPy's operators, or use engine='interpreted'"
+_ARM_INSIDE = "a robot inside a function cannot be traced; use engine='interpreted'"
 _ARM_INSIDE_A_LAW = (
-    "an arm inside a function cannot be traced: make it an attribute of a rd.control.Stateless controller, or take"
+    "a robot inside a function cannot be traced: make it an attribute of a rd.control.Stateless controller, or use"
     " engine='interpreted'"
 )
 
 
 def symbolic_plant(plant: Plant, bodies: Any, values: Mapping[Part, Mapping[str, Array]] | None = None) -> Plant:
-    """The same plant in symbols.
+    """Return the same plant in symbols.
 
     Args:
-        plant: What to trace.
-        bodies: Its rigid bodies, a `SymbolicDynamics`.
+        plant: Plant to trace.
+        bodies: Rigid bodies of the plant, a `SymbolicDynamics`.
         values: Symbols for the parameters of its effects; constants otherwise.
     """
     values = values or {}
-    return Plant(bodies, [_traced(each, values.get(("effect", i), {})) for i, each in enumerate(plant.effects)])
+    return Plant(bodies, [_traced(effect, values.get(("effect", i), {})) for i, effect in enumerate(plant.effects)])
 
 
 def symbolic_controller(
     controller: Controller, models: Mapping[str, Any], values: Mapping[Part, Mapping[str, Array]], pieces: Sequence[Any]
 ) -> Controller:
-    """The same controller in symbols.
+    """Return the same controller in symbols.
 
     Args:
-        controller: What to trace.
-        models: Its models of the arm in symbols, by attribute.
-        values: Symbols for its parameters, and those of its references.
-        pieces: The polynomials that its references are made of on a segment.
+        controller: Controller to trace.
+        models: Models of the robot in symbols, by attribute of the controller.
+        values: Symbols for the parameters of the controller and its references.
+        pieces: Polynomials of its references on a segment.
     """
     parts: dict[str, Any] = dict(values.get(CONTROLLER, {})) | dict(models)
     remaining = iter(pieces)
     for name, reference in controller.references.items():
         if isinstance(reference, PiecewisePolynomial) and type(reference).at is not PiecewisePolynomial.at:
             raise TraceError(
-                f"reference {type(reference).__name__} cannot be compiled: its at(t) is not that of its polynomials;"
-                " give an rd.control.PiecewisePolynomial, or take engine='interpreted'"
+                f"reference {type(reference).__name__} cannot be compiled: its at(t) differs from its polynomials;"
+                " use an rd.control.PiecewisePolynomial, or engine='interpreted'"
             )
         polynomials = {attribute: next(remaining) for attribute in reference.polynomials}
-        given = polynomials | dict(values.get(("reference", name), {}))
-        parts[name] = polynomials.get("") or with_values(reference, given)
+        attributes = polynomials | dict(values.get(("reference", name), {}))
+        parts[name] = polynomials.get("") or with_values(reference, attributes)
     return TracedController(with_values(controller, parts), controller)
 
 
 def wide(x: Any, n: int) -> np.ndarray:
-    """Symbols (n,) of a number or (n,)."""
+    """Broadcast a number, or (n,), to symbols (n,)."""
     return np.broadcast_to(np.asarray(x, dtype=object), (n,)).view(Symbols)
 
 
 def whichever_way(name: str, function: Callable[[], Any], of_arm_inside: str = _ARM_INSIDE) -> Any:
-    """The result of a part for every outcome of its comparisons; TraceError names the part.
+    """Return the result of a part for every outcome of its comparisons; TraceError names the part.
 
-    `of_arm_inside` is the remedy where the part asks an arm that it does not declare.
+    `of_arm_inside` is the remedy if the part uses a robot that it does not declare.
     """
     try:
         result = every_branch(function).view(Symbols)
-        column(result)  # reports what is not a number
+        column(result)  # raises if an entry is not a number
         return result
-    except Exception as error:  # anything that user-defined code raises on symbols
-        held = isinstance(error, QueryError) and Symbol.__name__ in str(error)  # an arm that was asked with symbols
-        remedy = of_arm_inside if held else REMEDY
+    except Exception as error:  # user code can raise anything on symbols
+        has_robot = isinstance(error, QueryError) and Symbol.__name__ in str(error)  # a query with symbols
+        remedy = of_arm_inside if has_robot else REMEDY
         raise TraceError(f"{name} cannot be compiled ({because(error)}): {remedy}") from error
 
 
 @final
 class Piece:
-    """One polynomial of a reference, of coefficients that are inputs: its first time and c₀, c₁, …, each (n,)."""
+    """A polynomial of a reference whose coefficients are inputs: start time and c₀, c₁, …, each (n,)."""
 
     def __init__(self, p: Array, n: int) -> None:
         self.start, self.coefficients = p[0], p[1:].reshape(-1, n).view(Symbols)
 
     def at(self, t: Any) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration."""
+        """Return position, velocity and acceleration."""
         return polynomial(self.coefficients, t - self.start)
 
 
 def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
     if isinstance(effect, CarriedPayload):
         if effect.carried is None:
-            raise TraceError(f"effect {effect.name} comes and goes: ask plant.at(t), t in [s], or simulate the plant")
+            raise TraceError(f"effect {effect.name} is temporary: use plant.at(t), t in [s], or simulate the plant")
         return effect
     own: Any = with_values(effect, values)
     if isinstance(effect, Drive):
@@ -120,22 +120,22 @@ def _traced(effect: Effect, values: Mapping[str, Array]) -> Effect:
 
 
 def _inner(name: str) -> Any:
-    """An attribute of the effect that is wrapped, as it is."""
+    """Return a property with the attribute of the wrapped effect."""
     return property(lambda self: getattr(self.inner, name))
 
 
 def _method(name: str, length: Callable[..., int]) -> Any:
-    """A method of the part that is wrapped, traced; `length` gives that of its result from its arguments."""
+    """Return a traced method of the wrapped part; `length` computes the length of its result from its arguments."""
 
     def traced(self: Any, *arguments: Any) -> Array:
-        """As the part that is wrapped, in symbols."""
+        """Return the result of the wrapped part in symbols."""
         return self.traced(lambda: getattr(self.inner, name)(*arguments), length(*arguments))
 
     return traced
 
 
 class _Part:
-    """An effect that is traced whichever way it branches."""
+    """An effect that is traced for every outcome of its branches."""
 
     name = _inner("name")
 
@@ -143,31 +143,31 @@ class _Part:
         self.inner = inner
 
     def traced(self, function: Callable[[], Any], length: int) -> Array:
-        """Symbols (length,) of a result."""
+        """Return a result as symbols (length,)."""
         return whichever_way(f"effect {self.name}", lambda: wide(function(), length))
 
 
 class _Torque(_Part):
-    """The torque of a force."""
+    """Torque of a force."""
 
     torque = _method("torque", lambda dynamics, *_: dynamics.n)
 
 
 class _TracedForce(_Torque, Active):
-    """A torque."""
+    """A traced torque."""
 
 
 class _TracedSetValued(_Torque, SetValued):
-    """An effect that may hold joints, in a mode."""
+    """A traced effect that may hold joints, in a mode."""
 
     rubs, stops, at_rest = map(_inner, ("rubs", "stops", "at_rest"))
     friction = _method("friction", len)
 
     @property
     def held(self) -> Any:
-        """1 for each joint that is held."""
+        """1 for each held joint."""
         if self.inner.held is None:
-            raise TraceError(f"effect {self.name} holds joints, and a run finds out which ones: {_INTERPRETED}")
+            raise TraceError(f"effect {self.name} holds joints, and only a run determines which ones: {_INTERPRETED}")
         return self.inner.held
 
     def bounds(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -180,49 +180,49 @@ class _TracedSetValued(_Torque, SetValued):
 
 
 class _TracedConservative(_Torque, Conservative):
-    """A torque with a potential."""
+    """A traced torque with a potential."""
 
     def potential(self, dynamics: Any, t: Any, q: Array) -> Any:
         return self.traced(lambda: self.inner.potential(dynamics, t, q), 1)[0]
 
 
 class _TracedBound(_Part, Bound):
-    """A bound on the actuation."""
+    """A traced bound on the actuation."""
 
     actuation = _method("actuation", lambda u, *_: len(u))
 
 
 class _States(_Part, Stateful):
-    """The states of an effect."""
+    """States of a traced effect."""
 
     state_size, start = map(_inner, ("state_size", "start"))
     state_rate = _method("state_rate", lambda dynamics, t, q, v, u, z, *_: len(z))
 
 
 class _StatefulForce(_States, _TracedForce):
-    """A torque with states."""
+    """A traced torque with states."""
 
 
 class _TracedDrive(_StatefulForce, Drive):
-    """A drive."""
+    """A traced drive."""
 
     driven, coupled, speeds = map(_inner, ("driven", "coupled", "speeds"))
     reaching, added_inertia, power = map(_inner, ("reaching", "added_inertia", "power"))
 
 
 class _TracedSetValuedDrive(_TracedDrive, _TracedSetValued):
-    """A drive with a mode."""
+    """A traced drive with a mode."""
 
     drag = _inner("drag")
 
 
 class _StatefulBound(_States, _TracedBound):
-    """A bound with states."""
+    """A traced bound with states."""
 
 
 @final
 class TracedController(Controller):
-    """A controller, traced likewise."""
+    """A traced controller."""
 
     def __init__(self, inner: Any, original: Controller) -> None:
         self.inner, self.original, self.period_s = inner, original, original.period_s
@@ -241,5 +241,5 @@ class TracedController(Controller):
     state_rate, next_state = (_method(name, lambda t, q, v, z: len(z)) for name in ("state_rate", "next_state"))
 
     def traced(self, function: Callable[[], Any], length: int) -> Array:
-        """Symbols (length,) of a result."""
+        """Return a result as symbols (length,)."""
         return whichever_way(f"controller {self.original.name}", lambda: wide(function(), length), _ARM_INSIDE_A_LAW)

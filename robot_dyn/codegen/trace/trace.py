@@ -1,6 +1,6 @@
-"""Trace: the library's formulations run on symbols → CasADi Functions; of each quantity the one of fewest instructions.
+"""Trace: the library's formulations run on symbols, giving CasADi Functions; of each quantity the shortest is used.
 
-closed form        M = Σ Jᵢᵀ 𝓜ᵢ Jᵢ and the Christoffel symbols, as `Lagrangian` writes them
+closed form        M = Σ Jᵢᵀ 𝓜ᵢ Jᵢ and the Christoffel symbols, as in `Lagrangian`
 recursion          Newton–Euler, composite body, articulated body
 energies           p = ∂K/∂v, M = ∂p/∂v, C v = ṗ − ∂K/∂q, N = ∂V/∂q by algorithmic differentiation of K and V
 """
@@ -35,10 +35,10 @@ from robot_dyn.lagrange.recursions.regressor import regressor
 from robot_dyn.lagrange.tree import Described
 from robot_dyn.queries.dynamics import EQUATION, FORWARD_DYNAMICS_DERIVATIVES, acceleration
 
-QUANTITIES = EQUATION | {"forward_dynamics_derivatives": FORWARD_DYNAMICS_DERIVATIVES}  # those with formulations
-_SOLVED_MOST = 8  # joints one after the other; with more, to solve M a = τ − … outnumbers articulated bodies
-_DERIVED_MOST = 6  # joints; with more, C v derived from K is longer, and takes as long to trace as all the rest
-_CLOSED_FORM_MOST = 4  # joints; with more its O(n³) terms outnumber other formulations everywhere, except of C
+QUANTITIES = EQUATION | {"forward_dynamics_derivatives": FORWARD_DYNAMICS_DERIVATIVES}  # quantities with formulations
+_SOLVED_MOST = 8  # joints in series; beyond, solving M a = τ − … is longer than the articulated-body algorithm
+_DERIVED_MOST = 6  # joints; beyond, C v derived from K is longer, and takes as long to trace as all others together
+_CLOSED_FORM_MOST = 4  # joints; beyond, its O(n³) terms make it the longest formulation, except of C
 
 
 @final
@@ -47,9 +47,9 @@ class Traced:
     """A quantity as a CasADi Function.
 
     Attributes:
-        function: Of the quantity's arguments, each (n,); its result row by row.
-        formulation: The shortest, that of the function.
-        counts: Instructions by formulation.
+        function: Function of the quantity's arguments, each (n,); its result is in row order.
+        formulation: Name of the shortest formulation, used by the function.
+        counts: Number of instructions by formulation.
     """
 
     function: ca.Function
@@ -63,8 +63,8 @@ class Trace:
     """A robot's dynamics in symbols.
 
     Attributes:
-        robot: The robot; its file, edits and order of joints are used.
-        parameters: CasADi symbols that its numbers depend on: one vector, the last argument of each function.
+        robot: Robot whose file, edits and order of joints are used.
+        parameters: CasADi symbols in its numbers: one vector, the last argument of each function.
     """
 
     robot: Described
@@ -72,23 +72,23 @@ class Trace:
 
     @cached_property
     def lagrangian(self) -> Lagrangian:
-        """The closed form, a `Dynamics` of symbols: what effects are traced with."""
+        """Closed form, a `Dynamics` of symbols, with which effects are traced."""
         return Lagrangian(self.robot, Symbolic())
 
     @cached_property
     @in_arithmetic
     def linkage(self) -> Linkage:
-        """The bodies that the recursions run on: other frames and fewer numbers, the same M, C and N."""
+        """Bodies for the recursions: other frames and fewer numbers, but the same M, C and N."""
         return regrouped(slid(self.lagrangian.linkage))
 
     @property
     def arithmetic(self) -> Symbolic:
-        """The numbers it runs in."""
+        """Arithmetic of all numbers."""
         return Symbolic()
 
     @property
     def given(self) -> tuple[Node, ...]:
-        """The vector of the parameters, if there are any."""
+        """Vector of the parameters, if there are any."""
         return (ca.vertcat(*self.parameters),) if self.parameters else ()
 
     @cached_property
@@ -97,13 +97,13 @@ class Trace:
         return {name: inputs(name, self.lagrangian.n) for name in ("q", "v", "a", "tau")}
 
     def shape(self, quantity: str) -> tuple[int, ...]:
-        """Shape of a quantity for one state, (1,) of a number."""
+        """Return the shape of a quantity for one state, (1,) for a number."""
         return QUANTITIES[quantity].shape(self.lagrangian.sizes) or (1,)
 
     @interrupts_later()
     @in_arithmetic
     def formulations(self, name: str) -> dict[str, ca.Function]:
-        """A quantity by each formulation that is worth tracing."""
+        """Return a quantity by each formulation that is worth tracing."""
         arguments = [*(self.symbols[argument][0] for argument in QUANTITIES[name].arguments), *self.given]
         return {
             formulation: ca.Function("f", arguments, [ca.cse(ca.densify(formula()))])
@@ -111,14 +111,14 @@ class Trace:
         }
 
     def quantity(self, name: str) -> Traced:
-        """A query of `Dynamics`, or "forward_dynamics_derivatives": ∂a/∂q, ∂a/∂v, ∂a/∂τ."""
+        """Return the trace of a query of `Dynamics`, or of "forward_dynamics_derivatives": ∂a/∂q, ∂a/∂v, ∂a/∂τ."""
         functions = self.formulations(name)
         counts = {formulation: instructions(function) for formulation, function in functions.items()}
         least = min(counts, key=counts.__getitem__)
         return Traced(functions[least], least, counts)
 
     def _formulations(self, name: str) -> Iterator[tuple[str, Callable[[], Node]]]:
-        """The formulations of a quantity; the closed form always if there is no other."""
+        """Return the formulations of a quantity; the closed form always if there is no other."""
         own, coupled = self.lagrangian, self.lagrangian.linkage.couplings.S.shape[0] != self.lagrangian.n
         articulated = name == "forward_dynamics" and not coupled
         depth = max(len(body.path) for body in own.linkage.bodies) if articulated else 0
@@ -147,7 +147,7 @@ class Trace:
                 self._mass, tau - newton_euler(linkage, q, v, zero), self.lagrangian.joint_names
             ),
             "C": lambda: christoffel(self._mass_derivative, v),
-            "regressor": lambda: regressor(self.lagrangian.linkage, q, v, a),  # of the bodies as the file has them
+            "regressor": lambda: regressor(self.lagrangian.linkage, q, v, a),  # for the bodies of the file
         }
         if name in formulas:
             yield "recursion", lambda: column(formulas[name]())
@@ -159,7 +159,7 @@ class Trace:
         K, V = symbol(self._kinetic).expression, symbol(self._potential).expression
         p = ca.gradient(K, v)
         formulas = {
-            "M": lambda: ca.vec(ca.jacobian(p, v)),  # symmetric: its columns are its rows
+            "M": lambda: ca.vec(ca.jacobian(p, v)),  # symmetric: columns equal rows
             "N": lambda: ca.gradient(V, q),
             "momentum": lambda: p,
             "coriolis_torque": lambda: ca.jtimes(p, q, v) - ca.gradient(K, q),
@@ -202,7 +202,7 @@ class Trace:
         return column(articulated_body(self.linkage, q, v, tau))
 
     def _derivatives(self) -> Node:
-        """∂a/∂x = −M⁻¹ ∂ID/∂x at a = FD(q, v, τ), and ∂a/∂τ = M⁻¹."""
+        """Return ∂a/∂x = −M⁻¹ ∂ID/∂x at a = FD(q, v, τ), and ∂a/∂τ = M⁻¹."""
         (q, qs), (v, vs), (a, as_), _ = self.symbols.values()
         n, names = len(qs), self.lagrangian.joint_names
         forward = self.quantity("forward_dynamics").function

@@ -1,13 +1,13 @@
-"""The doctor of URDF files: its faults and doubtful values, and repairs.
+"""The doctor of URDF files: faults, doubtful values, and repairs.
 
     check    the findings of a file, and its repairs (Checkup)
 
 checkup, report                   the whole check; findings as text
 document, finding                 the file; findings and changes
 spelling, literals, names         findings in the text
-limits, axes, proportions         findings in its joints and lengths
+limits, axes, proportions         findings in joints and lengths
 masses, gravity_load              findings in the numbers of the robot
-shapes, estimate                  the same against the shapes of links
+shapes, estimate                  comparison with the shapes of links; missing inertials
 command                           the command `check`
 """
 

@@ -1,4 +1,4 @@
-"""Axes of joints: one that moves and states none turns about x, the default of URDF, which is hardly ever meant."""
+"""Missing joint axes: a moving joint without one turns about x, the default of URDF, which is rarely intended."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from robot_dyn.tools.doctor.finding import Finding, Severity
 
 
 def missing_axes(document: Document) -> Iterator[Finding]:
-    """Joints that move and have no <axis>."""
+    """Report moving joints without an <axis>."""
     for joint in document.root.iterfind("joint"):
         axis = joint.find("axis")
         if joint.get("type") in ("revolute", "continuous", "prismatic") and (axis is None or axis.get("xyz") is None):
             yield document.finding(
                 Severity.WARNING, "axis_missing", joint,
-                f'is {joint.get("type")} and has no <axis>: it is taken as xyz="1 0 0"',
+                f'is {joint.get("type")} but has no <axis>; xyz="1 0 0" is used',
                 'write the axis, <axis xyz="0 0 1"/>, even where it is x',
             )  # fmt: skip

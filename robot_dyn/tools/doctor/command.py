@@ -23,7 +23,7 @@ _URDF = FileKind("a URDF", ".urdf", b"<?xml")
 
 
 class RepairError(RobotDynError):
-    """A repaired file that cannot be written."""
+    """A repaired file cannot be written."""
 
 
 @command("Files")
@@ -37,15 +37,15 @@ def check(
     options: FileOptions = FILE_AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Check URDF files, and repair what can be repaired.
+    """Check URDF files, and repair them with --fix.
 
-    Inertias, units, limits, names and shapes are checked. The exit code is 1 if errors are left. Masses, densities,
+    Inertias, units, limits, names and shapes are checked. The exit code is 1 if errors remain. Masses, densities,
     --allow-overlap and --units need --fix.
 
     Options:
         files (FILE...): URDF files, or names of robots.
         fix: Write NAME.fixed.urdf here, with every change in a comment.
-        units: With --fix: convert what seems to be in another unit, such as kg mm².
+        units: With --fix: convert values from suspected wrong units, such as kg mm².
         all_: Print each finding, not one line for each kind.
     """
     from robot_dyn.foundations import plain
@@ -53,24 +53,24 @@ def check(
 
     for option in [*options.stated, *(["--units"] if units else [])]:
         if option not in ("--package-dir", "--xacro") and not fix:
-            raise QueryError(f"{option} is for --fix, which writes the changes; add it, or leave {option} out")
+            raise QueryError(f"{option} needs --fix, which writes the changes; add it, or remove {option}")
     targets = {file: _target(file, force) for file in files} if fix else {}
     if len({*targets.values()}) < len(targets):
-        raise QueryError("--fix: two of the files would be written under one name; repair them one by one")
+        raise QueryError("--fix: two of the files would get the same name; repair them one by one")
     checkups = [rd.tools.doctor.check(file, units=units, **options.reading) for file in progress(files, "checking")]
     written = {}
-    for file, each in zip(files, checkups, strict=True):
-        if fix and each.repaired is not None:
-            text, to = each.repaired, targets[file]
+    for file, checkup in zip(files, checkups, strict=True):
+        if fix and checkup.repaired is not None:
+            text, to = checkup.repaired, targets[file]
             written[file] = str(save(to, lambda stream, text=text: stream.write(text), RepairError))
-    checked = [(file, each, written.get(file)) for file, each in zip(files, checkups, strict=True)]
-    document = {"files": [{"file": file, "written": to} | plain(each) for file, each, to in checked]}
-    show([line for each in checked for line in _lines(*each, all_)], as_json=as_json, document=document)
+    checked = [(file, checkup, written.get(file)) for file, checkup in zip(files, checkups, strict=True)]
+    document = {"files": [{"file": file, "written": to} | plain(checkup) for file, checkup, to in checked]}
+    show([line for result in checked for line in _lines(*result, all_)], as_json=as_json, document=document)
     if fix and not as_json:
         for file in files:
             if file not in written:
-                to_stderr(f"{file}: nothing that can be repaired")
-    remaining = (finding for file, each, _ in checked for finding in (each.left if file in written else each.findings))
+                to_stderr(f"{file}: nothing to repair")
+    remaining = (finding for file, x, _ in checked for finding in (x.left if file in written else x.findings))
     if any(finding.severity is Severity.ERROR for finding in remaining):
         raise typer.Exit(1)
 
@@ -81,13 +81,13 @@ def _target(file: str, force: bool) -> Path:
 
 
 def _lines(file: str, checkup: Checkup, written: str | None, every: bool) -> Iterator[str]:
-    """A file, its findings, and what was written."""
+    """Yield the lines about a file, its findings, and the repaired file."""
     from robot_dyn.tools.doctor.report import counted, grouped, sentence
 
     yield checkup.sentence.replace(checkup.source, file, 1)
     for group in grouped(checkup.findings):
-        for each in ((finding,) for finding in group) if every else (group,):
-            yield f"  {sentence(tuple(each))}{_repairable(each, written)}"
+        for line in ((finding,) for finding in group) if every else (group,):
+            yield f"  {sentence(tuple(line))}{_repairable(line, written)}"
     if written:
         repaired, left = counted(checkup.gone) or "nothing", counted(checkup.left) or "nothing"
         yield f"  written to {written}: repaired {repaired}; left {left}"
@@ -99,16 +99,16 @@ def _lines(file: str, checkup: Checkup, written: str | None, every: bool) -> Ite
 
 
 def _of_packages(file: Path, text: bytes) -> list[Path]:
-    """The folders in which a file finds packages of meshes by its place, which a file elsewhere does not find."""
+    """Return the folders of mesh packages that a file finds by its location, and a copy elsewhere does not."""
     if file.absolute().parent == Path.cwd():
         return []
     names = sorted(set(re.findall(rb'filename="package://([^/"]+)/', text)))
-    found = (package_folders(name.decode(errors="replace"), file) for name in names)
-    of = (next((folder for folder in each if folder.is_dir()), None) for each in found)
-    return list(dict.fromkeys(folder.parent for folder in of if folder is not None))
+    candidates = (package_folders(name.decode(errors="replace"), file) for name in names)
+    existing = (next((folder for folder in folders if folder.is_dir()), None) for folders in candidates)
+    return list(dict.fromkeys(folder.parent for folder in existing if folder is not None))
 
 
 def _repairable(findings: Iterable[Finding], written: str | None) -> str:
-    """The option that repairs these findings, or some of them; "" if they are repaired, or cannot be."""
-    supposed = {each.supposed for each in findings if each.changes and (each.supposed or written is None)}
+    """Return the option that repairs some of these findings; "" if they are repaired, or cannot be."""
+    supposed = {finding.supposed for finding in findings if finding.changes and (finding.supposed or written is None)}
     return "" if not supposed else " [--fix --units]" if supposed == {True} else " [--fix]"

@@ -1,4 +1,4 @@
-"""A URDF as its file has it, comments included: where each element belongs, and where its line is."""
+"""A URDF as its file states it, including comments: the link or joint of each element, and its line."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NOT_IN_M = ("limit", "dynamics", "calibration", "safety_controller")
 
 
 def parsed(text: str | None) -> float:
-    """Return the number of a literal; nan if it is not one."""
+    """Return the number of a literal; nan if it is not a number."""
     try:
         return float(text or "nan")
     except ValueError:
@@ -26,11 +26,11 @@ def parsed(text: str | None) -> float:
 
 @final
 class Document:
-    """The elements of a file.
+    """Elements of a file.
 
     Args:
-        text: Its bytes.
-        source: Names it in messages.
+        text: Bytes of the file.
+        source: Name of the file in messages.
 
     Raises:
         DescriptionError: If it is not XML.
@@ -43,25 +43,25 @@ class Document:
             raise DescriptionError(f"{source}: line {self.root.sourceline}: {other_format(self.root.tag)}")
 
     def elements(self) -> Iterator[Any]:
-        """All elements of links and joints, and these themselves, without comments."""
+        """Yield all links and joints with all their elements, without comments."""
         for part in self.root:
             if part.tag in ("link", "joint"):
-                yield from (each for each in part.iter() if isinstance(each.tag, str))
+                yield from (element for element in part.iter() if isinstance(element.tag, str))
 
     def named(self, kind: str, name: str) -> Any:
-        """A link or joint by its name, or None."""
-        found = (each for each in self.root.iterfind(kind) if (each.get("name") or "").strip() == name)
-        return next(found, None)
+        """Return a link or joint by its name, or None."""
+        matches = (element for element in self.root.iterfind(kind) if (element.get("name") or "").strip() == name)
+        return next(matches, None)
 
     def mended(self) -> Document:
-        """The document with the text of its elements as they are now; these keep the lines of the file."""
+        """Return the document with the text of its current elements, which keep the lines of the file."""
         text = etree.tostring(self.root.getroottree(), xml_declaration=True, encoding="UTF-8")
         new = copy(self)
         new.text = text + b"\n" if not text.endswith(b"\n") else text
         return new
 
     def line(self, where: str, what: str) -> int | None:
-        """Return the line of the link or joint, or of the element in it or in its inertial, that a refusal names."""
+        """Return the line of the link or joint, or of an element in it, to which a refusal refers."""
         for part in self.root.iter("link", "joint"):
             if self.where(part) == where:
                 tag = re.match(r"<(\w+)>", what)
@@ -72,12 +72,12 @@ class Document:
     def finding(
         self, severity: Severity, kind: str, element: Any, what: str, remedy: str, changes: tuple[Change, ...] = ()
     ) -> Finding:
-        """Return a finding at an element: with its link or joint, and its line."""
+        """Return a finding at an element, with its link or joint and its line."""
         return Finding(severity, kind, self.where(element), what, remedy, element.sourceline, changes)
 
     @staticmethod
     def moves_mass(element: Any) -> bool:
-        """Whether an element has a part in M: that of an inertial, or of a joint, limits and friction excepted."""
+        """Return True if an element affects M: part of an inertial, or of a joint except limits and friction."""
         while (above := element.getparent()) is not None and above.tag not in ("link", "joint", "robot"):
             element = above
         inertial = above is not None and above.tag == "link" and element.tag == "inertial"
@@ -85,7 +85,7 @@ class Document:
 
     @staticmethod
     def where(element: Any) -> str:
-        """The link or joint that an element belongs to."""
+        """Return the link or joint that contains an element."""
         while element.tag not in ("link", "joint") or element.getparent() is None or element.getparent().tag != "robot":
             if (above := element.getparent()) is None:
                 return "robot"

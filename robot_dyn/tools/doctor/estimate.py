@@ -1,4 +1,4 @@
-"""Inertials that a file does not state, and those that were estimated; with masses they are estimated from shapes."""
+"""Missing and estimated inertials; with masses, missing ones are estimated from shapes."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ def missing_inertials(
     masses: Masses | None,
     package_dirs: tuple[Path, ...],
 ) -> Iterator[Finding]:
-    """Links without an inertial that have a shape: with masses each gets one; and those whose inertial is marked.
+    """Report links with a shape but no inertial, which get one if masses are given; and estimated inertials.
 
     Raises:
-        QueryError: As `robot_dyn.shapes.estimate.with_estimates`; DescriptionError likewise.
+        QueryError, DescriptionError: See `robot_dyn.shapes.estimate.with_estimates`.
     """
-    found = dict[str, Estimate]()
+    new = dict[str, Estimate]()
     if masses is not None:
         shapes, unread = shapes_of_lacking(description, package_dirs, masses.allow_overlap)
-        found = {each.link: each for each in estimates(description, shapes, masses, unread)[0]}
+        new = {estimate.link: estimate for estimate in estimates(description, shapes, masses, unread)[0]}
     for name, shape in of.items():
-        if name not in found and shape.unit is not None and document.named("link", name).find("inertial") is None:
+        if name not in new and shape.unit is not None and document.named("link", name).find("inertial") is None:
             yield _finding(
                 document, name, "inertial_missing",
-                f"has a shape of {1e3 * shape.unit.mass:.3g} litres and no <inertial>: it has no mass",
-                "add one, or have it estimated: --fix with --mass, --total-mass or --density",
+                f"has a shape of {1e3 * shape.unit.mass:.3g} litres but no <inertial>, so it has no mass",
+                "add one, or estimate it: --fix with --mass, --total-mass or --density",
             )  # fmt: skip
-    for name, each in found.items():
-        what = "a mass and no moments of inertia" if each.moments_only else "a shape and no mass"
-        inertial = each.write(document.named("link", name))
-        del inertial.attrib["estimated"]  # which the change writes
+    for name, estimate in new.items():
+        lack = "a mass but no moments of inertia" if estimate.moments_only else "a shape but no mass"
+        inertial = estimate.write(document.named("link", name))
+        del inertial.attrib["estimated"]  # the change adds it again
         yield _finding(
-            document, name, "inertial_missing", f"has {what}; estimated, not measured: {each.basis}",
-            "replace it by measured values where you have them", (Change(inertial, "estimated", each.basis),),
+            document, name, "inertial_missing", f"has {lack}; estimated, not measured: {estimate.basis}",
+            "replace it by measured values where you have them", (Change(inertial, "estimated", estimate.basis),),
         )  # fmt: skip
     for name, basis in description.estimated.items():
         yield _finding(

@@ -1,4 +1,4 @@
-"""Findings of the doctor, and the changes of the file that remove them."""
+"""Findings of the doctor, and the changes of the file that repair them."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from robot_dyn.foundations import UNREPORTED, shorten
 
 
 class Severity(Enum):
-    """How grave a finding is.
+    """Severity of a finding.
 
-    ERROR: the file is refused, or M is wrong by a factor. WARNING: its numbers are hardly meant. NOTE: other programs
-    read it in another way, or something is not stated.
+    ERROR: the file is refused, or M is wrong by a factor. WARNING: the numbers are probably unintended. NOTE: other
+    programs read the file differently, or a value is missing.
     """
 
     ERROR = "error"
@@ -27,11 +27,11 @@ class Change:
     """A change of one element.
 
     Attributes:
-        element: The element of the document; None in copies and after `pickle`, which leave the document out.
-        key: The attribute that is changed; "" for the name of the element itself.
-        value: What it is then.
-        renames: The attribute that `key` was called before, if it is renamed.
-        text: Its description.
+        element: Element of the document; None in copies and after `pickle`, which omit the document.
+        key: Attribute that is changed; "" for the name of the element itself.
+        value: New value.
+        renames: Old name of the attribute `key`, if it is renamed.
+        text: Description of the change.
     """
 
     element: Any = field(metadata=UNREPORTED)
@@ -42,7 +42,7 @@ class Change:
 
     def __post_init__(self) -> None:
         tag, before = self.element.tag, self.element.get(self.key or "x", "")
-        text = f'{self.key} of <{tag}> was "{shorten(before)}"'  # while the old value is still there
+        text = f'{self.key} of <{tag}> was "{shorten(before)}"'  # before the old value is overwritten
         if not self.key:
             text = f"<{tag}> is now <{self.value}>"
         elif self.key not in self.element.attrib and not self.renames:
@@ -56,7 +56,7 @@ class Change:
 
     @property
     def places(self) -> tuple[tuple[Any, str], ...]:
-        """The attributes that it changes, each with its element; an element is a place of the one around it."""
+        """Attributes that are changed, each with its element; an element counts as a place of its parent."""
         if not self.key:
             return ((self.element.getparent(), f"<{self.value}>"),)
         return ((self.element, self.key), *([(self.element, self.renames)] if self.renames else []))
@@ -76,17 +76,17 @@ class Change:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Finding:
-    """What is wrong, or doubtful.
+    """A fault or a doubtful value.
 
     Attributes:
-        severity: How grave it is.
-        kind: What it is about, a fixed word for programs.
+        severity: Severity.
+        kind: Fixed identifier for programs.
         where: Link, joint or line.
-        what: What is found there, with its value.
-        remedy: What to do.
-        line: Line of the file, where it is known.
-        changes: What `--fix` changes; nothing where the file does not say what is meant.
-        supposed: Whether the changes rest on a unit that is only suspected, and are made on request alone.
+        what: Description of the fault, with the value.
+        remedy: Suggested correction.
+        line: Line of the file, or None.
+        changes: Changes by `--fix`; empty if the intended value is unclear.
+        supposed: True if the changes assume a suspected unit and need `--units`.
     """
 
     severity: Severity
@@ -100,7 +100,7 @@ class Finding:
 
     @property
     def place(self) -> str:
-        """Link, joint or file, with its line where it is known."""
+        """Link, joint or file, with its line if known."""
         return f"{self.where} (line {self.line})" if self.line else self.where
 
     def __str__(self) -> str:

@@ -1,8 +1,8 @@
 """Effort limits against gravity: a joint that cannot hold its own arm.
 
-    |N_i(q)| > τ_max,i    at q = 0, or the position within the limits that is nearest to it
+    |N_i(q)| > τ_max,i    at q = 0, or at the nearest position within the limits
 
-It is an error of the limit; a note where the masses or lengths of the file are doubtful themselves.
+It is an error of the limit; only a note if masses or lengths of the file are doubtful.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from robot_dyn.tools.doctor.finding import Finding, Severity
 _CAUSES = {"mass_density", "inertia_small", "mass_ratio", "com_outside", "origin_far", "length_long"}
 
 
-def weak_joints(document: Document, robot: Robot, found: Iterable[Finding]) -> Iterator[Finding]:
-    """Joints whose effort limit gravity alone passes, given all other findings; a limit of 0 is one of these."""
-    explained = any(each.kind in _CAUSES and each.severity is not Severity.NOTE for each in found)
+def weak_joints(document: Document, robot: Robot, others: Iterable[Finding]) -> Iterator[Finding]:
+    """Report joints whose effort limit, if not 0, is below the gravity load; `others` are all other findings."""
+    explained = any(other.kind in _CAUSES and other.severity is not Severity.NOTE for other in others)
     q = np.clip(0.0, robot.lower, robot.upper)
     N = robot.N(q, errors="nan")
     for name, load, limit in zip(robot.joint_names, np.abs(N), robot.effort_limit, strict=True):
@@ -29,7 +29,7 @@ def weak_joints(document: Document, robot: Robot, found: Iterable[Finding]) -> I
             stated = joint.find("limit").get("effort").strip()
             yield document.finding(
                 Severity.NOTE if explained else Severity.ERROR, "effort_gravity", joint,
-                f'its effort limit "{stated}" is below the {load:.3g} that gravity alone asks of it at q = 0, or as'
-                " near to it as the limits allow",
-                "correct the limit, or the masses of what it carries",
+                f'its effort limit "{stated}" is below the {load:.3g} that gravity alone requires at q = 0, or at the'
+                " nearest position within the limits",
+                "correct the limit, or the masses of the links it carries",
             )  # fmt: skip

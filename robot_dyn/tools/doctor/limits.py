@@ -1,4 +1,4 @@
-"""Limits of joints: not stated, 0, crossed, negative."""
+"""Limits of joints: missing, 0, crossed or negative."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _UNITS = {"effort": "N m or N", "velocity": "rad/s or m/s"}
 
 
 def limits(document: Document) -> Iterator[Finding]:
-    """What is wrong with the limits of joints that move."""
+    """Report faulty limits of moving joints."""
     for joint in document.root.iterfind("joint"):
         if joint.get("type") in ("revolute", "prismatic", "continuous"):
             yield from _of_joint(document, joint)
@@ -25,7 +25,7 @@ def _of_joint(document: Document, joint: Any) -> Iterator[Finding]:
     if limit is None:
         if joint.get("type") != "continuous":
             yield document.finding(
-                Severity.WARNING, "limit_missing", joint, f"is {joint.get('type')} and has no <limit>",
+                Severity.WARNING, "limit_missing", joint, f"is {joint.get('type')} but has no <limit>",
                 "add one: URDF requires it, and other programs refuse the file",
             )  # fmt: skip
         return
@@ -41,28 +41,28 @@ def _of_joint(document: Document, joint: Any) -> Iterator[Finding]:
             yield document.finding(
                 Severity.WARNING, "limit_zero", joint,
                 f'its {key} limit is "{limit.get(key).strip()}", which allows no {key} at all',
-                f"write the limit in {unit}",
+                f"give the limit in {unit}",
             )  # fmt: skip
         elif stated.get(key, 0.0) < 0:
             yield document.finding(
                 Severity.WARNING, "limit_negative", joint, f'its {key} limit is "{limit.get(key)}"',
-                "write it without the sign", (Change(limit, key, limit.get(key).strip().lstrip("-")),),
+                "remove the sign", (Change(limit, key, limit.get(key).strip().lstrip("-")),),
             )  # fmt: skip
     if joint.get("type") == "continuous" or not {"lower", "upper"} & stated.keys():
         return
     lower, upper = stated.get("lower", 0.0), stated.get("upper", 0.0)
     if lower > upper:
         exchanged = Change(limit, "lower", limit.get("upper", "0")), Change(limit, "upper", limit.get("lower", "0"))
-        in_degrees = limits_in_degrees(limit)  # 135 … -95: exchanged they would look right and still be too large
+        in_degrees = limits_in_degrees(limit)  # 135 … -95: exchanged, they would still be too large
         yield document.finding(
             Severity.WARNING, "limits_crossed", joint,
-            f'its lower limit "{limit.get("lower", "0")}" is above its upper one "{limit.get("upper", "0")}"',
-            "write them in radians, then exchange them" if in_degrees else "exchange them",
+            f'its lower limit "{limit.get("lower", "0")}" is above its upper limit "{limit.get("upper", "0")}"',
+            "convert them to radians, then exchange them" if in_degrees else "exchange them",
             () if in_degrees else exchanged,
         )  # fmt: skip
     elif lower == upper:
         yield document.finding(
             Severity.WARNING, "limits_equal", joint,
-            f'its limits are both "{limit.get("lower", "0")}", so that it cannot move',
+            f'its limits are both "{limit.get("lower", "0")}", so it cannot move',
             "correct them, or make the joint fixed",
         )  # fmt: skip

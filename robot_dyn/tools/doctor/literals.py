@@ -1,4 +1,4 @@
-"""Numbers as the file writes them: decimal commas, line breaks, right angles with few digits, degrees."""
+"""Numbers as written in the file: decimal commas, line breaks, right angles with few digits, degrees."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _BREAK = re.compile(rb"<\s*([A-Za-z_]+)((?:[^<>\"']|\"[^\"<]*\"|'[^'<]*')*)>")
 _QUOTED = re.compile(rb"([A-Za-z_]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _TURN = 2 * pi
 _DRAWN = ("box", "cylinder", "sphere", "mesh")
-_ROUNDED = 0.011  # [degrees], of an angle that was computed from radians of four digits
-_TURNS = 4 * _TURN  # [rad]: a limit beyond is in degrees; some joints turn several times
-_FEW = 20.0  # [rad]: whole limits below, such as ±10, are of joints without stops
+_ROUNDED = 0.011  # [degrees]: error of an angle converted from radians with four digits
+_TURNS = 4 * _TURN  # [rad]: larger limits are in degrees; some joints turn several times
+_FEW = 20.0  # [rad]: smaller whole limits, such as ±10, belong to joints without stops
 _LEAST_DECIMALS = 2
 _WHOLE = 15.0  # [degrees]: angles in degrees are most often multiples of this
 
 
 def numbers(document: Document) -> Iterator[tuple[Any, str, list[str]]]:
-    """Each element and attribute that holds numbers, with its words."""
+    """Yield each element and attribute that contains numbers, with its words."""
     for element in document.elements():
         for key in NUMBERS.get(element.tag, ()):
             if (text := element.get(key)) is not None:
@@ -37,7 +37,7 @@ def numbers(document: Document) -> Iterator[tuple[Any, str, list[str]]]:
 
 
 def decimal_commas(document: Document) -> Iterator[Finding]:
-    """Numbers with a comma in place of the point."""
+    """Report numbers with a decimal comma."""
     for element, key, words in numbers(document):
         if words and any(_COMMA.fullmatch(word) for word in words):
             text = " ".join(word.replace(",", ".") if _COMMA.fullmatch(word) else word for word in words)
@@ -45,15 +45,15 @@ def decimal_commas(document: Document) -> Iterator[Finding]:
             yield document.finding(
                 Severity.WARNING if drawn else Severity.ERROR, "decimal_comma", element,
                 f'{key} of <{element.tag}> is "{" ".join(words)}", with decimal commas',
-                "write a point; many programs read the digits before the comma alone, or drop the element",
+                "write a point; many programs read only the digits before the comma, or drop the element",
                 (Change(element, key, text),),
             )  # fmt: skip
 
 
 def line_breaks(document: Document) -> Iterator[Finding]:
-    """Numbers broken by line ends or tabs, for which urdfdom drops the whole element, an inertial with all of it.
+    """Report numbers separated by line ends or tabs: urdfdom then drops the element, and a whole <inertial>.
 
-    XML makes blanks of them, which is how they are read here; urdfdom's reader keeps them.
+    XML converts them to blanks, as this library does; urdfdom's reader does not.
     """
     lines = {}
     for tag in _BREAK.finditer(document.text):
@@ -63,7 +63,7 @@ def line_breaks(document: Document) -> Iterator[Finding]:
                     document.text.count(b"\n", 0, tag.end()) + 1
                 )
     for element, key, words in numbers(document):
-        if element.sourceline in lines.get((element.tag, key), ()):  # the line where its start tag ends
+        if element.sourceline in lines.get((element.tag, key), ()):  # the line at which its start tag ends
             inertial = element.getparent().tag == "inertial"
             drops = "urdfdom drops the whole <inertial> for that" if inertial else "urdfdom refuses that"
             yield document.finding(
@@ -74,26 +74,26 @@ def line_breaks(document: Document) -> Iterator[Finding]:
 
 
 def near_right_angles(document: Document) -> Iterator[Finding]:
-    """Angles that are multiples of π/2 to the digits that are written, and less exact than a float."""
+    """Report angles that are multiples of π/2 up to the written digits, but less exact than a float."""
     for element, key, words in numbers(document):
         if key != "rpy":
             continue
         full = [_right_angle(word) or word for word in words]
         if full != words:
             rounded = [(a, b) for a, b in zip(full, words, strict=True) if a != b]
-            off = max(abs(float(a) - float(b)) for a, b in rounded)
+            deviation = max(abs(float(a) - float(b)) for a, b in rounded)
             meant = " and ".join(dict.fromkeys(_named(float(a)) for a, _ in rounded))
             drawn = element.getparent().tag in ("visual", "collision")
-            severity = Severity.WARNING if off > 1e-6 and not drawn else Severity.NOTE
+            severity = Severity.WARNING if deviation > 1e-6 and not drawn else Severity.NOTE
             yield document.finding(
                 severity, "near_right_angle", element,
-                f'rpy "{" ".join(words)}" is off {meant} by {off:.1e} rad', f"write {meant} to 16 digits",
+                f'rpy "{" ".join(words)}" differs from {meant} by {deviation:.1e} rad', f"write {meant} to 16 digits",
                 (Change(element, key, " ".join(full)),),
             )  # fmt: skip
 
 
 def _right_angle(word: str) -> str | None:
-    """The multiple of π/2 that a literal is rounded or cut to, in full; None if it is not one, or exact."""
+    """Return the multiple of π/2 to which a literal was rounded, in full; None if it is none, or exact."""
     match = re.fullmatch(r"[+-]?\d*\.(\d+)", word)
     if not match or len(match[1]) < _LEAST_DECIMALS or not float(word):
         return None
@@ -105,14 +105,14 @@ def _right_angle(word: str) -> str | None:
 
 
 def _named(angle: float) -> str:
-    """A multiple of π/2 by its name, such as "−π/2", "π" or "3π/2"."""
+    """Return the name of a multiple of π/2, such as "−π/2", "π" or "3π/2"."""
     k = round(angle / (pi / 2))
-    whole, of = (k // 2, "π") if k % 2 == 0 else (k, "π/2")
-    return f"{'−' if k < 0 else ''}{'' if abs(whole) == 1 else abs(whole)}{of}"
+    whole, symbol = (k // 2, "π") if k % 2 == 0 else (k, "π/2")
+    return f"{'−' if k < 0 else ''}{'' if abs(whole) == 1 else abs(whole)}{symbol}"
 
 
 def angles_in_degrees(document: Document) -> Iterator[Finding]:
-    """Angles of more than a turn that are whole degrees; the two limits of a joint have one unit."""
+    """Report angles above one turn that are whole degrees; both limits of a joint have the same unit."""
     for element, key, words in numbers(document):
         values = [x for word in words if isfinite(x := parsed(word))]
         if key != "rpy" or len(values) != len(words) or not _beyond_a_turn(values):
@@ -121,9 +121,9 @@ def angles_in_degrees(document: Document) -> Iterator[Finding]:
         meant = " ".join(repr(radians(x)) for x in values)
         yield document.finding(
             Severity.WARNING, "degrees", element,
-            f'{key} "{" ".join(words)}" is more than a turn ({degrees(max(values, key=abs)):.0f}°)'
+            f'{key} "{" ".join(words)}" exceeds one turn ({degrees(max(values, key=abs)):.0f}°)'
             + (": degrees are suspected" if whole else ""),
-            "write radians", (Change(element, key, meant),) if whole else (),
+            "convert to radians", (Change(element, key, meant),) if whole else (),
         )  # fmt: skip
     for limit in document.root.iterfind("joint/limit"):
         if values := limits_in_degrees(limit):
@@ -131,13 +131,13 @@ def angles_in_degrees(document: Document) -> Iterator[Finding]:
             whole, most = _all_whole(values.values(), 1.0), max(values.values(), key=abs)
             yield document.finding(
                 Severity.WARNING, "degrees", limit,
-                f"{stated}: more than a turn ({degrees(most):.0f}°): degrees are suspected",
-                "write radians", tuple(Change(limit, key, repr(radians(x))) for key, x in values.items() if whole),
+                f"{stated}: over one turn ({degrees(most):.0f}°): degrees are suspected",
+                "convert to radians", tuple(Change(limit, key, repr(radians(x))) for key, x in values.items() if whole),
             )  # fmt: skip
 
 
 def limits_in_degrees(limit: Any) -> dict[str, float]:
-    """The position limits that a <limit> states, if one of them is suspected to be in degrees; otherwise empty."""
+    """Return the stated position limits if one of them may be in degrees; otherwise an empty dict."""
     stated = {key: parsed(limit.get(key)) for key in ("lower", "upper") if limit.get(key) is not None}
     values = [*stated.values()]
     if limit.getparent().get("type") != "revolute" or not all(map(isfinite, values)) or not _beyond_a_turn(values):

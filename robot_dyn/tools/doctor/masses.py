@@ -17,11 +17,11 @@ from robot_dyn.model import findings as doctor
 from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Finding, Severity
 
-_QUOTED = r"""(?:'[^']*'|"[^"]*")"""  # a name, which may hold colons and semicolons
+_QUOTED = r"""(?:'[^']*'|"[^"]*")"""  # a name, which may contain colons and semicolons
 _SENTENCE = re.compile(rf"((?:link|joint)s? {_QUOTED}(?:, {_QUOTED})*)(?:: | )(.*?); (.*)", re.DOTALL)
-_NOTHING = 1e-9  # of the largest moment
-_LOST = 1e-6  # of the heaviest link, and of the largest moment
-_RATIO = 1e4  # of the masses of two bodies of an arm: of a base of 100 kg to a finger of 10 g
+_NOTHING = 1e-9  # relative to the largest moment
+_LOST = 1e-6  # relative to the heaviest link and to the largest moment
+_RATIO = 1e4  # of two masses in an arm, for example a base of 100 kg and a finger of 10 g
 _KINDS = (
     (Severity.ERROR, "inertia_impossible", doctor.impossible_inertias),
     (Severity.WARNING, "inertia_without_mass", doctor.moments_without_mass),
@@ -34,38 +34,38 @@ _KINDS = (
 
 
 def masses(document: Document, robot: Robot) -> Iterator[Finding]:
-    """What is wrong with the masses and inertias of a robot that loads."""
+    """Report faulty masses and inertias of a robot that loads."""
     stated = structure_of(robot.description, robot.edits)
-    for found in (*_in_words(robot, stated), *_massless(document, robot, stated)):
-        yield replace(found, line=document.line(found.where, ""))
+    for finding in (*_in_words(robot, stated), *_massless(document, robot, stated)):
+        yield replace(finding, line=document.line(finding.where, ""))
     yield from _rods_and_points(document, stated)
     yield from _merged(document, robot, stated)
     yield from _proportions(document, stated)
 
 
-def beyond_reach(document: Document, robot: Robot, found: Iterable[Finding]) -> Iterator[Finding]:
-    """Inertias out of proportion to the robot, unless the shape of the link has shown them already."""
-    shown = {each.where for each in found if each.kind == "inertia_shape"}
+def beyond_reach(document: Document, robot: Robot, others: Iterable[Finding]) -> Iterator[Finding]:
+    """Report inertias out of proportion to the robot, unless the shape of the link has already revealed them."""
+    shown = {other.where for other in others if other.kind == "inertia_shape"}
     for text in doctor.inertias_beyond_reach(structure_of(robot.description, robot.edits)):
-        each = _of_words(Severity.ERROR, "inertia_far", text)
-        if each.where not in shown:
-            yield replace(each, line=document.line(each.where, ""))
+        finding = _of_words(Severity.ERROR, "inertia_far", text)
+        if finding.where not in shown:
+            yield replace(finding, line=document.line(finding.where, ""))
 
 
 def _in_words(robot: Robot, stated: Structure) -> Iterator[Finding]:
-    """The findings that `load` has as well."""
+    """Return the findings that `load` reports too."""
     for text in doctor.no_inertia_about_axis(stated, robot.joint_without_inertia):
         yield _of_words(Severity.ERROR, "inertia_missing", text)
     idle = _negligible(stated)
     for severity, kind, find in _KINDS:
         for text in find(stated):
-            found = _of_words(severity, kind, text)
-            mild = severity is Severity.ERROR and found.where in idle
-            yield replace(found, severity=Severity.WARNING) if mild else found
+            finding = _of_words(severity, kind, text)
+            mild = severity is Severity.ERROR and finding.where in idle
+            yield replace(finding, severity=Severity.WARNING) if mild else finding
 
 
 def _negligible(stated: Structure) -> set[str]:
-    """Links whose mass and moments are negligible next to those of others, such as 1e-8 of a frame: M is right."""
+    """Return links with negligible mass and moments, such as 1e-8 of a frame: M is not affected."""
     heaviest = max((link.mass for link in stated.links.values()), default=0.0)
     largest = max((float(np.trace(link.inertia)) for link in stated.links.values()), default=0.0)
     return {
@@ -76,25 +76,25 @@ def _negligible(stated: Structure) -> set[str]:
 
 
 def _of_words(severity: Severity, kind: str, text: str) -> Finding:
-    """A finding of `model.doctor`: where, what and remedy in one sentence."""
-    if said := _SENTENCE.fullmatch(text):
-        return Finding(severity, kind, said[1], said[2], said[3])
-    what, _, remedy = text.rpartition("; ")  # of a name with quotes of both kinds, or of more joints than are listed
+    """Convert a sentence of `model.findings` to a finding with place, fault and remedy."""
+    if match := _SENTENCE.fullmatch(text):
+        return Finding(severity, kind, match[1], match[2], match[3])
+    what, _, remedy = text.rpartition("; ")  # a name with both kinds of quotes, or an abbreviated list
     return Finding(severity, kind, "robot", what, remedy)
 
 
 def _massless(document: Document, robot: Robot, stated: Structure) -> Iterator[Finding]:
-    """Bodies without mass: an error if they are drawn, or M is singular; between the axes of a wrist they are meant."""
+    """Report bodies without mass: an error if they have a shape or M is singular; in a wrist they are intended."""
     for text in doctor.massless_bodies(stated):
-        found = _of_words(Severity.WARNING, "mass_missing", text)
-        links = next((links for links in stated.bodies.values() if found.where == f"link {links[0]!r}"), ())
+        finding = _of_words(Severity.WARNING, "mass_missing", text)
+        links = next((links for links in stated.bodies.values() if finding.where == f"link {links[0]!r}"), ())
         drawn = any(_has_shape(document, name) for name in links)
         singular = robot.joint_without_inertia is not None
-        yield replace(found, severity=Severity.ERROR) if drawn or singular or not links else found
+        yield replace(finding, severity=Severity.ERROR) if drawn or singular or not links else finding
 
 
 def _rods_and_points(document: Document, stated: Structure) -> Iterator[Finding]:
-    """Links that move with mass and a principal moment of 0, refused elsewhere; a warning if most have none."""
+    """Report moving links with mass and a zero principal moment, which other programs refuse."""
     moving = {name: link for name, link in stated.links.items() if link.mass > 0 and name not in stated.base}
     moments = {name: np.linalg.eigvalsh(link.inertia) for name, link in moving.items()}
     points = [name for name, (_, _, most) in moments.items() if most == 0 and _has_shape(document, name)]
@@ -102,14 +102,14 @@ def _rods_and_points(document: Document, stated: Structure) -> Iterator[Finding]
         if name in points and len(points) >= max(2, len(moving) / 2):
             yield document.finding(
                 Severity.WARNING, "inertia_zero", document.named("link", name),
-                f"all its moments are 0, as of a point of {moving[name].mass:g} kg, and it has a shape",
-                "give it moments: those of a link without <inertia> are estimated, --fix with --density",
+                f"all its moments are 0, like those of a point of {moving[name].mass:g} kg, but it has a shape",
+                "add moments, or remove its <inertia> and estimate them: --fix with --density",
             )  # fmt: skip
         elif abs(least) <= _NOTHING * most:
             yield document.finding(
                 Severity.NOTE, "inertia_zero", document.named("link", name),
-                f"its least principal moment is 0, as of a rod or a point of {moving[name].mass:g} kg; MuJoCo refuses"
-                " that",
+                f"its least principal moment is 0, like that of a rod or a point of {moving[name].mass:g} kg, which"
+                " MuJoCo refuses",
                 "give it the moments of a body with some width",
             )  # fmt: skip
 
@@ -120,32 +120,32 @@ def _has_shape(document: Document, name: str) -> bool:
 
 
 def _merged(document: Document, robot: Robot, stated: Structure) -> Iterator[Finding]:
-    """Merged bodies with impossible inertia, although that of each link may be possible."""
+    """Report merged bodies with impossible inertia, even if that of each link is possible."""
     for joint, body in zip(robot.model.names[1:], list(robot.model.inertias)[1:], strict=True):
         links = next((links for name, links in stated.bodies.items() if joint.endswith(name)), ())
         if len(links) > 1 and body.mass > 0 and (why := implausibility(body.mass, body.lever, body.inertia)):
-            named = ", ".join(map(repr, links[:4]))
+            listed = ", ".join(map(repr, links[:4]))
             yield document.finding(
                 Severity.ERROR, "inertia_impossible", document.named("link", links[0]),
-                f"merged with what is fixed to it ({named}), {why}", "correct the inertias of these links",
+                f"merged with the links fixed to it ({listed}), {why}", "correct the inertias of these links",
             )  # fmt: skip
 
 
 def _proportions(document: Document, stated: Structure) -> Iterator[Finding]:
-    """The lightest and the heaviest body that move, if their masses are out of all proportion."""
-    of = {
+    """Report the lightest or heaviest moving body if the masses are out of proportion."""
+    mass_of = {
         stated.joints[joint].child: sum(stated.links[name].mass for name in links)
         for joint, links in stated.bodies.items()
     }
-    of = {name: mass for name, mass in of.items() if mass > 0}
-    if not of:
+    mass_of = {name: mass for name, mass in mass_of.items() if mass > 0}
+    if not mass_of:
         return
-    (light, least), (heavy, most) = min(of.items(), key=lambda x: x[1]), max(of.items(), key=lambda x: x[1])
+    (light, least), (heavy, most) = min(mass_of.items(), key=lambda x: x[1]), max(mass_of.items(), key=lambda x: x[1])
     if most > _RATIO * least:
-        typical = float(np.exp(np.median(np.log(list(of.values())))))
+        typical = float(np.exp(np.median(np.log(list(mass_of.values())))))
         odd = light if typical / least > most / typical else heavy
         yield document.finding(
             Severity.WARNING, "mass_ratio", document.named("link", odd),
-            f"the masses of bodies that move reach from {least:.3g} kg ({light!r}) to {most:.3g} kg ({heavy!r})",
-            "check its mass and the unit of it",
+            f"the masses of moving bodies range from {least:.3g} kg ({light!r}) to {most:.3g} kg ({heavy!r})",
+            "check its mass and unit",
         )  # fmt: skip

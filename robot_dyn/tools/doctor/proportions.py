@@ -1,9 +1,9 @@
 """Lengths out of proportion to the robot: origins and centres of mass, most often in millimetres.
 
-    |xyz| > 100 times the median distance between a joint that moves and the link before it
+    |xyz| > 100 times the median distance between a moving joint and its parent link
 
-A centre of mass of an arm of several joints is out of proportion, too, beyond twice the longest of these distances
-and 0.3 m, as of a tool: an error, since M is then wrong by a factor.
+In an arm of several joints, a centre of mass is also out of proportion beyond twice the longest of these distances and
+0.3 m, the length of a tool. This is an error, because M is then wrong by a factor.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _MOVING = ("revolute", "continuous", "prismatic")
 
 
 def far_origins(document: Document) -> Iterator[Finding]:
-    """Origins of joints and of inertials that are far beyond the lengths of the robot."""
-    joints = [(each, each.find("origin")) for each in document.root.iterfind("joint")]
+    """Report origins of joints and inertials that are far beyond the lengths of the robot."""
+    joints = [(joint, joint.find("origin")) for joint in document.root.iterfind("joint")]
     lengths = [(joint, origin, _length(origin)) for joint, origin in joints if origin is not None]
     typical = [length for joint, _, length in lengths if joint.get("type") in _MOVING and length > 0]
     if not typical:
@@ -49,8 +49,9 @@ def _mass(inertial: Any) -> str | None:
 
 
 def _moves(document: Document, link: Any) -> bool:
-    """Whether a joint that moves carries a link."""
-    above = {(each.find("child").get("link") or "").strip(): each for each in document.root.iterfind("joint[child]")}
+    """Return True if a moving joint carries a link."""
+    joints = document.root.iterfind("joint[child]")
+    above = {(joint.find("child").get("link") or "").strip(): joint for joint in joints}
     name, seen = (link.get("name") or "").strip(), set[str]()
     while name in above and name not in seen:
         seen.add(name)
@@ -63,7 +64,7 @@ def _moves(document: Document, link: Any) -> bool:
 
 
 def _length(origin: Any) -> float:
-    """|xyz| in [m]; 0 where it is not three numbers."""
+    """Return |xyz| in [m]; 0 if it is not three numbers."""
     values = [parsed(word) for word in (origin.get("xyz") or "").split()]
     length = hypot(*values) if len(values) == 3 else 0.0
     return length if np.isfinite(length) else 0.0
@@ -72,10 +73,10 @@ def _length(origin: Any) -> float:
 def _finding(
     document: Document, origin: Any, length: float, median: float, severity: Severity = Severity.WARNING
 ) -> Finding:
-    what = "centre of mass" if origin.getparent().tag == "inertial" else "origin"
+    quantity = "centre of mass" if origin.getparent().tag == "inertial" else "origin"
     return document.finding(
         severity, "origin_far", origin,
-        f'its {what}, xyz "{" ".join(origin.get("xyz").split())}", lies {length:.3g} m away, on a robot whose links'
-        f" are {median:.3g} m long at the median",
-        "correct it, or its unit: metres",
+        f'its {quantity}, xyz "{" ".join(origin.get("xyz").split())}", is {length:.3g} m away, but the median link'
+        f" length of this robot is {median:.3g} m",
+        "correct it, or convert it to metres",
     )  # fmt: skip

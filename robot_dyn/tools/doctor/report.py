@@ -1,4 +1,4 @@
-"""Findings as text: one line a kind, with their number and the first three places."""
+"""Findings as text: one line for each kind, with their number and the first three places."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ _PLACES = 3
 
 
 def grouped(findings: Iterable[Finding]) -> Iterator[tuple[Finding, ...]]:
-    """The findings of one severity and kind together, in the order of the first of each."""
+    """Yield the findings of each severity and kind together, in order of first occurrence."""
     groups: dict[tuple[Severity, str], list[Finding]] = {}
-    for each in findings:
-        groups.setdefault((each.severity, each.kind), []).append(each)
+    for finding in findings:
+        groups.setdefault((finding.severity, finding.kind), []).append(finding)
     yield from map(tuple, groups.values())
 
 
 def sentence(findings: tuple[Finding, ...]) -> str:
-    """Findings of one kind in one line: a single one after its kind; of several the places, and what the first says."""
+    """Return findings of one kind in one line: one finding in full; several with their places and the first text."""
     first = findings[0]
     if len(findings) == 1:
         return f"{first.severity.value}: {first.kind}: {first}"
-    places = list(dict.fromkeys(each.place for each in findings))
+    places = list(dict.fromkeys(finding.place for finding in findings))
     more = ", …" if len(places) > _PLACES else ""
     listed = ", ".join(places[:_PLACES])
     return f"{first.severity.value}: {first.kind}, {len(findings)} times: {listed}{more}; {first.what}; {first.remedy}"
 
 
 def counted(findings: Iterable[Finding]) -> str:
-    """How many of each severity there are, such as "1 error, 2 notes"; empty for none."""
-    severities = [each.severity for each in findings]
-    counts = [(severities.count(each), each.value) for each in Severity]
+    """Return the number of findings of each severity, such as "1 error, 2 notes"; empty for none."""
+    severities = [finding.severity for finding in findings]
+    counts = [(severities.count(severity), severity.value) for severity in Severity]
     return ", ".join(f"{count} {name}{'s' * (count > 1)}" for count, name in counts if count)

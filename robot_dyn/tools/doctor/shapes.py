@@ -1,8 +1,8 @@
-"""Masses and inertias against the shapes of links: what fits at no density, and the units that would explain it.
+"""Masses and inertias compared with the shapes of links: values impossible at any density, and suspected units.
 
     ½ tr I ≤ m max |x − c|²   for a mass m with centre c anywhere within the shape
 
-Shapes are those of <collision>, else of <visual>. [Wensing, Kim, Slotine 2018, §III-B]
+Shapes are taken from <collision>, or else from <visual>. [Wensing, Kim, Slotine 2018, §III-B]
 """
 
 from __future__ import annotations
@@ -23,25 +23,29 @@ from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 from robot_dyn.tools.doctor.literals import NUMBERS
 from robot_dyn.view import Piece, solids
 
-_SLACK = 1.1  # of a shape's extent: collision shapes leave out screws
-_LIGHT, _HEAVY = 2.0, 1.2e4  # [kg/m³] of a link and its convex hull: below foam, above lead
-_CONCENTRATED = 0.15  # of the inertia of a uniform body: of 20 arms of the catalog the least is 0.35
+_SLACK = 1.1  # on a shape's extent: collision shapes omit screws
+_LIGHT, _HEAVY = 2.0, 1.2e4  # [kg/m³] of a link in its convex hull: lighter than foam, heavier than lead
+_CONCENTRATED = 0.15  # relative to a uniform body's inertia; the minimum of 20 arms in the catalog is 0.35
 _UNITS = {1e3: "g m²", 1e4: "kg cm²", 1e6: "kg mm²", 1e7: "g cm²", 1e9: "g mm²"}
-_WITHIN = 4.0  # a factor on either side, by which the inertia of a link is off that of a uniform body
-_LONG, _LEAST_LONG = 10.0, 10.0  # times the length of the arm, and [m], that a shape is: millimetres
+_WITHIN = 4.0  # largest factor between the inertia of a link and that of a uniform body
+_LONG, _LEAST_LONG = 10.0, 10.0  # times the length of the arm, and [m]: longer shapes are in millimetres
 _SIZE = "shape_in_mm"
-_MATERIAL, _MOST, _FEWEST = 0.01, 0.6, 4  # of the median density; part of the links; of different mass, at least
-_GRAVE = 3.0  # of ½ tr I to m d², from which M is wrong by a factor: below, makers round
+_MATERIAL, _MOST, _FEWEST = (
+    0.01,
+    0.6,
+    4,
+)  # deviation from the median density; fraction of links; minimum number of different masses
+_GRAVE = 3.0  # ratio of ½ tr I to m d² above which M is wrong by a factor; below, values may be rounded
 
 
 @final
 @dataclass(frozen=True)
 class Shape:
-    """The shapes of a link.
+    """Shapes of a link.
 
     Attributes:
-        points: Their corners in the link's frame, (k, 3), in [m].
-        unit: Their mass properties at 1 kg/m³; None if they have no volume.
+        points: Corners in the link's frame, (k, 3), in [m].
+        unit: Mass properties at 1 kg/m³; None without a volume.
     """
 
     points: np.ndarray
@@ -49,30 +53,30 @@ class Shape:
 
 
 def shapes(robot: Robot, package_dirs: Iterable[str | Path]) -> tuple[dict[str, Shape], tuple[str, ...]]:
-    """The shape of each link that has one, and what cannot be read."""
+    """Return the shape of each link that has one, and notes on unreadable shapes."""
     pieces, notes = solids(robot, package_dirs)
-    return {name: _shape(of) for name, of in pieces.items() if of}, notes
+    return {name: _shape(own) for name, own in pieces.items() if own}, notes
 
 
 def doubtful(
     document: Document, robot: Robot, of: dict[str, Shape], package_dirs: Iterable[str | Path]
 ) -> list[Finding]:
-    """What is wrong with masses, inertias and centres of mass by the collision shape of a link, and by its visual too.
+    """Report faulty masses, inertias and centres of mass, by the collision shape of a link and by its visual.
 
-    A collision shape may be a part of the link alone: what the visual explains is not reported.
+    A collision shape may cover only part of the link: findings that the visual shape explains are not reported.
     """
-    found = _by_shape(document, robot, of)
-    doubted = {name for name in of if any(each.where == f"link {name!r}" for each in found)}
+    findings = _by_shape(document, robot, of)
+    doubted = {name for name in of if any(finding.where == f"link {name!r}" for finding in findings)}
     pieces, _ = solids(robot, package_dirs, ("visual",), doubted)
     again = _by_shape(document, robot, {name: _shape(drawn) for name, drawn in pieces.items() if drawn})
-    by_visual = {(each.kind, each.where): each for each in again}
-    told = {f"link {name!r}" for name, drawn in pieces.items() if drawn}
-    told -= {each.where for each in again + found if each.kind == _SIZE}  # in another unit: it explains nothing
-    kept = [each for each in found if each.where not in told]
-    for where in sorted(told):
-        both = [each for each in found if each.where == where and (each.kind, where) in by_visual]
-        kept += [_milder(each, by_visual[each.kind, where]) for each in both] or [x for x in again if x.where == where]
-    return kept
+    by_visual = {(finding.kind, finding.where): finding for finding in again}
+    visible = {f"link {name!r}" for name, drawn in pieces.items() if drawn}
+    visible -= {x.where for x in again + findings if x.kind == _SIZE}  # a visual in a wrong unit explains nothing
+    result = [finding for finding in findings if finding.where not in visible]
+    for where in sorted(visible):
+        both = [x for x in findings if x.where == where and (x.kind, where) in by_visual]
+        result += [_milder(x, by_visual[x.kind, where]) for x in both] or [x for x in again if x.where == where]
+    return result
 
 
 def _by_shape(document: Document, robot: Robot, of: dict[str, Shape]) -> list[Finding]:
@@ -81,17 +85,17 @@ def _by_shape(document: Document, robot: Robot, of: dict[str, Shape]) -> list[Fi
 
 def _milder(one: Finding, other: Finding) -> Finding:
     order = [*Severity]
-    return max(one, other, key=lambda each: order.index(each.severity))
+    return max(one, other, key=lambda finding: order.index(finding.severity))
 
 
 def _shape(pieces: tuple[Piece, ...]) -> Shape:
-    points = np.vstack([each.mesh.vertices @ each.pose[:3, :3].T + each.pose[:3, 3] for each in pieces])
-    bodies = [body for each in pieces if (body := _of_piece(each)) is not None]
+    points = np.vstack([piece.mesh.vertices @ piece.pose[:3, :3].T + piece.pose[:3, 3] for piece in pieces])
+    bodies = [body for piece in pieces if (body := _of_piece(piece)) is not None]
     return Shape(points, combined(bodies) if bodies else None)
 
 
 def _of_piece(piece: Piece) -> MassProperties | None:
-    """A closed surface as it is; any other, and one whose parts overlap, by its convex hull."""
+    """Return a closed surface as a solid; any other, or one with overlapping parts, as its convex hull."""
     vertices, faces = piece.mesh.vertices.astype(float), piece.mesh.faces.astype(int)
     try:
         closed = surface.solid(vertices, faces)
@@ -102,7 +106,7 @@ def _of_piece(piece: Piece) -> MassProperties | None:
 
 
 def misfits(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
-    """Masses and inertias that their shapes have at no density."""
+    """Report masses and inertias that their shapes cannot have at any density."""
     stated, reach = structure_of(robot.description, robot.edits), _reach(robot)
     links = stated.links
     for name, shape in of.items():
@@ -114,40 +118,42 @@ def misfits(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[
         if link.mass <= 0:
             continue
         inertial = element.find("inertial")
-        found = _mass(name, link, shape, inertial)  # if it is doubtful, the inertia is as well
-        found = found or _inertia(name, link, shape, inertial) or _small(name, link, shape, inertial)
-        if found is not None:
-            yield replace(found, severity=Severity.NOTE) if name in stated.base else found
+        finding = _mass(name, link, shape, inertial)  # if the mass is doubtful, so is the inertia
+        finding = finding or _inertia(name, link, shape, inertial) or _small(name, link, shape, inertial)
+        if finding is not None:
+            yield replace(finding, severity=Severity.NOTE) if name in stated.base else finding
 
 
 def of_one_density(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
-    """A note if the masses of nearly all links are their volumes times one density, as programs of CAD write them."""
+    """Report if the masses of nearly all links are their volumes times one density, as CAD programs compute them."""
     links = structure_of(robot.description, robot.edits).links
-    known = {name: links[name].mass for name in of if links[name].mass > 0 and name not in robot.description.estimated}
-    density = {name: mass / unit.mass for name, mass in known.items() if (unit := of[name].unit) is not None}
+    mass_of = {
+        name: links[name].mass for name in of if links[name].mass > 0 and name not in robot.description.estimated
+    }
+    density = {name: mass / unit.mass for name, mass in mass_of.items() if (unit := of[name].unit) is not None}
     if len(density) < _FEWEST:
         return
     median = float(np.median([*density.values()]))
     alike = [name for name, x in density.items() if abs(x / median - 1) <= _MATERIAL]
     different = len({links[name].mass for name in alike})
-    if different >= _FEWEST and different >= _MOST * len({links[name].mass for name in known}):
+    if different >= _FEWEST and different >= _MOST * len({links[name].mass for name in mass_of}):
         total = sum(link.mass for link in links.values())
         yield document.finding(
             Severity.NOTE, "density_uniform", document.root,
-            f"{len(alike)} of {len(known)} links weigh {median:.4g} kg/m³ of their shapes, to 1 %, {total:.4g} kg in"
-            " all: computed from one material, as an arm with motors and gears hardly is",
+            f"{len(alike)} of {len(mass_of)} links weigh {median:.4g} kg/m³ of their shapes, to 1 %, {total:.4g} kg in"
+            " total: computed from one material, which is unlikely for an arm with motors and gears",
             "compare the total with the data sheet; Robot.with_(mass_scale=…) scales all masses",
         )  # fmt: skip
 
 
 def _farthest(points: np.ndarray) -> float:
-    """The largest distance of points (k, 3) from the origin, whose squares may overflow."""
+    """Return the largest distance of points (k, 3) from the origin, whose squares may overflow."""
     scale = float(np.abs(points).max()) or 1.0
     return scale * float(np.linalg.norm(points / scale, axis=1).max())
 
 
 def _reach(robot: Robot) -> float:
-    """The sum of the distances between joints, in [m]; 1 m if they coincide."""
+    """Return the sum of the distances between joints, in [m]; 1 m if they coincide."""
     total = sum(hypot(*map(float, joint.xyz)) for joint in structure_of(robot.description, robot.edits).joints.values())
     return total or 1.0
 
@@ -176,7 +182,7 @@ def _mass(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding |
     changes = (Change(mass, "value", _scaled(mass.get("value"), -3)),) if grams else ()
     return Finding(
         Severity.WARNING, "mass_density", f"link {name!r}",
-        f'its mass of "{mass.get("value").strip()}" kg in its shape is a density of {density:.3g} kg/m³{suspected}',
+        f'its mass of "{mass.get("value").strip()}" kg in its shape gives a density of {density:.3g} kg/m³{suspected}',
         "correct the mass, or its unit", inertial.sourceline, changes, True,
     )  # fmt: skip
 
@@ -190,7 +196,7 @@ def _inertia(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Findin
     changes, suspected = (), ""
     if shape.unit is not None:
         ratio = half / link.mass / (np.trace(shape.unit.inertia) / 2 / shape.unit.mass)
-        factor, unit = min(_UNITS.items(), key=lambda each: abs(np.log(ratio / each[0])))
+        factor, unit = min(_UNITS.items(), key=lambda item: abs(np.log(ratio / item[0])))
         if factor / _WITHIN < ratio < factor * _WITHIN:
             suspected, inertia = f": {unit} is suspected", inertial.find("inertia")
             power = -round(np.log10(factor))
@@ -198,14 +204,14 @@ def _inertia(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Findin
             changes = tuple(Change(inertia, key, _scaled(x, power)) for key, x in moments.items() if float(x))
     return Finding(
         Severity.ERROR if half >= _GRAVE * most else Severity.WARNING, "inertia_shape", f"link {name!r}",
-        f"its inertia is that of {link.mass:g} kg at {np.sqrt(half / link.mass):.3g} m and more from the centre of"
-        f" mass, and its shape ends at {far:.3g} m: {half / most:.3g} times the most of any density{suspected}",
+        f"for {link.mass:g} kg, its inertia needs mass at least {np.sqrt(half / link.mass):.3g} m from the centre, but"
+        f" its shape ends at {far:.3g} m: {half / most:.3g} times the maximum at any density{suspected}",
         "correct the inertia, or its unit", inertial.sourceline, changes, True,
     )  # fmt: skip
 
 
 def _small(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding | None:
-    """A mass too large for its inertia: neither of them alone is impossible."""
+    """Report a mass too large for its inertia, where neither alone is impossible."""
     uniform = 0.0 if shape.unit is None else float(np.trace(shape.unit.inertia)) * link.mass / shape.unit.mass
     ratio = float(np.trace(link.inertia)) / uniform if uniform else 1.0
     if not 0 < ratio < _CONCENTRATED:
@@ -219,25 +225,27 @@ def _small(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Finding 
 
 
 def _scaled(text: str, power: int) -> str:
-    """A literal times a power of ten, digit by digit."""
+    """Return a literal times a power of ten, digit by digit."""
     mantissa, _, exponent = text.strip().lower().partition("e")
     return f"{mantissa}e{int(exponent or 0) + power}"
 
 
 def outside(document: Document, robot: Robot, of: dict[str, Shape]) -> Iterator[Finding]:
-    """Centres of mass beyond the box around the shapes of their link."""
+    """Report centres of mass outside the bounding box of the shapes of their link."""
     stated = structure_of(robot.description, robot.edits)
     for name, shape in of.items():
         link, (low, high) = stated.links[name], (shape.points.min(axis=0), shape.points.max(axis=0))
-        room = 0.1 * float(np.max(high - low)) + 0.01  # [m]: of a thin flange, the rest is hidden in its neighbour
+        room = 0.1 * float(np.max(high - low)) + 0.01  # [m]: part of a thin flange is hidden in its neighbour
         away = hypot(*(np.maximum(low - room - link.com, 0) + np.maximum(link.com - high - room, 0)).tolist())
-        light = shape.unit is not None and link.mass < _LIGHT * shape.unit.mass  # hardly a mass, of which `_mass` tells
+        light = (
+            shape.unit is not None and link.mass < _LIGHT * shape.unit.mass
+        )  # nearly massless, which `_mass` reports
         if link.mass > 0 and away > 0 and not light:
             inertial = document.named("link", name).find("inertial")
             xyz = inertial.find("origin").get("xyz", "0 0 0") if inertial.find("origin") is not None else "0 0 0"
             yield document.finding(
                 Severity.NOTE if name in stated.base else Severity.WARNING, "com_outside", inertial,
-                f'its centre of mass "{" ".join(xyz.split())}" m lies {away + room:.2g} m outside its'
+                f'its centre of mass "{" ".join(xyz.split())}" m is {away + room:.2g} m outside its'
                 " shape",
                 "correct the origin of its <inertial>: it is that of the centre of mass in the frame of the link",
             )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Elements and attributes that URDF does not have, where one it has is spelt nearly so: other programs pass over them.
+"""Unknown elements and attributes with a name close to one of URDF, which other programs ignore.
 
 <orgin xyz="0 0 0.1"/>, <inertia xx="…"/>
 """
@@ -13,7 +13,7 @@ from robot_dyn.tools.doctor.document import Document
 from robot_dyn.tools.doctor.finding import Change, Finding, Severity
 
 _SHAPES = {"box": {"size"}, "cylinder": {"radius", "length"}, "sphere": {"radius"}, "mesh": {"filename", "scale"}}
-CHILDREN: dict[str, set[str]] = {  # of URDF, and what ROS, Gazebo and Drake add
+CHILDREN: dict[str, set[str]] = {  # of URDF, with extensions of ROS, Gazebo and Drake
     "link": {"inertial", "visual", "collision", "self_collision_checking", "contact", "verbose"},
     "joint": {"origin", "parent", "child", "axis", "calibration", "dynamics", "limit", "mimic", "safety_controller"},
     "inertial": {"origin", "mass", "inertia"},
@@ -36,19 +36,19 @@ ATTRIBUTES: dict[str, set[str]] = {
     **_SHAPES,
 }
 _NEEDED = {"mass": {"value"}, "inertia": ATTRIBUTES["inertia"], "parent": {"link"}, "child": {"link"}}
-_MATTER = {  # to dynamics: what is passed over in their place changes the robot
+_MATTER = {  # for dynamics: misspelling one of these changes the robot
     "inertial", "origin", "mass", "inertia", "parent", "child", "axis", "dynamics", "limit", "mimic",
 }  # fmt: skip
 _NEAR = 0.75
 
 
 def misspelt(document: Document) -> Iterator[Finding]:
-    """Elements and attributes with a name that URDF does not have."""
+    """Report elements and attributes with a name that URDF does not have."""
     for element in document.elements():
         tag, above = element.tag, element.getparent().tag
-        known = CHILDREN.get(above, set())
-        if above in CHILDREN and tag not in known and "}" not in tag and ":" not in tag:
-            free = [each for each in known & _MATTER if element.getparent().find(each) is None]
+        allowed_children = CHILDREN.get(above, set())
+        if above in CHILDREN and tag not in allowed_children and "}" not in tag and ":" not in tag:
+            free = [name for name in allowed_children & _MATTER if element.getparent().find(name) is None]
             yield _finding(document, element, f"<{tag}>", get_close_matches(tag.lower(), free, 1, _NEAR), "")
         for key in (*element.attrib,):
             if (allowed := ATTRIBUTES.get(tag)) and key not in allowed and "}" not in key:
@@ -58,18 +58,23 @@ def misspelt(document: Document) -> Iterator[Finding]:
 
 
 def _only(tag: str, missing: set[str]) -> list[str]:
-    """The one attribute that an element cannot be without."""
+    """Return the required attribute of an element, if exactly one is missing."""
     needed = list(_NEEDED.get(tag, set()) & missing)
     return needed if len(needed) == 1 else []
 
 
-def _finding(document: Document, element: Any, what: str, near: list[str], key: str) -> Finding:
-    kind, found = "unknown_attribute" if key else "unknown_element", f"{what} is not of URDF, and is passed over"
+def _finding(document: Document, element: Any, item: str, near: list[str], key: str) -> Finding:
+    kind, problem = "unknown_attribute" if key else "unknown_element", f"{item} is unknown in URDF and is ignored"
     if not near:
-        return document.finding(Severity.NOTE, kind, element, found, "remove it, or write what URDF calls it")
+        return document.finding(Severity.NOTE, kind, element, problem, "remove it, or use the name in URDF")
     change = Change(element, near[0], "", key) if key else Change(element, "", near[0])
     meant = near[0] if key else f"<{near[0]}>"
     grave = near[0] == "inertial" or (near[0] not in ("limit", "dynamics") and document.moves_mass(element))
     return document.finding(
-        Severity.ERROR if grave else Severity.WARNING, kind, element, found, f"{meant} is meant; correct it", (change,)
+        Severity.ERROR if grave else Severity.WARNING,
+        kind,
+        element,
+        problem,
+        f"{meant} is meant; correct it",
+        (change,),
     )

@@ -1,12 +1,12 @@
-"""Proven runs: enclosures of the flow ẋ = f(t, x), in ball arithmetic, of the numbers that a file states.
+"""Proven runs: enclosures of the flow ẋ = f(t, x) in ball arithmetic, for the numbers stated by a file.
 
-    prove    where the arm of a setup will be, as a theorem (Proof)
+    prove    a theorem (Proof) about the motion of a setup
 
-proven_run  step by step, as long as every bound holds
-theorem     its result; node: what it stores of a step
-motion      which setups a theorem can be about
-hypotheses  the start, and which numbers are meant
-term, tape  the equation of motion as a program in balls, by a trace that rounds nothing
+proven_run  proof step by step, as long as every bound holds
+theorem     result of a proof; node: stored data of a step
+motion      setups that theorems support
+hypotheses  the start, and the exact numbers assumed
+term, tape  the equation of motion as a program in balls, by a trace without rounding
 enclosure/  one proven step
 command     the command `prove`
 """

@@ -1,4 +1,4 @@
-"""The `prove` command: proves where an arm will be."""
+"""The `prove` command: proves bounds on the motion of an arm."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def prove(
 ) -> None:
     """Prove where the arm of a scene will be.
 
-    It prints balls that hold q and v. The exit code is 1 if the proof does not reach the end.
+    The result is printed as balls that contain q and v. The exit code is 1 if the proof does not reach the end.
 
     Options:
-        until (SECONDS): Time up to which to prove; that of the scene unless given.
+        until (SECONDS): End time of the proof; by default the duration of the scene.
         bits: Precision of the balls.
-        budget (SECONDS): Time that it may take.
+        budget (SECONDS): Limit on computing time.
     """
     setup = rd.read_scene(scene)
     with bar(setup.duration_s if until is None else until, "proving") as advance:

@@ -1,7 +1,7 @@
-"""The motion that a theorem describes, M(q) a + C(q, v) v + N(q) = Σ τ_effect + u(t, q, v), with analytic terms only.
+"""The motion of a theorem, M(q) a + C(q, v) v + N(q) = Σ τ_effect + u(t, q, v), with analytic terms only.
 
 A part that switches has no Taylor series across the switch, and user-defined code cannot be inspected: both are
-refused by name. Coefficients and gains are the exact values of the stored floats, with no floating-point arithmetic.
+refused with their names. Coefficients and gains are the exact values of the stored floats, without float arithmetic.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Motion:
     """A plant and its controller, all of whose parts are analytic.
 
     Attributes:
-        robot: The robot, with the payloads that it carries throughout.
+        robot: Robot with its permanent payloads.
         effects: Effects other than gravity and payloads.
         controller: A continuous controller, or None.
     """
@@ -46,7 +46,7 @@ class Motion:
         return self.controller.knots if self.controller is not None else ()
 
     def torque(self, model: Bodies, t: Array, q: Array, v: Array, piece: float) -> Array:
-        """Σ τ_effect + u in the arithmetic of a trace, (n,).
+        """Return Σ τ_effect + u in the arithmetic of a trace, (n,).
 
         Args:
             model: The bodies.
@@ -60,8 +60,8 @@ class Motion:
             total = total + effect.torque(model, t[0], q, v)  # pyright: ignore[reportAttributeAccessIssue]
         if self.controller is None:
             return total
-        own: dict[str, Any] = {name: _Piece(each, piece) for name, each in self.controller.references.items()}
-        own |= {name: Bodies(_robot(each, self.controller.name), model.arithmetic) for name, each in self._models}
+        own: dict[str, Any] = {name: _Piece(x, piece) for name, x in self.controller.references.items()}
+        own |= {name: Bodies(_robot(x, self.controller.name), model.arithmetic) for name, x in self._models}
         return total + with_values(self.controller, own).torque(t, q, v, total[:0])
 
     @property
@@ -71,10 +71,10 @@ class Motion:
 
 @final
 class Bodies:
-    """The rigid bodies of a robot under gravity, evaluated recursively in the arithmetic of a trace.
+    """Rigid bodies of a robot under gravity, evaluated recursively in the arithmetic of a trace.
 
     Args:
-        robot: The robot, which provides the file and edits.
+        robot: Robot whose file and edits are used.
         arithmetic: Arithmetic of the trace; methods must be called within its scope.
     """
 
@@ -83,16 +83,16 @@ class Bodies:
 
     @cached_property
     def linkage(self) -> Linkage:
-        """An equivalent linkage with other frames and fewer parameters, but the same M, C and N."""
-        known = tree_of(self.robot.description, self.robot.edits)
-        return regrouped(slid(linkage_of(known, self.robot.joint_names, self.arithmetic)))
+        """Equivalent linkage with other frames and fewer parameters, but the same M, C and N."""
+        tree = tree_of(self.robot.description, self.robot.edits)
+        return regrouped(slid(linkage_of(tree, self.robot.joint_names, self.arithmetic)))
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
-        """M a + C v + N, (n,)."""
+        """Return M a + C v + N, (n,)."""
         return newton_euler(self.linkage, q, v, a)
 
     def N(self, q: Array) -> Array:
-        """∂V/∂q, (n,)."""
+        """Return ∂V/∂q, (n,)."""
         zero = self.arithmetic.array(np.zeros(self.n))
         return newton_euler(self.linkage, q, zero, zero)
 
@@ -109,7 +109,7 @@ class _Piece:
             self._rests = float(breaks[0] if t < breaks[0] else breaks[-1])
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration at t (1,); at rest outside the breaks."""
+        """Return position, velocity and acceleration at t (1,); at rest outside the breaks."""
         if self._rests is None:
             return polynomial(self._coefficients, t - self._start)
         q, _, _ = polynomial(self._coefficients, 0 * t + self._rests - self._start)
@@ -120,45 +120,49 @@ def motion(setup: Setup, until_s: float) -> Motion:
     """Return the motion of a setup up to a time.
 
     Raises:
-        ProofError: If a part is not analytic, or not known to be; the message names the part.
+        ProofError: If a part is not analytic or user-defined; the message names the part.
     """
     plant, controller = setup.plant, setup.controller
     for effect in plant.effects:
         if isinstance(effect, CarriedPayload):
             if any(0 < t < until_s for t in effect.switches):
-                raise ProofError(f"{effect.name} comes or goes within {until_s:g} s: prove the motion up to there")
+                raise ProofError(
+                    f"{effect.name} is attached or dropped within {until_s:g} s; end the proof at that time"
+                )
         elif type(effect) not in _EFFECTS:
             raise ProofError(
-                f"effect {effect.name} switches, or is not known to be analytic: theorems are about gravity, payloads,"
-                " viscous friction, springs and tanh friction; leave it out"
+                f"effect {effect.name} switches or is user-defined: theorems support gravity, payloads, viscous"
+                " friction, springs and tanh friction; remove it"
             )
     if controller is not None:
         _check(controller)
     whole = plant.at(0.0)
     robot = _robot(whole.dynamics, "plant")
-    return Motion(robot, tuple(each for each in whole.effects if not isinstance(each, CarriedPayload)), controller)
+    return Motion(robot, tuple(x for x in whole.effects if not isinstance(x, CarriedPayload)), controller)
 
 
 def _check(controller: Controller) -> None:
     if type(controller) not in _CONTROLLERS:
         raise ProofError(
-            f"controller {controller.name} switches, has states, or is not known to be analytic: theorems are about PD,"
-            " PDGravity, FeedForward and ComputedTorque"
+            f"controller {controller.name} switches, has states or is user-defined: theorems support PD, PDGravity,"
+            " FeedForward and ComputedTorque; use one of them"
         )
     if controller.period_s > 0:
         raise ProofError(
-            f"controller {controller.name} is sampled every {controller.period_s:g} s: theorems are about continuous"
-            " control; take period_s=0"
+            f"controller {controller.name} is sampled every {controller.period_s:g} s: theorems support continuous"
+            " control; set period_s=0"
         )
-    for name, each in controller.references.items():
-        if not isinstance(each, PiecewisePolynomial):
-            raise ProofError(f"{name} of {controller.name} is not a piecewise polynomial")
+    for name, reference in controller.references.items():
+        if not isinstance(reference, PiecewisePolynomial):
+            raise ProofError(
+                f"{name} of {controller.name} is not a piecewise polynomial; use rd.control.PiecewisePolynomial"
+            )
 
 
-def _robot(dynamics: Any, what: str) -> Robot:
+def _robot(dynamics: Any, part: str) -> Robot:
     robot = getattr(dynamics, "robot", dynamics)
     if not isinstance(robot, Robot):
         raise ProofError(
-            f"{what}: {type(dynamics).__name__} comes from no robot's file, whose decimals theorems are about"
+            f"{part}: {type(dynamics).__name__} has no robot with a file, whose decimals a theorem needs; use a Robot"
         )
     return robot

@@ -1,4 +1,4 @@
-"""What is stored of a proven step: balls at its end, and polynomial and tube on the way, as whole numbers."""
+"""Stored data of a proven step: balls at its end, and polynomial and tube during the step, as integers."""
 
 from __future__ import annotations
 
@@ -16,33 +16,34 @@ Packed = tuple[int, int, int, int]
 
 
 def packed(x: Ball) -> Packed:
-    """The numbers of a ball, exactly."""
+    """Return the numbers of a ball, exactly."""
     (m, e), (r, s) = x.mid().man_exp(), x.rad().man_exp()
     return int(m), int(e), int(r), int(s)
 
 
 def unpacked(x: Packed) -> Ball:
-    """The ball of these numbers; its midpoint exactly, its radius rounded up."""
+    """Return the ball of these numbers, with its exact midpoint and its radius rounded up."""
     m, e, r, s = x
     with ctx.workprec(max(m.bit_length(), r.bit_length(), 2)):
         return arb(arb(m) * arb(2) ** e, arb(r) * arb(2) ** s)
 
 
 def of_joints(balls: Sequence[Ball]) -> tuple[Packed, ...]:
-    """One for each joint."""
+    """Return the numbers of balls, one for each joint."""
     return tuple(map(packed, balls))
 
 
 @final
 @dataclass(frozen=True)
 class Node:
-    """What is known at the end of a step, and of the step before it.
+    """Proven data at the end of a step and for the step before it.
 
     Attributes:
         t: Time in [s], exact.
-        q, v: Balls that hold the state at t.
-        polynomial: Of q on the step that ends there, by powers of the time since its start; none at the start.
-        tube_q, tube_v: Balls about 0: the state is off the polynomial by no more, anywhere on the step.
+        q, v: Balls that contain the state at t.
+        polynomial: Polynomial of q on the step that ends at t, in powers of the time since its start; empty at the
+            start.
+        tube_q, tube_v: Balls around 0 that contain the deviation from the polynomial during the step.
     """
 
     t: float
@@ -54,11 +55,12 @@ class Node:
 
 
 def node_of(state: State, step: Step | None = None) -> Node:
-    """Return what is stored of a state, and of the step before it."""
+    """Return the stored data of a state and of the step before it."""
     n = len(state.q)
     wide = [arb(0, bound) for bound in state.error.bounds]
     q, v = (
-        [x + e for x, e in zip(known, own, strict=True)] for known, own in ((state.q, wide[:n]), (state.v, wide[n:]))
+        [x + e for x, e in zip(centre, error, strict=True)]
+        for centre, error in ((state.q, wide[:n]), (state.v, wide[n:]))
     )
     t = float(state.t)
     assert t == state.t
@@ -69,15 +71,15 @@ def node_of(state: State, step: Step | None = None) -> Node:
 
 
 def on_the_way(start: float, node: Node) -> Callable[[float], tuple[list[Any], list[Any]]]:
-    """Balls that hold q and v at a time of the step from `start` to the node; in the precision of the calls."""
-    q = tuple(tuple(map(unpacked, each)) for each in node.polynomial)
+    """Return a function of time whose balls contain q and v on the step from `start` to the node, in its precision."""
+    q = tuple(tuple(map(unpacked, coefficients)) for coefficients in node.polynomial)
     v, wide_q, wide_v = derivatives(q), [*map(unpacked, node.tube_q)], [*map(unpacked, node.tube_v)]
 
     def at(t: float) -> tuple[list[Any], list[Any]]:
         tau = arb(t) - arb(start)
         return (
-            [horner(each, tau) + b for each, b in zip(q, wide_q, strict=True)],
-            [horner(each, tau) + b for each, b in zip(v, wide_v, strict=True)],
+            [horner(c, tau) + b for c, b in zip(q, wide_q, strict=True)],
+            [horner(c, tau) + b for c, b in zip(v, wide_v, strict=True)],
         )
 
     return at

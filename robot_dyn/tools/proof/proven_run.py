@@ -1,4 +1,4 @@
-"""Prove a theorem about the flow of a setup, step by step, for as long as every bound holds."""
+"""Proof of a theorem about the flow of a setup, step by step, as long as every bound holds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from robot_dyn.tools.proof.tape import Tape
 from robot_dyn.tools.proof.theorem import Proof
 
 _LEAST_BITS, _MOST_BITS = 40, 4096
-_LONGEST_S = 4096.0  # so that times are exact
+_LONGEST_S = 4096.0  # times up to this are exact
 
 
 def prove(
@@ -36,32 +36,32 @@ def prove(
     budget_s: float = 60.0,
     on_progress: Callable[[float], object] | None = None,
 ) -> Proof:
-    """A theorem: the motion exists, is the only one, and q(t), v(t) lie in balls, for 0 ≤ t ≤ until_s.
+    """Prove that the motion exists and is unique, and that q(t), v(t) lie in balls, for 0 ≤ t ≤ until_s.
 
     The theorem holds for the decimals of the URDF as written; floats of the setup (start, gravity, payloads,
-    coefficients, gains) are taken as exact binary numbers. The integrator and step of the setup are irrelevant.
+    coefficients, gains) are exact binary numbers. The method and step of the setup are irrelevant.
 
     Args:
         setup: Plant, start, and optionally a continuous controller.
         until_s: End time, in [s]; by default the duration of the setup.
         bits: Precision of the balls, from 40 to 4096; more bits give smaller radii and shorter steps.
-        q0: Initial q, (n,), in place of that of the setup: numbers, or strings for exact decimals.
-        v0: Initial velocity, likewise.
-        width_q: The start may be anywhere within this distance of each q, in [rad] or [m], not negative.
-        width_v: Likewise for v.
+        q0: Initial position, (n,), that replaces the setup's: numbers, or strings for exact decimals.
+        v0: Initial velocity, (n,), that replaces the setup's: numbers, or strings for exact decimals.
+        width_q: Largest deviation of each initial q, in [rad] or [m], not negative.
+        width_v: Largest deviation of each initial v, in [rad/s] or [m/s], not negative.
         budget_s: Limit on computing time, in [s].
-        on_progress: Called with the time reached, in [s], after each step.
+        on_progress: Function called with the time reached, in [s], after each step.
 
     Returns:
         The theorem; if it ends before until_s, it states the reason.
 
     Raises:
         QueryError: If an argument is not allowed.
-        ProofError: If a part of the setup switches, is sampled, or is not known to be analytic; names that part.
+        ProofError: If a part of the setup switches, is sampled, or is user-defined; names that part.
 
     Source: Lohner 1987; Nedialkov, Jackson, Corliss 1999.
     """
-    instance("setup", setup, Setup, "give one, as rd.Setup(rd.Plant(robot), q0)")
+    instance("setup", setup, Setup, "give a setup, for example rd.Setup(rd.Plant(robot), q0)")
     until_s = setup.duration_s if until_s is None else duration("until_s", until_s)
     if until_s > _LONGEST_S:
         raise QueryError(f"until_s must not exceed {_LONGEST_S:g} s, got {until_s:g}")
@@ -79,16 +79,25 @@ def prove(
             if on_progress is not None:
                 on_progress(node.t)
             if perf_counter() - began > budget_s and node.t < until_s:
-                raise NotProvenError(f"the budget of {budget_s:g} s is spent")
+                raise NotProvenError(f"the budget of {budget_s:g} s is used up")
     except NotProvenError as error:
         why = str(error)
-    meant = assumed(about, setup, q0 is not None, v0 is not None, widths)
     arm = about.robot
-    return Proof(arm.name, arm.joint_names, arm.joint_types, until_s, nodes[-1].t, why, bits, meant, tuple(nodes))
+    return Proof(
+        robot=arm.name,
+        joint_names=arm.joint_names,
+        joint_types=arm.joint_types,
+        requested_s=until_s,
+        until_s=nodes[-1].t,
+        why_not=why,
+        bits=bits,
+        assumed=assumed(about, setup, q0 is not None, v0 is not None, widths),
+        nodes=tuple(nodes),
+    )
 
 
 def _nodes(about: Motion, state: State, until_s: float, bits: int) -> Iterator[Node]:
-    """Ends of proven steps, one after the other; a step ends where a reference passes to another polynomial.
+    """Yield the ends of proven steps in sequence; a step ends where a reference changes to another polynomial.
 
     Raises:
         NotProvenError: If no step can be proven beyond the last one.

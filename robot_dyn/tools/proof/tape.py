@@ -1,8 +1,8 @@
 """The tape of a motion: R(t, q, v, a) = M a + C v + N − τ, its derivatives by q, v and a, and M, in balls.
 
-It is traced from the library's own recursions, with literals as balls: one more arithmetic over the same lines. The
-derivatives are CasADi's of the trace, which are trusted, and are compared with power series in the tests. A traced
-program runs in the arithmetic of balls, or of truncated power series of balls [Johansson 2017].
+It is traced from the library's own recursions, with literals as balls: one more arithmetic for the same code. CasADi
+computes the derivatives, which are trusted; tests compare them with power series. A traced program runs in the
+arithmetic of balls, or of truncated power series of balls [Johansson 2017].
 """
 
 from __future__ import annotations
@@ -24,49 +24,49 @@ from robot_dyn.tools.proof.term import Literals, expressions
 
 @final
 class Tape:
-    """The functions of a motion; numbers are balls, or truncated power series of balls.
+    """Functions of a motion; numbers are balls, or truncated power series of balls.
 
     Args:
-        motion: What moves.
-        piece: A time in [s] on the piece of the reference that counts.
+        motion: The motion.
+        piece: A time in [s] on the piece of the reference to use.
 
     Attributes:
         n: Number of joints.
-        programs: The instructions of residual, mass matrix and derivatives.
+        programs: Programs of residual, mass matrix and derivatives.
     """
 
     def __init__(self, motion: Motion, piece: float = 0.0) -> None:
         arithmetic, self.n = Literals(), motion.robot.n
         with arithmetic.scope():
-            made = _traced(motion, arithmetic, piece)
+            functions = _traced(motion, arithmetic, piece)
             self._constants = list(arithmetic.constants.balls)
             self.programs: dict[str, Program] = {
-                name: program_of(ca.Function(name, [*given, ca.vertcat(*arithmetic.constants.symbols)], [result]))
-                for name, (given, result) in made.items()
+                name: program_of(ca.Function(name, [*arguments, ca.vertcat(*arithmetic.constants.symbols)], [result]))
+                for name, (arguments, result) in functions.items()
             }
         self._functions = {name: straight_line(program) for name, program in self.programs.items()}
         self._rounded: dict[int, list[Any]] = {}
 
     def residual(self, t: Any, q: Sequence[Any], v: Sequence[Any], a: Sequence[Any]) -> Sequence[Any]:
-        """R(t, q, v, a), n numbers, 0 for the true motion."""
+        """Return R(t, q, v, a), n numbers, 0 for the true motion."""
         return self._of("residual", [*q, *v, *a, t])
 
     def mass(self, q: Sequence[Any]) -> Sequence[Any]:
-        """M(q), n² numbers row by row."""
+        """Return M(q), n² numbers row by row."""
         return self._of("mass", q)
 
     def derivatives(self, t: Any, q: Sequence[Any], v: Sequence[Any], a: Sequence[Any]) -> Sequence[Any]:
-        """∂R/∂(q, v, a), 3 n² numbers row by row; the last n columns are M."""
+        """Return ∂R/∂(q, v, a), 3 n² numbers row by row; the last n columns are M."""
         return self._of("derivatives", [*q, *v, *a, t])
 
     def _of(self, name: str, x: Sequence[Any]) -> Sequence[Any]:
-        if ctx.prec not in self._rounded:  # balls of fewer bits that hold the constants
-            self._rounded[ctx.prec] = [+each for each in self._constants]
+        if ctx.prec not in self._rounded:  # balls of fewer bits that contain the constants
+            self._rounded[ctx.prec] = [+constant for constant in self._constants]
         return self._functions[name]([*x, *self._rounded[ctx.prec]])
 
 
 def _traced(motion: Motion, arithmetic: Literals, piece: float) -> dict[str, tuple[list[Any], Any]]:
-    """Arguments and result of each function."""
+    """Return arguments and result of each function."""
     n, bodies = motion.robot.n, Bodies(motion.robot, arithmetic)
     (q, qs), (v, vs), (a, as_), (t, ts) = (
         arithmetic.inputs(name, size) for name, size in (("q", n), ("v", n), ("a", n), ("t", 1))
@@ -84,11 +84,11 @@ def _traced(motion: Motion, arithmetic: Literals, piece: float) -> dict[str, tup
 
 Function = Callable[[Sequence[Any]], Sequence[Any]]
 
-_MOST = 16.0  # of a constant that CasADi makes: exact halves, far from a rounded decimal
+_MOST = 16.0  # bound of constants from CasADi: exact halves, unlike rounded decimals
 
 
 def _tanh(x: Any) -> Any:
-    """Tanh x = 1 − 2 / (1 + e²ˣ), of a series; of a ball its own."""
+    """Return tanh x = 1 − 2 / (1 + e²ˣ) of a series; for a ball the method of Arb."""
     return x.tanh() if hasattr(x, "tanh") else 1 - 2 / (1 + (x + x).exp())
 
 
@@ -109,30 +109,32 @@ _OPERATIONS: dict[Kind, Callable[..., Any]] = {
 
 
 def straight_line(program: Program) -> Function:
-    """The function of a sequence of all inputs, one after the other, balls or series of balls.
+    """Return the function of a sequence of all inputs in order, balls or series of balls.
 
     Raises:
         ProofError: If a constant may have been rounded, or an instruction is not analytic.
     """
     for x in program.constants:
         if not (abs(x) <= _MOST and float(2 * x).is_integer()):
-            raise ProofError(f"the trace folded a constant in float64, {x!r}: no theorem could say which number it is")
+            raise ProofError(
+                f"the trace folded the constant {x!r} in float64, so its exact value is lost; write it as a literal"
+            )
     for op in program.ops:
         if op.kind not in _OPERATIONS:
-            raise ProofError(f"{op.kind.name.lower()} is not analytic: no theorem is proven across it")
+            raise ProofError(f"{op.kind.name.lower()} is not analytic; remove the effect or controller that uses it")
     steps = [(_OPERATIONS[op.kind], op.operands, op.results) for op in program.ops]
-    constants = [arb(each) for each in program.constants]
+    constants = [arb(constant) for constant in program.constants]
     count = 1 + max([sum(program.inputs) + len(constants) - 1, *(i for op in program.ops for i in op.results)])
 
     def function(x: Sequence[Any]) -> Sequence[Any]:
         values = [*x, *constants]
         values += [None] * (count - len(values))
-        for operation, of, made in steps:
-            result = operation(*(values[i] for i in of))
-            if len(made) == 1:
-                values[made[0]] = result
+        for operation, operands, results in steps:
+            result = operation(*(values[i] for i in operands))
+            if len(results) == 1:
+                values[results[0]] = result
             else:
-                values[made[0]], values[made[1]] = result
+                values[results[0]], values[results[1]] = result
         return [values[i] for i in program.outputs]
 
     return function

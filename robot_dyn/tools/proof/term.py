@@ -1,7 +1,7 @@
-"""The numbers of a trace that rounds nothing, x = c + node, of a ball c and a CasADi node, and their arithmetic.
+"""Numbers of a trace without rounding, x = c + node with a ball c and a CasADi node, and their arithmetic.
 
-Where a ball meets a node it becomes an input of the trace, one for each value, so that neither CasADi nor this library
-computes with it in floats. Only an exact 0 or ±1 is folded.
+A ball that is combined with a node becomes an input of the trace, one for each value, so that neither CasADi nor this
+library computes with it in floats. Only an exact 0 or ±1 is folded.
 """
 
 from __future__ import annotations
@@ -19,36 +19,36 @@ from flint import arb
 from robot_dyn.codegen.trace.condition import Node
 from robot_dyn.foundations import Arithmetic, Array, Ball
 
-BITS = 400  # of the constants: what they are rounded to, far below all else
+BITS = 400  # of the constants, whose rounding is negligible
 BALLS = Ball(BITS)
 
 
 @final
 class Constants:
-    """The balls that nodes of a trace are made of.
+    """Balls in the nodes of a trace.
 
     Attributes:
-        symbols: Their inputs of the trace.
-        balls: Their values, in the same order.
+        symbols: Inputs of the trace for the balls.
+        balls: Values of these inputs, in the same order.
     """
 
     def __init__(self) -> None:
         self.symbols: list[Node] = []
         self.balls: list[Any] = []
-        self._known: dict[tuple[Any, Any], Node] = {}
+        self._nodes: dict[tuple[Any, Any], Node] = {}
 
     def node(self, ball: Any) -> Node:
-        """The node of a ball: an exact 0 or ±1 itself, of others an input, or its opposite."""
+        """Return the node of a ball: an exact 0 or ±1 as a constant, any other as an input or its negative."""
         if ball.is_exact() and ball.is_integer() and abs(ball) <= 1:
             return ca.SX(int(float(ball)))
         if ball.mid() < 0:
             return -self.node(-ball)
         key = ball.mid().man_exp(), ball.rad().man_exp()
-        if key not in self._known:
-            self._known[key] = ca.SX.sym(f"c{len(self.balls)}")
-            self.symbols.append(self._known[key])
+        if key not in self._nodes:
+            self._nodes[key] = ca.SX.sym(f"c{len(self.balls)}")
+            self.symbols.append(self._nodes[key])
             self.balls.append(ball)
-        return self._known[key]
+        return self._nodes[key]
 
 
 CONSTANTS: ContextVar[Constants] = ContextVar("constants")
@@ -56,27 +56,28 @@ CONSTANTS: ContextVar[Constants] = ContextVar("constants")
 
 @final
 class Term:
-    """A number c + node; node None means the constant c.
+    """A number c + node; without a node, the constant c.
 
-    Comparisons of constants are those of midpoints, and of nodes true: a formulation only asks which of several
-    identities to take, or whether M is regular, which the proof decides by its pivots. What counts as 0 is exactly 0.
+    Constants are compared by their midpoints, and comparisons with nodes are true: a formulation only chooses one of
+    several identities, or tests whether M is regular, which the proof decides by its pivots. Zero means exactly 0.
     """
 
     __slots__ = ("constant", "node")
 
-    def __init__(self, constant: Any, node: Node = None) -> None:
-        self.constant, self.node = constant, node
+    def __init__(self, constant: Any, node: Node | None = None) -> None:
+        self.constant: Any = constant
+        self.node: Any = node
 
     @property
     def expression(self) -> Node:
-        """It as one CasADi expression."""
+        """Term as one CasADi expression."""
         c = CONSTANTS.get().node(self.constant)
         return c if self.node is None else c + self.node
 
     def __add__(self, other: Any) -> Any:
         if (x := _term(other)) is None:
             return NotImplemented
-        nodes = [each.node for each in (self, x) if each.node is not None]
+        nodes: list[Any] = [term.node for term in (self, x) if term.node is not None]
         return Term(self.constant + x.constant, sum(nodes[1:], start=nodes[0]) if nodes else None)
 
     __radd__ = __add__
@@ -119,27 +120,27 @@ class Term:
 
     def __pow__(self, exponent: Any) -> Term:
         if exponent != 2:
-            raise TypeError("only squares")
+            raise TypeError("only squares are supported")
         return self * self
 
     def sin(self) -> Term:
-        """Its sine."""
+        """Return the sine."""
         return self._unary(ca.sin, "sin")
 
     def cos(self) -> Term:
-        """Its cosine."""
+        """Return the cosine."""
         return self._unary(ca.cos, "cos")
 
     def tanh(self) -> Term:
-        """Its hyperbolic tangent."""
+        """Return the hyperbolic tangent."""
         return self._unary(ca.tanh, "tanh")
 
     def sqrt(self) -> Term:
-        """Its square root."""
+        """Return the square root."""
         return self._unary(ca.sqrt, "sqrt")
 
     def conjugate(self) -> Term:
-        """Itself: it is real."""
+        """Return the term itself, because it is real."""
         return self
 
     def _unary(self, symbolic: Callable[[Node], Node], name: str) -> Term:
@@ -182,9 +183,9 @@ class Term:
 
 
 def expressions(array: Any) -> Node:
-    """The entries of an array, row by row, as one CasADi column."""
-    made = (_term(x) for x in np.asarray(array, dtype=object).flat)
-    return ca.vertcat(*(x.expression for x in made if x is not None))
+    """Return the entries of an array, row by row, as one CasADi column."""
+    terms = (_term(x) for x in np.asarray(array, dtype=object).flat)
+    return ca.vertcat(*(x.expression for x in terms if x is not None))
 
 
 def _of(expression: Node) -> Term:
@@ -203,10 +204,10 @@ def _term(x: Any) -> Term | None:
 @final
 @dataclass(frozen=True, eq=False)
 class Literals(Arithmetic):
-    """Numbers of a trace, constants in balls of 400 bits.
+    """Numbers of a trace, with constants in balls of 400 bits.
 
     Attributes:
-        constants: Those that became inputs.
+        constants: Constants that became inputs.
     """
 
     constants: Constants = field(default_factory=Constants, repr=False)
@@ -231,6 +232,6 @@ class Literals(Arithmetic):
         return np.ones(np.shape(x), dtype=bool)
 
     def inputs(self, name: str, n: int) -> tuple[Node, Array]:
-        """A CasADi vector of n inputs, and the same as an array of numbers."""
+        """Return a CasADi vector of n inputs, and the same as an array of terms."""
         vector = ca.SX.sym(name, n)
         return vector, self.array([Term(BALLS.number(0), vector[i]) for i in range(n)])

@@ -1,4 +1,4 @@
-"""A theorem about where an arm will be: existence, uniqueness, and balls that hold q(t) and v(t)."""
+"""A theorem about the motion of an arm: existence, uniqueness, and balls that contain q(t) and v(t)."""
 
 from __future__ import annotations
 
@@ -30,25 +30,25 @@ from robot_dyn.tools.proof.node import Node, Packed, on_the_way, unpacked
 TRUSTED = (
     "the ball arithmetic of Arb (python-flint)",
     "the derivatives and common subexpressions of CasADi",
-    "CPython, and this library's equations, which tests hold to a second formulation",
+    "CPython, and this library's equations, which tests compare with a second formulation",
 )
 
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Proof(Answer, Value):
-    """A theorem about the flow, of the numbers that a file and a setup state; `rd.tools.proof.prove` makes it.
+    """A theorem about the flow, for the numbers stated by a file and a setup; result of `rd.tools.proof.prove`.
 
     Attributes:
         robot: Name of the arm.
-        joint_names: Of the n joints.
-        joint_types: Their types, such as "revolute".
-        requested_s: Time up to which it was requested, in [s].
-        until_s: Time up to which it is proven.
-        why_not: Why it is not proven beyond; empty if it is proven up to there.
+        joint_names: Names of the n joints.
+        joint_types: Types of the joints, such as "revolute".
+        requested_s: Requested end time, in [s].
+        until_s: Time up to which the theorem is proven, in [s].
+        why_not: Reason why the proof ended early; empty if it reached `requested_s`.
         bits: Precision of the balls.
-        assumed: Which numbers are meant, in sentences.
-        nodes: Ends of steps, the start first.
+        assumed: Exact numbers assumed, in sentences.
+        nodes: Start, and ends of all steps.
     """
 
     robot: str
@@ -63,12 +63,12 @@ class Proof(Answer, Value):
 
     @reported
     def joints(self) -> tuple[str, ...]:
-        """Names of the joints, by which `q` and `v` are ordered."""
+        """Names of the joints, in the order of `q` and `v`."""
         return self.joint_names
 
     @reported
     def proven(self) -> bool:
-        """Whether it reaches the requested time."""
+        """True if the proof reaches the requested time."""
         return not self.why_not
 
     @reported
@@ -78,7 +78,7 @@ class Proof(Answer, Value):
 
     @reported
     def radius_v(self) -> np.ndarray:
-        """Those of v, in [rad/s] or [m/s]."""
+        """Upper bounds of the radii of v at the end, (n,), in [rad/s] or [m/s]."""
         return _radii(self.nodes[-1].v)
 
     @property
@@ -88,65 +88,65 @@ class Proof(Answer, Value):
 
     @property
     def digits(self) -> float:
-        """−log₁₀ of the largest radius of q at the end; inf if that is a point."""
+        """−log₁₀ of the largest radius of q at the end; inf if the radius is 0."""
         return _digits(float(self.radius_q.max()))
 
     def at(self, t: float) -> tuple[Array, Array]:
-        """Balls that hold q(t) and v(t), (n,) each: those of a node there, else polynomial and tube of the step.
+        """Return balls that contain q(t) and v(t), (n,) each, from a node at t or from polynomial and tube of the step.
 
         Args:
             t: Time in [s] from 0 to `until_s`, taken exactly.
 
         Raises:
-            QueryError: If t is another.
+            QueryError: If t is outside this range.
         """
         t = number("t", t)
         if not 0 <= t <= self.until_s:
-            raise QueryError(f"t must be between 0 and {self.until_s!r} s, up to which it is proven, got {t!r}")
+            raise QueryError(f"t must be between 0 and {self.until_s!r} s, the end of the proof, got {t!r}")
         k = bisect_right(self.nodes, t, key=lambda node: node.t) - 1
         with Ball(self.bits).scope():
             if self.nodes[k].t == t:
-                q, v = ([unpacked(x) for x in known] for known in (self.nodes[k].q, self.nodes[k].v))
+                q, v = ([unpacked(x) for x in balls] for balls in (self.nodes[k].q, self.nodes[k].v))
             else:
                 q, v = on_the_way(self.nodes[k].t, self.nodes[k + 1])(t)
         return _array(q), _array(v)
 
     def contains(self, t: float, q: Any, v: Any = None) -> bool:
-        """Whether a state lies in the balls at t, all of it if it is balls; in those of q alone if v is not given.
+        """Return True if a state, or all of a state of balls, is in the balls at t; without v, only q is compared.
 
         Args:
             t: Time in [s].
             q: Position, (n,), numbers, text or balls.
-            v: Velocity, likewise.
+            v: Velocity, (n,), numbers, text or balls.
 
         Raises:
-            QueryError: If one has another shape, or t is beyond what is proven.
+            QueryError: If a shape is wrong, or t is outside the proven range.
         """
-        known = dict(zip("qv", self.at(t), strict=True))
+        balls = dict(zip("qv", self.at(t), strict=True))
         with Ball(self.bits).scope():
-            given = {"q": numbers_of("q", q, self.joint_names)}
+            state = {"q": numbers_of("q", q, self.joint_names)}
             if v is not None:
-                given["v"] = numbers_of("v", v, self.joint_names)
+                state["v"] = numbers_of("v", v, self.joint_names)
             return all(
-                bool(ball.contains(x)) for name in given for x, ball in zip(given[name], known[name], strict=True)
+                bool(ball.contains(x)) for name in state for x, ball in zip(state[name], balls[name], strict=True)
             )
 
     def digits_of(self, t: Any, q: Any) -> float:
-        """Decimal digits of positions that the theorem confirms: −log₁₀ of the largest distance that is possible.
+        """Return the decimal digits of positions that the theorem confirms: −log₁₀ of the largest possible error.
 
         Args:
-            t: Times in [s], (m,); those beyond `until_s` are left out.
+            t: Times in [s], (m,); times after `until_s` are ignored.
             q: Positions, (m, n), floats.
 
         Raises:
-            QueryError: If they are not finite numbers of these shapes, or no time is within what is proven.
+            QueryError: If they are not finite numbers of these shapes, or no time is in the proven range.
         """
         t, q = numbers("t", t, ("m",)), numbers("q", q, ("m", "n"))
         if q.shape != (len(t), len(self.joint_names)):
             raise QueryError(f"q must have shape ({len(t)}, {len(self.joint_names)}), got {q.shape}")
         within = (t >= 0) & (t <= self.until_s)
         if not within.any():
-            raise QueryError(f"no sample lies within the {self.until_s!r} s that are proven")
+            raise QueryError(f"no sample is in the proven range of {self.until_s!r} s; give one that is")
         ends, most = np.array([node.t for node in self.nodes]), 0.0
         steps = np.clip(np.searchsorted(ends, t[within], side="left"), 1, None)
         with Ball(self.bits).scope():
@@ -158,22 +158,22 @@ class Proof(Answer, Value):
 
     @reported
     def q(self) -> tuple[str, ...]:
-        """The balls of q at the end, as decimals with a radius that hold them."""
+        """Balls of q at the end, as decimals with a radius that contain them."""
         return tuple(map(_decimals, self.nodes[-1].q))
 
     @reported
     def v(self) -> tuple[str, ...]:
-        """Those of v."""
+        """Balls of v at the end, as decimals with a radius that contain them."""
         return tuple(map(_decimals, self.nodes[-1].v))
 
     @reported
     def steps(self) -> int:
-        """Number of steps that are proven."""
+        """Number of proven steps."""
         return len(self.nodes) - 1
 
     @reported
     def trusted(self) -> tuple[str, ...]:
-        """What the theorem rests on."""
+        """Software that the theorem relies on."""
         return TRUSTED
 
     def blocks(self) -> Iterator[Block]:
@@ -182,8 +182,8 @@ class Proof(Answer, Value):
         yield Table(heading, tuple(zip(self.joint_names, self.q, self.v, strict=True)), right=heading[1:])
         if self.why_not:
             yield f"Not proven beyond t = {self.until_s!r} s, because {self.why_not}."
-        yield "Which numbers are meant:"
-        yield from (f"  {each}" for each in self.assumed)
+        yield "Numbers assumed:"
+        yield from (f"  {sentence}" for sentence in self.assumed)
         yield f"Trusted: {'; '.join(self.trusted)}."
         yield f"{self.steps} steps, balls of {self.bits} bits"
 
@@ -199,18 +199,18 @@ class Proof(Answer, Value):
 
     @property
     def summary(self) -> str:
-        """The theorem as text."""
+        """Theorem as text."""
         return repr(self)
 
     @property
     def _claim(self) -> str:
         if not self.until_s:
             return "nothing is proven."
-        return f"the motion exists and is the only one for 0 ≤ t ≤ {self.until_s!r} s, and at its end it is within"
+        return f"the motion exists and is unique for 0 ≤ t ≤ {self.until_s!r} s, and its end lies within"
 
 
 def _far(ball: Any, x: float) -> float:
-    """The largest distance of a number from a ball, rounded up; inf if it is not a number."""
+    """Return the largest distance of a number from a ball, rounded up; inf if it is not finite."""
     far = float((ball - x).abs_upper())
     return nextafter(far, inf) if far < inf else inf
 
@@ -233,5 +233,5 @@ def _digits(error: float) -> float:
 def _decimals(x: Packed) -> str:
     with Ball(max(64, x[0].bit_length() + 8)).scope():
         ball = unpacked(x)
-        known = ball.rel_accuracy_bits()
-        return ball.str(max(2, min(int(known * 0.30103) + 2, 60)) if known < 10**6 else 20)
+        accuracy = ball.rel_accuracy_bits()
+        return ball.str(max(2, min(int(accuracy * 0.30103) + 2, 60)) if accuracy < 10**6 else 20)

@@ -70,7 +70,7 @@ def test_an_inertial_is_estimated_at_a_density() -> None:
     """A box of the density that its stated mass is: the moments of the closed form, and M of the sound file."""
     mass, _, edges = LINKS["hand"]
     text = BROKEN["no inertial"].change(SOUND).encode()
-    made = checked(text, "rig.urdf", known=Masses({}, density=float(mass / np.prod(edges))))
+    made = checked(text, "rig.urdf", estimates=Masses({}, density=float(mass / np.prod(edges))))
     assert made.repaired is not None
     x, y = rd.Robot.from_text(SOUND).M(Q), rd.Robot.from_text(made.repaired).M(Q)
     assert np.abs(x - y).max() <= 1e-12 * np.abs(x).max()
@@ -239,7 +239,7 @@ def test_the_line_and_the_text_of_a_finding_are_those_of_the_file_though_another
     text = BROKEN["kg mm²"].change(BROKEN["decimal comma"].change(BROKEN["crossed limits"].change(SOUND)))
     of_kind = {each.kind: each for each in checked(text.encode(), "rig.urdf").findings}
     assert of_kind["inertia_shape"].line == 1 + text[: text.index("<inertial", text.index('"upper"'))].count("\n")
-    assert 'lower limit "2.5" is above its upper one "-2.5"' in of_kind["limits_crossed"].what
+    assert 'lower limit "2.5" is above its upper limit "-2.5"' in of_kind["limits_crossed"].what
 
 
 def test_what_is_left_is_what_a_check_of_the_repaired_file_finds() -> None:
@@ -351,7 +351,7 @@ def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.M
     told = run("check", "arm.urdf")
     assert told.returncode == 1
     assert "error: unknown_element: joint 'elbow' (line" in told.stdout
-    assert "<orgin> is not of URDF, and is passed over; <origin> is meant; correct it [--fix]" in told.stdout
+    assert "<orgin> is unknown in URDF and is ignored; <origin> is meant; correct it [--fix]" in told.stdout
     fixed = run("check", "arm.urdf", "--fix", "--json")
     (document,) = json.loads(fixed.stdout)["files"]
     assert document["written"] == "arm.fixed.urdf"
@@ -370,7 +370,7 @@ def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.M
     Path("other/arm.urdf").write_text(SOUND, encoding="utf-8")
     both = run("check", "arm.urdf", "other/arm.urdf", "--fix", "--force")
     assert both.returncode == 2
-    assert "under one name" in both.stderr
+    assert "the same name" in both.stderr
 
 
 @pytest.mark.parametrize(
@@ -380,7 +380,7 @@ def test_the_command_tells_fixes_and_exits(tmp_path: Path, monkeypatch: pytest.M
 def test_the_multiple_of_a_right_angle_that_is_meant_is_named(word: str, named: str) -> None:
     text = SOUND.replace('xyz="0.3 0 0" rpy="0 0 0.3"', f'xyz="0.3 0 0" rpy="0 {word} 0"')
     (finding,) = checked(text.encode(), "rig.urdf").findings
-    assert f'rpy "0 {word} 0" is off {named} by' in finding.what
+    assert f'rpy "0 {word} 0" differs from {named} by' in finding.what
     assert finding.remedy == f"write {named} to 16 digits"
 
 

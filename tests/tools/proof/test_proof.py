@@ -344,10 +344,10 @@ def test_what_is_not_proven_is_said_and_no_wide_ball_given() -> None:
     assert not made.proven and 0 < made.until_s < 1.0 and made.why_not
     assert f"Not proven beyond t = {made.until_s!r} s, because {made.why_not}." in made.summary
     assert made.radius_q.max() < 1.0
-    with pytest.raises(QueryError, match="up to which it is proven"):
+    with pytest.raises(QueryError, match="the end of the proof"):
         made.at(1.0)
     late = proof(arm("ur5"), 10.0, budget_s=0.5)
-    assert not late.proven and late.why_not == "the budget of 0.5 s is spent" and late.until_s > 0
+    assert not late.proven and late.why_not == "the budget of 0.5 s is used up" and late.until_s > 0
 
 
 def test_few_bits_are_enough_for_a_theorem_of_few_digits() -> None:

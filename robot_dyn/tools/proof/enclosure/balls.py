@@ -1,6 +1,6 @@
-"""Bounds of balls and of matrices of balls; what is not finite ends a proof instead of passing a comparison.
+"""Bounds of balls and of matrices of balls; a value that is not finite ends a proof instead of passing a comparison.
 
-Solutions of M x = r for all matrices M of balls, by a matrix A close to M⁻¹ of one of them:
+Solutions of M x = r for all matrices M in balls, from a matrix A close to M⁻¹ of one of them:
 
     x = A r + E x,  E = 1 − A M:   |x|ᵢ ≤ |A r|ᵢ + uᵢ ε/(1−ε) maxⱼ |A r|ⱼ / uⱼ   with  ε = ‖E‖ < 1
 
@@ -15,45 +15,41 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from math import sqrt
-from typing import Any, final
+from typing import final
 
 from flint import arb, arb_mat, ctx, fmpq
 
-Ball = Any  # flint.arb
-Matrix = Any  # flint.arb_mat
+Ball = arb
+Matrix = arb_mat
 
-_GUARD = 24  # with 100 bits no more than two words
+_GUARD = 24  # bits; with 100 bits this still fits two words
 
 
 class NotProvenError(Exception):
-    """Internal: a bound does not hold, or a step is too long for it; says why."""
+    """Internal: a bound does not hold, or a step is too long for it; the message gives the reason."""
 
 
 @contextmanager
 def finer() -> Iterator[None]:
-    """More bits, where numbers cancel: of a residual those of its terms would be left otherwise."""
+    """Use more bits where numbers cancel: in a residual, otherwise only the rounding of its terms would remain."""
     with ctx.workprec(ctx.prec + _GUARD):
         yield
 
 
 def upper(x: Ball) -> Ball:
-    """An exact number that |x| does not exceed."""
+    """Return an exact upper bound of |x|."""
     if not x.is_finite():
         raise NotProvenError("a ball is not finite: a divisor may be 0")
     return x.abs_upper()
 
 
 def largest(balls: Iterable[Ball]) -> Ball:
-    """An exact number that none of |x| exceeds."""
-    most = None
-    for x in balls:
-        bound = upper(x)
-        most = bound if most is None or bound > most else most
-    return most
+    """Return an exact upper bound of all |x|."""
+    return max(map(upper, balls))
 
 
 def dot(x: Sequence[Ball], y: Sequence[Ball]) -> Ball:
-    """Σ xᵢ yᵢ."""
+    """Return Σ xᵢ yᵢ."""
     total = x[0] * y[0]
     for a, b in zip(x[1:], y[1:], strict=True):
         total = total + a * b
@@ -61,7 +57,7 @@ def dot(x: Sequence[Ball], y: Sequence[Ball]) -> Ball:
 
 
 def horner(coefficients: Sequence[Ball], x: Ball) -> Ball:
-    """Σ cₖ xᵏ."""
+    """Return Σ cₖ xᵏ."""
     total = coefficients[-1]
     for c in coefficients[-2::-1]:
         total = total * x + c
@@ -69,35 +65,35 @@ def horner(coefficients: Sequence[Ball], x: Ball) -> Ball:
 
 
 def exact(x: Fraction) -> Ball:
-    """A fraction with a power of two below it, as a number without radius."""
+    """Return a fraction whose denominator is a power of two, as an exact number."""
     with ctx.workprec(x.numerator.bit_length() + 2):
-        made = arb(fmpq(x.numerator, x.denominator))
-    assert made.is_exact()
-    return made
+        result = arb(fmpq(x.numerator, x.denominator))
+    assert result.is_exact()
+    return result
 
 
 def between(low: Ball, high: Ball) -> Ball:
-    """A ball that holds the interval between two exact numbers."""
+    """Return a ball that contains the interval between two exact numbers."""
     return low.union(high)
 
 
 def matrix(rows: Sequence[Sequence[Ball]]) -> Matrix:
-    """The matrix of its rows."""
+    """Return the matrix of these rows."""
     return arb_mat([list(row) for row in rows])
 
 
 def identity(n: int) -> Matrix:
-    """The unit matrix, (n, n)."""
+    """Return the unit matrix, (n, n)."""
     return matrix([[arb(int(i == j)) for j in range(n)] for i in range(n)])
 
 
 def absolute_product(A: Matrix, x: Sequence[Ball]) -> list[Ball]:
-    """Balls of Σⱼ |Aᵢⱼ| xⱼ, of exact bounds of |Aᵢⱼ|."""
+    """Return balls of Σⱼ |Aᵢⱼ| xⱼ, from exact bounds of |Aᵢⱼ|."""
     return [dot([upper(A[i, j]) for j in range(A.ncols())], x) for i in range(A.nrows())]
 
 
 def norm(A: Matrix, w: Sequence[Ball]) -> Ball:
-    """A bound of ‖A‖ in the norm maxᵢ |xᵢ| / wᵢ."""
+    """Return a bound of ‖A‖ in the norm maxᵢ |xᵢ| / wᵢ."""
     return largest(x / unit for x, unit in zip(absolute_product(A, w), w, strict=True))
 
 
@@ -107,14 +103,14 @@ class Inverse:
     """A matrix close to M⁻¹.
 
     Attributes:
-        A: Exact, (n, n).
+        A: Exact matrix, (n, n).
     """
 
     A: Matrix
 
     @classmethod
     def of(cls, M: Sequence[Ball]) -> Inverse:
-        """Of the midpoints of M, n² numbers row by row."""
+        """Return an approximate inverse of the midpoints of M, n² numbers row by row."""
         n = round(sqrt(len(M)))
         try:
             return cls(matrix([M[i * n : (i + 1) * n] for i in range(n)]).mid().inv().mid())
@@ -123,33 +119,31 @@ class Inverse:
 
     @cached_property
     def units(self) -> list[Ball]:
-        """u, exact and positive."""
-        made = [float(self.A[i, i]) for i in range(self.A.nrows())]
-        if not all(x > 0 for x in made):
+        """Units u of the norm, exact and positive."""
+        diagonal = [float(self.A[i, i]) for i in range(self.A.nrows())]
+        if not all(x > 0 for x in diagonal):
             raise NotProvenError("M may be singular")
-        return [arb(sqrt(x)) for x in made]
+        return [arb(sqrt(x)) for x in diagonal]
 
     def contraction(self, M: Matrix) -> Ball:
-        """ε/(1−ε) for all matrices that the balls of M hold.
+        """Return ε/(1−ε) for all matrices in the balls of M.
 
         Raises:
-            NotProvenError: If ε is not less than 1: then one of them may be singular.
+            NotProvenError: If ε is not less than 1, because one of them may be singular.
         """
         epsilon = norm(identity(M.nrows()) - self.A * M, self.units)
         if not epsilon < 1:
-            raise NotProvenError(
-                "within a step M is not certainly regular: the set of states is too wide, or M nearly singular"
-            )
+            raise NotProvenError("M may be singular within a step: the set of states is too wide, or M nearly singular")
         return upper(epsilon / (1 - epsilon))
 
     def bound(self, more: Ball, r: Sequence[Ball]) -> list[Ball]:
-        """Exact bounds of |M⁻¹ x| for all |x| ≤ r, (n,), where ε/(1−ε) ≤ `more`."""
+        """Return exact bounds of |M⁻¹ x| for all |x| ≤ r, (n,), where ε/(1−ε) ≤ `more`."""
         first, u = absolute_product(self.A, r), self.units
         size = more * largest(x / w for x, w in zip(first, u, strict=True))
         return [upper(x + size * w) for x, w in zip(first, u, strict=True)]
 
     def solve(self, more: Ball, right: Matrix) -> Matrix:
-        """M⁻¹ G for all matrices where ε/(1−ε) ≤ `more`, (n, k)."""
+        """Return M⁻¹ G for all matrices where ε/(1−ε) ≤ `more`, (n, k)."""
         product, u = self.A * right, self.units
         n, columns = product.nrows(), product.ncols()
         sizes = [more * largest(product[i, j] / u[i] for i in range(n)) for j in range(columns)]

@@ -2,7 +2,7 @@
 
     M ∂a/∂x = −∂R/∂x (t, x, a),   x = (q, v)
 
-as matrices of balls, or as power series of these, order by order: M₀ Jₖ = −Gₖ − Σ Mᵢ Jₖ₋ᵢ. On a set x = p(t) + b the
+as matrices of balls, or as power series of them, order by order: M₀ Jₖ = −Gₖ − Σ Mᵢ Jₖ₋ᵢ. On a set x = p(t) + b the
 acceleration is a = p'' + c with M c = −R(t, x, p'') = −ρ − ∂R/∂x b: c is small, and needs no forward dynamics.
 """
 
@@ -24,19 +24,19 @@ from robot_dyn.tools.proof.enclosure.polynomial import coefficient
 from robot_dyn.tools.proof.tape import Tape
 
 
-def jacobian(tape: Tape, inverse: Inverse, given: Sequence[Any], length: int = 1) -> list[Matrix]:
-    """∂a/∂(q, v), (n, 2n), as series of a length.
+def jacobian(tape: Tape, inverse: Inverse, arguments: Sequence[Any], length: int = 1) -> list[Matrix]:
+    """Return ∂a/∂(q, v), (n, 2n), as series of a length.
 
     Args:
-        tape: Of the motion.
-        inverse: Close to M⁻¹.
-        given: t, q, v, a: balls, or series of the length.
+        tape: Tape of the motion.
+        inverse: Approximate inverse of M.
+        arguments: t, q, v, a: balls, or series of the length.
         length: Number of coefficients; 1 for balls.
 
     Raises:
         NotProvenError: If M may be singular.
     """
-    parts = _parts(tape, given, length)
+    parts = _parts(tape, arguments, length)
     more = inverse.contraction(parts[0][1])
     coefficients: list[Matrix] = []
     for k, (right, _) in enumerate(parts):
@@ -50,23 +50,23 @@ def on_a_set(
     tape: Tape, inverse: Inverse, t: Ball, p: tuple[list[Ball], list[Ball], list[Ball]], B: Sequence[Ball],
     C: Sequence[Ball], rho: Sequence[Ball],
 ) -> Matrix:  # fmt: skip
-    """∂a/∂(q, v) wherever (q, v) is in p(t) + B, (n, 2n).
+    """Return ∂a/∂(q, v) for all (q, v) in p(t) + B, (n, 2n).
 
     Args:
-        tape: Of the motion.
-        inverse: Close to M⁻¹.
+        tape: Tape of the motion.
+        inverse: Approximate inverse of M.
         t: Times, a ball.
         p: Position, velocity and acceleration of the polynomial at these times.
-        B: Balls about 0, (2n,).
-        C: Balls about 0 that are to hold a − p'', (n,).
+        B: Balls around 0, (2n,).
+        C: Balls around 0 that should contain a − p'', (n,).
         rho: Bounds of the residual along the polynomial at these times, (n,).
 
     Raises:
-        NotProvenError: If C does not hold a − p'' everywhere, or M may be singular.
+        NotProvenError: If C may not contain a − p'' everywhere, or M may be singular.
     """
     n = tape.n
     q, v, a = (
-        [x + b for x, b in zip(known, wide, strict=True)] for known, wide in zip(p, (B[:n], B[n:], C), strict=True)
+        [x + b for x, b in zip(centre, wide, strict=True)] for centre, wide in zip(p, (B[:n], B[n:], C), strict=True)
     )
     ((right, M),) = _parts(tape, (t, q, v, a), 1)
     more = inverse.contraction(M)
@@ -78,9 +78,9 @@ def on_a_set(
     return J
 
 
-def _parts(tape: Tape, given: Sequence[Any], length: int) -> list[tuple[Matrix, Matrix]]:
-    """∂R/∂(q, v), (n, 2n), and M, (n, n), of each order."""
-    n, coefficients = tape.n, tape.derivatives(*given)
+def _parts(tape: Tape, arguments: Sequence[Any], length: int) -> list[tuple[Matrix, Matrix]]:
+    """Return ∂R/∂(q, v), (n, 2n), and M, (n, n), of each order."""
+    n, coefficients = tape.n, tape.derivatives(*arguments)
     parts = []
     for k in range(length):
         rows = [[coefficient(x, k) for x in coefficients[3 * n * i : 3 * n * (i + 1)]] for i in range(n)]

@@ -1,4 +1,4 @@
-"""The error from step to step, e ∈ Q [−r, r], with Q that turns along: Lohner's way against the wrapping effect.
+"""The error from step to step, e ∈ Q [−r, r], with a rotating Q: Lohner's method against the wrapping effect.
 
     e(h) ∈ Y(h) e(0) + w [−1, 1] (δ |e(0)| + h e^{hL} |d|),    δ = h e^{hL} ‖Y' − J Y‖
 
@@ -32,9 +32,9 @@ from robot_dyn.tools.proof.enclosure.polynomial import Polynomial, series
 from robot_dyn.tools.proof.enclosure.tube import Tube
 from robot_dyn.tools.proof.tape import Tape
 
-_ORDERS = 3, 6  # of Y: the second where the first does not know it to a thousandth
+_ORDERS = 3, 6  # of Y: the second if the first has an error above _ENOUGH
 _ENOUGH = 1e-3
-_DOUBT = 0.05  # δ at most
+_DOUBT = 0.05  # largest δ
 
 
 @final
@@ -43,8 +43,8 @@ class ErrorSet:
     """The set Q [−r, r].
 
     Attributes:
-        Q: Exact, (m, m).
-        r: Exact and not negative, (m,).
+        Q: Exact matrix, (m, m).
+        r: Exact numbers, not negative, (m,).
     """
 
     Q: Matrix
@@ -52,19 +52,19 @@ class ErrorSet:
 
     @property
     def bounds(self) -> list[Ball]:
-        """Of each |eᵢ|."""
+        """Bounds of each |eᵢ|."""
         return [upper(x) for x in absolute_product(self.Q, self.r)]
 
 
 def box(r: Sequence[Ball]) -> ErrorSet:
-    """The set |eᵢ| ≤ rᵢ."""
+    """Return the set |eᵢ| ≤ rᵢ."""
     return ErrorSet(identity(len(r)), tuple(r))
 
 
 def fundamental(
     tape: Tape, time: Ball, p: Polynomial, everywhere: Polynomial, inverse: Inverse, h: Ball, T: Ball, within: Tube
 ) -> tuple[Matrix, Ball]:  # fmt: skip
-    """Y(h), and δ, on a tube; `everywhere` is p about T.
+    """Return Y(h) and δ on a tube; `everywhere` is p expanded about T.
 
     Raises:
         NotProvenError: If δ is too large.
@@ -79,30 +79,30 @@ def fundamental(
         if delta < _ENOUGH:
             break
     if not delta < _DOUBT:
-        raise NotProvenError("the fundamental matrix is not well known: the start is too wide, or a step too long")
+        raise NotProvenError("the fundamental matrix is too uncertain: the start is too wide, or a step too long")
     at_end = Y[-1]
-    for each in Y[-2::-1]:
-        at_end = at_end * h + each
+    for term in Y[-2::-1]:
+        at_end = at_end * h + term
     return at_end, delta
 
 
 def _coefficients(
     tape: Tape, time: Ball, p: Polynomial, inverse: Inverse, within: Tube, order: int
 ) -> list[Matrix]:  # fmt: skip
-    """Those of J(p + b) for all b in a tube, to the order."""
+    """Return the coefficients of J(p + b) for all b in a tube, up to the order."""
     n, length = tape.n, order + 1
     ctx.cap = length
     sets = within.B[:n], within.B[n:], within.C
     x = (
-        [series([each[0] + b, *each[1:]], length) for each, b in zip(known, wide, strict=True)]
-        for known, wide in zip((p.q, p.v, p.a), sets, strict=True)
+        [series([c[0] + b, *c[1:]], length) for c, b in zip(coefficients, wide, strict=True)]
+        for coefficients, wide in zip((p.q, p.v, p.a), sets, strict=True)
     )
-    made = jacobian(tape, inverse, (series([time, arb(1)], length), *x), length)
-    return [_whole(each, k == 0) for k, each in enumerate(made)]
+    J = jacobian(tape, inverse, (series([time, arb(1)], length), *x), length)
+    return [_whole(term, k == 0) for k, term in enumerate(J)]
 
 
 def _expansion(J: Sequence[Matrix], h: Ball, within: Tube) -> tuple[list[Matrix], Ball]:
-    """Y of order m by the m + 1 coefficients of J, and δ."""
+    """Return Y of order m from the m + 1 coefficients of J, and δ."""
     m, size = len(J) - 1, J[0].nrows()
     Y = [identity(size)]
     for k in range(m):
@@ -118,7 +118,7 @@ def _expansion(J: Sequence[Matrix], h: Ball, within: Tube) -> tuple[list[Matrix]
 
 
 def carried(before: ErrorSet, Y: Matrix, delta: Ball, within: Tube, rounding: Sequence[Ball]) -> ErrorSet:
-    """The set at the end of a step, of centres with a rounding, (m,)."""
+    """Return the error set at the end of a step, for centres rounded by `rounding`, (m,)."""
     w = within.weights
     size = largest(e / x for e, x in zip(before.bounds, w, strict=True))
     local = [upper(x * (delta * size + within.local) + e) for x, e in zip(w, rounding, strict=True)]
@@ -134,7 +134,7 @@ def carried(before: ErrorSet, Y: Matrix, delta: Ball, within: Tube, rounding: Se
 
 
 def _turned(YQ: Matrix, r: Sequence[Ball], w: Sequence[Ball]) -> Matrix:
-    """Q', exact: any matrix is right, this one keeps the set narrow."""
+    """Return Q', exact: any matrix is valid, and this one keeps the set narrow."""
     m, most = len(r), largest(r)
     units = np.array([float(x) for x in w])
     sizes = np.array([float(x / most) if most > 0 else 0.0 for x in r])
@@ -147,7 +147,7 @@ def _turned(YQ: Matrix, r: Sequence[Ball], w: Sequence[Ball]) -> Matrix:
 
 
 def _whole(J: Matrix, constant: bool) -> Matrix:
-    """[0 1; J], of a coefficient of a power series: the identity is constant."""
+    """Return [0 1; J] for a coefficient of a power series, whose identity is only in the constant one."""
     n = J.nrows()
     top = [[arb(int(constant and j == n + i)) for j in range(2 * n)] for i in range(n)]
     return matrix([*top, *([J[i, j] for j in range(2 * n)] for i in range(n))])

@@ -1,4 +1,4 @@
-"""One proven step: polynomial, defect, tube, and the error set carried on; shorter until all bounds hold."""
+"""One proven step: polynomial, defect, tube and the propagated error set; shortened until all bounds hold."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from robot_dyn.tools.proof.tape import Tape
 
 _GRID = 2**40  # steps end at multiples of 1/grid, so that times are floats
 _LONGEST_S = 1.0
-_OFF, _SHARE = 30.0, 1e-4  # h |d| at most: of the tolerance, and of the errors at the start
+_OFF, _SHARE = 30.0, 1e-4  # largest h |d|, relative to the tolerance and to the errors at the start
 _SHORTER, _TRIES = Fraction(3, 4), 24
-_LONGER = 1.2  # than the step before
-_GROWTH, _LEAST_GROWTH = 0.6, 0.1  # h L that is tried, and at least
-_LARGER = 1.25  # σ than the spectral radius
+_LONGER = 1.2  # relative to the previous step
+_GROWTH, _LEAST_GROWTH = 0.6, 0.1  # h L to try first, and its minimum
+_LARGER = 1.25  # σ relative to the spectral radius
 _LIGHTEST = 1e-12  # weight
 
 
 @final
 @dataclass(frozen=True)
 class Effort:
-    """What a proof puts into its steps.
+    """Settings of the steps of a proof.
 
     Attributes:
-        order: Of the accelerations of a polynomial.
-        tolerance: Of the last term of a step's velocity.
+        order: Order of the accelerations of a polynomial.
+        tolerance: Size of the last term of a step's velocity.
     """
 
     order: int
@@ -52,7 +52,7 @@ class Effort:
 
 
 def effort(bits: int) -> Effort:
-    """Order and tolerance for a precision: 16 and 1e-16 at 53 bits, 22 and 1e-22 at 100."""
+    """Return order and tolerance for a precision: 16 and 1e-16 at 53 bits, 22 and 1e-22 at 100."""
     more = 6 * (bits - 53) / 47
     return Effort(round(16 + more), max(10.0 ** -(16 + more), 1e-300))
 
@@ -60,12 +60,12 @@ def effort(bits: int) -> Effort:
 @final
 @dataclass(frozen=True)
 class State:
-    """Where a step starts: the centre of a set, and the set about it.
+    """Start of a step: the centre of a set, and the set around it.
 
     Attributes:
         t: Time in [s].
-        q, v: The centre, exact.
-        error: What the true state may be off it.
+        q, v: Centre, exact.
+        error: Set of deviations of the true state from the centre.
     """
 
     t: Fraction
@@ -77,14 +77,14 @@ class State:
 @final
 @dataclass(frozen=True)
 class Step:
-    """A step that is proven.
+    """A proven step.
 
     Attributes:
-        start: Its start.
-        h: In [s].
-        p: Its polynomial.
-        tube: Around it.
-        end: Its end.
+        start: State at the start.
+        h: Length, in [s].
+        p: Polynomial.
+        tube: Tube around the polynomial.
+        end: State at the end.
     """
 
     start: State
@@ -95,10 +95,10 @@ class Step:
 
 
 def proven_step(tape: Tape, start: State, end: Fraction, how: Effort, before: Fraction | None = None) -> Step:
-    """The longest step up to `end` that is found to be proven; after one of `before` hardly longer than that.
+    """Return the longest step up to `end` that can be proven, at most slightly longer than the step `before`.
 
     Raises:
-        NotProvenError: If none is; says why.
+        NotProvenError: If there is none; the message gives the reason.
     """
     time = exact(start.t)
     try:
@@ -111,10 +111,10 @@ def proven_step(tape: Tape, start: State, end: Fraction, how: Effort, before: Fr
         raise NotProvenError("M may be singular") from None
     for attempt in range(_TRIES):
         try:
-            return _step(tape, time, start, p, inverse, weights, rate, h, how)
+            return _step(tape, time, start, p, inverse, weights=weights, rate=rate, step=h, how=how)
         except NotProvenError as error:
             why = error
-        except ValueError:  # a power series is divided by one that may begin with 0
+        except ValueError:  # the leading coefficient of a divisor may be 0
             why = NotProvenError("a divisor may be 0 within a step")
         h = _to_grid(start.t, end, h * _SHORTER)
         if attempt == _TRIES - 1:
@@ -134,12 +134,12 @@ def _step(
     most = _OFF * how.tolerance + _SHARE * largest(errors) + 2 * h * largest(d.rounding)
     if not h * largest(d.d) < most:
         raise NotProvenError("a step is too long for its polynomial")
-    around = tube(tape, time, p, inverse, h, d, errors, weights, rate)
+    around = tube(tape, time, p, inverse, h, d, start=errors, weights=weights, rate=rate)
     Y, delta = fundamental(tape, time, p, everywhere, inverse, h, T, around)
     with finer():
-        ends = [horner(each, h) for each in (*p.q, *p.v)]
-    centre = tuple((+each).mid() for each in ends)
-    error = carried(start.error, Y, delta, around, [upper(each - c) for each, c in zip(ends, centre, strict=True)])
+        ends = [horner(coefficients, h) for coefficients in (*p.q, *p.v)]
+    centre = tuple((+x).mid() for x in ends)
+    error = carried(start.error, Y, delta, around, [upper(x - c) for x, c in zip(ends, centre, strict=True)])
     end = State(start.t + step, centre[: tape.n], centre[tape.n :], error)
     return Step(start, step, p, around, end)
 
@@ -147,10 +147,11 @@ def _step(
 def _weights(
     tape: Tape, time: Ball, p: Polynomial, inverse: Inverse, h: float, errors: Sequence[Ball], tolerance: float
 ) -> tuple[list[Ball], float, float]:
-    """Exact weights w = e + A w / σ, the logarithmic norm L ≤ σ at the start, and σ, A = [0 1; |J|], σ = 1.25 ρ(A).
+    """Return exact weights w = e + A w / σ, the logarithmic norm L ≤ σ at the start, and σ.
 
-    A box of the shape w holds the errors e of the start, and what grows of them. At some states parts of J are 0, such
-    as those of a level arm at rest, but not in a tube around them: a σ below 0.1 / h wins nothing.
+    A = [0 1; |J|] and σ = 1.25 ρ(A). A box of the shape w contains the errors e of the start and their growth. Some
+    entries of J vanish at special states, for example of a level arm at rest, but not in a tube around them: a σ below
+    0.1 / h has no benefit.
     """
     n = tape.n
     (J,) = jacobian(tape, inverse, (time, *p.at(arb(0))))
@@ -162,27 +163,27 @@ def _weights(
         with np.errstate(over="raise", invalid="raise"):  # the Jacobian may be beyond a float64
             A[n:, :n] += np.eye(n) * (_LEAST_GROWTH / max(h, 1 / _GRID)) ** 2
             sigma = _LARGER * float(np.abs(np.linalg.eigvals(A)).max())
-            e[n:] = np.maximum(e[n:], sigma * e[:n])  # no narrower: those of q make them
+            e[n:] = np.maximum(e[n:], sigma * e[:n])  # at least the errors caused by those of q
             x = np.linalg.solve(sigma * np.eye(2 * n) - A, e)
             x = np.maximum(x / x.max(), _LIGHTEST)
     except (FloatingPointError, np.linalg.LinAlgError):
         raise NotProvenError("the Jacobian is not finite") from None
-    w = [arb(float(each)) for each in x]
+    w = [arb(float(weight)) for weight in x]
     return w, float(logarithmic_norm(J, w)), sigma
 
 
 def _longest(p: Polynomial, how: Effort, before: Fraction | None) -> float:
-    """The longest step that is tried: by the last coefficients, and by the step before."""
-    found = [_LONGEST_S] if before is None else [_LONGER * float(before)]
+    """Return the longest step to try, from the last coefficients and from the previous step."""
+    lengths = [_LONGEST_S] if before is None else [_LONGER * float(before)]
     for k in (how.order, how.order + 1):
-        size = max(float(abs(each[k])) for each in p.v)
+        size = max(float(abs(coefficients[k])) for coefficients in p.v)
         if size > 0:
-            found.append(0.9 * (how.tolerance / size) ** (1 / k))
-    return min(found)
+            lengths.append(0.9 * (how.tolerance / size) ** (1 / k))
+    return min(lengths)
 
 
 def _to_grid(t: Fraction, end: Fraction, h: Fraction) -> Fraction:
-    """A step of about h that ends on the grid, or at the end."""
+    """Return a step of about h that ends on the grid, or at the end."""
     if t + h >= end:
         return end - t
     after = Fraction(int((t + h) * _GRID), _GRID)

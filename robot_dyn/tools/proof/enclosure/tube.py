@@ -1,4 +1,4 @@
-"""The tube: a set p(t) + B that the true motion does not leave within a step.
+"""The tube: a set p(t) + B that the true motion cannot leave within a step.
 
     e' = J e − (0, d),  J ∈ J(p + B),   |e(t)| ≤ e^{ht L} (|e₀| + h |d|)   with  L ≥ μ(J) on p + B
 
@@ -31,8 +31,8 @@ class Tube:
     """A tube around the polynomial of a step.
 
     Attributes:
-        weights: w, exact, (2n,).
-        size: s, where |eᵢ| ≤ s wᵢ for all i.
+        weights: Weights w, exact, (2n,).
+        size: Size s, with |eᵢ| ≤ s wᵢ for all i.
         growth: Bound of e^{hL}.
         local: Bound of h e^{hL} |d|.
         B: Balls |bᵢ| ≤ s wᵢ, (2n,).
@@ -51,7 +51,7 @@ def tube(
     tape: Tape, time: Ball, p: Polynomial, inverse: Inverse, h: Ball, of: Defect, start: Sequence[Ball],
     weights: Sequence[Ball], rate: float,
 ) -> Tube:  # fmt: skip
-    """The tube of a step.
+    """Return the tube of a step.
 
     Args:
         tape: Tape of the motion.
@@ -61,8 +61,8 @@ def tube(
         h: The step.
         of: Defect of the polynomial.
         start: Bounds of |e| at the start, (2n,).
-        weights: w, exact and positive, (2n,).
-        rate: σ at the start, by which |J| w ≤ σ w.
+        weights: Weights w, exact and positive, (2n,).
+        rate: Rate σ at the start, with |J| w ≤ σ w.
 
     Raises:
         NotProvenError: If the motion may leave the tube.
@@ -88,7 +88,7 @@ def tube(
 
 
 def logarithmic_norm(J: Matrix, w: Sequence[Ball]) -> Ball:
-    """A bound of μ of [0 1; J] in the norm maxᵢ |eᵢ| / wᵢ: maxᵢ (Jᵢᵢ + Σ |Jᵢⱼ| wⱼ / wᵢ); at least 0."""
+    """Return a bound of μ of [0 1; J] in the norm maxᵢ |eᵢ| / wᵢ: maxᵢ (Jᵢᵢ + Σ |Jᵢⱼ| wⱼ / wᵢ); at least 0."""
     n = J.nrows()
     most = largest(w[n + i] / w[i] for i in range(n))
     for i in range(n):
