@@ -237,7 +237,8 @@ class PlainMethod(Integrator):
             derivatives = system.derivatives(t, x.T.reshape(y.shape), t + h)
             out[...] = np.moveaxis(derivatives.reshape(m + 1, -1, m), 1, 2)
 
-        x = States(y=start, after=after, p=None, run_parameters=None, failed=failed)
+        no_numbers = np.zeros(0)  # the system has its own
+        x = States(y=start, after=after, p=no_numbers, run_parameters=no_numbers, failed=failed)
         step(RightSide(rate, jacobian), coefficients, work, t, h, x)
         return after.T.reshape(y.shape), failed, work
 

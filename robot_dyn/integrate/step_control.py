@@ -148,7 +148,8 @@ def first_step(f: Any, work: Any, control: StepControl, t: float, end: float, x:
 
 def next_of_mesh(control: StepControl, t: float, end: float) -> float:
     """Return the first time of the mesh after t, or the end."""
-    k, mesh = control.mesh_index[0], control.mesh
+    mesh = control.mesh
+    k: int = control.mesh_index[0]
     while k < len(mesh) and mesh[k] <= t:
         k += 1
     control.mesh_index[0] = k

@@ -34,14 +34,14 @@ class EventLog(NamedTuple):
 
     Attributes:
         rows: The rows, (R, 5 + 2n).
-        count: Number of rows in use, (1,).
+        filled: Number of rows in use, (1,).
         limit: Number of rows from which on the loop returns; one event may write further rows.
         latest, total: Times of the latest events, (CHATTER,), and number of all events, (1,).
         brief: Time in which CHATTER events may be chatter of a threshold, which Python handles, in [s].
     """
 
     rows: Array
-    count: Array
+    filled: Array
     limit: int
     latest: Array
     total: Array
@@ -52,7 +52,7 @@ def event_log(n: int, at_once: int, brief: float) -> EventLog:
     """Return an empty log for n joints, with up to `at_once` rows for one event."""
     return EventLog(
         rows=np.zeros((_ROWS + at_once, 5 + 2 * n)),
-        count=np.zeros(1, np.int64),
+        filled=np.zeros(1, np.int64),
         limit=_ROWS,
         latest=np.zeros(CHATTER),
         total=np.zeros(1, np.int64),
@@ -62,11 +62,11 @@ def event_log(n: int, at_once: int, brief: float) -> EventLog:
 
 def log_event(log: EventLog, t: float, y: Array, number: int, kind: int, side: float, direction: float) -> None:
     """Write a row."""
-    row = log.rows[log.count[0]]
+    row = log.rows[log.filled[0]]
     row[0], row[1], row[2], row[3], row[4] = t, float(number), float(kind), side, direction
     for j in range(len(row) - 5):
         row[5 + j] = y[j, 0]
-    log.count[0] += 1
+    log.filled[0] += 1
     log_time(log, t)
 
 

@@ -105,7 +105,7 @@ def function_approaches(table: EventTable, lanes: Lanes, t: float) -> bool:
     may_pass = table.user_defined > 0
     evaluate(table.functions, t, lanes.after, lanes.p, lanes.run_parameters, table.values)
     for e in range(coordinates(table), len(table.rows) - table.user_defined):
-        i = table.rows[e]
+        i: int = table.rows[e]
         x0, x1, change = table.previous[i], table.values[i, 0], table.change[i]
         may_pass = may_pass or function_nears(x0, x1, change, table.levels[e], table.sides[e])
     for i in range(len(table.values)):

@@ -60,7 +60,7 @@ def end_mode(f: Functions, t: float, lanes: Lanes, table: EventTable, mode: Cont
     write_guards(mode, lanes.y, table)
     if not same_sides(table, lanes, t):
         return Ended.CHANGED
-    return Ended.DONE if mode.log.count[0] <= mode.log.limit else Ended.PAUSED
+    return Ended.DONE if mode.log.filled[0] <= mode.log.limit else Ended.PAUSED
 
 
 def without_modes(f: Functions, t: float, lanes: Lanes, table: EventTable, mode: ContactMode, guard: int) -> int:
@@ -171,7 +171,8 @@ def accumulates(mode: ContactMode, t: float) -> bool:
     most = len(mode.changes)
     mode.changes[mode.change_count[0] % most] = t
     mode.change_count[0] += 1
-    return mode.change_count[0] >= most and t - mode.changes[mode.change_count[0] % most] <= mode.brief
+    count: int = mode.change_count[0]
+    return count >= most and t - mode.changes[count % most] <= mode.brief
 
 
 def write_guards(mode: ContactMode, y: Array, table: EventTable) -> None:

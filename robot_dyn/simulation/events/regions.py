@@ -24,7 +24,7 @@ class Regions(NamedTuple):
     Attributes:
         sides: Sides of the thresholds in each region, see `EventTable`, (T, K).
         run_parameters: Parameters there, without the actuation in zero-order hold, (P, K).
-        count: Number of regions in use, (1,); 0 where Python functions change with the sides.
+        filled: Number of regions in use, (1,); 0 where Python functions change with the sides.
         directions: Direction of each user-defined event, (G,).
         terminal: True if the event ends the run, (G,).
         log: Log of events.
@@ -32,7 +32,7 @@ class Regions(NamedTuple):
 
     sides: Array
     run_parameters: Array
-    count: Array
+    filled: Array
     directions: Array
     terminal: Array
     log: EventLog
@@ -43,7 +43,7 @@ def regions_of(thresholds: int, parameters: int, directions: Array, terminal: Ar
     return Regions(
         sides=np.zeros((thresholds, _MOST)),
         run_parameters=np.zeros((parameters, _MOST)),
-        count=np.zeros(1, np.int64),
+        filled=np.zeros(1, np.int64),
         directions=directions,
         terminal=terminal,
         log=log,
@@ -66,7 +66,7 @@ def pass_threshold(
     """
     number = event if event < table.thresholds else event - table.guards
     side, log = table.sides[event], regions.log
-    if log.count[0] >= log.limit:
+    if log.filled[0] >= log.limit:
         return False
     g = number - len(regions.sides)  # among the user-defined events
     if g >= 0:
@@ -83,7 +83,7 @@ def pass_threshold(
 
 def enter_region(regions: Regions, table: EventTable, mode: ContactMode, lanes: Lanes, held: int) -> bool:
     """Write the run parameters of the region that the sides determine. Return False if they are not cached."""
-    for k in range(regions.count[0]):
+    for k in range(regions.filled[0]):
         same = True
         for i in range(len(regions.sides)):
             e = i if i < table.thresholds else i + table.guards
@@ -98,7 +98,7 @@ def enter_region(regions: Regions, table: EventTable, mode: ContactMode, lanes: 
 
 def add_region(regions: Regions, sides: np.ndarray, parameters: np.ndarray) -> None:
     """Cache the parameters of a new region; if the table is full, the loop returns to Python each time."""
-    k = int(regions.count[0])
+    k = int(regions.filled[0])
     if k < _MOST and not (sides == regions.sides[:, :k].T).all(axis=1).any():
         regions.sides[:, k], regions.run_parameters[:, k] = sides, parameters
-        regions.count[0] += 1
+        regions.filled[0] += 1

@@ -81,7 +81,7 @@ class EventHandler:
 
     def take_log(self) -> None:
         """Move the events that the loop has logged to the events of the run."""
-        count, self.log.count[0] = int(self.log.count[0]), 0
+        count, self.log.filled[0] = int(self.log.filled[0]), 0
         if count:
             happened = [self._occurrence(row) for row in self.log.rows[:count].tolist()]
             self.state.events = sorted([*self.state.events, *happened], key=lambda event: event.t)

@@ -84,7 +84,7 @@ def event_loop(
         table, lanes, position = loop.table, loop.lanes, loop.position
         last = len(table.counts) - 1
         while position.segment[0] <= last:
-            s = position.segment[0]
+            s: int = position.segment[0]
             if table.payload_events[s] == 1:
                 return Ended.PAYLOAD
             copy(lanes.p, table.parameters[s])
@@ -231,7 +231,8 @@ def event_loop(
 
 def begin_segment(f: Functions, loop: Loop) -> bool:
     """Do the tick and the samples at the start of a segment. Return False if the torque at the tick is not finite."""
-    table, lanes, config, position, s = loop.table, loop.lanes, loop.config, loop.position, loop.position.segment[0]
+    table, lanes, config, position = loop.table, loop.lanes, loop.config, loop.position
+    s: int = position.segment[0]
     t, period, share_period = table.starts[s], config.sample_period, config.share_period
     if table.ticks[s] > 0 and not act(f, loop, t, table.at_ticks[s], table.ticks[s]):
         return False
@@ -264,7 +265,8 @@ def finish_step(
     f: Functions, work: Any, loop: Loop, table: EventTable, control: StepControl, event: int, rest: float
 ) -> None:
     """Take y⁺ at the end of a step, and record it; `rest` is the length that is left to an event."""
-    lanes, config, position, s = loop.lanes, loop.config, loop.position, loop.position.segment[0]
+    lanes, config, position = loop.lanes, loop.config, loop.position
+    s: int = position.segment[0]
     y, t, t1, start = lanes.y, position.time[0], control.end[0], loop.table.starts[s]
     copy(y, lanes.after)
     if event >= 0:

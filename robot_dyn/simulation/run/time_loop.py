@@ -36,7 +36,7 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
         if not config.alone:
             begin_lanes(functions, loop)
         while position.segment[0] <= last:
-            s = position.segment[0]
+            s: int = position.segment[0]
             start, h, tick = table.starts[s], table.lengths[s], table.ticks[s]
             if table.payload_events[s] == 1:
                 return Ended.PAYLOAD

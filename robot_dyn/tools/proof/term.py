@@ -77,8 +77,8 @@ class Term:
     def __add__(self, other: Any) -> Any:
         if (x := _term(other)) is None:
             return NotImplemented
-        nodes: list[Any] = [term.node for term in (self, x) if term.node is not None]
-        return Term(self.constant + x.constant, sum(nodes[1:], start=nodes[0]) if nodes else None)
+        node = self.node if x.node is None else x.node if self.node is None else self.node + x.node
+        return Term(self.constant + x.constant, node)
 
     __radd__ = __add__
 

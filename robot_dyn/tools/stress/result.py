@@ -24,7 +24,7 @@ _TABLES = {  # by title, the findings in a table and their attributes
         ("what", "duration_s", "estimated", "true", "unsure", "report", "misleads"),
     ),
 }
-_HEADINGS = {"within": "at 0.98 of value", "beyond": "at 1.02 of value", "duration_s": "duration [s]"}
+_HEADINGS: dict[str, str] = {"within": "at 0.98 of value", "beyond": "at 1.02 of value", "duration_s": "duration [s]"}
 _NUMBERS = ("typical", "random", "searched", "minimal", "value", "duration [s]", "estimated", "true", "unsure")
 
 
