@@ -77,6 +77,8 @@ def test_arrays_of_other_kinds_are_taken_or_refused(count: int) -> None:
     right = ARM.forward_dynamics(*rows)
     masked = [np.ma.masked_array(x) for x in rows]
     np.testing.assert_allclose(FAST.forward_dynamics(*masked), right, rtol=1e-12)
+    whole = [1, 2], np.array([1, -1]), np.array([[3, 0]] * count, np.int8)
+    np.testing.assert_allclose(FAST.forward_dynamics(*whole), ARM.forward_dynamics(*whole), rtol=1e-12)
     locked = np.empty((count, 2))
     locked.flags.writeable = False
     with pytest.raises(QueryError, match="read-only"):

@@ -17,6 +17,7 @@ from robot_dyn.lagrange import Linkage, composite_body, magnitudes, newton_euler
 from robot_dyn.lagrange.recursions.kinetic_energy import kinetic_energy
 from robot_dyn.model import completed
 from robot_dyn.scene import of_scene, parse_scene
+from tests.long import long
 from tests.random_trees import RandomTree, trees
 
 
@@ -34,14 +35,26 @@ def assert_same(given: Linkage, made: Linkage, seed: int) -> None:
     assert abs(energy) <= 1e-12 * np.abs(v) @ size.M @ np.abs(v)
 
 
-@settings(max_examples=40)
-@given(trees(), st.integers(0, 2**32 - 1))
-def test_the_equations_stay_the_same(tree: RandomTree, seed: int) -> None:
-    """Any axis, branches, couplings, up to twelve joints; armature is of the joint and stays there."""
-    robot = tree.robot
+def assert_unchanged(robot: rd.Robot, seed: int) -> None:
+    """With armature as well, which is of the joint and stays there."""
     linkage = rd.Lagrangian(robot.with_(armature={robot.joint_names[-1]: 0.05})).linkage
     for change in (slid, regrouped, lambda linkage: regrouped(slid(linkage))):
         assert_same(linkage, change(linkage), seed)
+
+
+@pytest.mark.parametrize(
+    "name", ["ur5", "panda", "kinova", *long(["cart_pole", "mimic_chain", "skew_tree", "planar_2r"])]
+)
+def test_the_equations_stay_the_same(name: str) -> None:
+    for seed in range(5):
+        assert_unchanged(rd.load(name), seed)
+
+
+@settings(max_examples=40)
+@given(trees(), st.integers(0, 2**32 - 1))
+def test_of_random_trees_too(tree: RandomTree, seed: int) -> None:
+    """Any axis, branches, couplings, up to twelve joints."""
+    assert_unchanged(tree.robot, seed)
 
 
 def test_bodies_that_turn_have_no_mass_left() -> None:

@@ -266,7 +266,7 @@ def test_a_compiled_plant_is_the_interpreted_one(name: str) -> None:
     compiled = plant(EFFECTS[name])
     q, v, u = states(2, 12)
     for t in (0.0, 0.3, 0.9):
-        for method in ("N", "forward_dynamics"):
+        for method in ("N", "torque", "forward_dynamics"):
             rest = (9 * u,) if method == "forward_dynamics" else ()
             ours, theirs = (
                 np.array([getattr(each, method)(t, *row) for row in zip(q, v, *rest, strict=True)])

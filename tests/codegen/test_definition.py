@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
@@ -224,21 +223,6 @@ def test_what_another_process_may_have_otherwise_has_no_definition(what: str) ->
     assert definition(cell("def f(t, q, v): return -v").f) is not None
 
 
-def drag_with_method(module: Any) -> Any:
-    made = module.Drag()
-    object.__setattr__(made, "torque", lambda dynamics, t, q, v: -v)
-    return made
-
-
-def drag_with(**changes: Any) -> Callable[[Any], Any]:
-    def make(module: Any) -> Any:
-        for name, value in changes.items():
-            setattr(module.Drag, name, value)
-        return module.Drag()
-
-    return make
-
-
 def structure_of(effect: Any) -> Any:
     return structure(StateEquation(rd.Plant(ARM, [effect]), None))
 
@@ -247,15 +231,19 @@ def test_what_is_changed_at_run_time_is_in_the_structure() -> None:
     """An attribute of a class, a method put in its place, one put into an object, a variable of the module."""
     module = cell(CELL)
     known = [structure_of(module.Drag())]
-    known.append(structure_of(drag_with(width=0.3)(module)))
-    known.append(structure_of(drag_with(shape=lambda self, v: v)(module)))
-    module.GAIN = 7.0
-    known.append(structure_of(module.Drag()))
-    module.deepest.__defaults__ = (5,)
-    known.append(structure_of(module.Drag()))
+    for changed, name, value in (
+        (module.Drag, "width", 0.3),
+        (module.Drag, "shape", lambda self, v: v),
+        (module, "GAIN", 7.0),
+        (module.deepest, "__defaults__", (5,)),
+    ):
+        setattr(changed, name, value)
+        known.append(structure_of(module.Drag()))
     assert all(each.lasting for each in known)
     assert len({each.described for each in known}) == len(known)
-    assert not structure_of(drag_with_method(module)).lasting
+    drag = module.Drag()
+    object.__setattr__(drag, "torque", lambda dynamics, t, q, v: -v)
+    assert not structure_of(drag).lasting
 
 
 def test_values_inside_of_parts_that_are_no_parameters_are_in_the_structure() -> None:

@@ -85,8 +85,9 @@ def test_every_operation_computes_what_casadi_does(dtype: str) -> None:
     assert max(kernel.call(row, y) for row, y in zip(data, one, strict=True)) == Status.FINE
     exact = [Kind.SIGN, Kind.FLOOR, Kind.CEILING, Kind.NEGATE, Kind.MINIMUM, Kind.MAXIMUM, Kind.COPY_SIGN]
     exact += [Kind.ABSOLUTE, Kind.LESS, Kind.LESS_OR_EQUAL, Kind.EQUAL, Kind.NOT_EQUAL, Kind.NOT, Kind.AND, Kind.OR]
+    of_c = [Kind.EXPONENTIAL, Kind.LOGARITHM, Kind.POWER, Kind.REMAINDER, Kind.ARC_TANGENT_OF_TWO]
     for k, kind in enumerate(made):
-        ulps = 0 if kind in exact else 4
+        ulps = 0 if kind in exact else 2 if kind in of_c and dtype == "float64" else 4
         for ours in (batch[:, k], one[:, k]):
             assert np.all(np.abs(ours - expected[:, k]) <= ulps * np.finfo(dtype).eps * np.abs(expected[:, k])), kind
 

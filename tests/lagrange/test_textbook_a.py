@@ -157,28 +157,12 @@ def test_a5_solids_have_the_inertia_and_volume_of_the_table(seed: int) -> None:
         "ellipsoid": (in_ellipsoid, [0, 0, 0], [1, np.pi, turn]),
     }
     integrals = {name: from_density(lambda x: rho, lo, up, chart=f) for name, (f, lo, up) in round_parts.items()}
+    squares = np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2])
+    of_disc = np.array([(3 * a**2 + b**2) / 12] * 2 + [a**2 / 2])
     table = [  # solid, its integral, volume, moments per mass
-        (
-            box,
-            (a, b, c),
-            from_density(lambda x: rho, -half, half),
-            a * b * c,
-            np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2]) / 12,
-        ),
-        (
-            cylinder,
-            (a, b),
-            integrals["cylinder"],
-            np.pi * a**2 * b,
-            np.array([(3 * a**2 + b**2) / 12] * 2 + [a**2 / 2]),
-        ),
-        (
-            ellipsoid,
-            (a, b, c),
-            integrals["ellipsoid"],
-            4 * np.pi * a * b * c / 3,
-            np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2]) / 5,
-        ),
+        (box, (a, b, c), from_density(lambda x: rho, -half, half), a * b * c, squares / 12),
+        (cylinder, (a, b), integrals["cylinder"], np.pi * a**2 * b, of_disc),
+        (ellipsoid, (a, b, c), integrals["ellipsoid"], 4 * np.pi * a * b * c / 3, squares / 5),
     ]
     for solid, lengths, integral, volume, moments in table:
         body = solid(integral.mass, *lengths)

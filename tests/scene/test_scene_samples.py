@@ -23,9 +23,10 @@ ARM, T = rd.load("planar_2r"), np.linspace(0, 1, 21)
 Q = 0.2 + np.outer(10 * T**3 - 15 * T**4 + 6 * T**5, [0.7, -0.4])
 
 
-def reference(folder: Path, text: str) -> rd.control.PiecewisePolynomial:
+def reference(folder: Path, text: str, head: str = SCENE) -> rd.control.PiecewisePolynomial:
+    """What the controller of a scene follows; the scene is written next to its table."""
     path = folder / "scene.toml"
-    path.write_text(SCENE + text, encoding="utf-8")
+    path.write_text(head + text, encoding="utf-8")
     return rd.read_scene(path).controller.desired
 
 
@@ -52,11 +53,8 @@ def test_the_motion_of_a_scene_is_that_of_from_samples(tmp_path: Path) -> None:
 
 def test_way_points_of_a_logger_are_those_of_the_scene(tmp_path: Path) -> None:
     write(tmp_path / "way.csv", "t [ms],J2,J1", 1000 * T[::5] + 500, np.degrees(Q[::5, 1]), np.degrees(Q[::5, 0]))
-    scene = SCENE.replace('"samples"', '"via_points"')
-    (tmp_path / "scene.toml").write_text(
-        scene + 'file = "way.csv"\nunit = "deg"\njoints = {joint_1 = "J1", joint_2 = "J2"}\n', encoding="utf-8"
-    )
-    desired = rd.read_scene(tmp_path / "scene.toml").controller.desired
+    text = 'file = "way.csv"\nunit = "deg"\njoints = {joint_1 = "J1", joint_2 = "J2"}\n'
+    desired = reference(tmp_path, text, SCENE.replace('"samples"', '"via_points"'))
     np.testing.assert_allclose(desired.at(T[::5] + 0.5)[0], Q[::5], atol=1e-12)
 
 
@@ -99,22 +97,13 @@ ROWS = "0.5,0.4,0.1\n0.9,-0.2,0.3\n1.6,0.7,0.2\n"
 TIMES, POINTS = [0.5, 0.9, 1.6], [[0.1, 0.4], [0.3, -0.2], [0.2, 0.7]]  # in the order of the joints: slide, hinge
 
 
-def followed(folder: Path, text: str) -> rd.control.PiecewisePolynomial:
-    """What the controller of a scene follows; the scene is written beside its table."""
-    path = folder / "scene.toml"
-    path.write_text(OF_POINTS + text, encoding="utf-8")
-    controller = rd.read_scene(path).controller
-    assert controller is not None and isinstance(controller.desired, rd.control.PiecewisePolynomial)
-    return controller.desired
-
-
 def test_points_of_a_file_are_those_of_the_scene(tmp_path) -> None:
     """From rest at the start through the rows, columns by the names of joints; a row at 0 s is the start itself."""
     (tmp_path / "way.csv").write_text(HEAD + ROWS)
     (tmp_path / "whole.csv").write_text(HEAD + "0,0.3,0\n" + ROWS)
-    stated = followed(tmp_path, f"times_s = {TIMES}\npoints = {POINTS}\n")
+    stated = reference(tmp_path, f"times_s = {TIMES}\npoints = {POINTS}\n", OF_POINTS)
     for name in ("way.csv", "whole.csv"):
-        read = followed(tmp_path, f'file = "{name}"\n')
+        read = reference(tmp_path, f'file = "{name}"\n', OF_POINTS)
         np.testing.assert_array_equal(read.breaks, stated.breaks)
         np.testing.assert_array_equal(read.coefficients, stated.coefficients)
     for t, q in zip([0.0, *TIMES], [[0.0, 0.3], *POINTS], strict=True):
