@@ -125,19 +125,15 @@ def stepper(m: int, rows: int, bounded: int) -> ControlledStepper:
     )
 
 
-def stage(f: RightSide, c: Coefficients, work: Work, t: Any, h: Any, x: States, i: int, state: Array) -> None:
-    """Compute stage i, with its state in an array (m, 1)."""
-    combination(state, x.y, h, c.a[i], work.K, i)
-    evaluate(f.rate, t + c.c[i] * h, state, x.p, x.run_parameters, work.K[i])
-    subtract(work.K[i], work.K[0])
-
-
 def step(f: RightSide, c: Coefficients, work: Work, t: Any, h: Any, x: States) -> int:
     """Take a trial step; see `ControlledStepper`."""
+    y, after, p, run_parameters, K = x.y, x.after, x.p, x.run_parameters, work.K
     x.failed[0] = 0
     for i in range(1, _STAGES):
-        stage(f, c, work, t, h, x, i, x.after)
-    combination(x.after, x.y, h, c.b, work.K, _STAGES)
+        combination(after, y, h, c.a[i], K, i)
+        evaluate(f.rate, t + c.c[i] * h, after, p, run_parameters, K[i])
+        subtract(K[i], K[0])
+    combination(after, y, h, c.b, K, _STAGES)
     return _STAGES - 1
 
 
@@ -155,17 +151,19 @@ def error(c: Coefficients, work: Work, h: Any, x: States, rtol: float, atol: flo
 
 def dense(f: RightSide, c: Coefficients, work: Work, t: Any, h: Any, x: States) -> int:
     """Compute the dense output, from three further stages; see `ControlledStepper`."""
-    F = work.F
-    copy(work.K[_STAGES], work.last)
-    subtract(work.K[_STAGES], work.K[0])
+    F, K = work.F, work.K
+    copy(K[_STAGES], work.last)
+    subtract(K[_STAGES], K[0])
     for i in range(_STAGES + 1, _EXTENDED):
-        stage(f, c, work, t, h, x, i, F[0])
+        combination(F[0], x.y, h, c.a[i], K, i)
+        evaluate(f.rate, t + c.c[i] * h, F[0], x.p, x.run_parameters, K[i])
+        subtract(K[i], K[0])
     copy(F[0], x.after)
     subtract(F[0], x.y)
-    combination(F[1], work.zero, h, c.b, work.K, 1)
+    combination(F[1], work.zero, h, c.b, K, 1)
     subtract(F[1], F[0])
-    combination(F[2], F[0], -h, c.end, work.K, _STAGES + 1)
+    combination(F[2], F[0], -h, c.end, K, _STAGES + 1)
     subtract(F[2], F[1])
     for i in range(4):
-        combination(F[3 + i], work.zero, h, c.d[i], work.K, _EXTENDED)
+        combination(F[3 + i], work.zero, h, c.d[i], K, _EXTENDED)
     return _EXTENDED - _STAGES - 1

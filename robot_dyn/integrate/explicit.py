@@ -29,12 +29,12 @@ class Stages(NamedTuple):
 
 def explicit_step(f: RightSide, tableau: Coefficients, work: Stages, t: Any, h: Any, x: States) -> int:
     """Take a step of an explicit Runge–Kutta method; see `Stepper` for the arguments."""
-    K, s = work.K, len(tableau.c)
-    evaluate(f.rate, t, x.y, x.p, x.run_parameters, K[0])
+    y, after, p, run_parameters, K, s = x.y, x.after, x.p, x.run_parameters, work.K, len(tableau.c)
+    evaluate(f.rate, t, y, p, run_parameters, K[0])
     for i in range(1, s):
-        combination(x.after, x.y, h, tableau.a[i], K, i)
-        evaluate(f.rate, t + tableau.c[i] * h, x.after, x.p, x.run_parameters, K[i])
-    combination(x.after, x.y, h, tableau.b, K, s)
+        combination(after, y, h, tableau.a[i], K, i)
+        evaluate(f.rate, t + tableau.c[i] * h, after, p, run_parameters, K[i])
+    combination(after, y, h, tableau.b, K, s)
     return s
 
 

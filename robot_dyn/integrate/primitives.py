@@ -8,7 +8,8 @@ above them exists once. A state is (m, W), entry by run: one run, or W of them i
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,6 +19,13 @@ MOST_ITERATIONS = 100  # the iteration must gain a binary digit in two rounds, t
 PATIENCE = 2  # rounds: where q' = v and v' = −k q, increments shrink only every second one
 NOISE = 1e3  # roundings of the largest entry that an increment may keep, as where forces cancel
 GOING, SETTLED, LOST = 1, 0, 2  # an iteration: not yet ended; at rounding; overflowed
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def inlined(function: F) -> F:
+    """Mark a plain function for machine code, which then inserts it at each call: for parts of a loop."""
+    function.__dict__["inlined"] = True
+    return function
 
 
 def evaluate(function: Any, t: Any, y: Array, p: Array, run_parameters: Array, out: Array) -> None:

@@ -68,13 +68,14 @@ def differentiate(f: RightSide, work: Linear, t: Any, x: States) -> None:
 
 def stages(f: RightSide, table: Numbers, work: Linear, t: Any, h: Any, x: States) -> int:
     """Take the step, from these derivatives."""
-    K, U, h_gamma, y, after = work.K, work.U, h * table.gamma, x.y, x.after
+    K, U, h_gamma = work.K, work.U, h * table.gamma
+    y, after, p, run_parameters = x.y, x.after, x.p, x.run_parameters
     factor(work.A, work.J, h_gamma, work.rows, x.failed)
     combination(K[1][: len(y)], work.zero, h, table.last, work.J, len(work.J))
     for i in range(len(table.m)):
         if i > 0:
             combination(after, y, table.one, table.a[i], U, i)
-            evaluate(f.rate, t + table.alpha[i] * h, after, x.p, x.run_parameters, K[2])
+            evaluate(f.rate, t + table.alpha[i] * h, after, p, run_parameters, K[2])
         combination(work.rhs, work.zero, h_gamma, table.f[i], K, 3 if i > 0 else 2)
         combination(U[i], work.rhs, table.gamma, table.c[i], U, i)
         solve(work.A, work.rows, U[i])

@@ -105,13 +105,16 @@ def initial_control(
     error_order: int, rtol: float = 0.0, atol: float = 0.0, longest: float = inf, mesh: np.ndarray = _NO_MESH
 ) -> StepControl:
     """Return the state of step control before the first step; see `StepControl` for the arguments."""
+    next_h, h, end, error = np.zeros((4, 1))
+    rejected, mesh_index = np.zeros((2, 1), np.int64)
+    error[0] = 1e-4
     return StepControl(
-        next_h=np.zeros(1),
-        h=np.zeros(1),
-        end=np.zeros(1),
-        error=np.full(1, 1e-4),
-        rejected=np.zeros(1, np.int64),
-        mesh_index=np.zeros(1, np.int64),
+        next_h=next_h,
+        h=h,
+        end=end,
+        error=error,
+        rejected=rejected,
+        mesh_index=mesh_index,
         mesh=mesh,
         rtol=float(rtol),
         atol=float(atol),

@@ -107,9 +107,14 @@ def pack(values: tuple[Any, ...], store: Callable[[], Store | None]) -> Packed:
     if found is None:
         kinds = (kind_of(value) for value in values)
         found = layout.kinds.setdefault(known, (next(_numbers), tuple([_one.setdefault(kind, kind) for kind in kinds])))
+    floats = memoryview(block).cast("B").cast("d")
     for at, number in zip(layout.numbers, numbers, strict=True):
-        letter = "d" if isinstance(number, float) else "Q" if type(number) is np.uint64 else "q"
-        struct.pack_into(letter, block, 8 * at, number if letter == "d" else int(number))
+        if isinstance(number, float):
+            floats[at] = number
+        elif type(number) is np.uint64:
+            struct.pack_into("Q", block, 8 * at, int(number))
+        else:
+            block[at] = int(number)
     return Packed(found[1], found[0], block, tuple([start + 8 * at for at in layout.starts]))
 
 
@@ -118,11 +123,13 @@ def _flatten(values: tuple[Any, ...], form: list[Any], arrays: list[np.ndarray],
     for value in values:
         kind = type(value)
         if kind is np.ndarray:
-            form.append(value.dtype)
-            form.append(value.ndim)
+            form += value.dtype, value.ndim
             arrays.append(value)
             continue
-        form.append(kind)
+        form += (kind,)
+        if kind is float or kind is int or kind is bool:
+            numbers.append(value)
+            continue
         if isinstance(value, tuple):
             form.append(len(value))
             _flatten(value, form, arrays, numbers)

@@ -88,9 +88,10 @@ class Position(NamedTuple):
 
 
 def start_position(sample_time: float = 0.0) -> Position:
-    """Return the position at the start of a run, with the time of its first sample."""
-    position = Position._make(np.zeros((len(Position._fields), 1), np.int64))
-    return position._replace(time=np.zeros(1), sample_time=np.full(1, sample_time))
+    """Return the position at the start of a run, with the time of its first sample; the last two fields are floats."""
+    position = Position._make([*np.zeros((len(Position._fields) - 2, 1), np.int64), *np.zeros((2, 1))])
+    position.sample_time[0] = sample_time
+    return position
 
 
 class Functions(NamedTuple):
@@ -242,26 +243,32 @@ def lanes_of(
     seed, run = (0, 0) if equation.controller is None else equation.controller.noise_key
     start, after = aligned((2, m, W))
     start[...] = y
+    inner, end_state = np.zeros((2, m, W))
+    size, end_time, energy, peak = np.zeros((4, W))
+    failed, reason = np.zeros((2, W), np.int64)
+    keys = np.empty((2, W), np.uint64)
+    keys[0], keys[1] = seed, numbers
+    keys[1] += np.uint64(run)
     return Lanes(
         y=start,
         after=after,
-        p=np.array(p),
+        p=p.copy(),
         run_parameters=np.array(run_parameters, order="C"),
-        failed=np.zeros(W, np.int64),
-        inner=np.zeros((m, W)),
+        failed=failed,
+        inner=inner,
         sampled=np.empty((sampled, W)),
         command=np.empty((n * equation.sampled + equation.state_size, W)),
         u=np.empty((n, W)),
         energies=np.empty((2, W)),
-        size=np.empty(W),
+        size=size,
         alive=np.ones(W, np.int64),
-        reason=np.zeros(W, np.int64),
-        end_time=np.zeros(W),
-        end_state=np.zeros((m, W)),
-        energy=np.zeros(W),
+        reason=reason,
+        end_time=end_time,
+        end_state=end_state,
+        energy=energy,
         scale=np.ones(W),
-        peak=np.zeros(W),
-        keys=np.array([np.full(W, seed, np.uint64), np.uint64(run) + numbers.astype(np.uint64)]),
+        peak=peak,
+        keys=keys,
     )
 
 

@@ -193,7 +193,7 @@ def _workspace(m: int, N: int, n: int) -> EventWorkspace:
         M_all=np.zeros((N, max(N, 2))),
         struck=np.zeros(n),
         settling=settling(N),
-        **{name: np.zeros(N) for name in names},
+        **dict(zip(names, np.zeros((len(names), N)), strict=True)),
     )
 
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.bernstein import NONE
-from robot_dyn.integrate.primitives import between, copy
+from robot_dyn.integrate.primitives import between, copy, inlined
 from robot_dyn.integrate.step_control import (
     Choice,
     StepControl,
@@ -137,6 +137,7 @@ def event_loop(
         position.phase[0] = Phase.STEPS
         return True
 
+    @inlined
     def take_step(f: Functions, c: Any, work: Any, loop: Loop, control: StepControl, end: float) -> bool:
         """Choose and take a step, and evaluate the rate at its end. Return False if no step is small enough."""
         position, lanes, t = loop.position, loop.lanes, loop.position.time[0]
@@ -147,6 +148,7 @@ def event_loop(
         position.evaluations[0] += accept(f, c, work, t, control.h[0], lanes)
         return True
 
+    @inlined
     def locate_event(
         f: Functions, c: Any, work: Any, loop: Loop, table: EventTable, control: StepControl
     ) -> tuple[int, float, bool]:
@@ -257,6 +259,7 @@ def reject(loop: Loop, table: EventTable, control: StepControl, h: float, e: flo
     start_table(table, loop.lanes, loop.position.time[0])
 
 
+@inlined
 def finish_step(
     f: Functions, work: Any, loop: Loop, table: EventTable, control: StepControl, event: int, rest: float
 ) -> None:
@@ -287,6 +290,7 @@ def arrive(table: EventTable, y: Array, rate: Array, event: int, rest: float) ->
             y[row, 0] = level
 
 
+@inlined
 def check_step(f: Functions, loop: Loop, events: Events) -> int:
     """Check a step without an event for divergence; return `DONE`, or the reason for which the loop returns."""
     config, position, y, fastest = loop.config, loop.position, loop.lanes.y, 0.0
