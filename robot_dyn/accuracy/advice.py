@@ -161,7 +161,7 @@ class Advice(Answer):
             return "error to expect: not estimated for a run in which deviations grow so, or of too many steps"
         end = self.run.outcome
         if end.ending is not Ending.FINISHED:
-            return f"the run {end.ending} at {end.t:.3g} s: {end.advice}"
+            return f"the run {end.ending} at {end.t:.3g} s: {end.text}"
         unit = joint_units("q", joint_types(self.run))
         return f"error of q [{unit}] to expect: {self.run.error}"
 

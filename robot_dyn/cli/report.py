@@ -16,6 +16,7 @@ from robot_dyn.foundations.validate import choice
 from robot_dyn.model.robot import Robot, info
 from robot_dyn.queries.dynamics import QUANTITIES
 from robot_dyn.queries.units import numbers_row
+from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.ledger import largest
 from robot_dyn.simulation.results.trajectory import Trajectory
 
@@ -51,10 +52,15 @@ def run(trajectory: Trajectory) -> Document:
         "error_note": None if error is None else error.note or error.reason,
         "tracking_error": trajectory.tracking_error,
         "accuracy": trajectory.accuracy,
-        "remarks": trajectory.remarks,
+        "remarks": [_remark(remark) for remark in trajectory.remarks],
         "extremes": _extremes(trajectory),
         "statistics": trajectory.statistics,
     }
+
+
+def _remark(remark: Remark) -> Document:
+    """A remark and its sentences."""
+    return vars(remark) | {"text": remark.text, "remedy": remark.remedy}
 
 
 def _extremes(trajectory: Trajectory) -> Document | None:

@@ -60,7 +60,7 @@ def test_a_name_of_a_file_is_one_line(command: tuple[str, ...], swing: rd.Trajec
 
 def test_the_summary_of_a_run_file_has_the_lines_of_a_summary(swing: rd.Trajectory, tmp_path) -> None:
     """Whatever texts are in the file."""
-    remark = Remark(RemarkKind.CHATTER, HOSTILE, "u", 0.0, 0.1, 0.0, 1.0, None, HOSTILE, HOSTILE)
+    remark = Remark(RemarkKind.CHATTER, HOSTILE, "u", 0.0, 0.1, 0.0, 1.0, None, {"unit": HOSTILE})
     strange = replace(
         swing, outcome=Outcome(Reason.TERMINAL_EVENT, 0.01, HOSTILE, {"event": HOSTILE}),
         about=swing.about | {"right_angles": HOSTILE},

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from robot_dyn.simulation import Ending, Outcome, Reason
+from robot_dyn.simulation import Ending, Outcome, Reason, Remark, RemarkKind
 
 sys.path.append(str(Path(__file__).parents[2] / "docs"))
 from site_parts import reasons
@@ -37,3 +38,11 @@ def test_a_sentence_leaves_out_what_it_has_no_facts_for() -> None:
     bare = Outcome(Reason.STATE_OVERFLOWS, 1.0, "elbow").text
     known = Outcome(Reason.STATE_OVERFLOWS, 1.0, "elbow", {"step_s": 0.01}).text
     assert known.startswith(bare) and "elbow" in known and "elbow" not in bare
+
+
+def test_of_several_remedies_one_is_given() -> None:
+    """With a stable period, without one, and where none was looked for."""
+    loop = Remark(RemarkKind.UNSTABLE, "elbow", "q", 0.0, 0.0, 0.0, 2.0, 1.0, {"growth": "2", "period_s": 0.25})
+    known = replace(loop, facts=loop.facts | {"limit_s": 0.125, "shorter_s": "0.06"})
+    assert "0.125" in known.remedy and "0.25" not in known.remedy
+    assert "0.25" in loop.remedy and loop.remedy != known.remedy

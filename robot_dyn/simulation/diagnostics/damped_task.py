@@ -47,12 +47,5 @@ def _of(task: OperationalSpace, t: np.ndarray, q: np.ndarray) -> Iterator[Remark
     lasts = np.append(np.diff(t), 0.0)
     at, start, duration = int(smallest.argmin()), float(t[below.argmax()]), float(lasts[below].sum())
     least, when = float(smallest[at]), float(t[at])
-    text = (
-        f"{task.frame} for {duration:.3g} s from {start:.4g} s (smallest eigenvalue of J M⁻¹ Jᵀ {max(least, 0.0):.2g}"
-        f" of threshold {task.threshold:.2g} at {when:.4g} s)"
-    )
-    yield Remark(
-        RemarkKind.DAMPED, task.frame, "q", start, duration, when, least, float(task.threshold), text,
-        "it does not follow along that direction: keep the reference within reach, or take a larger threshold for"
-        " smaller torques",
-    )  # fmt: skip
+    facts: dict[str, float | str] = {"least": max(least, 0.0)}  # rounding may leave it below 0
+    yield Remark(RemarkKind.DAMPED, task.frame, "q", start, duration, when, least, float(task.threshold), facts)

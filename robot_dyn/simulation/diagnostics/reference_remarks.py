@@ -43,11 +43,8 @@ def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterato
         gaps[gaps <= _JUMP * size] = 0.0
         for i in np.flatnonzero(gaps.any(axis=0)):
             begins, at_start = float(begin[i]), float(there[gaps[:, i].argmax(), i])
-            text = f"{quantity} of {names[i]} from {at_start:.4g} to {begins:.4g} {units[i][row]} at {t:.4g} s"
-            yield Remark(
-                RemarkKind.JUMPS, names[i], quantity, t, 0.0, t, begins, at_start, text,
-                "let it begin where and as fast as the joint does; rd.control.via_points(…) starts at rest",
-            ), gaps[:, i]  # fmt: skip
+            facts: dict[str, float | str] = {"unit": units[i][row]}
+            yield Remark(RemarkKind.JUMPS, names[i], quantity, t, 0.0, t, begins, at_start, facts), gaps[:, i]
 
 
 def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Iterator[Remark]:
@@ -72,11 +69,8 @@ def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Ite
     for i in np.flatnonzero(rubs & at_rest(extremes) & moves):
         name, (unit, _, of_u) = setup.plant.dynamics.joint_names[i], units[i]
         most = float(np.nan_to_num(np.abs(extremes[2, :, i])).max())
-        text = f"{name} at {setup.q0[i]:.4g} {unit}, its reference moves by {span[i]:.3g}, |u| up to {most:.3g} {of_u}"
-        yield Remark(
-            RemarkKind.HELD, name, "q", 0.0, float(t[-1]), 0.0, float(setup.q0[i]), float(span[i]), text,
-            "the control demands less than friction holds: take larger gains, or less friction",
-        )  # fmt: skip
+        facts: dict[str, float | str] = {"unit": unit, "unit_of_u": of_u, "most": most}
+        yield Remark(RemarkKind.HELD, name, "q", 0.0, float(t[-1]), 0.0, float(setup.q0[i]), float(span[i]), facts)
 
 
 def at_rest(extremes: np.ndarray) -> np.ndarray:

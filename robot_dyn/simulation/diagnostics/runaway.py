@@ -15,7 +15,7 @@ from robot_dyn.model.robot import Robot
 from robot_dyn.queries.units import joint_types_of, unit
 from robot_dyn.simulation.dynamics.fastest_motion import fastest, jacobian
 from robot_dyn.simulation.dynamics.stability import below, excess_rate, longest_step
-from robot_dyn.simulation.observation.remarks import Remark, RemarkKind, remark_lines
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.results.samples import ledger
 from robot_dyn.simulation.run.outcome import Ending, Outcome, Reason
 from robot_dyn.simulation.run.recording import Recording
@@ -64,13 +64,10 @@ def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
         limit, motion = longest_step(*linear), fastest(equation, 0.0, y, held)
     except (RobotDynError, np.linalg.LinAlgError):
         return ()
-    text = f"{step:.4g} s, {setup.integrator.name} is stable up to {limit:.4g} s; {motion}"
-    remedy = f"take step_s={below(limit)}, or an implicit method"
-    remark = Remark(
-        kind=RemarkKind.TOO_LONG, joint=motion.joint, quantity="v", start=0.0, duration=setup.duration_s, at=0.0,
-        value=step, limit=limit, text=text, remedy=remedy,
-    )  # fmt: skip
-    return (remark,)
+    facts: dict[str, float | str] = {
+        "method": setup.integrator.name, "motion": str(motion), "step_s": below(limit)
+    }  # fmt: skip
+    return (Remark(RemarkKind.TOO_LONG, motion.joint, "v", 0.0, setup.duration_s, 0.0, step, limit, facts),)
 
 
 def judged(setup: Setup, record: Recording, why: str) -> Outcome:
@@ -85,7 +82,7 @@ def judged(setup: Setup, record: Recording, why: str) -> Outcome:
     if outcome.ending is not Ending.FINISHED or setup.integrator.controls_error:
         return outcome
     if remarks := step_too_long(setup, outcome.t):
-        return Outcome(Reason.STEP_TOO_LONG, outcome.t, remarks[0].joint, {"cause": remark_lines(remarks)[0]})
+        return Outcome(Reason.STEP_TOO_LONG, outcome.t, remarks[0].joint, dict(remarks[0].fields))
     with np.errstate(all="ignore"):
         if ledger(setup.equation, record).closes:
             return outcome

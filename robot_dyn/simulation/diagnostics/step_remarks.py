@@ -20,7 +20,7 @@ from robot_dyn.simulation.observation.chatter import Episode
 from robot_dyn.simulation.observation.guard_levels import Level
 from robot_dyn.simulation.observation.observation import Observed, Visit
 from robot_dyn.simulation.observation.observer import Observer
-from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
+from robot_dyn.simulation.observation.remarks import Facts, Remark, RemarkKind
 from robot_dyn.simulation.setup.setup import Setup
 
 Units = list[tuple[str, str, str]]  # of q, v and u of each joint
@@ -69,7 +69,7 @@ def of_reference(setup: Setup, t: np.ndarray, extremes: np.ndarray, units: Units
 
 def of_steps(
     names: tuple[str, ...], units: Units, visits: dict[Level, Visit], episodes: dict[int, Episode],
-    remedy: Callable[[Episode], str], instants: int = 0,
+    remedy: Callable[[Episode], Facts], instants: int = 0,
 ) -> list[Remark]:  # fmt: skip
     """Remarks on what was observed of a run: chatter, then levels.
 
@@ -78,7 +78,7 @@ def of_steps(
         units: As of `units_of`.
         visits: By level.
         episodes: Of chatter, by joint.
-        remedy: What to do about one.
+        remedy: Returns the facts that its remedy depends on.
         instants: As of `Observed`.
     """
     found = [*_chatter(names, units, episodes, remedy)]
@@ -96,11 +96,7 @@ def _gaining(setup: Setup, t: np.ndarray, power: dict[str, np.ndarray]) -> Itera
         if not takes or not (np.nan_to_num(P) > _ROUNDING * np.nanmax(np.abs(P))).any():
             continue
         at = int(np.nanargmax(P))
-        text = f"{name} {P[at]:.4g} W at {t[at]:.4g} s"
-        yield Remark(
-            RemarkKind.GAINS, name, "power", float(t[at]), 0.0, float(t[at]), float(P[at]), 0.0, text,
-            "declare it Active, or see to the sign of its torque",
-        )  # fmt: skip
+        yield Remark(RemarkKind.GAINS, name, "power", float(t[at]), 0.0, float(t[at]), float(P[at]), 0.0)
 
 
 def _creeping(setup: Setup, t: np.ndarray, v: np.ndarray, units: Units) -> Iterator[Remark]:
@@ -117,11 +113,13 @@ def _creeping(setup: Setup, t: np.ndarray, v: np.ndarray, units: Units) -> Itera
         level, part = np.broadcast_to(effect.friction, mean.shape), np.abs(np.tanh(mean / effect.velocity_scale))
         for i in np.flatnonzero(steady & (level > 0) & (part > _LOADED[0]) & (part < _LOADED[1])):
             name, (_, of_v, of_u) = setup.plant.dynamics.joint_names[i], units[i]
-            text = f"{name} at {mean[i]:.3g} {of_v}, under {part[i] * level[i]:.3g} of {level[i]:.3g} {of_u}"
-            yield Remark(
-                RemarkKind.CREEPS, name, "v", start, lasted, float(t[-1]), float(mean[i]), None, text,
-                "dry_friction would hold what is below its level",
-            )  # fmt: skip
+            facts: dict[str, float | str] = {
+                "unit": of_v,
+                "unit_of_u": of_u,
+                "load": float(part[i] * level[i]),
+                "level": float(level[i]),
+            }
+            yield Remark(RemarkKind.CREEPS, name, "v", start, lasted, float(t[-1]), float(mean[i]), None, facts)
 
 
 def units_of(dynamics: Any) -> Units:
@@ -142,47 +140,43 @@ def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit], in
         level, most = max(both, key=lambda each: abs(each[1].value - each[0].limit))
         start = min(x.start for _, x in both)
         duration = sum({level.limit: x.duration for level, x in both}.values())  # a limit of 0 is both sides of one
-        unit = f" {units[joint][quantity]}".rstrip()
-        far = f"{most.value:.4g} of {level.limit:.4g}{unit} at {most.at:.4g} s"
-        spent = f"for {duration:.3g} s from {start:.4g} s"
-        texts = {
-            RemarkKind.BEYOND: far,
-            RemarkKind.STOP_REACHED: f"{far}, {spent}",
-            RemarkKind.EFFORT_REACHED: f"{spent} ({abs(level.limit):.4g}{unit})",
-        }
-        seen = f" (at samples and {instants} instants)" if QUANTITIES[quantity] == "u" and instants else ""
-        text = f"{names[joint]} {texts[level.kind]}{seen}"
+        facts: dict[str, float | str] = {"unit": units[joint][quantity]}
+        if QUANTITIES[quantity] == "u" and instants:
+            facts["instants"] = instants
         yield Remark(
-            level.kind, names[joint], QUANTITIES[quantity], start, duration, most.at, most.value, level.limit, text,
-            "nothing in the plant enforces them" if level.kind is RemarkKind.BEYOND else "",
-        )  # fmt: skip
+            level.kind, names[joint], QUANTITIES[quantity], start, duration, most.at, most.value, level.limit, facts
+        )
 
 
 def _chatter(
-    names: tuple[str, ...], units: Units, episodes: dict[int, Episode], remedy: Callable[[Episode], str]
+    names: tuple[str, ...], units: Units, episodes: dict[int, Episode], remedy: Callable[[Episode], Facts]
 ) -> Iterator[Remark]:
     for joint, episode in sorted(episodes.items(), key=lambda each: -each[1].amplitude):
-        unit = f" {units[joint][2]}".rstrip()
-        text = f"{names[joint]} ±{episode.amplitude:.3g}{unit} from {episode.start:.4g} s for {episode.duration:.3g} s"
         yield Remark(
             RemarkKind.CHATTER, names[joint], "u", episode.start, episode.duration, episode.start, episode.amplitude,
-            None, text, remedy(episode),
+            None, {**remedy(episode), "unit": units[joint][2]},
         )  # fmt: skip
 
 
-def against(setup: Setup, t: np.ndarray, q: np.ndarray) -> Callable[[Episode], str]:
-    """What to do about chatter of a run with positions q (m, n) at times t (m,)."""
+def against(setup: Setup, t: np.ndarray, q: np.ndarray) -> Callable[[Episode], Facts]:
+    """Return a function of an episode of chatter that returns what its remedy depends on.
+
+    Args:
+        setup: What ran.
+        t: Times of samples, (m,), in [s].
+        q: Positions there, (m, n).
+    """
     period = setup.controller.period_s if setup.controller else 0.0
     if not period:
-        return lambda episode: "the step is too long for the gains: take a smaller one"
+        return lambda episode: {"step_s": setup.taken_step_s}
     return lambda episode: _remedy(
         setup, episode.start, q[np.clip(np.searchsorted(t, episode.start), 0, len(t) - 1)], period
     )
 
 
-def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
-    """What to do about a chatter, with the largest kd T/M: the eigenvalue of −M⁻¹ ∂u/∂v times the period."""
-    general = "take a shorter period_s or less damping: it reverses where an eigenvalue of M⁻¹ kd period_s is above 1"
+def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> Facts:
+    """Return the period and, where it explains a chatter, the largest kd T/M: the eigenvalue of −M⁻¹ ∂u/∂v times T."""
+    general: Facts = {"period_s": period}
     controller = setup.controller.controller if isinstance(setup.controller, Loop) else setup.controller
     assert controller is not None
     z, v = np.zeros(controller.state_size), np.zeros(len(q))
@@ -193,14 +187,8 @@ def _remedy(setup: Setup, t: float, q: np.ndarray, period: float) -> str:
     except (RobotDynError, np.linalg.LinAlgError):
         return general
     if ratio <= 1 and (blocks := _of_sensors(setup.controller)):
-        what = f"kd period_s / M is {ratio:.2g}, and reverses nothing: {' and '.join(blocks)} of the measurement does"
-        return f"{what}; filter it, as rd.control.LowPass does, or take less damping: a shorter period is no remedy"
-    if not 1 < ratio < np.inf:
-        return general
-    return (
-        f"kd period_s / M is {ratio:.3g}, and above 1 it reverses, above 2 it grows: take period_s below "
-        f"{period / ratio:.2g} s, or less damping"
-    )
+        return {"ratio": ratio, "blocks": " and ".join(blocks)}
+    return {"ratio": ratio, "longest_s": period / ratio} if 1 < ratio < np.inf else general
 
 
 def _of_sensors(controller: Any) -> tuple[str, ...]:
@@ -235,10 +223,6 @@ def _coarse(setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray
         up = above[window, row] > below[window, row]
         value, shown = (high, largest) if up else (low, least)
         start, end, quantity = float(edges[window]), float(edges[window + 1]), QUANTITIES[row // n]
-        seen, unit = float(shown[window, row]), f" {units[joint][row // n]}".rstrip()
-        at = (start + end) / 2
-        text = f"{quantity} of {names[joint]} {value[window, row]:.4g}{unit} near {at:.4g} s (sampled: {seen:.4g})"
-        yield Remark(
-            RemarkKind.COARSE, names[joint], quantity, start, end - start, at, float(value[window, row]), seen, text,
-            "take a shorter record_period_s",
-        )  # fmt: skip
+        numbers = (start + end) / 2, float(value[window, row]), float(shown[window, row])
+        facts: dict[str, float | str] = {"unit": units[joint][row // n]}
+        yield Remark(RemarkKind.COARSE, names[joint], quantity, start, end - start, *numbers, facts)

@@ -22,7 +22,7 @@ from robot_dyn.foundations.errors import RobotDynError
 from robot_dyn.simulation.diagnostics.runaway import EXPLAINS
 from robot_dyn.simulation.dynamics.sampled_loop import SampledLoop, linearised, remedy
 from robot_dyn.simulation.dynamics.stability import after, below, periods, shown
-from robot_dyn.simulation.observation.remarks import Remark, RemarkKind, remark_lines
+from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
 from robot_dyn.simulation.run.outcome import Ending, Outcome, Reason
 from robot_dyn.simulation.setup.setup import Setup
 
@@ -30,7 +30,7 @@ _GAINS = ("kp", "ki", "kd")
 _HALVINGS = 20  # of the gains, tried for a stable loop
 
 
-def unstable(setup: Setup, t: np.ndarray, y: np.ndarray, runs_away: bool) -> Iterator[Remark]:
+def unstable(setup: Setup, t: np.ndarray, y: np.ndarray, runs_away: bool, remedies: bool = True) -> Iterator[Remark]:
     """Yield a remark if the loop is unstable about the start, the middle or the end of a run, where states are finite.
 
     Args:
@@ -39,6 +39,7 @@ def unstable(setup: Setup, t: np.ndarray, y: np.ndarray, runs_away: bool) -> Ite
         y: Its states there, (m, size).
         runs_away: True if the run diverged or reached an implausible speed. A continuous loop is examined only then:
             deviations may grow for a while along a motion that is as it should be.
+        remedies: True to search for the period or the gains that are stable, which takes most of the time.
     """
     if setup.controller is None or not (setup.equation.sampled or runs_away):
         return
@@ -46,7 +47,7 @@ def unstable(setup: Setup, t: np.ndarray, y: np.ndarray, runs_away: bool) -> Ite
     rows = sorted({int(k) for k in finite[[0, len(finite) // 2, -1]]}) if len(finite) else []
     for k in rows:  # the first of them: later ones may be far out
         if growing := growing_loop(setup, float(t[k]), y[k]):
-            yield growing.remark(setup)
+            yield growing.remark(setup, remedies)
             return
 
 
@@ -65,42 +66,37 @@ class GrowingLoop(NamedTuple):
     rate: float
     loop: SampledLoop
 
-    def remark(self, setup: Setup) -> Remark:
-        """Return the remark about it."""
+    def remark(self, setup: Setup, remedies: bool) -> Remark:
+        """Return the remark about it, with what its remedy depends on if `remedies`."""
         assert setup.controller is not None
         period, joint, t = setup.controller.period_s, setup.plant.dynamics.joint_names[self.joint], self.t
+        facts: dict[str, float | str]
         if period:
             over_the_run = shown(after(self.rate, periods(setup.duration_s, period)))
-            growth = f"by {shown(self.rate)} in each period of {period:.4g} s about the state at {t:.4g} s, by"
-            text, what_to_do = f"{joint} {growth} {over_the_run} over the run", self.other_period(period)
+            facts = {"growth": shown(self.rate), "period_s": period, "over_run": over_the_run}
+            facts |= self._other_period(period) if remedies else {}
         else:
-            gains = _gains(setup, self.joint)
-            text = f"{joint} with {self.rate:.3g} per second about the state at {t:.4g} s" + (gains and f", {gains}")
-            what_to_do = self.lower_gains()
-        return Remark(
-            kind=RemarkKind.UNSTABLE, joint=joint, quantity="q", start=t, duration=0.0, at=t, value=self.rate,
-            limit=1.0 if period else 0.0, text=text, remedy=what_to_do,
-        )  # fmt: skip
+            facts = _gains(setup, self.joint) | (self._lower_gains() if remedies else {})
+        return Remark(RemarkKind.UNSTABLE, joint, "q", t, 0.0, t, self.rate, 1.0 if period else 0.0, facts)
 
-    def other_period(self, period_s: float) -> str:
-        """Return what to do about a sampled loop."""
+    def _other_period(self, period_s: float) -> dict[str, float | str]:
+        """Return the longest stable period of a sampled loop, or how it grows with any period."""
         if limit := self.loop.longest_period(period_s):
-            return f"the loop is stable up to {limit:.3g} s: take period_s={below(limit)}, or lower gains"
+            return {"limit_s": limit, "shorter_s": below(limit)}
         anyway = self.loop.grows_anyway()
         limit = self.loop.longest_that_adds_none(period_s) if anyway else 0.0
         if 0 < limit < inf:
-            slower = f"under control at all times they grow, too, at {anyway:.3g} per second"
-            return f"{slower}; sampling adds to that beyond {limit:.3g} s: take period_s={below(limit)}, or lower gains"
-        return f"so it is with every period: take {remedy(anyway)}"
+            return {"anyway": anyway, "limit_s": limit, "shorter_s": below(limit)}
+        return {"otherwise": remedy(anyway)}
 
-    def lower_gains(self) -> str:
-        """Return what to do about a continuous loop: A + s B K is tried for s = ½, ¼ and so on."""
+    def _lower_gains(self) -> dict[str, float | str]:
+        """Return the part s of the gains with which A + s B K is stable, tried for s = ½, ¼ and so on."""
         A, closed = self.loop.A, self.loop.continuous
         if closed.shape == A.shape:
             for s in 0.5 ** np.arange(1, _HALVINGS + 1):
                 if replace(self.loop, continuous=A + s * (closed - A)).grows_anyway() == 0.0:
-                    return f"lower the gains: about this state the loop is stable with {s:.3g} times these"
-        return "lower the gains"
+                    return {"stable_with": float(s)}
+        return {}
 
 
 def growing_loop(setup: Setup, t: float, y: np.ndarray) -> GrowingLoop | None:
@@ -141,12 +137,13 @@ def _joint(deviation: np.ndarray, n: int, time_s: float) -> int:
     return int(np.argmax(np.abs(deviation[:n]) + time_s * np.abs(deviation[n : 2 * n])))
 
 
-def _gains(setup: Setup, joint: int) -> str:
-    """Return the gains of a joint as text, such as "kp = 2e+04 N m/rad"; empty for a law that declares none."""
+def _gains(setup: Setup, joint: int) -> dict[str, float | str]:
+    """Return the gains of a joint, such as "kp = 2e+04 N m/rad"; nothing for a law that declares none."""
     law, n = setup.controller, setup.plant.dynamics.n
     units = {name: gain.unit for name, gain in declared(type(law)).items() if name in _GAINS}
     values = {name: np.broadcast_to(getattr(law, name), (n,))[joint] for name in units}
-    return ", ".join(f"{name} = {values[name]:.4g} {unit}" for name, unit in units.items())
+    gains = ", ".join(f"{name} = {values[name]:.4g} {unit}" for name, unit in units.items())
+    return {"gains": gains} if gains else {}
 
 
 def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outcome:
@@ -166,4 +163,4 @@ def explained(outcome: Outcome, setup: Setup, remarks: Iterable[Remark]) -> Outc
 
 def _because(reason: Reason, t: float, remark: Remark) -> Outcome:
     """Return the outcome of a run that a remark explains."""
-    return Outcome(reason, t, remark.joint, {"cause": remark_lines([remark])[0]})
+    return Outcome(reason, t, remark.joint, dict(remark.fields))

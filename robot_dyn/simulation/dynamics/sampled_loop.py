@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from math import inf, log
 from typing import Any, final
 
@@ -152,7 +153,7 @@ def linearised(plant: Plant, controller: Controller, t: float, y: Array) -> Samp
         return made
 
     at_all_times = _at_all_times(A, B, continuous, t, law)
-    return SampledLoop(cycle, A, at_all_times, controller.cycle, not controller.state_size)
+    return SampledLoop(lru_cache(maxsize=1)(cycle), A, at_all_times, controller.cycle, not controller.state_size)
 
 
 def _at_all_times(A: Array, B: Array, controller: Controller, t: float, law: Array) -> Array:

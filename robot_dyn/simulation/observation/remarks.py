@@ -1,19 +1,35 @@
-"""Remarks on a run: what its samples need not show, seen at the end of every step.
+"""Remarks on a run are rows of numbers and names; the one table of this file turns a row into a sentence.
 
-chatter · an effort limit or a stop reached · beyond a limit that the file states · a record coarser than the motion ·
-an effect declared dissipative that does positive work · friction that creeps · steps that stability bounds ·
-a step that is too long · a control loop that is unstable · a task that is damped · a reference that jumps where it
-begins · a joint that is held while its reference moves
+A kind more: a member of `RemarkKind`, a row of `_SENTENCES`, and a function that yields its remarks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import final
+from string import Formatter
+from typing import Any, NamedTuple, final
+
+Facts = Mapping[str, float | str]
+"""Numbers and names by name: the fields of a sentence."""
+
+Parts = tuple[str | tuple[str, ...], ...]
+"""The parts of a sentence, each a format string; of several in brackets, the first whose facts are all known."""
 
 _NAMED = 3  # joints in a line
+
+
+def sentence(parts: Parts, facts: Facts) -> str:
+    """Return the parts of a sentence with their facts filled in, without the parts whose facts are missing."""
+    chosen = ((part,) if isinstance(part, str) else part for part in parts)
+    complete = (next((text for text in texts if _fields(text) <= facts.keys()), "") for texts in chosen)
+    return "".join(text.format_map(facts) for text in complete)
+
+
+def _fields(text: str) -> set[str]:
+    """Return the names of the facts in a format string."""
+    return {name for _, name, _, _ in Formatter().parse(text) if name}
 
 
 class RemarkKind(StrEnum):
@@ -35,21 +51,115 @@ class RemarkKind(StrEnum):
     HELD = "held_while_reference_moves"
 
 
-_HEADINGS = {
-    RemarkKind.CHATTER: "actuation reverses at every tick",
-    RemarkKind.EFFORT_REACHED: "effort limit reached",
-    RemarkKind.STOP_REACHED: "joint stop reached",
-    RemarkKind.BEYOND: "beyond the file's limits",
-    RemarkKind.COARSE: "record too coarse",
-    RemarkKind.GAINS: "a dissipative effect does positive work",
-    RemarkKind.CREEPS: "regularised friction creeps",
-    RemarkKind.ACCUMULATE: "events accumulate",
-    RemarkKind.STIFF: "steps bounded by stability",
-    RemarkKind.TOO_LONG: "step too long to be stable",
-    RemarkKind.UNSTABLE: "control loop unstable, deviations grow",
-    RemarkKind.DAMPED: "task damped near a singularity",
-    RemarkKind.JUMPS: "reference does not begin as the joint does",
-    RemarkKind.HELD: "held by friction at every step",
+class Sentence(NamedTuple):
+    """The parts of the line about a kind: its heading, the text of each remark, and the remedy for all."""
+
+    heading: str
+    text: Parts
+    remedy: Parts = ()
+
+
+_REACHED = "{joint} {value:.4g} of {limit:.4g} {unit} at {at:.4g} s"
+_LASTED = "for {duration:.3g} s from {start:.4g} s"
+_SEEN = " (at samples and {instants} instants)"
+_ELSEWHERE = ", {elsewhere}"  # the numbers are of another run of the batch
+_SENTENCES: Mapping[RemarkKind, Sentence] = {
+    RemarkKind.CHATTER: Sentence(
+        "actuation reverses at every tick",
+        ("{joint} ±{value:.3g} {unit} from {start:.4g} s for {duration:.3g} s",),
+        (
+            (
+                "kd period_s / M is {ratio:.2g}, and reverses nothing: {blocks} of the measurement does; filter it, as "
+                "rd.control.LowPass does, or take less damping: a shorter period is no remedy",
+                "kd period_s / M is {ratio:.3g}, and above 1 it reverses, above 2 it grows: take period_s below "
+                "{longest_s:.2g} s, or less damping",
+                "take a shorter period_s than {period_s:g} or less damping: it reverses where an eigenvalue of "
+                "M⁻¹ kd period_s is above 1",
+                "the step of {step_s:g} s is too long for the gains: take a smaller one",
+            ),
+        ),
+    ),
+    RemarkKind.EFFORT_REACHED: Sentence(
+        "effort limit reached", ("{joint} " + _LASTED + " ({bound:.4g} {unit})", _SEEN)
+    ),
+    RemarkKind.STOP_REACHED: Sentence("joint stop reached", (_REACHED + ", " + _LASTED,)),
+    RemarkKind.BEYOND: Sentence("beyond the file's limits", (_REACHED, _SEEN), ("nothing in the plant enforces them",)),
+    RemarkKind.COARSE: Sentence(
+        "record too coarse",
+        ("{quantity} of {joint} {value:.4g} {unit} near {at:.4g} s (sampled: {limit:.4g})",),
+        ("take a shorter record_period_s",),
+    ),
+    RemarkKind.GAINS: Sentence(
+        "a dissipative effect does positive work",
+        ("{joint} {value:.4g} W at {at:.4g} s",),
+        ("declare it Active, or correct the sign of its torque",),
+    ),
+    RemarkKind.CREEPS: Sentence(
+        "regularised friction creeps",
+        ("{joint} at {value:.3g} {unit}, under {load:.3g} of {level:.3g} {unit_of_u}",),
+        ("dry_friction would hold what is below its level",),
+    ),
+    RemarkKind.ACCUMULATE: Sentence(
+        "events accumulate",
+        ("{changes} changes of mode in {span_s:.1e} s, the last of joint {joint!r}, at t = {at:.6g} s",),
+        ("made by time stepping with steps of {step_s} s, without an estimate of its error",),
+    ),
+    RemarkKind.STIFF: Sentence(
+        "steps bounded by stability",
+        ("{motion}",),
+        (("made by {method} in place of {before}", "take integrator={method!r}"),),
+    ),
+    RemarkKind.TOO_LONG: Sentence(
+        "step too long to be stable",
+        ("{value:.4g} s", ", {method} is stable up to {limit:.4g} s", "; {motion}"),
+        ("take step_s={step_s}, or an implicit method",),
+    ),
+    RemarkKind.UNSTABLE: Sentence(
+        "control loop unstable, deviations grow",
+        (
+            (
+                "{joint} by {growth} in each period of {period_s:.4g} s about the state at {start:.4g} s, by "
+                "{over_run} over the run",
+                "{joint} with {value:.3g} per second about the state at {start:.4g} s",
+            ),
+            ", {gains}",
+        ),
+        (
+            (
+                "under control at all times they grow, too, at {anyway:.3g} per second; sampling adds to that beyond "
+                "{limit_s:.3g} s: take period_s={shorter_s}, or lower gains",
+                "the loop is stable up to {limit_s:.3g} s: take period_s={shorter_s}, or lower gains",
+                "so it is with every period: take {otherwise}",
+                "lower the gains: about this state the loop is stable with {stable_with:.3g} times these",
+                "take a shorter period than {period_s:g} s, or lower gains",
+                "lower the gains",
+            ),
+        ),
+    ),
+    RemarkKind.DAMPED: Sentence(
+        "task damped near a singularity",
+        (
+            "{joint} " + _LASTED,
+            " (smallest eigenvalue of J M⁻¹ Jᵀ {least:.2g} of threshold {limit:.2g} at {at:.4g} s)",
+        ),
+        (
+            "it does not follow along that direction: keep the reference within reach, or take a larger threshold for "
+            "smaller torques",
+        ),
+    ),
+    RemarkKind.JUMPS: Sentence(
+        "reference does not begin as the joint does",
+        ("{quantity} of {joint} from {limit:.4g} to {value:.4g} {unit} at {at:.4g} s", _ELSEWHERE),
+        ("let it begin where and as fast as the joint does; rd.control.via_points(…) starts at rest",),
+    ),
+    RemarkKind.HELD: Sentence(
+        "held by friction at every step",
+        (
+            "{joint} at {value:.4g} {unit}, its reference moves by {limit:.3g}, |u| up to {most:.3g} {unit_of_u}",
+            _ELSEWHERE,
+        ),
+        ("the control demands less than friction holds: take larger gains, or less friction",),
+    ),
 }
 
 
@@ -62,13 +172,12 @@ class Remark:
         kind: What it is about.
         joint: Name of the joint; of the effect or the frame, if it is about one.
         quantity: "q", "v", "u" or "power", of which value and limit are.
-        start: When it began, in [s].
+        start: Time at which it began, in [s].
         duration: How long it lasted in all, in [s].
-        at: When the value was reached, in [s].
+        at: Time at which the value was reached, in [s].
         value: The extreme; the amplitude of a chatter, half of what the actuation changes between two ticks.
-        limit: What it compares with: a limit, or the extreme that the samples show; None for a chatter.
-        text: Joint, value and time in words.
-        remedy: What to do about it; alike for all remarks of a kind in a run.
+        limit: Number that it compares with: a limit, or the extreme that the samples show; None for a chatter.
+        facts: Further numbers and names of its sentence.
         runs: Of a batch, the numbers of the runs that it is about; the first is the worst, whose values and text these
             are. Empty for a single run.
         looked: Of a batch, how many runs were looked at.
@@ -82,29 +191,58 @@ class Remark:
     at: float
     value: float
     limit: float | None
-    text: str
-    remedy: str = ""
+    facts: dict[str, float | str] = field(default_factory=dict, hash=False)
     runs: tuple[int, ...] = ()
     looked: int = 0
 
+    @property
+    def fields(self) -> Facts:
+        """The numbers and names of its sentence."""
+        own: dict[str, Any] = {
+            "joint": self.joint, "quantity": self.quantity, "start": self.start, "duration": self.duration,
+            "at": self.at, "value": self.value,
+        }  # fmt: skip
+        limit = {} if self.limit is None else {"limit": self.limit, "bound": abs(self.limit)}
+        return own | limit | self.facts
+
+    @property
+    def text(self) -> str:
+        """Joint, value and time in words."""
+        return sentence(_SENTENCES[self.kind].text, self.fields)
+
+    @property
+    def remedy(self) -> str:
+        """A remedy, alike for all remarks of a kind in a run; empty if there is none."""
+        return sentence(_SENTENCES[self.kind].remedy, self.fields)
+
+
+def line_parts(kind: RemarkKind) -> Parts:
+    """Return the parts of the line about one remark of a kind."""
+    heading, text, remedy = _SENTENCES[kind]
+    return (f"{heading}: ", *text, *(_after_semicolon(part) for part in remedy))
+
+
+def _after_semicolon(part: str | tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(f"; {text}" for text in ((part,) if isinstance(part, str) else part))
+
 
 def remark_lines(remarks: Iterable[Remark]) -> list[str]:
-    """A line for each kind: its joints, and what to do."""
-    said: dict[RemarkKind, list[Remark]] = {}
+    """Return a line for each kind: its joints, and a remedy."""
+    by_kind: dict[RemarkKind, list[Remark]] = {}
     for remark in remarks:
-        said.setdefault(remark.kind, []).append(remark)
-    return [_line(kind, each) for kind, each in said.items()]
+        by_kind.setdefault(remark.kind, []).append(remark)
+    return [_line(kind, of_kind) for kind, of_kind in by_kind.items()]
 
 
 def _line(kind: RemarkKind, remarks: list[Remark]) -> str:
     texts = [remark.text + _of_runs(remark) for remark in remarks[:_NAMED]]
     more = f", and {len(remarks) - _NAMED} more" if len(remarks) > _NAMED else ""
     remedy = f"; {remarks[0].remedy}" if remarks[0].remedy else ""
-    return f"{_HEADINGS[kind]}: {', '.join(texts)}{more}{remedy}"
+    return f"{_SENTENCES[kind].heading}: {', '.join(texts)}{more}{remedy}"
 
 
 def _of_runs(remark: Remark) -> str:
-    """Of which runs of a batch; nothing of a single run."""
+    """Return the runs of a batch that a remark is about, as text; empty for a single run."""
     if not remark.runs:
         return ""
     count = f"{len(remark.runs)} of {remark.looked} runs" if remark.looked > 1 else "the only run looked at"

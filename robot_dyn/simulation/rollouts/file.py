@@ -25,7 +25,9 @@ def save_rollouts(runs: Rollouts, path: str | Path) -> Path:
     if not isinstance(runs, Rollouts):
         raise RunFileError(f"save_rollouts takes the Rollouts of rd.rollouts, got {type(runs).__name__}")
     about = packed(runs.about, file_path(path, RunFileError).parent)
-    return _ROLLOUTS.save(replace(runs, about=about, saved=runs.overview, setup=None, numbers=None), path)
+    return _ROLLOUTS.save(
+        replace(runs, about=about, ends=runs.outcomes, saved=runs.overview, setup=None, numbers=None), path
+    )
 
 
 def load_rollouts(path: str | Path) -> Rollouts:
@@ -45,14 +47,14 @@ def _check(runs: Rollouts, found: Found) -> None:
     if not are_times(runs.t) or not len(runs.t):
         raise StoreError("the times of member 't' are not finite, or do not grow")
     if not all(map(are_times, runs.ended[:, None])):
-        raise StoreError("the times in 'outcomes' are not those of runs")
+        raise StoreError("the times in 'ends' are not those of runs")
     numbered = (number for each in (() if runs.saved is None else runs.saved.remarks) for number in each.runs)
     if len(runs.observed.levels) != runs.observed.limits.shape[1]:
         raise StoreError("'observed/levels' are not those of member 'observed/limits'")
     if not all(0 <= number < len(runs) for number in (*numbered, 0 if runs.saved is None else runs.saved.worst)):
         raise StoreError(f"'saved' is about a run that is not one of the {len(runs)}")
-    if len(runs.outcomes) != len(runs.q0):
-        raise StoreError(f"'outcomes' is of {len(runs.outcomes)} runs, not of {len(runs.q0)}")
+    if len(runs.ends) != len(runs.q0):
+        raise StoreError(f"'ends' is of {len(runs.ends)} runs, not of {len(runs.q0)}")
     if runs.work is not None and set(runs.work) != set(runs.sources):
         raise StoreError("members 'work/…' and 'sources' have different names")
     whole = ~(runs.diverged | runs.stopped)[:, None] & (

@@ -16,9 +16,11 @@ import numpy as np
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.coefficients import with_values
+from robot_dyn.foundations.values import cached
 from robot_dyn.integrate.integrator import PlainMethod
 from robot_dyn.model.right_angles import robot_of
 from robot_dyn.simulation.compiled.machine_code import MachineCode
+from robot_dyn.simulation.diagnostics.runaway import speed_limits
 from robot_dyn.simulation.dynamics.loop_state import Ended, LaneEnd, lanes_of, loop_config, start_position
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.events.detection import DetectingWork
@@ -109,16 +111,28 @@ class Tiles:
         return float((left * np.where(self.unfinished, np.minimum(next_samples, end), end)).mean())
 
     def _repeated(self, threads: int, report: Callable[[float], object]) -> dict[int, Single | None]:
-        """Repeat the runs that may have passed a threshold, or diverged, with cuts; None where Ctrl-C came first."""
-        B, end = len(self.batch), self.setup.duration_s
-        passed = np.isfinite(self.until) | (self.why > 0)
-        runs = np.flatnonzero(passed[:B] & (self.thresholds is not None))
+        """Repeat, by themselves, runs that lock step cannot judge; None where Ctrl-C came first.
+
+        With cuts, these are the runs that may have passed a threshold or diverged. In addition, they are the runs that
+        finished at an implausible speed: `simulate` judges them by their energy ledger, which is not recorded here.
+        """
+        B, end, whole = len(self.batch), self.setup.duration_s, self.batch.thresholds
+        passed = (np.isfinite(self.until) | (self.why > 0)) & (self.thresholds is not None)
+        as_simulated = self.thresholds is not None or whole is None or not whole.some.any()
+        runs = np.flatnonzero((passed | (self._implausible() & as_simulated))[:B])
         records: list[Single | None] = [None] * len(runs)
         if len(runs) and not self.stop[0]:
             part = len(runs) / B
             levels = self.levels.of_runs(runs)
             records, _ = singles(self.batch.some(runs), levels, threads, lambda t: report((1 - part) * end + part * t))
         return dict(zip(runs.tolist(), records, strict=True))
+
+    def _implausible(self) -> np.ndarray:
+        """Return which runs finished with a joint faster than its speed limit, (tiles · LANES,)."""
+        n = self.setup.plant.dynamics.n
+        low, high = (np.hstack([getattr(of, side)[n : 2 * n] for of in self.observations]) for side in ("low", "high"))
+        fast = (np.maximum(-low, high) > cached(self.setup, speed_limits)[:, None]).any(axis=0)
+        return fast & (self.why == 0) & ~np.repeat(self.unfinished, LANES)
 
     def _tile(self, tile: int) -> None:
         equation, n = self.code.compiled_form, self.setup.plant.dynamics.n
@@ -188,8 +202,8 @@ class Tiles:
             parts = np.split(by_run, np.cumsum([sizes[name] for name in names]), axis=-1)
             columns |= dict(zip(names, parts, strict=False))
         label = f"compiled, {B} runs side by side"
-        if repeated:
-            label += f", {len(repeated)} of them repeated with steps cut at thresholds"
+        if cut := sum(bool(np.isfinite(self.until[run]) or why[run]) for run in repeated):
+            label += f", {cut} of them repeated with steps cut at thresholds"
         step, most = setup.duration_s / self.steps, int(self.evaluations.max())
         alone = {run: single.observation for run, single in repeated.items() if single is not None}
         instants = self.steps // self.apart if self.apart > 1 else 0
@@ -201,7 +215,7 @@ class Tiles:
         for run, single in repeated.items():
             if single is not None:
                 result.write(run, single)
-            else:
+            elif np.isfinite(self.until[run]) or why[run]:
                 rows = int(np.searchsorted(t, self.until[run], side="right"))
                 result.cut(run, rows, Outcome(Reason.INTERRUPTED, float(min(self.until[run], ended[run]))))
         return result

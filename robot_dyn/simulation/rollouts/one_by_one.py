@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 
 from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.simulation.compiled.choice import choose_for_batch, for_run
+from robot_dyn.simulation.diagnostics.runaway import judged, runaway
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.observation.guard_levels import GuardLevels
 from robot_dyn.simulation.observation.observation import Observation, observation_of, observed
@@ -49,7 +51,10 @@ def singles(
         observer = observer_of(own, levels.of_runs([i]))
         run = Run(own, for_run(engine, setup, own), observer=observer)
         run.state.stop = stop
-        records[i] = _single(batch, own, run.record(), observer.observation)
+        record = run.record()
+        if far := runaway(own, observer.fastest):
+            record = replace(record, outcome=judged(own, record, far))
+        records[i] = _single(batch, own, record, observer.observation)
 
     def report() -> None:
         if on_progress is not None:

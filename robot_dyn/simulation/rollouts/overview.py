@@ -1,4 +1,4 @@
-"""Overview of a batch: remarks with counts, tracking errors, the run to look at first, and why runs diverged."""
+"""Overview of a batch: remarks with counts, tracking errors, and the run to look at first."""
 
 from __future__ import annotations
 
@@ -12,23 +12,22 @@ from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.queries.units import unit
 from robot_dyn.simulation.diagnostics.reference_remarks import at_rest, held, jumps
 from robot_dyn.simulation.diagnostics.step_remarks import KINDS, Units, against, of_reference, of_steps, units_of
-from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
+from robot_dyn.simulation.diagnostics.unstable_loop import unstable
 from robot_dyn.simulation.observation.chatter import Episode
-from robot_dyn.simulation.observation.remarks import Remark, RemarkKind
+from robot_dyn.simulation.observation.remarks import Facts, Remark, RemarkKind
 from robot_dyn.simulation.results.provenance import joint_types
 from robot_dyn.simulation.results.samples import root_mean_square, tracking_of
+from robot_dyn.simulation.rollouts.reasons import states
 from robot_dyn.simulation.rollouts.rollouts_data import Overview, RolloutsData
-from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.simulation.setup.setup import Setup
 
 OF_REFERENCES = RemarkKind.JUMPS, RemarkKind.HELD
-_JUDGED = 8  # runs that diverged: each loop is linearised about a start of its own
 
 
 def overview(runs: RolloutsData) -> Overview:
     """Return the overview of runs with their setup."""
 
-    def remedy(run: int) -> Callable[[Episode], str]:
+    def remedy(run: int) -> Callable[[Episode], Facts]:
         setup = runs.setup_of(run)
         return against(setup, runs.t, np.tile(setup.q0, (len(runs.t), 1)) if runs.q is None else runs.q[run])
 
@@ -39,10 +38,10 @@ def overview(runs: RolloutsData) -> Overview:
 
 def remarks_on_each(runs: RolloutsData) -> tuple[Remark, ...]:
     """Return the remarks that a run has whatever the others of its batch are, without remedies."""
-    return tuple(_remarks(runs, lambda _: lambda _: ""))
+    return tuple(_remarks(runs, lambda _: lambda _: {}))
 
 
-def _remarks(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], str]]) -> Iterator[Remark]:
+def _remarks(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], Facts]]) -> Iterator[Remark]:
     """Yield remarks on what was observed, and on the reference, with a remedy for the chatter of a run."""
     yield from _counted(runs, remedy)
     if runs.setup is not None:
@@ -61,8 +60,8 @@ def texts_by_run(remarks: Iterable[Remark], count: int) -> list[str]:
 def of_some(runs: RolloutsData, numbers: range, whole: Overview) -> Overview:
     """Of runs without their setup that were these of a larger batch."""
     errors = None if whole.tracking_error is None else whole.tracking_error[numbers]
-    remedies = {each.kind: each.remedy for each in whole.remarks}
-    remarks = *_counted(runs, lambda _: lambda _: remedies[RemarkKind.CHATTER]), *_of_whole(whole, numbers)
+    facts = {remark.kind: remark.facts for remark in whole.remarks}
+    remarks = *_counted(runs, lambda _: lambda _: facts[RemarkKind.CHATTER]), *_of_whole(whole, numbers)
     alone = (remark for remark in whole.remarks if remark.looked == 1 != len(numbers) and remark.runs[0] in numbers)
     remarks += tuple(replace(remark, runs=(numbers.index(remark.runs[0]),)) for remark in alone)
     return Overview(worst_of(runs, remarks, errors), remarks, errors)
@@ -71,7 +70,7 @@ def of_some(runs: RolloutsData, numbers: range, whole: Overview) -> Overview:
 def remarks_of(runs: RolloutsData, run: int, setup: Setup | None, t: np.ndarray, q: np.ndarray) -> tuple[Remark, ...]:
     """On what was observed of one run, with positions q (m, n) at times t (m,)."""
     visits, episodes = runs.observed.visits_of(run), runs.observed.episodes_of(run)
-    remedy = (lambda _: "") if setup is None else against(setup, t, q)
+    remedy = (lambda _: {}) if setup is None else against(setup, t, q)
     instants = int(runs.observed.instants[run])
     found = of_steps(runs.joint_names, units(runs), visits, episodes, remedy, instants)
     if setup is not None:
@@ -86,8 +85,8 @@ def _of_whole(whole: Overview, numbers: range) -> Iterator[Remark]:
     for each in whole.remarks:
         of = tuple(numbers.index(run) for run in each.runs if run in numbers)
         if of and each.kind in OF_REFERENCES:
-            other = "" if each.runs[0] in numbers else ", in another run"
-            yield replace(each, runs=of, looked=len(numbers), text=each.text + other)
+            elsewhere = {} if each.runs[0] in numbers else {"elsewhere": "in another run"}
+            yield replace(each, runs=of, looked=len(numbers), facts=each.facts | elsewhere)
 
 
 def units(runs: RolloutsData) -> Units:
@@ -97,7 +96,7 @@ def units(runs: RolloutsData) -> Units:
     return [(unit("q", each), unit("v", each), unit("u", each)) for each in joint_types(runs)]
 
 
-def _counted(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], str]]) -> Iterator[Remark]:
+def _counted(runs: RolloutsData, remedy: Callable[[int], Callable[[Episode], Facts]]) -> Iterator[Remark]:
     """Yield, for each kind, joint and quantity, the remark on the worst run, and which runs have one."""
     of = runs.observed
     named = runs.joint_names, units(runs)
@@ -148,12 +147,7 @@ def _in_runs(remark: Remark, worst: int, some: np.ndarray) -> Remark:
 def _linearised(runs: RolloutsData, run: int) -> Iterator[Remark]:
     """The remark on the sampled loop of one run."""
     setup = runs.setup_of(run)
-    equation = setup.equation
-    t, y = np.zeros(1), equation.start(setup.q0, setup.v0)[None]
-    if runs.q is not None and runs.v is not None and not equation.equation_of_motion.state_size:
-        t, rest = runs.t, np.zeros((len(runs.t), equation.size - 2 * len(setup.q0)))
-        y = np.hstack([runs.q[run], runs.v[run], rest])
-    for remark in unstable(setup, t, y, bool(runs.diverged[run])):
+    for remark in unstable(setup, *states(runs, setup, run), bool(runs.diverged[run])):
         yield replace(remark, runs=(run,), looked=1)
 
 
@@ -180,20 +174,3 @@ def tracking_errors(runs: RolloutsData) -> np.ndarray | None:
     if deviation is None:
         return None
     return np.array([root_mean_square(x[of]) if of.any() else np.nan for x, of in zip(deviation, known, strict=True)])
-
-
-def causes(runs: RolloutsData) -> tuple[Outcome, ...]:
-    """Return the outcome of each run; of the first that diverged with its loop as the reason, if it explains it.
-
-    Loops are linearised about the starts, which differ from run to run, as their parameters may.
-    """
-    outcomes, diverged = list(runs.outcomes), np.flatnonzero(runs.diverged)
-    controller = None if runs.setup is None else runs.setup.controller
-    if controller is None or not len(diverged):
-        return runs.outcomes
-    earliest = diverged[np.argsort(runs.ended[diverged], kind="stable")]
-    for run in list(dict.fromkeys([int(diverged[0]), *earliest.tolist()]))[:_JUDGED]:
-        setup = runs.setup_of(run)
-        remarks = unstable(setup, np.zeros(1), setup.equation.start(setup.q0, setup.v0)[None], True)
-        outcomes[run] = explained(runs.outcome(run), setup, remarks)
-    return tuple(outcomes)

@@ -44,7 +44,7 @@ class Rollouts(RolloutsData):
         u: Actuation within its bounds, (B, m, n), in [N m] or [N].
         kinetic, potential: Energies, (B, m), in [J].
         work: Work done up to each sample by the control and by each other effect, by name, (B, m), in [J].
-        outcomes: How each run ended, B of them, as in `simulate`: reason, time, and the numbers that explain it.
+        ends: How each run ended, B of them, before its step and its loop are judged; see `outcomes`.
         steps: Number of steps of each run, (B,).
         evaluations: Evaluations of the equation of motion by the group of 64 runs that includes each run, (B,).
         statistics: Statistics of the longest run; the time is that of all runs.
@@ -169,7 +169,7 @@ class Rollouts(RolloutsData):
             lines.append(f"cuts=False: no step ends at {levels}, and a run that passes one is not that of simulate")
         if self.diverged.any():
             run = int(self.diverged.argmax())
-            lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.outcomes[run].text}")
+            lines.append(f"run {run} diverged at t = {self.ended[run]:g} s; {self.outcome(run).text}")
         counted = len(self) > 1
         remarks = [each if counted else replace(each, runs=()) for each in self.remarks]
         lines += lines_of(remarks)
@@ -185,6 +185,6 @@ class Rollouts(RolloutsData):
     def _early(self) -> str:
         """How many runs ended early, and why."""
         at = f" by an interrupt, the first at t = {self.ended[self.stopped].min():g} s" if self.stopped.any() else ""
-        by_event = sum(outcome.reason is Reason.TERMINAL_EVENT for outcome in self.outcomes)
+        by_event = sum(outcome.reason is Reason.TERMINAL_EVENT for outcome in self.ends)
         early = f"{int(self.diverged.sum())} diverged, {int(self.stopped.sum())} stopped{at}"
         return early + (f", {by_event} ended by an event" if by_event else "")

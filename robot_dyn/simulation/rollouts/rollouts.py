@@ -34,7 +34,6 @@ from robot_dyn.simulation.results.provenance import edits_of_machine_code, origi
 from robot_dyn.simulation.rollouts.batch import Batch
 from robot_dyn.simulation.rollouts.lock_step import LANES, Tiles
 from robot_dyn.simulation.rollouts.one_by_one import one_by_one
-from robot_dyn.simulation.rollouts.overview import causes
 from robot_dyn.simulation.rollouts.result import Rollouts
 from robot_dyn.simulation.rollouts.thresholds import Thresholds
 from robot_dyn.simulation.setup.checks import check_stops
@@ -119,8 +118,7 @@ def rollouts(
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")
     batch = batch_of(setup, q0, v0, params or {}, record, numbers)
-    runs = run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), most_bytes, on_progress)
-    return replace(runs, outcomes=causes(replace(runs, setup=setup)))
+    return run_batch(batch, batch.thresholds, truth("cuts", cuts), thread_count(threads), most_bytes, on_progress)
 
 
 def batch_of(
@@ -173,7 +171,7 @@ def run_batch(
     batch: Batch, passed: Thresholds | None, cuts: bool, threads: int, most_bytes: int,
     on_progress: Callable[[float], object] | None = None,
 ) -> Rollouts:  # fmt: skip
-    """Return the rollouts of a batch with thresholds `passed`, without the causes of their divergence."""
+    """Return the rollouts of a batch with thresholds `passed`."""
     setup, why = batch.setup, batch.why_one_by_one
     if not cuts and why:
         raise QueryError(f"cuts=False: {why}, and so the runs go one after the other; leave it out")
@@ -195,7 +193,7 @@ def run_batch(
         u=columns.get("u"), kinetic=None if energy is None else energy[..., 0],
         potential=None if energy is None else energy[..., 1],
         work=None if work is None else dict(zip(sources, np.moveaxis(work, -1, 0), strict=True)),
-        outcomes=tuple(record.outcomes),
+        ends=tuple(record.outcomes),
         steps=record.steps, evaluations=record.evaluations, statistics=record.statistics, sources=sources,
         about=about | setup.about, params=dict(batch.sweep), setup=record.setup, q0=batch.q0, v0=batch.v0,
         observed=record.observed, numbers=batch.numbers, uncut=() if cuts or passed is None else passed.names,

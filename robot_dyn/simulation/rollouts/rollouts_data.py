@@ -17,6 +17,7 @@ from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.run_data import SAMPLED, RunData
+from robot_dyn.simulation.rollouts.reasons import reason_of
 from robot_dyn.simulation.rollouts.sweepable import parts_of_run
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
@@ -49,7 +50,7 @@ class RolloutsData(RunData):
     kinetic: Annotated[np.ndarray, SAMPLED["kinetic"].of_runs] | None
     potential: Annotated[np.ndarray, SAMPLED["potential"].of_runs] | None
     work: dict[str, Annotated[np.ndarray, SAMPLED["work"].of_runs]] | None
-    outcomes: tuple[Outcome, ...]
+    ends: tuple[Outcome, ...]
     steps: Annotated[np.ndarray, Layout(("B",), "int64")]
     evaluations: Annotated[np.ndarray, Layout(("B",), "int64")]
     sources: tuple[str, ...]
@@ -63,12 +64,12 @@ class RolloutsData(RunData):
     numbers: Annotated[np.ndarray | None, NOT_STORED] = None
 
     def __len__(self) -> int:
-        return len(self.outcomes)
+        return len(self.ends)
 
     @cached_property
     def ended(self) -> np.ndarray:
         """Time at which each run ended, (B,), in [s]."""
-        return np.array([outcome.t for outcome in self.outcomes])
+        return np.array([end.t for end in self.ends])
 
     @cached_property
     def diverged(self) -> np.ndarray:
@@ -81,11 +82,28 @@ class RolloutsData(RunData):
         return self._ended_by(Ending.STOPPED)
 
     def _ended_by(self, ending: Ending) -> np.ndarray:
-        return np.array([outcome.ending is ending for outcome in self.outcomes])
+        return np.array([end.ending is ending for end in self.ends])
 
     def outcome(self, run: int) -> Outcome:
         """Return how a run ended; raises QueryError if no run has that number."""
-        return self.outcomes[integer("run", run, least=-len(self), most=len(self) - 1)]
+        return self._outcome(integer("run", run, least=-len(self), most=len(self) - 1) % len(self))
+
+    @property
+    def outcomes(self) -> tuple[Outcome, ...]:
+        """Outcome of each run, B of them, as in `simulate`; a run that diverged is judged when it is read first."""
+        return tuple(map(self._outcome, range(len(self))))
+
+    def _outcome(self, run: int) -> Outcome:
+        if self.setup is None or self.ends[run].ending is not Ending.DIVERGED:
+            return self.ends[run]
+        if run not in self._judged:
+            self._judged[run] = reason_of(self, run)
+        return self._judged[run]
+
+    @cached_property
+    def _judged(self) -> dict[int, Outcome]:
+        """Outcomes by run, of those that diverged and were read."""
+        return {}
 
     def setup_of(self, run: int) -> Setup:
         """Return the setup of a single run: `rd.simulate(runs.setup_of(17))` repeats the run with an error estimate.

@@ -26,7 +26,7 @@ def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
     for key, start in (("q", runs.q0), ("v", runs.v0)):
         yield from of_joints(f"start {key}", start, key, types)
     yield Column("ended", runs.ended, "s")
-    yield Column("outcome", np.array([outcome.ending.value for outcome in runs.outcomes]))
+    yield Column("outcome", np.array([end.ending.value for end in runs.ends]))
     yield Column("reason", np.array([outcome.reason.value for outcome in runs.outcomes]))
     yield Column("steps", runs.steps)
     if of.tracking_error is not None:

@@ -218,7 +218,6 @@ class EventHandler:
             remedy = soft if excludes_time_stepping else stepping
             facts = {"changes": len(mode.changes), "span_s": span, "remedy": remedy}
             raise DivergedError(Outcome(Reason.EVENTS_ACCUMULATE, t, joint, facts))
-        what = f"{len(mode.changes)} changes of what holds joints in {span:.1e} s, the last of joint {joint!r}"
         return Accumulation(
             Remark(
                 kind=RemarkKind.ACCUMULATE,
@@ -229,8 +228,7 @@ class EventHandler:
                 at=t,
                 value=float(np.abs(y[self.state.config.n : 2 * self.state.config.n]).max()),
                 limit=None,
-                text=f"{what}, at t = {t:.6g} s",
-                remedy=f"made by time stepping with steps of {STEP_S} s, without an estimate of its error",
+                facts={"changes": len(mode.changes), "span_s": span, "step_s": STEP_S},
             )
         )
 

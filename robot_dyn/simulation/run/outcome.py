@@ -8,13 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from string import Formatter
 from typing import final
 
-from robot_dyn.simulation.observation.remarks import Remark
-
-Facts = Mapping[str, float | str]
-"""Numbers and names by name: the fields of a sentence."""
+from robot_dyn.simulation.observation.remarks import Parts, Remark, RemarkKind, line_parts, sentence
 
 
 class Ending(StrEnum):
@@ -154,11 +150,11 @@ _FASTEST = "; the fastest joint is {joint!r}: take a smaller step than {step_s:g
 _PERIOD = "; or, if the sampled loop is unstable, a shorter period than {period_s:g} s"
 _BENDS = " ({effect} of joint {effect_joint!r} bends within {width:.1e} {unit})"
 _GROWS = " at t = {t:.9g}, max |y| = {largest:.3g}: y grows without bound, or tolerances are too tight"
-_SENTENCES: Mapping[Reason, tuple[str, ...]] = {
+_SENTENCES: Mapping[Reason, Parts] = {
     Reason.END: (),
     Reason.TERMINAL_EVENT: ("ended by the event {event!r}",),
-    Reason.CONTROL_LOOP_UNSTABLE: ("{cause}",),
-    Reason.STEP_TOO_LONG: ("{cause}",),
+    Reason.CONTROL_LOOP_UNSTABLE: line_parts(RemarkKind.UNSTABLE),
+    Reason.STEP_TOO_LONG: line_parts(RemarkKind.TOO_LONG),
     Reason.IMPLAUSIBLE_SPEED: (
         "{cause}, and the energy ledger does not close: take a smaller step than {step_s:g} s, or an implicit method",
         "a joint moves faster than {limit:g} rad/s: the control is unstable",
@@ -184,16 +180,6 @@ _SENTENCES: Mapping[Reason, tuple[str, ...]] = {
     Reason.INTERRUPTED: ("interrupted; all samples up to here are kept",),
     Reason.INTERRUPTED_IN_ESTIMATE: ("interrupted after the run, in its error estimate",),
 }
-
-
-def sentence(parts: tuple[str, ...], facts: Facts) -> str:
-    """Return the parts of a sentence with their facts filled in, without the parts whose facts are missing."""
-    return "".join(part.format_map(facts) for part in parts if _fields(part) <= facts.keys())
-
-
-def _fields(part: str) -> set[str]:
-    """Return the names of the facts in a part."""
-    return {name for _, name, _, _ in Formatter().parse(part) if name}
 
 
 @final

@@ -43,8 +43,7 @@ def changes_over(setup: Setup, equation: StateEquation, ends: Array, y: Array, h
         motion = fastest(equation, t, y, held)
     except (RobotDynError, np.linalg.LinAlgError):
         return None
-    remedy = f"made by {STIFF} in place of {EXPLICIT}"
-    return Stiff(_remark(motion, 0.0, t, t, remedy)) if _bounds(motion, h) else None
+    return Stiff(_remark(motion, t, t, {"method": STIFF, "before": EXPLICIT})) if _bounds(motion, h) else None
 
 
 def bounded_by_stability(setup: Setup, record: Recording) -> tuple[Remark, ...]:
@@ -68,7 +67,7 @@ def bounded_by_stability(setup: Setup, record: Recording) -> tuple[Remark, ...]:
     if len(found) <= _LOOKS // 2:
         return ()
     _, k, motion = max(found, key=lambda each: each[0])
-    return (_remark(motion, 0.0, float(t[-1]), float(t[k]), f"take integrator={STIFF!r}"),)
+    return (_remark(motion, float(t[-1]), float(t[k]), {"method": STIFF}),)
 
 
 def damped_oscillation(setup: Setup, record: Recording) -> Fastest | None:
@@ -93,7 +92,7 @@ def _bounds(motion: Fastest, h: float) -> bool:
     return motion.decays and _BOUND[0] < abs(motion.eigenvalue) * h < _BOUND[1]
 
 
-def _remark(motion: Fastest, start: float, end: float, at: float, remedy: str) -> Remark:
-    """That stability bounds the steps from `start` to `end`, as seen at time `at`."""
-    size = abs(motion.eigenvalue)
-    return Remark(RemarkKind.STIFF, motion.joint, "v", start, end - start, at, size, None, str(motion), remedy)
+def _remark(motion: Fastest, end: float, at: float, methods: dict[str, str]) -> Remark:
+    """Return the remark that stability bounds the steps up to `end`, as seen at time `at`."""
+    size, facts = abs(motion.eigenvalue), {"motion": str(motion), **methods}
+    return Remark(RemarkKind.STIFF, motion.joint, "v", 0.0, end, at, size, None, dict[str, float | str](facts))

@@ -114,7 +114,7 @@ def tracking(view: BatchView) -> list[Panel]:
 def outcomes(view: BatchView) -> list[Panel]:
     """How many runs finished, ended by an event, diverged, or were stopped."""
     runs = view.runs
-    by_event = np.array([outcome.reason is Reason.TERMINAL_EVENT for outcome in runs.outcomes])
+    by_event = np.array([outcome.reason is Reason.TERMINAL_EVENT for outcome in runs.ends])
     kinds = {"ended by an event": by_event, "diverged": runs.diverged, "stopped": runs.stopped}
     kinds = {"finished": ~np.any(list(kinds.values()), axis=0)} | kinds
     counts = {name: int(some.sum()) for name, some in kinds.items() if some.any()}
