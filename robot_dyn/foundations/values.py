@@ -104,11 +104,8 @@ class Derived(Value):
 
         def __getattr__(self, name: str) -> Any:
             held = vars(self)
-            if name in self.__dataclass_fields__ and (stored := held.get("_source")) is not None:
-                source, lock = stored
-                with lock:
-                    if name not in held:
-                        held[name] = _frozen(getattr(source, name))
+            if name in self.__dataclass_fields__ and (source := held.get("_source")) is not None:
+                held.setdefault(name, _frozen(getattr(source, name)))  # two threads may compute it, and get one value
                 if self.__dataclass_fields__.keys() <= held.keys():
                     held.pop("_source", None)  # nothing more is read from it
             if name not in held:  # another thread may have read it, and the last one, by now
@@ -129,7 +126,7 @@ def derived(of: type[Late], source: Any, **known: Any) -> Late:
     value = object.__new__(of)
     vars(value).update({name: _frozen(x) for name, x in known.items()})
     if len(known) < len(of.__dataclass_fields__):  # pyright: ignore[reportAttributeAccessIssue]
-        vars(value)["_source"] = source, RLock()
+        vars(value)["_source"] = source
     return value
 
 
