@@ -172,15 +172,20 @@ def with_values(part: Any, values: Mapping[str, Any]) -> Any:
     """
     if not values:
         return part
-    changed, inside = copy(part), _by_head(values)
-    if declared(type(part)).keys() & values.keys():
-        for name in cached_properties(changed):  # they may depend on the coefficients
-            del vars(changed)[name]
+    inside = _by_head(values)
+    changed = _without_caches(part) if declared(type(part)).keys() & values.keys() else copy(part)
     for name, value in values.items():
         if "." not in name:
             object.__setattr__(changed, name, value)
     for head, below in inside.items():
         object.__setattr__(changed, head, _within(getattr(changed, head), below, with_values))
+    return changed
+
+
+def _without_caches(part: Any) -> Any:
+    """A copy of a part without its cached properties, which may depend on its coefficients."""
+    changed, caches = object.__new__(type(part)), cached_properties(part)
+    vars(changed).update({name: x for name, x in vars(part).items() if name not in caches})
     return changed
 
 

@@ -104,14 +104,11 @@ class Derived(Value):
 
         def __getattr__(self, name: str) -> Any:
             values = vars(self)
-            if name in self.__dataclass_fields__ and (stored := values.get("_source")) is not None:
-                source, lock = stored
-                with lock:
-                    if name not in values:
-                        values[name] = _frozen(getattr(source, name))
+            if name in self.__dataclass_fields__ and (source := values.get("_source")) is not None:
+                values.setdefault(name, _frozen(getattr(source, name)))  # two threads may compute it, and get one value
                 if self.__dataclass_fields__.keys() <= values.keys():
-                    values.pop("_source", None)  # all fields are read
-            if name not in values:  # otherwise another thread has read it, and possibly dropped the source
+                    values.pop("_source", None)  # nothing more is read from it
+            if name not in values:  # another thread may have read it, and the last one, by now
                 raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
             return values[name]
 
@@ -129,7 +126,7 @@ def derived(kind: type[Late], source: Any, /, **values: Any) -> Late:
     value = object.__new__(kind)
     vars(value).update({name: _frozen(x) for name, x in values.items()})
     if len(values) < len(kind.__dataclass_fields__):  # pyright: ignore[reportAttributeAccessIssue]
-        vars(value)["_source"] = source, RLock()
+        vars(value)["_source"] = source
     return value
 
 

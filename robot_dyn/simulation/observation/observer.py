@@ -7,6 +7,7 @@ the extremes of windows of time from all of them at once.
 from __future__ import annotations
 
 from contextlib import suppress
+from threading import Lock
 from typing import final
 
 import numpy as np
@@ -47,7 +48,7 @@ class Observer:
         self.columns, self.filled, self._chunk = np.empty((1 + 3 * self.n, CHUNK + _PAD)), 0, CHUNK
         self.seen = np.zeros(2 * self.n)
         self.observation, self._levels = start, levels
-        self._edges, self._width = np.zeros(1), _WINDOW
+        self._edges, self._width, self._closing = np.zeros(1), _WINDOW, Lock()
         self._low, self._high = (np.empty((0, 3 * self.n)) for _ in range(2))
 
     @property
@@ -87,8 +88,9 @@ class Observer:
         self.columns = self.columns[:, : self.filled].copy()
 
     def close(self) -> Observed:
-        """Look at the last steps; what was observed."""
-        self.look(end=True)
+        """Return what was observed, the last steps included; threads may call it at one time."""
+        with self._closing:
+            self.look(end=True)
         return observed([self.observation], self._levels)
 
     @property

@@ -48,6 +48,7 @@ class EventHandler:
     Attributes:
         switching: The switching functions, and the contacts.
         event_table: The switching functions as arrays.
+        events: The events, as the loop takes them.
         error: Why the rate had no value in a trial step, or None.
     """
 
@@ -72,12 +73,6 @@ class EventHandler:
         self.log = event_log(state.config.n, 0, brief) if contacts is None else contacts.mode.log
         self._forget_regions()
         self._change_mode()
-
-    @property
-    def events(self) -> Events:
-        """The events, as the loop takes them."""
-        contacts = self.switching.contacts
-        return Events(self.event_table, self.regions, NO_CONTACT if contacts is None else contacts.mode)
 
     def take_log(self) -> None:
         """Move the events that the loop has logged to the events of the run."""
@@ -162,8 +157,10 @@ class EventHandler:
             state.set_parameters(parameters)
             if by_numbers:  # else functions change with the sides
                 add_region(self.regions, switching.of_thresholds(self.event_table.sides), parameters)
-        if switching.contacts is not None:
-            write_mode(switching.contacts.mode, state.lanes.run_parameters)
+        contacts = switching.contacts
+        self.events = Events(self.event_table, self.regions, NO_CONTACT if contacts is None else contacts.mode)
+        if contacts is not None:
+            write_mode(contacts.mode, state.lanes.run_parameters)
         if callable(state.functions.rate):
             state.functions = self._lenient(state.functions)
 
@@ -221,7 +218,6 @@ class EventHandler:
             remedy = soft if excludes_time_stepping else stepping
             facts = {"changes": len(mode.changes), "span_s": span, "remedy": remedy}
             raise DivergedError(Outcome(Reason.EVENTS_ACCUMULATE, t, joint, facts))
-        facts = {"changes": len(mode.changes), "span_s": span, "step_s": STEP_S}
         return Accumulation(
             Remark(
                 kind=RemarkKind.ACCUMULATE,
@@ -232,7 +228,7 @@ class EventHandler:
                 at=t,
                 value=float(np.abs(y[self.state.config.n : 2 * self.state.config.n]).max()),
                 limit=None,
-                facts=facts,
+                facts={"changes": len(mode.changes), "span_s": span, "step_s": STEP_S},
             )
         )
 

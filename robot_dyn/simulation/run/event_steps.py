@@ -12,10 +12,11 @@ from typing import Any, ClassVar, final
 import numpy as np
 
 from robot_dyn.foundations.errors import RobotDynError, is_mistake
+from robot_dyn.foundations.values import cached
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
 from robot_dyn.integrate.step_control import ControlledStepper, StepControl, initial_control
-from robot_dyn.simulation.dynamics.loop_state import Ended, LoopConfig
+from robot_dyn.simulation.dynamics.loop_state import Ended, LoopConfig, loop_config
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
 from robot_dyn.simulation.engine.interpreted import interpreted, system
 from robot_dyn.simulation.events.mode_change import end_mode, without_modes
@@ -68,7 +69,7 @@ class EventSteps:
         self.past_horizon = inf  # time of the first terminal event that a companion passed, in [s]
         self._next_look = FIRST_LOOK if may_replace else 0  # number of steps at which stiffness is checked; 0 for never
         self.stepper, self.control = _method(setup, state.equation, mesh)
-        config = _with_records(state.config, setup, samples)
+        config = cached(setup, event_config if samples else companion_config)
         shared = 0 if config.share_period == inf else _COMPARED + len(state.table.counts) + 2
         state.allocate(config, int(most_samples(setup)) + 2 if samples else 0, shared, _CHUNK)
         self.handler = EventHandler(state, self.control, len(self.stepper.work.F), thresholds, may_replace)
@@ -217,12 +218,14 @@ def _method(setup: Setup, equation: StateEquation, mesh: np.ndarray | None) -> t
     return stepper, initial_control(stepper.error_order, part * method.rtol, part * method.atol, longest, ends)
 
 
-def _with_records(config: LoopConfig, setup: Setup, samples: bool) -> LoopConfig:
-    """Return the settings of the loop with the times of samples and of shared states."""
+def event_config(setup: Setup, samples: bool = True) -> LoopConfig:
+    """Return the settings of the loop, with the times of samples and of shared states."""
     controls_error, every = setup.integrator.controls_error, not setup.record_period_s
     period = setup.record_period_s or (setup.duration_s / _SAMPLES if controls_error else inf)
     share_period = setup.duration_s / _COMPARED if controls_error and setup.estimate_error else inf
-    return config._replace(
+    return loop_config(
+        setup.equation,
+        alone=True,
         sample_period=float(period) if samples else inf,
         share_period=float(share_period),
         samples_nodes=samples and every,
@@ -230,3 +233,8 @@ def _with_records(config: LoopConfig, setup: Setup, samples: bool) -> LoopConfig
         duration=float(setup.duration_s),
         restarts=setup.integrator.needs_jacobian,
     )
+
+
+def companion_config(setup: Setup) -> LoopConfig:
+    """Return the settings of the loop without samples."""
+    return event_config(setup, samples=False)

@@ -38,7 +38,9 @@ _LONGEST_STEP_S, _LEAST_STEPS = 0.01, 200  # where a part does not declare where
 
 CACHED = {
     "table_of": "its segments as arrays",
-    "single_run_config": "the settings of the loop",
+    "single_run_config": "the settings of a loop of fixed steps",
+    "event_config": "the settings of a loop with events",
+    "companion_config": "the settings of its companion runs",
     "start_energies": "kinetic and potential energy at the start",
     "switching_of": "its switching functions",
     "start_table_of": "their values at the start",
