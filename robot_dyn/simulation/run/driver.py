@@ -197,7 +197,8 @@ class Driver(ABC):
         shared, step_log, ends = self._paths()
         return Recording(
             outcome, records.t[:rows], records.y[:rows, :, 0], records.made[:rows, :, 0], shared, step_log,
-            int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]), tuple(self.events),
+            int(self.now[Now.STEPS]), int(self.now[Now.EVALUATIONS]), float(self.runs.peak[0]),
+            tuple(event for event in self.events if event.t <= outcome.t),  # not those of states that overflow
             ends,
         )  # fmt: skip
 

@@ -165,8 +165,11 @@ class EventRun(SwitchedRun):
         if self.now[Now.EVALUATIONS] > self.most:
             return TooLong(int(self.now[Now.EVALUATIONS]))
         t, y = self.time, self.y
-        if not np.isfinite(t):  # of an event that was looked for in states that overflow
-            t = float(self.records.t[: int(self.now[Now.ROW])].max(initial=0.0))
+        if not t <= self.setup.duration_s * (1 + 1e-9):  # of an event that was looked for in states that overflow
+            known = [0.0, *self.records.t[: int(self.now[Now.ROW])], *(event.t for event in self.events)]
+            t = float(max(time for time in known if time <= self.setup.duration_s))
+            if not self.setup.integrator.controls_error:
+                raise self.watch.diverged(Reason.STATE_OVERFLOWS, t, y)
             raise DivergedError(Outcome(Reason.STATE_OVERFLOWS, t, facts={"largest": inf}))
         if t > self.past_horizon + self.setup.duration_s / _COMPARED:
             return Outcome(Reason.END, self.past_horizon)
