@@ -26,12 +26,12 @@ from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.estimate.estimate import estimate
 from robot_dyn.simulation.estimate.requested_accuracy import run_to
 from robot_dyn.simulation.observation.observer import Observer
-from robot_dyn.simulation.observation.remarks import Remark
+from robot_dyn.simulation.observation.remarks import Remark, sentence
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estimate
 from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.make_run import make_run
-from robot_dyn.simulation.run.outcome import Accumulation, Ending, Outcome, Reason, Stiff, TooLong
+from robot_dyn.simulation.run.outcome import TOO_FAST, Accumulation, Ending, Outcome, Reason, Stiff, TooLong
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.setup.options import Options, setup_of, starts, takes_options
 from robot_dyn.simulation.setup.setup import Setup, check_record
@@ -109,7 +109,7 @@ class _Ran(NamedTuple):
     record: Recording
     ready: float
     remarks: tuple[Remark, ...]
-    runaway: str
+    runaway: dict[str, float | str]
 
 
 def _by_choice(setup: Setup, on_progress: Callable[[float], object] | None) -> _Ran:
@@ -155,7 +155,7 @@ def _with_estimate(
     if not setup.estimate_error or record.outcome.ending is Ending.STOPPED:
         return record, None, 0, 0
     if ran.runaway:
-        return record, no_estimate(ran.runaway), 0, 0
+        return record, no_estimate(sentence(TOO_FAST, ran.runaway)), 0, 0
     at_the_end = None if on_progress is None else lambda _: on_progress(record.outcome.t)
 
     def companion(pace: Any, of: Setup) -> Recording:
