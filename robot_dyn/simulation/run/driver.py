@@ -210,7 +210,7 @@ class Driver(ABC):
             outcome=outcome,
             t=records.t[:rows],
             y=records.y[:rows, :, 0],
-            sampled=records.sampled[:rows, :, 0],
+            made=records.sampled[:rows, :, 0],
             shared=shared,
             step_log=step_log,
             steps=int(self.position.steps[0]),

@@ -145,9 +145,9 @@ class FixedStep(Driver):
         if self.setup.integrator.nonsmooth:
             # machine code has no rates at samples: which joints rest is for the equation to find
             m, n = self.equation.size, self.config.n
-            for t, y, row in zip(recording.t, recording.y, recording.sampled, strict=True):
-                if np.isnan(row[:m]).all():
-                    sample(self.equation, float(t), y, row[m : m + n].copy() if self.config.held else None, row)
+            for t, y, made in zip(recording.t, recording.y, recording.made, strict=True):
+                if np.isnan(made[:m]).all():
+                    sample(self.equation, float(t), y, made[m : m + n].copy() if self.config.held else None, made)
         return recording
 
 
