@@ -24,7 +24,7 @@ _TABLES = {  # by title, the findings in a table and their attributes
         ("what", "duration_s", "estimated", "true", "unsure", "report", "misleads"),
     ),
 }
-_HEADINGS = {"within": "at 0.98 of value", "beyond": "at 1.02 of value", "duration_s": "duration [s]"}
+_HEADINGS: dict[str, str] = {"within": "at 0.98 of value", "beyond": "at 1.02 of value", "duration_s": "duration [s]"}
 _NUMBERS = ("typical", "random", "searched", "minimal", "value", "duration [s]", "estimated", "true", "unsure")
 
 
@@ -164,7 +164,7 @@ class Stress(Result):
         for title, (part, columns) in _TABLES.items():
             rows = tuple(tuple(_cell(getattr(case, name)) for name in columns) for case in getattr(self, part))
             if rows:
-                heading = tuple(_HEADINGS.get(name, name) for name in columns)
+                heading = tuple(_HEADINGS.get(str(name), str(name)) for name in columns)
                 yield from (title, Table(heading, rows, right=_NUMBERS, wrap=True), "")
         yield from (f"not looked at for lack of time: {name}" for name in self.out_of_time)
 

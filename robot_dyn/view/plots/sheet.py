@@ -66,8 +66,8 @@ def draw(
     above = lines * _LINE * style.text if style.titled else 0.0
     heights = [panel.tall(panel.height) for panel in panels]
     tall = max(above + sum(panel.tall(_LEAST_ROW) for panel in panels), min(A4_MM, above + sum(heights)))
-    figure = Figure((width * MM, tall * MM), 120, facecolor=style.colours["paper"], layout="constrained")
-    figure.get_layout_engine().set(rect=(0, 0, 1 - _RIGHT / width, 1))
+    figure = Figure((width * MM, tall * MM), 120, facecolor=style.colours["paper"])
+    figure.set_layout_engine("constrained", rect=(0, 0, 1 - _RIGHT / width, 1))
     body = figure.add_subfigure(figure.add_gridspec()[0])
     if style.titled:
         headed(figure, opening, style.colours["ink"], fontsize=style.text)
