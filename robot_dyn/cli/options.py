@@ -195,7 +195,7 @@ def with_options(function: Callable[..., Any]) -> Callable[..., Any]:
     replaced.__signature__ = inspect.Signature(parameters)  # pyright: ignore[reportAttributeAccessIssue]
     replaced.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     paragraphs = inspect.cleandoc(function.__doc__ or "").partition("\n\nOptions:")[0].split("\n\n")
-    replaced.__doc__ = "\n\n".join(" ".join(each.split()) for each in paragraphs)  # the terminal breaks lines
+    replaced.__doc__ = "\n\n".join(" ".join(text.split()) for text in paragraphs)  # the terminal breaks lines
     return replaced
 
 

@@ -93,7 +93,7 @@ class Table:
             yield replace(self, heading=tuple(self.heading[k] for k in part), rows=rows)
 
     def fitted(self, width: int) -> list[int]:
-        """Return the width of each column in lines of `width` letters; columns of long texts share what is left."""
+        """Return the width of each column in lines of `width` letters; columns of long texts share the rest."""
         fitted, widths = self.least_widths, self.widths
         spare = width - sum(fitted) - 2 * (len(fitted) - 1)
         open_columns = sorted(range(len(fitted)), key=lambda k: widths[k] - fitted[k])

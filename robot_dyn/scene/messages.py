@@ -39,7 +39,7 @@ def named_part(paths: Mapping[str, tuple[str | int, ...]], kinds: Sequence[str])
         kinds: Of the effects of the scene.
 
     Raises:
-        SceneError: In place of an error whose message names a part.
+        SceneError: Instead of an error whose message names a part.
     """
     try:
         yield

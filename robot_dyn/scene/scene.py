@@ -158,7 +158,7 @@ class Scene(Part):
                     else:
                         built = effect.build(robot)
                         acting += built
-                        paths |= {each.name: ("effect", k) for each in built if each.name not in paths}
+                        paths |= {one.name: ("effect", k) for one in built if one.name not in paths}
                 except RobotDynError as error:
                     raise SceneError(f"effect {k + 1} ({effect.kind}): {error}") from None
         with part("start"):

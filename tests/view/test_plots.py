@@ -118,7 +118,7 @@ def test_a_legend_names_curves_of_its_own_panel_only(run) -> None:
     (part,) = plot(run, "energy").subfigs[0].subfigs
     assert not part.legends
     for axes in part.axes:
-        entries = [text.get_text() for text in axes.get_legend().texts] if axes.get_legend() else []
+        entries = [text.get_text() for text in shown.texts] if (shown := axes.get_legend()) else []
         assert entries == ([line.get_label() for line in axes.lines] if len(axes.lines) > 1 else [])
 
 

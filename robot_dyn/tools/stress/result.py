@@ -164,7 +164,7 @@ class Stress(Result):
         for title, (part, columns) in _TABLES.items():
             rows = tuple(tuple(_cell(getattr(case, name)) for name in columns) for case in getattr(self, part))
             if rows:
-                heading = tuple(_HEADINGS.get(name, name) for name in columns)
+                heading = tuple(_HEADINGS.get(str(name), str(name)) for name in columns)
                 yield from (title, Table(heading, rows, right=_NUMBERS, wrap=True), "")
         yield from (f"not looked at for lack of time: {name}" for name in self.out_of_time)
 

@@ -57,8 +57,6 @@ def draw(
     panels: list[Panel], opening: str, remarks: Sequence[str], style: Style, width: float, diverged: bool
 ) -> Figure:
     """The panels from top to bottom, under an opening and remarks in colour."""
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
-
     from robot_dyn.view.plots.shown import Figure
 
     told = "\n".join(remarks)
@@ -68,8 +66,8 @@ def draw(
     above = lines * _LINE * style.text if style.titled else 0.0
     heights = [panel.tall(panel.height) for panel in panels]
     tall = max(above + sum(panel.tall(_LEAST_ROW) for panel in panels), min(A4_MM, above + sum(heights)))
-    layout = ConstrainedLayoutEngine(rect=(0, 0, 1 - _RIGHT / width, 1))
-    figure = Figure((width * MM, tall * MM), 120, facecolor=style.colours["paper"], layout=layout)
+    figure = Figure((width * MM, tall * MM), 120, facecolor=style.colours["paper"])
+    figure.set_layout_engine("constrained", rect=(0, 0, 1 - _RIGHT / width, 1))
     body = figure.add_subfigure(figure.add_gridspec()[0])
     if style.titled:
         headed(figure, opening, style.colours["ink"], fontsize=style.text)

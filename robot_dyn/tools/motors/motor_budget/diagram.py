@@ -121,7 +121,7 @@ def _is_near(joint: JointBudget) -> bool:
 
 
 def _handles(result: MotorBudget, colours: Colours) -> list[Any]:
-    """Return entries of the legend for what is drawn."""
+    """Return the entries of the legend: only things that the figure has."""
     joints = result.joints
     acting = [name for name, torque in result.demand.split.torques.items() if torque.any()]
     causes = [(k, name) for k, name in enumerate(joints[0].of_rms) if name in acting]
