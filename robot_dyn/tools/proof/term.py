@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import add
 from typing import Any, final
 
 import casadi as ca
@@ -77,8 +79,8 @@ class Term:
     def __add__(self, other: Any) -> Any:
         if (x := _term(other)) is None:
             return NotImplemented
-        nodes: list[Any] = [term.node for term in (self, x) if term.node is not None]
-        return Term(self.constant + x.constant, sum(nodes[1:], start=nodes[0]) if nodes else None)
+        nodes = [term.node for term in (self, x) if term.node is not None]
+        return Term(self.constant + x.constant, reduce(add, nodes) if nodes else None)
 
     __radd__ = __add__
 
