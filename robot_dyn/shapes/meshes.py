@@ -109,10 +109,8 @@ def corners(path: Path, scale: Any = (1.0, 1.0, 1.0)) -> ndarray:
 def _reading(missing: list[str]) -> Iterator[None]:
     """Convert all exceptions of readers to MeshError, and silence their warnings."""
     try:
-        with (
-            warnings.catch_warnings(action="ignore"),
-            _logged(missing),
-        ):  # numpy and Pillow warn of content that is refused here
+        # numpy and Pillow warn of content that is refused here
+        with warnings.catch_warnings(action="ignore"), _logged(missing):
             yield
     except MeshError:
         raise

@@ -172,5 +172,5 @@ def test_a_plant_is_asked_at_a_time() -> None:
             EffectError, match=r"depends on the carried payloads, and so on the time: use plant.at\(t\)"
         ):
             ask()
-    with pytest.raises(TraceError, match=r"carried_payload comes and goes: ask plant.at\(t\)"):
+    with pytest.raises(TraceError, match=r"carried_payload is temporary: use plant.at\(t\)"):
         rd.Compiled(plant).forward_dynamics(0.0, Q, V, V)

@@ -19,12 +19,14 @@ from robot_dyn.codegen.program import Program
 REGISTER = 64  # bytes: a 512-bit register, or two or four smaller ones
 
 
-def lanes(kind: Any) -> int:
+def lanes(kind: ir.Type) -> int:
     """Return L, the number of states in a vector."""
     return REGISTER // (4 if kind is F32 else 8)
 
 
-def batch_function(module: Any, name: str, program: Program, kind: Any, limits: Limits, parameters: bool) -> Any:
+def batch_function(
+    module: ir.Module, name: str, program: Program, kind: ir.Type, limits: Limits, parameters: bool
+) -> Any:
     """Write the function for a batch of at least L states; the last vector may overlap the previous one.
 
     With `parameters` the last input is one row, the same for all states.

@@ -21,7 +21,13 @@ _LARGEST_NARROW = LEAST_EXACT / float(np.finfo(np.float32).eps)
 
 
 def write_state_entry(
-    module: Any, name: str, state: Any, inputs: tuple[int, ...], shape: tuple[int, ...], timed: bool, parameters: bool
+    module: ir.Module,
+    name: str,
+    state: Any,
+    inputs: tuple[int, ...],
+    shape: tuple[int, ...],
+    timed: bool,
+    parameters: bool,
 ) -> None:
     """Write the entry (x₁, …, y) of a function of one state: arrays (nᵢ,), y of `shape`; x₁ a number if it is a time.
 
@@ -40,7 +46,7 @@ def write_state_entry(
 
 
 def write_batch_entry(
-    module: Any, name: str, batch: Any, inputs: tuple[int, ...], outputs: int, parameters: bool
+    module: ir.Module, name: str, batch: Any, inputs: tuple[int, ...], outputs: int, parameters: bool
 ) -> None:
     """Write the entry (x₁, …, y, start, stop) of a function of batches: arrays (B, nᵢ), y (B, m), not overlapping."""
     kind, widths = batch.args[0].type.pointee, [ir.Constant(I64, n) for n in (*inputs, outputs)]
@@ -61,7 +67,7 @@ def write_batch_entry(
     _answer(builder, result, status)
 
 
-def _entry(module: Any, name: str, count: int, arrays_: int) -> tuple[Any, Any, list[Any], list[Any], Any]:
+def _entry(module: ir.Module, name: str, count: int, arrays_: int) -> tuple[Any, Any, list[Any], list[Any], Any]:
     """Write the frame of a Python function: return its builder, `self`, the arguments, views, and the status.
 
     The block of the status releases the views, also those still empty, and returns the status.
@@ -78,7 +84,7 @@ def _entry(module: Any, name: str, count: int, arrays_: int) -> tuple[Any, Any, 
     return builder, own, objects, views, status
 
 
-def _data(builder: Any, objects: list[Any], views: list[Any], kind: Any, axes: list[int], status: Any) -> list[Any]:
+def _data(builder: Any, objects: list[Any], views: list[Any], kind: ir.Type, axes: list[int], status: Any) -> list[Any]:
     """Return pointers to the numbers of C-contiguous arrays with these numbers of axes; the last is writeable."""
     for value, view, count in zip(objects, views, axes, strict=True):
         _require(builder, [arrays.is_array(builder, value)], status)
@@ -111,7 +117,7 @@ def _answer(builder: Any, found: Any, status: Any) -> None:
     builder.branch(status.parent)
 
 
-def _number(builder: Any, value: Any, kind: Any, status: Any) -> Any:
+def _number(builder: Any, value: Any, kind: ir.Type, status: Any) -> Any:
     """Return a Python number as float; refuse other objects, and numbers too large to be rounded to float32."""
     x = api(builder, "PyFloat_AsDouble", value)
     with builder.if_then(builder.fcmp_ordered("==", x, ir.Constant(F64, -1.0)), likely=False):

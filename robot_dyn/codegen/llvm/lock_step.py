@@ -42,7 +42,9 @@ class Computed(NamedTuple):
 Body = Callable[[Writer, list[list[Any]]], Computed]  # (writer, the vectors of each input) → …
 
 
-def write_function(module: Any, name: str, program: Program, runs: int, shared: Mapping[int, int] = _NOTHING) -> None:
+def write_function(
+    module: ir.Module, name: str, program: Program, runs: int, shared: Mapping[int, int] = _NOTHING
+) -> None:
     """Write the function of a program with the inputs t (1,), y, p and run_parameters.
 
     Args:
@@ -62,7 +64,7 @@ def write_function(module: Any, name: str, program: Program, runs: int, shared: 
 
 
 def write_step(
-    module: Any,
+    module: ir.Module,
     name: str,
     programs: tuple[Program, Program, Program],
     runs: int,
@@ -96,7 +98,7 @@ def write_step(
 
 
 def _write(
-    module: Any, name: str, inputs: tuple[int, ...], body: Body, runs: int, shared: Mapping[int, int]
+    module: ir.Module, name: str, inputs: tuple[int, ...], body: Body, runs: int, shared: Mapping[int, int]
 ) -> None:  # fmt: skip
     rows = [k for k in range(inputs[-1]) if k not in shared]
     run_parameters = {k: (row, False) for row, k in enumerate(rows)} | {k: (at, True) for k, at in shared.items()}
@@ -150,7 +152,9 @@ def _repeated(writer: Writer, program: Program, inputs: list[list[Any]], passes:
     return results
 
 
-def _any_angle(module: Any, name: str, inputs: tuple[int, ...], body: Body, runs: int, run_parameters: Own) -> Any:
+def _any_angle(
+    module: ir.Module, name: str, inputs: tuple[int, ...], body: Body, runs: int, run_parameters: Own
+) -> Any:
     """Write the same function with the C library's sine, which stores results only for runs whose bit is set."""
     side = min(SIDE, runs)
     shape = ir.FunctionType(ir.VoidType(), [*_ARGUMENTS, I64, ir.IntType(side)])

@@ -40,7 +40,7 @@ def acquired(builder: ir.IRBuilder, value: Any, view: Any, request: int) -> Any:
     return builder.icmp_signed("==", status, ir.Constant(I32, 0))
 
 
-def has_form(builder: ir.IRBuilder, view: Any, kind: Any, axes: int) -> Any:
+def has_form(builder: ir.IRBuilder, view: Any, kind: ir.Type, axes: int) -> Any:
     """Return whether a view contains aligned numbers of `kind` in native byte order, along `axes` axes."""
     conditions = [builder.icmp_signed("==", field(builder, view, "axes"), ir.Constant(I32, axes))]
     text = field(builder, view, "format")

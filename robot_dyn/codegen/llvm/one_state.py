@@ -40,7 +40,7 @@ class Limits:
 
 
 def state_function(
-    module: Any, name: str, program: Program, kind: Any, limits: Limits, any_angle: bool, parameters: bool
+    module: ir.Module, name: str, program: Program, kind: ir.Type, limits: Limits, any_angle: bool, parameters: bool
 ) -> Any:
     """Write the function of one state; with `any_angle` it uses the C library's sine and cosine, for any angle."""
     pointers = [kind.as_pointer()] * (len(program.inputs) + 1)

@@ -66,7 +66,7 @@ def _method(address: int) -> _Method:
     return _Method(b"kernel", address, _FASTCALL, None)
 
 
-def function_of(module: Any, name: str) -> Any:
+def function_of(module: ir.Module, name: str) -> Any:
     """Declare a function of this form in a module: arguments (self, pointer to the arguments, their number)."""
     return ir.Function(module, ir.FunctionType(OBJECT, [OBJECT, OBJECT.as_pointer(), I64]), name)
 

@@ -20,7 +20,7 @@ I1, I32, I64 = ir.IntType(1), ir.IntType(32), ir.IntType(64)
 F32, F64 = ir.FloatType(), ir.DoubleType()
 
 
-def wide(kind: Any, count: int) -> Any:
+def wide(kind: ir.Type, count: int) -> Any:
     """Return the type of a vector of `count` numbers; for one, the type of the number."""
     return kind if count == 1 else ir.VectorType(kind, count)
 
@@ -37,7 +37,7 @@ class Vectors:
     """
 
     builder: Any
-    kind: Any
+    kind: ir.Type
     count: int
 
     @property
@@ -157,12 +157,12 @@ class Lanes:
         """Return a constant, or other lanes, as an LLVM value of this type."""
         return x.value if isinstance(x, Lanes) else self.vectors.constant(x)
 
-    def like(self, value: Any, kind: Any = None) -> Lanes:
+    def like(self, value: Any, kind: ir.Type | None = None) -> Lanes:
         """Return lanes of the same length, of this type or another."""
         vectors = self.vectors
         return Lanes(vectors if kind is None else Vectors(vectors.builder, kind, vectors.count), value)
 
-    def cast(self, instruction: str, kind: Any) -> Lanes:
+    def cast(self, instruction: str, kind: ir.Type) -> Lanes:
         """Convert the lanes to another type: "bitcast" keeps the bits, "fpext" and "fptrunc" the numbers."""
         return self.like(getattr(self.vectors.builder, instruction)(self.value, wide(kind, self.vectors.count)), kind)
 

@@ -144,7 +144,7 @@ def _shortened(f: Function, nodes: list[ast.expr], all_: bool, item: Callable[[a
     return _merged(f, BOOL.llvm, ends)
 
 
-def _merged(f: Function, kind: Any, ends: list[tuple[Any, Any]]) -> Any:
+def _merged(f: Function, kind: ir.Type, ends: list[tuple[Any, Any]]) -> Any:
     if f.silent:
         return None
     phi = f.builder.phi(kind)

@@ -153,7 +153,7 @@ def _reader(store: Callable[[], Store | None]) -> Any:
     return _readers[0]
 
 
-def _write(module: Any, prefix: str) -> None:
+def _write(module: ir.Module, prefix: str) -> None:
     """Write the reader. An array's form has four bits: contiguous, misaligned, read-only, last axis of length 1."""
     function = function_of(module, f"{prefix}read")
     b = ir.IRBuilder(function.append_basic_block())

@@ -59,7 +59,7 @@ class Program:
             marked by `emits`, (f, node, arguments) → value, which write instructions.
     """
 
-    def __init__(self, module: Any, prefix: str, instead: Instead) -> None:
+    def __init__(self, module: ir.Module, prefix: str, instead: Instead) -> None:
         self.module, self.prefix, self.instead = module, prefix, instead
         self._unchecked = {function for function in instead.values() if not hasattr(function, "emits")}
         self._done: dict[tuple[Callable[..., Any], tuple[Kind, ...]], Written | None] = {}
@@ -166,7 +166,7 @@ class Program:
             self._texts[text] = self._global(kind, data).bitcast(TEXT)
         return self._texts[text]
 
-    def _global(self, kind: Any, data: Any) -> Any:
+    def _global(self, kind: ir.Type, data: Any) -> Any:
         variable: Any = ir.GlobalVariable(self.module, kind, f"{self.prefix}data_{len(self.module.globals)}")
         variable.linkage, variable.global_constant, variable.initializer = "internal", True, ir.Constant(kind, data)
         return variable

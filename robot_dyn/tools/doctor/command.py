@@ -99,7 +99,7 @@ def _lines(file: str, checkup: Checkup, written: str | None, every: bool) -> Ite
 
 
 def _of_packages(file: Path, text: bytes) -> list[Path]:
-    """Return the folders of mesh packages that a file finds by its location, and a copy elsewhere does not."""
+    """Return the folders of mesh packages that are found from a file's location, but not from a copy elsewhere."""
     if file.absolute().parent == Path.cwd():
         return []
     names = sorted(set(re.findall(rb'filename="package://([^/"]+)/', text)))

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import add
 from typing import Any, final
 
 import casadi as ca
@@ -77,8 +79,8 @@ class Term:
     def __add__(self, other: Any) -> Any:
         if (x := _term(other)) is None:
             return NotImplemented
-        node = self.node if x.node is None else x.node if self.node is None else self.node + x.node
-        return Term(self.constant + x.constant, node)
+        nodes = [term.node for term in (self, x) if term.node is not None]
+        return Term(self.constant + x.constant, reduce(add, nodes) if nodes else None)
 
     __radd__ = __add__
 
