@@ -20,9 +20,7 @@ EXAMPLES = {
         "value": 0.01, "limit": 0.004, "method": "rk4", "step_s": "0.002",
         "motion": "the fastest motion changes with 710 per second, of joint 'elbow_joint', by 'joint_stops'",
     },
-    Reason.IMPLAUSIBLE_SPEED: {
-        "cause": "elbow_joint reached 640 rad/s, over 100 times its limit (3.15): check gains and step", **_STEP
-    },
+    Reason.IMPLAUSIBLE_SPEED: {"value": 640.0, "limit": 3.15, "unit": "rad/s", "step_s": 0.002},
     Reason.ENERGY_WITHOUT_SOURCE: _STEP,
     Reason.STATE_OVERFLOWS: _STEP,
     Reason.RATE_NOT_FINITE: _LARGEST,

@@ -25,11 +25,11 @@ from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.estimate.estimate import estimate
 from robot_dyn.simulation.estimate.requested_accuracy import trials
 from robot_dyn.simulation.observation.observer import Observer, observer_of
-from robot_dyn.simulation.observation.remarks import Remark
+from robot_dyn.simulation.observation.remarks import Remark, sentence
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estimate
 from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.outcome import Accumulation, Ending, Outcome, Reason, Stiff, TooLong
+from robot_dyn.simulation.run.outcome import TOO_FAST, Accumulation, Ending, Outcome, Reason, Stiff, TooLong
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.run.run import Run
 from robot_dyn.simulation.run.runner import Runner
@@ -125,7 +125,7 @@ class _Ran(NamedTuple):
         recording: Its recording.
         run_s: Time of the run, without compiling, in [s].
         remarks: Remarks on a run that it replaces.
-        runaway: The joint that reached an implausible speed, as text; empty if there is none.
+        runaway: The joint that reached an implausible speed, with its speed and limit; empty if there is none.
     """
 
     setup: Setup
@@ -134,7 +134,7 @@ class _Ran(NamedTuple):
     recording: Recording
     run_s: float
     remarks: tuple[Remark, ...]
-    runaway: str
+    runaway: dict[str, float | str]
 
 
 def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _Ran:
@@ -180,7 +180,7 @@ def _estimated(ran: _Ran, runner: Runner) -> tuple[Recording, ErrorEstimate | No
     if not setup.estimate_error or recording.outcome.ending is Ending.STOPPED:
         return recording, None
     if ran.runaway:
-        return recording, no_estimate(ran.runaway)
+        return recording, no_estimate(sentence(TOO_FAST, ran.runaway))
     try:
         return recording, estimate(setup, recording, runner)
     except KeyboardInterrupt:

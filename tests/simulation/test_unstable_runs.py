@@ -127,5 +127,19 @@ def test_a_run_that_a_stop_throws_out_of_its_steps_has_not_finished() -> None:
         rd.Plant(arm, [rd.effects.EffortLimit(30.0), *stops]), [0.4, -0.7], [3.0, 5.0], duration_s=0.2, controller=law,
         integrator="rk4", step_s=2e-3,
     )  # fmt: skip
-    assert not run.ledger.closes
-    assert run.outcome.ending == "diverged" and "joint_2" in run.outcome.text
+    assert run.outcome.ending == "diverged" and run.outcome.joint == "joint_2"
+    assert max(event.t for event in run.events) <= run.outcome.t < 0.2, "an event was located after the end"
+
+
+@pytest.mark.parametrize("kp", [1e10, 1e60, 1e150])
+@pytest.mark.parametrize("engine", ["interpreted", "compiled"])
+def test_no_event_of_states_that_overflow_is_after_the_end_of_the_run(kp: float, engine) -> None:
+    """Explosive gains, with a stop and an effort limit that are passed in steps of which the end is no number."""
+    arm = rd.load("pendulum")
+    law = rd.control.PD(rd.control.hold([0.2]), kp, 0.0)
+    plant = rd.Plant(arm, [rd.effects.EffortLimit(1e300), *rd.effects.joint_stops([-1.0], [1.0], 1e4)])
+    run = rd.simulate(
+        plant, [0.3], [0.1], duration_s=0.05, controller=law, integrator="rk4", step_s=2e-3, engine=engine
+    )
+    assert run.outcome.ending == "diverged"
+    assert max([0.0, run.t[-1], *(event.t for event in run.events)]) <= run.outcome.t <= 0.05

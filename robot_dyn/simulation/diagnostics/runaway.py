@@ -33,8 +33,8 @@ def speed_limits(setup: Setup) -> np.ndarray:
     return _TIMES * np.where((limits > 0) & np.isfinite(limits), limits, _LIMIT)
 
 
-def runaway(setup: Setup, speeds: np.ndarray) -> str:
-    """Return which joint has passed its speed limit most, as text; empty if none has.
+def runaway(setup: Setup, speeds: np.ndarray) -> dict[str, float | str]:
+    """Return the joint that has passed its speed limit most, its speed and the limit; empty if none has.
 
     Args:
         setup: What ran.
@@ -42,13 +42,10 @@ def runaway(setup: Setup, speeds: np.ndarray) -> str:
     """
     limits = cached(setup, speed_limits)
     if (speeds <= limits).all():
-        return ""
+        return {}
     dynamics, joint = setup.plant.dynamics, int(np.argmax(np.nan_to_num(speeds / limits, nan=np.inf)))
-    reached = f"{speeds[joint]:.3g} {unit('v', joint_types_of(dynamics)[joint])}"
-    limit = limits[joint] / _TIMES
-    return (
-        f"{dynamics.joint_names[joint]} reached {reached}, over 100 times its limit ({limit:.3g}): check gains and step"
-    )
+    limit, unit_of_v = float(limits[joint]) / _TIMES, unit("v", joint_types_of(dynamics)[joint])
+    return {"joint": dynamics.joint_names[joint], "value": float(speeds[joint]), "limit": limit, "unit": unit_of_v}
 
 
 def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
@@ -70,13 +67,13 @@ def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
     return (Remark(RemarkKind.TOO_LONG, motion.joint, "v", 0.0, setup.duration_s, 0.0, step, limit, facts),)
 
 
-def judged(setup: Setup, record: Recording, why: str) -> Outcome:
+def judged(setup: Setup, record: Recording, fast: dict[str, float | str]) -> Outcome:
     """Return the outcome of an implausibly fast run by fixed steps: diverged if its ledger does not close.
 
     Args:
         setup: What ran.
         record: Its recording.
-        why: Which joint reached an implausible speed, see `runaway`.
+        fast: The joint that reached an implausible speed, see `runaway`.
     """
     outcome = record.outcome
     if outcome.ending is not Ending.FINISHED or setup.integrator.controls_error:
@@ -86,4 +83,4 @@ def judged(setup: Setup, record: Recording, why: str) -> Outcome:
     with np.errstate(all="ignore"):
         if ledger(setup.equation, record).closes:
             return outcome
-    return Outcome(Reason.IMPLAUSIBLE_SPEED, outcome.t, facts={"cause": why, "step_s": setup.taken_step_s})
+    return Outcome(Reason.IMPLAUSIBLE_SPEED, outcome.t, str(fast["joint"]), fast | {"step_s": setup.taken_step_s})

@@ -118,8 +118,12 @@ class EventSteps:
         state, handler, t, y = self.state, self.handler, self.time, self.state.y
         if state.position.evaluations[0] > self.max_evaluations:
             return TooLong(int(state.position.evaluations[0]))
-        if not np.isfinite(t):  # of an event that was looked for in states that overflow
-            t = float(state.records.t[: int(state.position.sample_row[0])].max(initial=0.0))
+        if not t <= state.setup.duration_s * (1 + 1e-9):  # of an event that was looked for in states that overflow
+            samples = state.records.t[: int(state.position.sample_row[0])]
+            times = [0.0, *samples, *(event.t for event in state.events)]
+            t = float(max(time for time in times if time <= state.setup.duration_s))
+            if not state.setup.integrator.controls_error:
+                raise state.watch.diverged(Reason.STATE_OVERFLOWS, t, y)
             raise DivergedError(Outcome(Reason.STATE_OVERFLOWS, t, facts={"largest": inf}))
         if t > self.past_horizon + state.setup.duration_s / _COMPARED:
             return Outcome(Reason.END, self.past_horizon)

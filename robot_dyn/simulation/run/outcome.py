@@ -146,6 +146,7 @@ class Outcome:
         return sentence(_SENTENCES[self.reason], {"joint": self.joint, "t": self.t, **self.facts})
 
 
+TOO_FAST = ("{joint} reached {value:.3g} {unit}, over 100 times its limit ({limit:.3g}): check gains and step",)
 _FASTEST = "; the fastest joint is {joint!r}: take a smaller step than {step_s:g} s, or an implicit method"
 _PERIOD = "; or, if the sampled loop is unstable, a shorter period than {period_s:g} s"
 _BENDS = " ({effect} of joint {effect_joint!r} bends within {width:.1e} {unit})"
@@ -156,8 +157,8 @@ _SENTENCES: Mapping[Reason, Parts] = {
     Reason.CONTROL_LOOP_UNSTABLE: line_parts(RemarkKind.UNSTABLE),
     Reason.STEP_TOO_LONG: line_parts(RemarkKind.TOO_LONG),
     Reason.IMPLAUSIBLE_SPEED: (
-        "{cause}, and the energy ledger does not close: take a smaller step than {step_s:g} s, or an implicit method",
-        "a joint moves faster than {limit:g} rad/s: the control is unstable",
+        (*TOO_FAST, "a joint moves faster than {limit:g} rad/s: the control is unstable"),
+        ", and the energy ledger does not close: take a smaller step than {step_s:g} s, or an implicit method",
     ),
     Reason.ENERGY_WITHOUT_SOURCE: ("energy grows without a source", _FASTEST, _PERIOD),
     Reason.STATE_OVERFLOWS: ("a number overflowed", _GROWS, _FASTEST, _PERIOD),
