@@ -86,7 +86,7 @@ def first_below(b: Array, slack: float, stack: Array) -> float:
             left[2 + k] = piece[2]
             for j in range(d - k):
                 piece[2 + j] = (piece[2 + j] + piece[3 + j]) / 2
-        # what is left in place are the last coefficients of all levels, which are the right half
+        # the last coefficients of all levels remain in place: the right half
         piece[0] = middle
         depth += 1
     return NONE

@@ -13,7 +13,7 @@ from robot_dyn.foundations.errors import OverflowedError, RobotDynError, is_mist
 from robot_dyn.foundations.values import copied
 from robot_dyn.integrate.integrator import RightSide, States, System
 from robot_dyn.integrate.primitives import between
-from robot_dyn.integrate.step_control import Choice, ControlledStepper, StepControl, chosen_step, first_step
+from robot_dyn.integrate.step_control import ControlledStepper, StepControl, chosen_step, first_step
 
 _NO_PARAMETERS = np.zeros(0)
 Stop = Callable[[float, Array], float]
@@ -114,8 +114,8 @@ class Steps:
         coefficients, work = stepper.coefficients, stepper.work
         if control.next_h[0] == 0:
             first_step(self._f, work, control, t, end, x)
-        _, choice = self._choose(self._f, coefficients, work, control, t, end, x)
-        if choice != Choice.TAKEN:
+        _, taken = self._choose(self._f, coefficients, work, control, t, end, x)
+        if not taken:
             return None
         h = control.h[0]
         stepper.accept(self._f, coefficients, work, t, h, x)

@@ -24,7 +24,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.integrator import RightSide, States
 from robot_dyn.integrate.primitives import combination, copy, evaluate, norm, subtract
-from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end, rate_at_start
+from robot_dyn.integrate.step_control import ControlledStepper
 
 _STAGES, _EXTENDED, _DEGREE, _ERROR_ORDER = 12, 16, 7, 8
 
@@ -93,8 +93,8 @@ def table() -> Any:
     try:
         assert package is not None
         file = Path((package.submodule_search_locations or [""])[0], "integrate", "_ivp", "dop853_coefficients.py")
-        known, s = run_path(str(file)), _STAGES
-        A, B, C, D, E3, E5 = (known[name] for name in ("A", "B", "C", "D", "E3", "E5"))
+        names, s = run_path(str(file)), _STAGES
+        A, B, C, D, E3, E5 = (names[name] for name in ("A", "B", "C", "D", "E3", "E5"))
     except (AssertionError, KeyError, OSError):  # SciPy stores it elsewhere
         from scipy.integrate import DOP853
 
@@ -113,15 +113,9 @@ def stepper(m: int, rows: int, bounded: int) -> ControlledStepper:
         error=np.zeros((2, bounded, 1)),
         zero=np.zeros((m, 1)),
     )
+    numbers = coefficients()
     return ControlledStepper(
-        begin=rate_at_start,
-        step=step,
-        error=error,
-        accept=rate_at_end,
-        dense=dense,
-        coefficients=coefficients(),
-        work=work,
-        error_order=_ERROR_ORDER,
+        step=step, error=error, dense=dense, coefficients=numbers, work=work, error_order=_ERROR_ORDER
     )
 
 

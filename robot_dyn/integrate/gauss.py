@@ -157,7 +157,7 @@ class Gauss(PlainMethod):
         def update(x: Array) -> Array:
             return np.stack([system.rate(at, y + combine(row, x)) * h for at, row in zip(times, a, strict=True)])
 
-        x = enclose_fixed_point(update, np.stack([each.T.reshape(y.shape) for each in Z]))
+        x = enclose_fixed_point(update, np.stack([stage.T.reshape(y.shape) for stage in Z]))
         if x is None:
             raise self.not_found(t, h)
         return y + combine(b, x)

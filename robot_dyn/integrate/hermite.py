@@ -17,7 +17,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import FLOAT64, Array
 from robot_dyn.integrate.integrator import Integrator, RightSide, States
 from robot_dyn.integrate.primitives import combination, copy, subtract
-from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end, rate_at_start
+from robot_dyn.integrate.step_control import ControlledStepper
 
 
 class Numbers(NamedTuple):
@@ -59,16 +59,8 @@ def stepper(method: Integrator, m: int, n: int, rows: int, widths: Array | None)
         error=np.zeros((0, m, 1)),
         zero=np.zeros((m, 1)),
     )
-    return ControlledStepper(
-        begin=rate_at_start,
-        step=(_cached_step if method.plain else step_of)(inner.step),
-        error=no_error,
-        accept=rate_at_end,
-        dense=dense,
-        coefficients=Numbers(inner.coefficients, *np.eye(2)),
-        work=work,
-        error_order=1,
-    )
+    step, numbers = (_cached_step if method.plain else step_of)(inner.step), Numbers(inner.coefficients, *np.eye(2))
+    return ControlledStepper(step=step, error=no_error, dense=dense, coefficients=numbers, work=work, error_order=1)
 
 
 def step_of(inner: Callable[..., int]) -> Callable[..., int]:

@@ -35,7 +35,7 @@ _READY = (
 # Factories for the methods; order_8 reads SciPy's coefficients only when it is used.
 METHODS: Mapping[str, Callable[[], Integrator | Adaptive]] = MappingProxyType(
     {
-        **{each.name: lambda each=each: each for each in _READY},
+        **{ready.name: lambda ready=ready: ready for ready in _READY},
         "order_8": order_8,
         **{name: lambda name=name: Adaptive(name) for name in ADAPTIVE},
     }
@@ -52,16 +52,16 @@ def method(name: str) -> Any:
     return METHODS[choice("integration method", name, METHODS)]()
 
 
-def as_method(given: Any) -> Integrator | Adaptive:
+def as_method(value: Any) -> Integrator | Adaptive:
     """Return the method for a name; a method is returned unchanged.
 
     Raises:
-        QueryError: If `given` is neither a name nor a method.
+        QueryError: If `value` is neither a name nor a method.
     """
-    if isinstance(given, str):
-        return method(given)
-    if not isinstance(given, Integrator | Adaptive):
+    if isinstance(value, str):
+        return method(value)
+    if not isinstance(value, Integrator | Adaptive):
         raise QueryError(
-            f"integrator: give a name, such as 'rk4' or 'DOP853', or an rd.integrate.Adaptive(…), got {shown(given)}"
+            f"integrator: give a name, such as 'rk4' or 'DOP853', or an rd.integrate.Adaptive(…), got {shown(value)}"
         )
-    return given
+    return value

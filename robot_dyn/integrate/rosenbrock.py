@@ -20,7 +20,7 @@ from robot_dyn.foundations.values import aligned
 from robot_dyn.integrate.integrator import IntegrationError, PlainMethod, RightSide, States, Stepper
 from robot_dyn.integrate.primitives import combination, copy, evaluate, factor, norm, solve, subtract
 from robot_dyn.integrate.rosenbrock_table import RODAS5P, Numbers, RosenbrockTable
-from robot_dyn.integrate.step_control import ControlledStepper, rate_at_end
+from robot_dyn.integrate.step_control import ControlledStepper
 
 
 class Linear(NamedTuple):
@@ -147,15 +147,9 @@ class Rosenbrock(PlainMethod):
 
     def controlled(self, m: int, rows: int, bounded: int) -> ControlledStepper:
         """Return the method with control of its error, for the arguments of `dop853.stepper`."""
+        c, work = self.table.numbers(FLOAT64, m), self._work(FLOAT64, m, rows, 1, bounded)
         return ControlledStepper(
-            begin=begin,
-            step=trial,
-            error=error,
-            accept=rate_at_end,
-            dense=dense,
-            coefficients=self.table.numbers(FLOAT64, m),
-            work=self._work(FLOAT64, m, rows, 1, bounded),
-            error_order=self.order,
+            step=trial, error=error, dense=dense, coefficients=c, work=work, error_order=self.order, begin=begin
         )
 
     def _work(self, kind: Arithmetic, m: int, rows: int, runs: int, bounded: int) -> Linear:

@@ -19,7 +19,7 @@ class Numbers(NamedTuple):
     """The coefficients in one arithmetic.
 
     Attributes:
-        a, c: Of the stages before each, (s, s).
+        a, c: Weights of earlier stages, (s, s).
         m: Weights, (s,).
         alpha: α_i, (s,).
         f: Weights of f at the start, of h ∂f/∂t, and of the latest f, for each stage, (s, 3).
@@ -66,8 +66,8 @@ class RosenbrockTable:
     def numbers(self, kind: Arithmetic, size: int) -> Numbers:
         """Return the coefficients as arrays, for states of `size` entries."""
         s, dtype = len(self.m), kind.dtype
-        a, c = (np.array([[*row, *[0.0] * (s - len(row))] for row in each], dtype) for each in (self.a, self.c))
-        m, alpha = (np.array(each, dtype) for each in (self.m, self.alpha))
+        a, c = (np.array([[*row, *[0.0] * (s - len(row))] for row in table], dtype) for table in (self.a, self.c))
+        m, alpha = np.array(self.m, dtype), np.array(self.alpha, dtype)
         first = np.arange(s) == 0
         f = np.column_stack([first, self.gammas, ~first]).astype(dtype)
         h0, h1, h2 = np.array(self.dense)

@@ -9,7 +9,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import IntEnum
 from math import inf
 from typing import Any, NamedTuple
 
@@ -25,13 +24,6 @@ _NOT_FINITE = 0.1  # factor of a step whose error is not a number
 _STRETCH = 1.01  # to avoid a sliver of a step before the end
 _SPACINGS = 4  # of floats at t: the least step
 _ONE, _NO_MESH = np.ones(1), np.zeros(0)
-
-
-class Choice(IntEnum):
-    """The outcome of the choice of a step."""
-
-    TAKEN = 0
-    TOO_SMALL = 1  # only steps within rounding of t have an error within the tolerance
 
 
 class StepControl(NamedTuple):
@@ -63,32 +55,6 @@ class StepControl(NamedTuple):
     exponent: float
 
 
-class ControlledStepper(NamedTuple):
-    """A method prepared for steps of controlled error, for one state (m, 1).
-
-    Functions are plain; f has the functions of a `RightSide`, c are the coefficients, x the arrays of `States`.
-
-    Attributes:
-        begin: (f, c, work, t, x) → evaluations. Terms that depend on (t, y) alone: work.K[0], (r, 1), is the rate.
-        step: (f, c, work, t, h, x) → evaluations. A trial: writes y(t + h) into x.after.
-        error: (c, work, h, x, rtol, atol) → ‖e‖.
-        accept: (f, c, work, t, h, x) → evaluations. work.last, (r, 1), is the rate at the end of the step.
-        dense: (f, c, work, t, h, x) → evaluations. work.F, (d, m, 1), is the polynomial of `between`.
-        coefficients: Numbers of the method, c.
-        work: Arrays of the method; work.error, (…, k, 1), of the first entries of y, whose error is bounded.
-        error_order: Order of ‖e‖ in h.
-    """
-
-    begin: Callable[..., int]
-    step: Callable[..., int]
-    error: Callable[..., float]
-    accept: Callable[..., int]
-    dense: Callable[..., int]
-    coefficients: Any
-    work: Any
-    error_order: int
-
-
 def rate_at_start(f: RightSide, c: Any, work: Any, t: Any, x: States) -> int:
     """Write the rate into work.K[0]: the `begin` of a method that needs nothing else."""
     evaluate(f.rate, t, x.y, x.p, x.run_parameters, work.K[0])
@@ -99,6 +65,32 @@ def rate_at_end(f: RightSide, c: Any, work: Any, t: Any, h: Any, x: States) -> i
     """Write the rate at the end of a step into work.last: the `accept` of every method here."""
     evaluate(f.rate, t + h, x.after, x.p, x.run_parameters, work.last)
     return 1
+
+
+class ControlledStepper(NamedTuple):
+    """A method prepared for steps of controlled error, for one state (m, 1).
+
+    Functions are plain; f has the functions of a `RightSide`, c are the coefficients, x the arrays of `States`.
+
+    Attributes:
+        step: (f, c, work, t, h, x) → evaluations. A trial: writes y(t + h) into x.after.
+        error: (c, work, h, x, rtol, atol) → ‖e‖.
+        dense: (f, c, work, t, h, x) → evaluations. work.F, (d, m, 1), is the polynomial of `between`.
+        coefficients: Numbers of the method, c.
+        work: Arrays of the method; work.error, (…, k, 1), of the first entries of y, whose error is bounded.
+        error_order: Order of ‖e‖ in h.
+        begin: (f, c, work, t, x) → evaluations. Terms that depend on (t, y) alone: work.K[0], (r, 1), is the rate.
+        accept: (f, c, work, t, h, x) → evaluations. work.last, (r, 1), is the rate at the end of the step.
+    """
+
+    step: Callable[..., int]
+    error: Callable[..., float]
+    dense: Callable[..., int]
+    coefficients: Any
+    work: Any
+    error_order: int
+    begin: Callable[..., int] = rate_at_start
+    accept: Callable[..., int] = rate_at_end
 
 
 def initial_control(
@@ -190,21 +182,21 @@ def adapt(control: StepControl, h: float, e: float, reaches_end: bool, rejected:
     control.error[0] = max(e, 1e-4)
 
 
-def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callable[..., tuple[int, int]]:
+def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callable[..., tuple[int, bool]]:
     """Return the function that chooses and takes a step, for a method's `step` and `error`.
 
-    choose(f, c, work, control, t, end, x) → evaluations, Choice. Steps end at the times of the mesh, and before them
-    where the error requires it.
+    choose(f, c, work, control, t, end, x) → evaluations, and False if only steps within rounding of t have an error
+    within the tolerance. Steps end at the times of the mesh, and before them where the error requires it.
     """
 
     def choose(
         f: RightSide, c: Any, work: Any, control: StepControl, t: float, end: float, x: States
-    ) -> tuple[int, int]:
+    ) -> tuple[int, bool]:
         end = next_of_mesh(control, t, end)
         if not controls_error(control):
             control.h[0], control.end[0] = end - t, end
             evaluations = step(f, c, work, t, end - t, x)
-            return evaluations, Choice.TAKEN if x.failed[0] == 0 and is_finite(x.after) else Choice.TOO_SMALL
+            return evaluations, x.failed[0] == 0 and is_finite(x.after)
         left, evaluations, rejected = abs(end - t), 0, False
         control.next_h[0] = min(control.next_h[0], control.longest)
         least = _SPACINGS * (np.nextafter(abs(t), np.inf) - abs(t))
@@ -212,7 +204,7 @@ def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callab
             reaches_end = control.next_h[0] * _STRETCH >= left
             h = left if reaches_end else control.next_h[0]
             if h < least and not reaches_end:
-                return evaluations, Choice.TOO_SMALL
+                return evaluations, False
             signed = h if end >= t else -h
             evaluations += step(f, c, work, t, signed, x)
             e = error(c, work, signed, x, control.rtol, control.atol) if x.failed[0] == 0 else np.inf
@@ -221,9 +213,9 @@ def chosen_step(step: Callable[..., int], error: Callable[..., float]) -> Callab
             rejected = True
             control.next_h[0] = shortened(control, h, e)
             if control.next_h[0] < least:
-                return evaluations, Choice.TOO_SMALL
+                return evaluations, False
         adapt(control, h, e, reaches_end, rejected)
         control.h[0], control.end[0] = signed, end if reaches_end else t + signed
-        return evaluations, Choice.TAKEN
+        return evaluations, True
 
     return choose

@@ -85,12 +85,12 @@ class ButcherTableau:
 
     def arrays(self, kind: Arithmetic) -> Coefficients:
         """Return the coefficients in an arithmetic, zeros included."""
-        known = self._arrays.get(kind.dtype)
-        if known is not None:
-            return known
+        cached = self._arrays.get(kind.dtype)
+        if cached is not None:
+            return cached
         s, zero = len(self.b), kind.number(0)
         rows = [[*(_number(kind, x) for x in row), *[zero] * (s - len(row))] for row in self.a]
-        b, c = ([_number(kind, x) for x in each] for each in (self.b, self.c))
+        b, c = ([_number(kind, x) for x in row] for row in (self.b, self.c))
         coefficients = Coefficients(kind.array(rows).reshape(s, s), kind.array(b), kind.array(c), zero, kind.number(1))
         if kind.dtype != object:  # balls change with the precision, which the caller sets
             self._arrays[kind.dtype] = coefficients
@@ -99,7 +99,7 @@ class ButcherTableau:
 
 def combine(weights: Array, k: Sequence[Array] | Array) -> Array:
     """Σ_j w_j k_j over the weights that are not zero, of which there must be one."""
-    first, *rest = [each * weight for weight, each in zip(weights, k, strict=True) if weight != 0]
+    first, *rest = [stage * weight for weight, stage in zip(weights, k, strict=True) if weight != 0]
     for term in rest:
         first = first + term
     return first

@@ -1,6 +1,6 @@
 """Time stepping by Moreau and Jean: velocities that jump, at impacts and where dry friction takes hold, within a step.
 
-    q_m = q + h/2 v,   v⁺ from M(q_m) (v⁺ − v) = h (τ − C v − N) + the impulses of what holds joints,
+    q_m = q + h/2 v,   v⁺ from M(q_m) (v⁺ − v) = h (τ − C v − N) + the impulses on held joints,
     q⁺ = q_m + h/2 v⁺
 
 The impulses are those of a convex problem in v⁺. Within a step, events are neither

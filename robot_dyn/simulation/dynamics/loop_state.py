@@ -243,32 +243,24 @@ def lanes_of(
     seed, run = (0, 0) if equation.controller is None else equation.controller.noise_key
     start, after = aligned((2, m, W))
     start[...] = y
-    inner, end_state = np.zeros((2, m, W))
-    size, end_time, energy, peak = np.zeros((4, W))
-    failed, reason = np.zeros((2, W), np.int64)
     keys = np.empty((2, W), np.uint64)
     keys[0], keys[1] = seed, numbers
     keys[1] += np.uint64(run)
+    rows = {"inner": m, "end_state": m, "sampled": sampled, "u": n, "energies": 2}
+    rows["command"] = n * equation.sampled + equation.state_size
+    of_runs = "size", "end_time", "energy", "peak"
     return Lanes(
         y=start,
         after=after,
         p=p.copy(),
         run_parameters=np.array(run_parameters, order="C"),
-        failed=failed,
-        inner=inner,
-        sampled=np.empty((sampled, W)),
-        command=np.empty((n * equation.sampled + equation.state_size, W)),
-        u=np.empty((n, W)),
-        energies=np.empty((2, W)),
-        size=size,
+        failed=np.zeros(W, np.int64),
         alive=np.ones(W, np.int64),
-        reason=reason,
-        end_time=end_time,
-        end_state=end_state,
-        energy=energy,
+        reason=np.zeros(W, np.int64),
         scale=np.ones(W),
-        peak=peak,
         keys=keys,
+        **{name: np.zeros((count, W)) for name, count in rows.items()},
+        **dict(zip(of_runs, np.zeros((len(of_runs), W)), strict=True)),
     )
 
 

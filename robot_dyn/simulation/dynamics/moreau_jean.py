@@ -1,9 +1,10 @@
-"""A step of Moreau and Jean of a state equation, as its method asks for it: the problem, its solution, what is behind.
+"""A step of Moreau and Jean of a state equation: the convex problem, its solution, and the state after it.
 
-    M(q_m) v⁺ = M v + h (τ − C v − N) + r,   r of what holds joints:  −r ∈ h f ∂|v⁺| + N(v⁺)
+    M(q_m) v⁺ = M v + h (τ − C v − N) + r,   r the impulses on held joints:  −r ∈ h f ∂|v⁺| + N(v⁺)
 
 at q_m = q + h/2 v. The work of each force is that of its impulse at the mean velocity (v + v⁺)/2, so that the ledger
-tells what stops and friction took. In floats, or in symbols for machine code. [As of `integrate.time_stepping`]
+has the energy that stops and friction removed. In floats, or in symbols for machine code; see
+`integrate.time_stepping`.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ from robot_dyn.simulation.dynamics.state_equation import StateEquation
 
 
 def problem(equation: StateEquation, t: Any, x: Array, held: Array | None) -> Array:
-    """The numbers of the convex problem of a step, from `Problem.M` on.
+    """Return the numbers of the convex problem of a step, from `Problem.M` on.
 
     Args:
         equation: The state equation.
         t: Time in the middle of the step, in [s].
         x: The state at its start and, last, its length in [s].
-        held: The actuation in zero-order hold; None of a controller that acts continuously.
+        held: The actuation in zero-order hold; None if the controller acts continuously.
     """
     motion, n, (y, h) = equation.equation_of_motion, equation.plant.dynamics.n, (x[:-1], x[-1])
     q, v, z, _ = equation.state(y)
@@ -54,73 +55,73 @@ def problem(equation: StateEquation, t: Any, x: Array, held: Array | None) -> Ar
     return np.concatenate([M[np.triu_indices(n)], *of_joints, *working, rates, *shares])
 
 
-def solution(n: int, known: Array, place: Array) -> Array:
-    """v⁺ and its places by one Newton step, and how many of these have changed.
+def solution(n: int, numbers: Array, place: Array) -> Array:
+    """Return v⁺ and its places by one Newton step, and the number of places that changed.
 
     Args:
         n: Number of joints.
-        known: The numbers of `problem`.
+        numbers: The numbers of `problem`.
         place: The places before.
     """
-    M, given = _of(n, known)
-    x, after = newton(M, given["p"], given["f"], given["lower"], given["upper"], place)
+    M, vectors = _split(n, numbers)
+    x, after = newton(M, vectors["p"], vectors["f"], vectors["lower"], vectors["upper"], place)
     return np.concatenate([x, after, np.abs(after - place) @ np.ones((n, 1))])
 
 
 def stepped(equation: StateEquation, t: float, x: Array, held: Array | None) -> Array:
-    """y⁺, v⁺ and its places, how many have changed, and the numbers of `problem`; in floats.
+    """Return y⁺, v⁺ and its places, the number that changed, and the numbers of `problem`; in floats.
 
     Args:
         equation: The state equation.
         t: Time in the middle of the step, in [s].
         x: The state, the step, and the places to start from.
-        held: As of `problem`.
+        held: See `problem`.
     """
     n = equation.plant.dynamics.n
-    known = problem(equation, t, x[:-n], held)
-    found = np.concatenate([_solved(n, known, x[-n:]), known])
-    return np.concatenate([behind(equation, x[:-n], found), found])
+    numbers = problem(equation, t, x[:-n], held)
+    solved = np.concatenate([_solved(n, numbers, x[-n:]), numbers])
+    return np.concatenate([behind(equation, x[:-n], solved), solved])
 
 
-def _solved(n: int, known: Array, place: Array) -> Array:
-    """The solution after as many Newton steps as it takes, but for PASSES at most; nan where M is not definite."""
+def _solved(n: int, numbers: Array, place: Array) -> Array:
+    """Return the solution after up to PASSES Newton steps; nan where M is not definite."""
     try:
-        made = solution(n, known, place)
+        result = solution(n, numbers, place)
         for _ in range(PASSES - 1):
-            if made[2 * n] > 0:
-                made = solution(n, known, made[n : 2 * n])
+            if result[2 * n] > 0:
+                result = solution(n, numbers, result[n : 2 * n])
     except NotPositiveDefiniteError:  # of a state far beyond all bounds: the run ends there, as in machine code
         return np.full(2 * n + 1, np.nan)
-    return made
+    return result
 
 
-def behind(equation: StateEquation, x: Array, found: Array) -> Array:
-    """The state behind a step.
+def behind(equation: StateEquation, x: Array, solved: Array) -> Array:
+    """Return the state after a step.
 
     Args:
         equation: The state equation.
-        x: As of `problem`.
-        found: v⁺, its places, how many changed, and the numbers of `problem`.
+        x: See `problem`.
+        solved: v⁺, its places, the number that changed, and the numbers of `problem`.
     """
     n, motion, (y, h) = equation.plant.dynamics.n, equation.equation_of_motion, (x[:-1], x[-1])
-    v, after, known = y[n : 2 * n], found[:n], found[problem_rows(n).M :]
-    M, given = _of(n, known)
+    v, after, numbers = y[n : 2 * n], solved[:n], solved[problem_rows(n).M :]
+    M, vectors = _split(n, numbers)
     mean = (v + after) / 2
-    reaction = M @ after - given["p"]
-    f, lower, upper = given["f"], given["lower"], given["upper"]
+    reaction = M @ after - vectors["p"]
+    f, lower, upper = vectors["f"], vectors["lower"], vectors["upper"]
     rubbing = np.where(after > 0, -f, np.where(after < 0, f, np.minimum(np.maximum(reaction, -f), f)))
     left = reaction - rubbing
     stopping = np.where(after <= lower, left, np.where(after >= upper, left, 0 * f))
-    own = [force for force in motion.forces if not isinstance(force, Conservative)]
-    at, works = problem_rows(n).rest - problem_rows(n).M, [h * (given["u"] @ mean)]
-    smooth = sum(not isinstance(force, SetValued) for force in own)
-    rates = known[at + n * smooth :][: equation.states - equation.impulses]
-    impulses = impulses_of(motion.set_valued, rubbing, stopping, known[at + n * smooth + len(rates) :])
-    for force in own:
+    working = [force for force in motion.forces if not isinstance(force, Conservative)]
+    at, works = problem_rows(n).rest - problem_rows(n).M, [h * (vectors["u"] @ mean)]
+    smooth = sum(not isinstance(force, SetValued) for force in working)
+    rates = numbers[at + n * smooth :][: equation.states - equation.impulses]
+    impulses = impulses_of(motion.set_valued, rubbing, stopping, numbers[at + n * smooth + len(rates) :])
+    for force in working:
         if isinstance(force, SetValued):
             works.append(next(impulses) @ mean)
         else:
-            works.append(h * (known[at : at + n] @ mean))
+            works.append(h * (numbers[at : at + n] @ mean))
             at += n
     total = y[2 * n :].copy()
     total[: len(rates)] = total[: len(rates)] + h * rates
@@ -131,10 +132,10 @@ def behind(equation: StateEquation, x: Array, found: Array) -> Array:
     return np.concatenate([y[:n] + mean * h, after, total])
 
 
-def _of(n: int, known: Array) -> tuple[Array, dict[str, Array]]:
-    """The mass matrix, and the other numbers of joints by their names in `Problem`."""
+def _split(n: int, numbers: Array) -> tuple[Array, dict[str, Array]]:
+    """Return the mass matrix, and the vectors of the problem by their names in `Problem`."""
     rows = problem_rows(n)
     i, j = np.triu_indices(n)
-    M = np.empty((n, n), dtype=known.dtype).view(type(known))
-    M[i, j] = M[j, i] = known[: rows.p - rows.M]
-    return M, {name: known[getattr(rows, name) - rows.M :][:n] for name in ("p", "f", "lower", "upper", "u")}
+    M = np.empty((n, n), dtype=numbers.dtype).view(type(numbers))
+    M[i, j] = M[j, i] = numbers[: rows.p - rows.M]
+    return M, {name: numbers[getattr(rows, name) - rows.M :][:n] for name in ("p", "f", "lower", "upper", "u")}

@@ -197,40 +197,15 @@ def _workspace(m: int, N: int, n: int) -> EventWorkspace:
     )
 
 
-_NONE, _ROWS, _TABLE = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
-NO_CONTACT = ContactMode(  # of an equation in which nothing may hold joints
-    laws=ContactLaws(
-        n=0,
-        joints=_ROWS,
-        rows=_ROWS,
-        speeds=_ROWS,
-        impulses=_ROWS,
-        motors=_ROWS,
-        works=_ROWS,
-        inertia=_NONE,
-        least=_NONE,
-        most=_NONE,
-        sliding=_NONE,
-        has_friction=np.zeros(0, bool),
-        lower=_TABLE,
-        upper=_TABLE,
-        restitution=_TABLE,
-        lowest=_TABLE,
-        highest=_TABLE,
-        works_of_stops=_ROWS,
-    ),
-    places=Places(held=_ROWS, direction=_ROWS, contact=_ROWS),
-    held=_NONE,
-    direction=_NONE,
-    contact=_NONE,
-    run_parameters=_TABLE,
-    held_actuation=0,
-    impacts=_NONE,
-    strikes=_TABLE,
-    impact_count=_ROWS,
-    changes=_NONE,
-    change_count=_ROWS,
-    brief=0.0,
+def _without(kind: Any, **fields: Any) -> Any:
+    """Return a named tuple whose other fields are empty arrays."""
+    return kind(**dict.fromkeys(kind._fields, np.zeros(0)) | fields)
+
+
+NO_CONTACT = _without(  # of an equation in which nothing may hold joints
+    ContactMode,
+    laws=_without(ContactLaws, n=0),
+    places=Places._make([np.zeros(0, np.int64)] * 3),
     log=event_log(0, 0, 0.0),
     work=_workspace(0, 0, 0),
 )

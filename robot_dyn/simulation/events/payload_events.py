@@ -1,8 +1,8 @@
-"""Payloads that are picked up and dropped in a run: what is carried, and the state behind such a time.
+"""Payloads that are picked up and dropped in a run, and the state after such a time.
 
-    v⁺ = (M + ΔM)⁻¹ M v⁻  of bodies picked up at rest, else v⁺ = v⁻;   W_k⁺ = W_k⁻ + energy that came, or went, with it
+    v⁺ = (M + ΔM)⁻¹ M v⁻  for bodies picked up at rest, else v⁺ = v⁻;   W_k⁺ = W_k⁻ + energy gained or lost with it
 
-M has what is carried before and after; of several bodies at one time those that are dropped go first.
+M includes the bodies carried before and after; of several bodies at one time, those that are dropped are first.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ Carried = tuple[bool, ...]
 
 @final
 class PayloadEvents:
-    """What a run carries.
+    """The payloads of a run.
 
     Args:
-        equation: Its state equation, of payloads that come and go.
+        equation: The state equation, whose payloads are picked up and dropped.
 
     Attributes:
-        equation: The same with what is carried now in its bodies; itself if nothing comes or goes.
+        equation: The state equation with the carried payloads in its bodies; unchanged if no payload changes.
     """
 
     def __init__(self, equation: StateEquation) -> None:
@@ -38,15 +38,15 @@ class PayloadEvents:
 
     def _at(self, t: float) -> Carried:
         payloads = self._whole.equation_of_motion.payloads
-        return tuple(bool(each.acts(t)) for each in payloads if each.carried is None)
+        return tuple(bool(payload.acts(t)) for payload in payloads if payload.carried is None)
 
     @property
     def any(self) -> bool:
-        """Whether there are payloads that come and go."""
+        """True if payloads are picked up or dropped."""
         return bool(self._carried)
 
     def over(self, t: float, y: np.ndarray) -> tuple[np.ndarray, list[Occurrence]]:
-        """The state behind a time in [s] at which payloads are picked up or dropped, and what happened."""
+        """Return the state after a time in [s] at which payloads are picked up or dropped, and these events."""
         now = self._at(t)
         y, happened = _transferred(self._whole, self._carried, now, t, y)
         self._carried, self.equation = now, _carrying(self._whole, now)
@@ -60,12 +60,12 @@ def _carrying(equation: StateEquation, carried: Carried) -> StateEquation:
 def _transferred(
     equation: StateEquation, was: Carried, now: Carried, t: float, y: np.ndarray
 ) -> tuple[np.ndarray, list[Occurrence]]:
-    """The state behind a time at which payloads are picked up or dropped, and what happened.
+    """Return the state after a time at which payloads are picked up or dropped, and these events.
 
     Args:
-        equation: The state equation, of payloads that come and go.
-        was: Which of them are carried before.
-        now: Which are behind.
+        equation: The state equation, whose payloads are picked up and dropped.
+        was: True for each payload that is carried before.
+        now: True for each that is carried after.
         t: Time, in [s].
         y: The state before.
     """
@@ -83,8 +83,8 @@ def _transferred(
     def momentum() -> np.ndarray:
         return carrying(equation.plant, tuple(held)).dynamics.momentum(q, v)
 
-    def report(k: int, what: str, direction: int) -> None:
-        name = f"payload on {payloads[k].payload.frame} {what}"
+    def report(k: int, event: str, direction: int) -> None:
+        name = f"payload on {payloads[k].payload.frame} {event}"
         happened.append(Occurrence(t, name, direction, tuple(q.tolist()), tuple(v.tolist())))
 
     changes = [k for k in range(len(was)) if was[k] != now[k]]

@@ -25,15 +25,7 @@ import numpy as np
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.integrate.bernstein import NONE
 from robot_dyn.integrate.primitives import between, copy, inlined
-from robot_dyn.integrate.step_control import (
-    Choice,
-    StepControl,
-    chosen_step,
-    controls_error,
-    first_step,
-    is_finite,
-    shortened,
-)
+from robot_dyn.integrate.step_control import StepControl, chosen_step, controls_error, first_step, is_finite, shortened
 from robot_dyn.simulation.dynamics.loop_state import Ended, Functions, Phase
 from robot_dyn.simulation.events.contact_mode import ContactMode
 from robot_dyn.simulation.events.detection import FASTEST
@@ -141,12 +133,11 @@ def event_loop(
     def take_step(f: Functions, c: Any, work: Any, loop: Loop, control: StepControl, end: float) -> bool:
         """Choose and take a step, and evaluate the rate at its end. Return False if no step is small enough."""
         position, lanes, t = loop.position, loop.lanes, loop.position.time[0]
-        evaluations, choice = choose(f, c, work, control, t, end, lanes)
+        evaluations, taken = choose(f, c, work, control, t, end, lanes)
         position.evaluations[0] += evaluations
-        if choice != Choice.TAKEN:
-            return False
-        position.evaluations[0] += accept(f, c, work, t, control.h[0], lanes)
-        return True
+        if taken:
+            position.evaluations[0] += accept(f, c, work, t, control.h[0], lanes)
+        return taken
 
     @inlined
     def locate_event(

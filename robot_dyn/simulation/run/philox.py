@@ -2,7 +2,7 @@
 
     ξ = Φ⁻¹((⌊x/2¹¹⌋ + ½) / 2⁵³),   x a word of Philox at (tick, ⌊channel/4⌋, 0, 0) of the key (seed, run)
 
-No number depends on one before it, so that a run has the same noise alone, among others and in any thread. Plain
+No number depends on an earlier one, so that a run has the same noise alone, among others and in any thread. Plain
 functions without allocation, of integers and of operations that IEEE 754 rounds alone: interpreted and as machine code
 they give the same bits.
 
@@ -66,7 +66,7 @@ def draw(y: Array, first: int, count: int, keys: Array, tick: int) -> None:
 
 
 def philox(tick: Any, block: Any, seed: Any, run: Any) -> tuple[Any, Any, Any, Any]:
-    """The four words of Philox4x64-10 at the counter (tick, block, 0, 0) of the key (seed, run)."""
+    """Return the four words of Philox4x64-10 at the counter (tick, block, 0, 0) of the key (seed, run)."""
     a, b, c, d = tick, block, _ZERO, _ZERO
     for _ in range(_ROUNDS):
         a, b, c, d = _high(_TIMES[1], c) ^ b ^ seed, _TIMES[1] * c, _high(_TIMES[0], a) ^ d ^ run, _TIMES[0] * a
@@ -75,7 +75,7 @@ def philox(tick: Any, block: Any, seed: Any, run: Any) -> tuple[Any, Any, Any, A
 
 
 def _high(x: Any, y: Any) -> Any:
-    """The high word of a product of two."""
+    """Return the high word of a product."""
     x1, x0, y1, y0 = x >> _HALF, x & _LOW, y >> _HALF, y & _LOW
     middle = x1 * y0 + (x0 * y0 >> _HALF)
     carried = (middle & _LOW) + x0 * y1
@@ -83,7 +83,7 @@ def _high(x: Any, y: Any) -> Any:
 
 
 def normal(word: Any) -> float:
-    """The normal deviate of a word, Φ⁻¹ of the middle of one of 2⁵³ equal parts of (0, 1); relative error 1e-15."""
+    """Return the normal deviate of a word: Φ⁻¹ of the middle of one of 2⁵³ equal parts of (0, 1), to 1e-15."""
     q = (float(word >> _DROPPED) - 2.0**52 + 0.5) * 2.0**-53  # exact, and so is the distance to the nearer end
     if abs(q) <= 0.425:
         return q * _ratio(_MIDDLE, 0.180625 - q * q)
@@ -92,15 +92,15 @@ def normal(word: Any) -> float:
     return -x if q < 0.0 else x
 
 
-def _ratio(of: Any, x: float) -> float:
-    above, below = of[0][7], of[1][7]
+def _ratio(table: Any, x: float) -> float:
+    above, below = table[0][7], table[1][7]
     for i in range(6, -1, -1):
-        above, below = above * x + of[0][i], below * x + of[1][i]
+        above, below = above * x + table[0][i], below * x + table[1][i]
     return above / below
 
 
 def _logarithm(x: float) -> float:
-    """Ln x = 2 artanh((m − 1)/(m + 1)) + e ln 2 with x = 2ᵉ m; that of a library may round as it likes."""
+    """Return ln x = 2 artanh((m − 1)/(m + 1)) + e ln 2 with x = 2ᵉ m; libraries round it in different ways."""
     m, e = frexp(x)
     if m < 0.7071067811865476:
         m, e = 2.0 * m, e - 1

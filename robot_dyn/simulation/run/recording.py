@@ -1,4 +1,4 @@
-"""What a time loop records, and the recording of a run: samples, and the states that companion runs share.
+"""The records of a time loop, and the recording of a run: samples, and the states that companion runs share.
 
 `Records` and its functions are plain functions of arrays, for both loops; `Recording` is the result for Python.
 """
@@ -24,7 +24,7 @@ MOST_SHARED = 200_000  # states of a run that are compared with those of its com
 @final
 @dataclass(frozen=True)
 class Path:
-    """States on the way, k of them.
+    """States during a run, k of them.
 
     Attributes:
         key: Steps of the run before each, (k,), by which the states of a run and of its companions are matched.
@@ -43,17 +43,17 @@ class Recording:
     """The states of a run.
 
     Attributes:
-        outcome: How it ended.
-        t: Of the samples, (k,), in [s].
+        outcome: The end of the run.
+        t: Times of the samples, (k,), in [s].
         y: States of the state equation, (k, m).
-        made: What follows from them: y', u, K and V, (k, m + n + 2).
+        made: y', u, K and V at the samples, (k, m + n + 2).
         shared: States at which runs of other steps are compared.
-        step_log: States at the ends of all steps; the same, unless the method chooses its steps.
+        step_log: States at the ends of all steps; the same as `shared` unless the method chooses its steps.
         steps: Number of steps.
-        evaluations: Of the equation of motion.
-        kinetic_peak: Largest kinetic energy that is known, beside that of the samples, in [J].
-        events: That occurred.
-        ends: Of the steps, in [s], where the method chooses them; None for any other.
+        evaluations: Number of evaluations of the equation of motion.
+        kinetic_peak: Largest kinetic energy at the energy checks, in [J].
+        events: Events that occurred.
+        ends: Ends of the steps, in [s], if the method chooses them; otherwise None.
     """
 
     outcome: Outcome
