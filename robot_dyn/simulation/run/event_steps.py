@@ -118,8 +118,9 @@ class EventSteps:
         state, handler, t, y = self.state, self.handler, self.time, self.state.y
         if state.position.evaluations[0] > self.max_evaluations:
             return TooLong(int(state.position.evaluations[0]))
-        if not t <= state.setup.duration_s * (1 + 1e-9):  # of an event located in states that overflow
-            times = [0.0, *state.records.t[: int(state.position.sample_row[0])], *(event.t for event in state.events)]
+        if not t <= state.setup.duration_s * (1 + 1e-9):  # of an event that was looked for in states that overflow
+            samples = state.records.t[: int(state.position.sample_row[0])]
+            times = [0.0, *samples, *(event.t for event in state.events)]
             t = float(max(time for time in times if time <= state.setup.duration_s))
             if not state.setup.integrator.controls_error:
                 raise state.watch.diverged(Reason.STATE_OVERFLOWS, t, y)

@@ -174,7 +174,7 @@ class Run:
             steps=int(state.position.steps[0]),
             evaluations=int(state.position.evaluations[0]),
             kinetic_peak=float(state.lanes.peak[0]),
-            events=tuple(event for event in state.events if event.t <= outcome.t),  # not of states that overflow
+            events=tuple(event for event in state.events if event.t <= outcome.t),  # not those of states that overflow
             ends=ends,
         )
         if state.setup.integrator.nonsmooth:
