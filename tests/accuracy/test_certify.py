@@ -177,7 +177,7 @@ def test_ctrl_c_keeps_what_was_counted() -> None:
 
     made = rd.accuracy.certify(rd.load("pendulum"), on_progress=stop, **QUICK)
     assert made.interrupted and made.quantities == ("M",)
-    assert made.left_out == ("what was to come when it was interrupted",)
+    assert made.left_out == ("the remaining parts, because of an interruption",)
 
 
 def test_what_was_not_counted_is_told(made: Certificate) -> None:

@@ -1,4 +1,4 @@
-"""The command that says whether motors suffice for a motion: budget."""
+"""The command budget: compare the demand of a motion with the limits of motors."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ def budget(
     options: RobotOptions = AS_STATED,
     results: Results = PRINTED,
 ) -> None:
-    """Say whether motors suffice for a motion, and why.
+    """Check whether motors suffice for a motion, and show why.
 
-    It compares the demand on each motor with its limits, by cause. The exit code is 1 if a motor is too small.
-    With --fastest it is 1 if one is too small for the given motion or for the fastest one.
-    Torque and speed peaks, rms torque, power, energy, and the torque at which dry friction breaks away.
+    Compare the demand on each motor with its limits, by cause. The exit code is 1 if a motor is too small.
+    With --fastest it is 1 if a motor is too small for the given motion or for the fastest one.
+    Show torque and speed peaks, rms torque, power, energy, and the torque at which dry friction breaks away.
 
     Options:
         what (ROBOT|SCENE.toml|RUN.npz): A robot, with a plan; a scene, which is simulated; or a run file.
@@ -59,21 +59,21 @@ def budget(
         limits (MOTORS.csv): Motors: joint, peak, continuous, speed, gear_ratio, …, with units; else the
             robot's file.
         max_payload (LINK@X,Y,Z): Find the largest payload there that still fits.
-        fastest: Move along the same path as fast as the limits allow; -o and --csv are then of it.
-        share: With --fastest: of the peak torques that it may take, up to 1.
-        unit: rad or deg, of angles in the plan whose heading says none.
+        fastest: Move along the same path as fast as the limits allow; -o and --csv then write this motion.
+        share: With --fastest: fraction of the peak torques that it may use, up to 1.
+        unit: rad or deg, for angles in the plan without a unit in the heading.
         period (SECONDS): Time between rows of a plan without times.
         time (COLUMN): Heading of the times in the plan, unless it is t or time.
-        ends: rest or measured: whether the plan stops at its ends, or is cut from a longer motion.
-        joint (JOINT=COLUMN): Heading of a joint in the plan, for each; others are left out.
+        ends: rest or measured: the plan stops at its ends, or is part of a longer motion.
+        joint (JOINT=COLUMN): Heading of a joint in the plan; repeat it for each joint, others are ignored.
     """
     from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 
     paths = results.files(MotorBudget, what, plan, limits)
     if share is not None and not fastest:
-        raise QueryError("--share is of the fastest motion: add --fastest, or leave it out")
+        raise QueryError("--share is for the fastest motion: add --fastest, or remove --share")
     if time is not None and period is not None:
-        raise QueryError("--time and --period both give the times: leave one of them out")
+        raise QueryError("--time and --period both give the times: remove one of them")
     motors = None if limits is None else rd.tools.motors.read_motors(limits)
     of_robots = {
         "PLAN.csv": plan, "--payload": payload, "--effects": effects, "--max-payload": max_payload,
@@ -82,28 +82,28 @@ def budget(
         **options.stated,
     }  # fmt: skip
     if what.lower().endswith(_RUNS):
-        if given := [name for name, value in of_robots.items() if value]:
-            raise QueryError(f"{given[0]}: is for a robot with a plan; a scene or a run has its own, so leave it out")
-        found = rd.tools.motors.budget(_run(what), motors=motors)
+        if unused := [name for name, value in of_robots.items() if value]:
+            raise QueryError(f"{unused[0]} is for a robot with a plan; a scene or a run has its own, so remove it")
+        result = rd.tools.motors.budget(_run(what), motors=motors)
     else:
         if plan is None:
-            raise QueryError(f"{what}: give its motion as well, a CSV file with a column t [s] and one for each joint")
+            raise QueryError(f"{what}: give a motion as well, a CSV file with a column t [s] and one for each joint")
         robot = options.load(what)
         times = time if period is None else period
         columns = arguments.pairs("--joint", joint, "JOINT=COLUMN") or None
         motion = rd.control.from_samples(robot, plan, time=times, joints=columns, unit=unit, ends=ends)
-        bodies = [arguments.payload(each) for each in payload or ()] or None
-        with bar(what="asking for the torque"):
-            found = rd.tools.motors.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)
-    more = _more(found, max_payload, fastest, 1.0 if share is None else share)
-    judged = [found, more["fastest"].budget] if fastest else [found]
-    results.give(found, paths, judged[-1], **more)
-    if not all(each.fits for each in judged):
+        bodies = [arguments.payload(text) for text in payload or ()] or None
+        with bar(what="computing the torque"):
+            result = rd.tools.motors.budget(motion, rd.Plant(robot, effects or ()), payload=bodies, motors=motors)
+    more = _more(result, max_payload, fastest, 1.0 if share is None else share)
+    budgets = [result, more["fastest"].budget] if fastest else [result]
+    results.give(result, paths, budgets[-1], **more)
+    if not all(x.fits for x in budgets):
         raise typer.Exit(1)
 
 
 def _run(path: str) -> Trajectory:
-    """The run of a file, or of a scene."""
+    """Return the run of a file, or simulate a scene."""
     if path.lower().endswith(".npz"):
         return rd.load_run(path)
     setup = rd.read_scene(path)
@@ -111,15 +111,15 @@ def _run(path: str) -> Trajectory:
         return rd.simulate(setup, on_progress=advance)
 
 
-def _more(found: MotorBudget, max_payload: str | None, fastest: bool, share: float) -> dict[str, Any]:
-    """What follows from a budget, by key."""
+def _more(result: MotorBudget, max_payload: str | None, fastest: bool, share: float) -> dict[str, Any]:
+    """Return further results of a budget, by key."""
     more: dict[str, Any] = {}
     if max_payload is not None:
-        with bar(what="looking for the largest payload"):
+        with bar(what="computing the largest payload"):
             more["max_payload"] = rd.tools.motors.max_payload(
-                found, *arguments.link_and_place("--max-payload", max_payload)
+                result, *arguments.link_and_place("--max-payload", max_payload)
             )
     if fastest:
-        with bar(what="looking for the fastest motion"):
-            more["fastest"] = rd.tools.motors.fastest(found, share)
+        with bar(what="planning the fastest motion"):
+            more["fastest"] = rd.tools.motors.fastest(result, share)
     return more

@@ -1,4 +1,4 @@
-"""Limits of joints: torque, velocity and acceleration, of the robot's file, of its motors, or given."""
+"""Limits of joints: torque, velocity and acceleration, from the robot's file, its motors, or arguments."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from robot_dyn.foundations import EffectError, PlanError, check_coefficients, co
 from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.motors_file import Motors
 
-_SAME_ROTOR = 0.01  # difference of inertias, in their size
-_BEYOND = 1e-9  # [rad] or [m] of a position limit, which rounding may pass
+_SAME_ROTOR = 0.01  # largest relative difference of inertias
+_BEYOND = 1e-9  # [rad] or [m]: rounding by which a position may exceed its limit
 
 
 @final
@@ -47,13 +47,13 @@ class Limits:
             PlanError: If a joint is unknown, or the number of joints differs.
         """
         try:
-            by_joint = {name: known.on(name, getattr(self, name), dynamics) for name, known in declared(Limits).items()}
+            by_joint = {name: form.on(name, getattr(self, name), dynamics) for name, form in declared(Limits).items()}
         except EffectError as error:
             raise PlanError(str(error)) from None
         return Limits(**{name: np.broadcast_to(x, dynamics.n) for name, x in by_joint.items()})
 
     def times(self, torque: float, rates: float = 1.0) -> Limits:
-        """Return the limits with peak torques, and velocities and accelerations, times a factor."""
+        """Return the limits with peak torques times one factor, velocities and accelerations times another."""
         return replace(
             self, effort=torque * self.effort, velocity=rates * self.velocity, acceleration=rates * self.acceleration
         )
@@ -63,10 +63,10 @@ def limits_of(
     plant: Plant, motors: Motors | None = None, effort: Any = None, velocity: Any = None, acceleration: Any = None,
     continuous: Any = None,
 ) -> Limits:  # fmt: skip
-    """Return the limits of a plant: those given, else of its motors, else of its file; at most its `EffortLimit`s.
+    """Return the limits of a plant: from arguments, else motors, else the file; its `EffortLimit`s always apply.
 
     Raises:
-        PlanError: If a joint is unknown, a limit is not positive, or a motor's rotor is not a part of the arm.
+        PlanError: If a joint is unknown, a limit is not positive, or the rotor of a motor is not part of the arm.
     """
     robot: Any = plant.dynamics
     if motors is not None:
@@ -89,7 +89,7 @@ def _stated(robot: Any, kind: str) -> Any:
         name for name, limit in zip(robot.joint_names, np.broadcast_to(limits, robot.n), strict=True) if not limit
     ]:
         raise PlanError(
-            f"the file states a limit of {kind} of 0 for {', '.join(map(repr, zero[:6]))}; give limits by joint,"
+            f"the file states a {kind} limit of 0 for {', '.join(map(repr, zero[:6]))}; give limits by joint,"
             f" {kind}={{{zero[0]!r}: 10.0}}: joints left out have none"
         )
     return limits
@@ -98,28 +98,28 @@ def _stated(robot: Any, kind: str) -> Any:
 def outside_positions(
     robot: Any, motion: PiecewisePolynomial, stops: RigidStops | None = None, at: str = "{:.4g} s"
 ) -> Iterator[str]:
-    """Yield, for each joint that a motion takes outside its position limits, where and when.
+    """Yield a message, with place and time, for each joint that a motion takes outside its position limits.
 
     Args:
         robot: The arm.
-        motion: Its motion.
-        stops: Stops whose limits replace those of the robot's file.
+        motion: Motion of the arm.
+        stops: Stops that replace the limits in the robot's file.
         at: Format of a time, or of a place along a path.
     """
-    found, n = extreme_values(motion), robot.n
+    extremes, n = extreme_values(motion), robot.n
     limits = robot if stops is None else stops
     lower, upper = (np.broadcast_to(getattr(limits, x, y), n) for x, y in (("lower", -inf), ("upper", inf)))
     types = getattr(robot, "joint_types", (None,) * n)
     for i, name in enumerate(robot.joint_names):
-        below, above = lower[i] - found.least[i], found.greatest[i] - upper[i]
+        below, above = lower[i] - extremes.least[i], extremes.greatest[i] - upper[i]
         if max(below, above) > _BEYOND:
-            q, t = (found.least, found.at_least) if below > above else (found.greatest, found.at_greatest)
+            q, t = (extremes.least, extremes.at_least) if below > above else (extremes.greatest, extremes.at_greatest)
             where = f"{q[i]:.6g} {of_joint('rad', types[i])} at {at.format(t[i])}"
             yield f"{name} is at {where}, outside its limits {lower[i]:.6g} to {upper[i]:.6g}"
 
 
 def check_motors(motors: object) -> None:
-    """Raise a PlanError if `motors` are not those of a file."""
+    """Raise a PlanError if `motors` is not a `Motors`."""
     if motors is not None:
         instance("motors", motors, Motors, "read them with rd.tools.motors.read_motors(path)", error=PlanError)
 
@@ -130,12 +130,12 @@ def same_rotor(one: float, other: float) -> bool:
 
 
 def _check_rotors(motors: Motors, robot: Any) -> None:
-    """Raise a PlanError if a rotor is not a part of the arm: its torque would be missing."""
-    felt = dict(zip(robot.joint_names, getattr(robot, "armature", np.zeros(robot.n)), strict=True))
+    """Raise a PlanError if a rotor is not part of the arm: its torque would be missing."""
+    armatures = dict(zip(robot.joint_names, getattr(robot, "armature", np.zeros(robot.n)), strict=True))
     for joint, inertia in motors.armature.items():
-        there = float(felt.get(joint, inertia))
-        if not same_rotor(inertia, there):
+        armature = float(armatures.get(joint, inertia))
+        if not same_rotor(inertia, armature):
             raise PlanError(
-                f"{motors.source}: the rotor of {joint!r} is felt as {inertia:.6g} kg m² at the joint, the arm has"
-                f' {there:.6g}; take arm.with_(armature=motors.armature), in a scene kind = "armature"'
+                f"{motors.source}: the rotor of {joint!r} has {inertia:.6g} kg m² at the joint, but the arm has"
+                f' {armature:.6g}; use arm.with_(armature=motors.armature), in a scene kind = "armature"'
             )

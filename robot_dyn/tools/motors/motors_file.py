@@ -1,11 +1,11 @@
-"""Motors of joints from a CSV file: peak and continuous torque, speed, and the rotor behind its gear.
+"""Motors of joints from a CSV file: peak and continuous torque, speed, gear and rotor.
 
     joint, peak [N m], continuous [N m], speed [rad/s], gear_ratio, rotor_inertia [kg m^2], at
     shoulder_pan_joint, 150, 56, 3.15, 101, 1.2e-4, joint
 
-Torques and speeds are at the joint, or, where the column `at` says "motor", at the shaft of the motor: then the torque
-at the joint is the gear ratio times that, and the speed that divided by the ratio. A rotor is felt at the joint as the
-inertia ratio² · rotor_inertia. [Siciliano et al. 2009, sec. 5.2]
+Torques and speeds are at the joint, or at the motor shaft if the column `at` is "motor": the gear ratio then multiplies
+the torque and divides the speed. A rotor adds the inertia ratio² · rotor_inertia at the joint.
+[Siciliano et al. 2009, sec. 5.2]
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robot_dyn.foundations import PlanError, csv_rows, nearest, shorten
 
 _MOST_BYTES = 2**20
 _HEAD = re.compile(r"\s*([a-z_ ]+?)\s*(?:\[(.*?)\])?\s*")
-# units that a column may have, with their factors; those of joints that slide as well
+# units of columns with their factors, including units of prismatic joints
 _TORQUE = {"N m": 1.0, "Nm": 1.0, "N": 1.0}
 _SPEED = {"rad/s": 1.0, "m/s": 1.0, "rpm": pi / 30, "deg/s": pi / 180}
 _INERTIA = {"kg m^2": 1.0, "kg m²": 1.0, "kg": 1.0, "kg cm^2": 1e-4, "kg cm²": 1e-4, "g cm^2": 1e-7, "g cm²": 1e-7}
@@ -39,14 +39,14 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
 @final
 @dataclass(frozen=True, eq=False)
 class Motors:
-    """Motors by joint, at the joint; what is not stated is inf, or 0 for the rotor's inertia.
+    """Motors by joint, with values at the joint; joints without a value have no limit, or no rotor inertia.
 
     Attributes:
-        peak: Greatest torque, in [N m] or [N].
-        continuous: Torque that may last, likewise.
-        speed: Greatest speed, in [rad/s] or [m/s].
-        armature: Inertia of the rotor behind its gear, in [kg m²] or [kg].
-        source: The file.
+        peak: Peak torque, in [N m] or [N].
+        continuous: Continuous torque, in [N m] or [N].
+        speed: Largest speed, in [rad/s] or [m/s].
+        armature: Inertia of the rotor at the joint, in [kg m²] or [kg].
+        source: Path of the file.
     """
 
     peak: Mapping[str, float]
@@ -57,14 +57,14 @@ class Motors:
 
 
 def read_motors(path: str | Path) -> Motors:
-    """The motors of a CSV file; its first line names the columns, with their units in brackets.
+    """Read the motors of a CSV file; the first line names the columns, with units in brackets.
 
-    Columns: joint, peak [N m], continuous [N m], speed [rad/s], gear_ratio, rotor_inertia [kg m^2], at. All but `joint`
-    and `peak` may be left out, and entries may be empty. [N] and [m/s] are of joints that slide; speeds may be in [rpm]
-    or [deg/s]. `at` is "joint" or "motor": where torques and speeds are meant; it is asked for with gear ratios.
+    Columns: joint, peak [N m], continuous [N m], speed [rad/s], gear_ratio, rotor_inertia [kg m^2], at. All except
+    `joint` and `peak` are optional, and entries may be empty. Prismatic joints have [N] and [m/s]; speeds may be in
+    [rpm] or [deg/s]. `at` is "joint" or "motor", the place of torques and speeds; it is required with gear ratios.
 
     Raises:
-        PlanError: If it cannot be read, a column or unit is unknown, or an entry is not a positive number.
+        PlanError: If the file cannot be read, a column or unit is unknown, or an entry is not a positive number.
     """
     lines = csv_rows(path, _MOST_BYTES, PlanError, "give a CSV file with columns joint, peak [N m] …", skip_blank=True)
     heads = _heads(path, next(lines)[1])
@@ -73,7 +73,7 @@ def read_motors(path: str | Path) -> Motors:
         raise PlanError(f"{path}: names no motor; write a line for each joint")
     names = [row["joint"] for row in rows]
     if twice := next((name for k, name in enumerate(names) if name in names[:k]), None):
-        raise PlanError(f"{path}: joint {shorten(twice)!r} is there twice; keep one line")
+        raise PlanError(f"{path}: joint {shorten(twice)!r} appears twice; keep one line")
     columns = {
         key: {row["joint"]: row[key] for row in rows if row.get(key)}
         for key in ("peak", "continuous", "speed", "armature")
@@ -88,14 +88,14 @@ def _heads(path: str | Path, heads: Sequence[str]) -> dict[str, float]:
         match = _HEAD.fullmatch(head)
         name, unit = (match[1].replace(" ", "_"), match[2] or "") if match else (head, "")
         if name not in _UNITS or name in factors:
-            raise PlanError(f"{path}: column {shorten(head)!r} is unknown or there twice; {nearest(name, _UNITS)}")
+            raise PlanError(f"{path}: column {shorten(head)!r} is unknown or repeated; {nearest(name, _UNITS)}")
         if unit not in _UNITS[name]:
-            listed = ", ".join(f"[{known}]" for known in _UNITS[name])
+            listed = ", ".join(f"[{valid}]" for valid in _UNITS[name])
             raise PlanError(f"{path}: the unit of {name} must be one of {listed}, got {shorten(head)!r}")
         factors[name] = _UNITS[name][unit]
     for needed in ("joint", "peak", *(("at",) if "gear_ratio" in factors else ())):
         if needed not in factors:
-            why = " (joint or motor: where torques and speeds are meant)" if needed == "at" else ""
+            why = " (joint or motor: the place of torques and speeds)" if needed == "at" else ""
             raise PlanError(f"{path}: there is no column {needed!r}{why}; name the columns in the first line")
     return factors
 
@@ -111,8 +111,8 @@ def _row(where: str, factors: Mapping[str, float], line: Sequence[str]) -> dict[
         if text:
             row[name] = factors[name] * _positive(f"{where}: {name}", text)
     if "gear_ratio" not in row and (at == "motor" or "rotor_inertia" in row):
-        what = "values at the motor need" if at == "motor" else "a rotor_inertia needs"
-        raise PlanError(f"{where}: {what} its gear_ratio, 1 without a gear")
+        subject = "values at the motor need" if at == "motor" else "a rotor_inertia needs"
+        raise PlanError(f"{where}: {subject} a gear_ratio; give 1 without a gear")
     ratio = row.get("gear_ratio", 1.0)
     for name, power in (("peak", 1), ("continuous", 1), ("speed", -1)):
         if at == "motor" and name in row:
@@ -120,11 +120,11 @@ def _row(where: str, factors: Mapping[str, float], line: Sequence[str]) -> dict[
     return row | {"armature": ratio**2 * row.get("rotor_inertia", 0.0)}
 
 
-def _positive(what: str, text: str) -> float:
+def _positive(name: str, text: str) -> float:
     try:
         value = float(text)
     except ValueError:
         value = -1.0
     if not 0 < value < inf:
-        raise PlanError(f"{what} must be a positive number, got {shorten(text)!r}")
+        raise PlanError(f"{name} must be a positive number, got {shorten(text)!r}")
     return value

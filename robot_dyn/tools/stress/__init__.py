@@ -2,8 +2,8 @@
 
     stress   the first limits that an arm reaches (Stress)
 
-search       the parts of a stress test, one after the other
-work         pieces of work within a time
+search       the parts of a stress test, in sequence
+work         pieces of work within a time limit
 worst        worst configurations, and states of few digits
 limits       limits of step, gain, speed and payload, confirmed by runs
 runs         random scenes, and their runs judged

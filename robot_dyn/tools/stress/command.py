@@ -1,4 +1,4 @@
-"""The command that looks for what breaks first: stress."""
+"""The command stress: search for the first failures of an arm."""
 
 from __future__ import annotations
 
@@ -25,17 +25,16 @@ def stress(
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Look for what breaks first on an arm.
+    """Find the first limits of an arm: worst configurations, step, gain, speed and payload.
 
-    Worst configurations, step, gain, speed and payload; the exit code is 1 on failures.
-    Ctrl-C ends it and keeps what was found.
+    The exit code is 1 on failures. Ctrl-C ends the search and keeps the results.
 
     Options:
-        output (RESULT.json): Write all that was found, as of --json.
+        output (RESULT.json): Write the whole result, same as --json.
         samples: Number of random states.
         runs: Number of random runs.
-        seed: Of the random states and runs.
-        budget (SECONDS): Time to spend; what is not looked at by then is named.
+        seed: Seed of the random states and runs.
+        budget (SECONDS): Time to spend; unfinished parts are listed.
     """
     from robot_dyn.report import JSON, ResultError
 

@@ -1,15 +1,15 @@
-"""What breaks first: the step of each method, the gain of a sampled PD, speed and payload, judged at 0.98 and 1.02.
+"""Limits of step, gain of a sampled PD, speed and payload, checked at 0.98 and 1.02 of their values.
 
-The arm is held at a configuration by a PD with its gravity balanced, an equilibrium, and the viscous friction of its
-file. Runs from near it judge steps and gain: at 0.98 of a limit a push stays, at 1.02 it grows.
+A PD with gravity compensation holds the arm at a configuration, an equilibrium, with the viscous friction of its file.
+Runs from near the equilibrium check steps and gain: at 0.98 of a limit a perturbation stays small, at 1.02 it grows.
 
     growth = max ‖√M_ii δq_i‖ in the second half of the run / ‖√M_ii δq_i‖ at its start
     kp = ω² m,   kd = 2 ω m,   m the median of M_ii:   the largest ω at which ticks of the given period are stable
     s² |C(q, u) u|_i = τ_max,i,   |N_i(q) + m n_i(q)| = τ_max,i
 
-u is a velocity whose largest entry is the velocity limit of its joint, and n the gravity torque of 1 kg at the tip.
-Speed and payload are searched for over all configurations, and judged by the library's own implementation, a payload
-also by a run under a PD.
+u is a velocity with at least one entry at the velocity limit of its joint, and n the gravity torque of 1 kg at the tip.
+Speed and payload are minimised over all configurations, and checked by the library's own Lagrangian, a payload also by
+a run under a PD.
 """
 
 from __future__ import annotations
@@ -34,25 +34,25 @@ from robot_dyn.tools.stress.result import Limit, WorstCase
 from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import NOTHING, Gains, worst
 
-_WITHIN, _BEYOND = 0.98, 1.02  # of a limit
-LEAST = 0.3  # of the true error: an estimate below misleads
-_MOST = 1e3  # by which a push may grow within a limit, as the advisor counts it
-_LEFT = 10.0  # a run whose push grows by more, of itself and of what it does within the limit, has left
-_PUSH = 1e-6  # of the start, in [rad] or [m] of the joint of median inertia
-_RATE = 1e3  # [1/s]: that times as much in [rad/s] or [m/s] at most, as motions that are faster move less
-_TIMES = 400.0  # of the run, 1/|λ| of the fastest motion
-_STEPS = 10  # of a method whose stages are iterated
-_PARTS = 20  # of the run: the longest step that is judged
-_PERIOD_S, _TICKS = 1e-3, 200  # of the sampled PD, and of its run
-_RANGE, _SHARP = (1.0, 1e5), 1e-3  # of ω, in [rad/s]; relative
-_LOOKS = 50  # states at which the tip is looked for
-_HOLD_S = 0.05  # of a run that holds a payload
-_SPEED = 1.0  # [rad/s] or [m/s], of joints without a velocity limit
+_WITHIN, _BEYOND = 0.98, 1.02  # fractions of a limit
+LEAST = 0.3  # fraction of the true error below which an estimate misleads
+_MOST = 1e3  # largest growth of a perturbation within a limit, same as for the advisor
+_LEFT = 10.0  # growth, absolute and relative to a run within the limit, from which a run has left the equilibrium
+_PUSH = 1e-6  # perturbation of the start, in [rad] or [m] of the joint of median inertia
+_RATE = 1e3  # [1/s]: largest ratio of the perturbation of velocities to it, because faster motions move less
+_TIMES = 400.0  # duration of the run, in units of 1/|λ| of the fastest motion
+_STEPS = 10  # number of steps of a method with iterated stages
+_PARTS = 20  # the longest step is this part of the run
+_PERIOD_S, _TICKS = 1e-3, 200  # period of the sampled PD, and ticks of its run
+_RANGE, _SHARP = (1.0, 1e5), 1e-3  # range of ω, in [rad/s], and its relative tolerance
+_LOOKS = 50  # number of states in the search for the tip
+_HOLD_S = 0.05  # duration of a run that holds a payload
+_SPEED = 1.0  # [rad/s] or [m/s], for joints without a velocity limit
 _NO_TORQUE = "it has no torque on any joint with a limit"
 
 
 def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, budget: Budget) -> Limit:
-    """Return the least multiple of the velocity limits at which Coriolis torque alone passes an effort limit."""
+    """Return the smallest multiple of the velocity limits at which Coriolis torque alone exceeds an effort limit."""
     effort, own = _efforts(robot), Lagrangian(robot)
     most = np.where((robot.velocity_limit > 0) & np.isfinite(robot.velocity_limit), robot.velocity_limit, _SPEED)
     states = states | {"v": states["v"] / np.abs(states["v"]).max() * most}
@@ -69,7 +69,7 @@ def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, budget: B
         return _load(own.coriolis_torque(q, part * limit.value * v), effort)
 
     limit = Limit(
-        "speed", "Coriolis torque passes an effort limit, at a multiple of the velocity limits", "", inf, "times"
+        "speed", "Coriolis torque exceeds an effort limit, at a multiple of the velocity limits", "", inf, "times"
     )
     case = worst(WorstCase("speed"), states, rng, ("q", "v"), measure, budget)
     if not case.minimal > NOTHING:
@@ -81,27 +81,27 @@ def speed_limit(robot: Robot, states: Batch, rng: np.random.Generator, budget: B
 
 
 def payload_limit(robot: Robot, states: Batch, rng: np.random.Generator, gains: Gains | None, budget: Budget) -> Limit:
-    """Return the least mass at the tip at which gravity torque passes an effort limit.
+    """Return the smallest mass at the tip at which gravity torque exceeds an effort limit.
 
     Args:
         robot: The robot.
-        states: Random ones.
-        rng: Of the search.
-        gains: Of the PD that holds it; None where M is singular, so that nothing can be run.
-        budget: Of search and runs.
+        states: Random states.
+        rng: Random generator of the search.
+        gains: Gains of the PD that holds the payload; None if M is singular, so that runs are impossible.
+        budget: Time budget of search and runs.
     """
     effort, frame, setups = _efforts(robot), _tip(robot, states), list[Setup]()
     kilogram = robot.with_(payload=Payload(frame, 1.0))
 
     def inverse_masses(batch: Batch) -> np.ndarray:
-        """1/m of each joint, (S, n)."""
+        """Return 1/m of each joint, (S, n)."""
         own = evaluate(robot, N, batch)
         per_kg = evaluate(kilogram, N, batch) - own
         spare = effort - np.sign(per_kg) * own
         return np.where(np.isfinite(effort), np.abs(per_kg) / np.where(spare > 0, spare, 1e-300), 0.0)
 
     def holds(part: float) -> tuple[bool, str]:
-        """By our Lagrangian and, with gains, by a run."""
+        """Check a part of the limit by the library's Lagrangian and, with gains, by a run."""
         loaded = robot.with_(payload=Payload(frame, part * limit.value))
         by_torque, load = _load(Lagrangian(loaded).N(q), effort)
         if gains is None:
@@ -124,29 +124,29 @@ def payload_limit(robot: Robot, states: Batch, rng: np.random.Generator, gains: 
     joint = robot.joint_names[int(np.argmax(inverse_masses({"q": q[None]})[0]))]
     limit = replace(limit, joint=joint, value=1 / case.minimal, state=case.state)
     if case.minimal > 1e250:
-        return replace(limit, value=0.0, within="gravity alone passes its effort limit")
+        return replace(limit, value=0.0, within="gravity alone exceeds the effort limit")
     return replace(_judged(limit, holds), setups=tuple(setups))
 
 
 def _efforts(robot: Robot) -> np.ndarray:
-    """Effort limits, inf where none is stated or it is 0, (n,)."""
+    """Return the effort limits, (n,); inf where the file states none or 0."""
     return np.where(robot.effort_limit > 0, robot.effort_limit, np.inf)
 
 
 def _load(torque: np.ndarray, effort: np.ndarray) -> tuple[bool, str]:
-    """Return True if a torque is within the effort limits, and how much of them it is."""
+    """Return True if a torque is within the effort limits, and its largest fraction of them, in words."""
     part = float((np.abs(torque) / effort).max())
     return part < 1, f"{part:.3f} of the effort limit"
 
 
 def _judged(limit: Limit, holds: Callable[[float], tuple[bool, str]]) -> Limit:
-    """Return a limit with what happens at 0.98 and 1.02 of it."""
+    """Check a limit at 0.98 and 1.02 of its value."""
     (is_held, within), (is_held_beyond, beyond) = holds(_WITHIN), holds(_BEYOND)
     return replace(limit, within=within, beyond=beyond, confirmed=is_held and not is_held_beyond)
 
 
 def _tip(robot: Robot, states: Batch) -> str:
-    """The frame at which a mass has the largest gravity torques, −Jᵀ g of 1 kg."""
+    """Return the frame at which a mass has the largest gravity torques, −Jᵀ g for 1 kg."""
     q, effort = states["q"][:_LOOKS], _efforts(robot)
     effort = np.where(np.isfinite(effort), effort, np.nanmin(effort[np.isfinite(effort)], initial=1.0))
 
@@ -158,7 +158,7 @@ def _tip(robot: Robot, states: Batch) -> str:
 
 
 def held(robot: Robot, q: np.ndarray, gains: Gains, rate: float) -> Setup:
-    """The arm at rest at q, held there; the run lasts so many times its fastest motion."""
+    """Return a setup that holds the arm at rest at q, for 400 times 1/rate, with the rate of its fastest motion."""
     effects = [ViscousFriction(robot.damping)] if np.any(robot.damping) else []
     return Setup(
         Plant(robot, effects), q, duration_s=_TIMES / rate, controller=PDGravity(robot, hold(q), *gains),
@@ -167,34 +167,34 @@ def held(robot: Robot, q: np.ndarray, gains: Gains, rate: float) -> Setup:
 
 
 def step_limits(setup: Setup, seed: int, work: Work) -> Iterator[Limit | None]:
-    """Yield the limit of each method of fixed step, with runs at 0.98 and 1.02 of it.
+    """Yield the limit of each method with a fixed step, with runs at 0.98 and 1.02 of it.
 
     Args:
-        setup: As of `held`.
-        seed: Of the push.
-        work: Does it.
+        setup: Setup from `held`.
+        seed: Seed of the perturbation.
+        work: Execution within a time limit.
     """
     names = {name: f"step of {name}" for name in FIXED_STEP}
-    known = work.do("linearisation", lambda _: _linearised(setup), tuple(names.values()))
-    if known is not None:
-        advice, J = known
+    linearisation = work.do("linearisation", lambda _: _linearised(setup), tuple(names.values()))
+    if linearisation is not None:
+        advice, J = linearisation
         setup = replace(setup, duration_s=min(setup.duration_s, _TIMES / abs(advice.fastest.eigenvalue)))
         for name, piece in names.items():
             yield work.do(piece, partial(_judged_step, setup, name, advice, J, seed))
 
 
 def _linearised(setup: Setup) -> tuple[Advice, np.ndarray]:
-    """The advice at rest, and J there."""
+    """Return the advice at rest, and J there."""
     loop = StateEquation(setup.plant, setup.controller).in_a_mode
     ((t, y),) = at_rest(setup, loop)
     return advice_about(setup, at_rest), jacobian(loop, t, y, None)
 
 
 def _judged_step(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: int, budget: Budget) -> Limit:
-    """The limit of a method, with runs at both sides of it; without one, with steps as long as are judged.
+    """Return the limit of a method, with runs on both sides of it; without a limit, with a run of the longest step.
 
-    Where the stages of a method are iterated, every step is stable, and a run ends, and says so, where they are not
-    found: a limit that is not sharp is neither reached nor kept.
+    A method with iterated stages is stable for all steps; a run ends with a message if the iteration fails. Such a
+    limit is not sharp, and is therefore neither confirmed nor refuted by its value.
     """
     limit = Limit("step", name, advice.fastest.joint, advice.limits[name], "s", state={"q": setup.q0.tolist()})
     at, iterates = setup.q0, isinstance(method(name), Gauss)
@@ -210,7 +210,7 @@ def _judged_step(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: i
             return replace(limit, joint="", within=within, confirmed=holds, setups=(setup,))
         if iterates:
             setup = replace(setup, duration_s=_STEPS * limit.value)
-            limit = replace(limit, what=f"{name}, about where its stages are not found")
+            limit = replace(limit, what=f"{name}, where the iteration of its stages begins to fail")
         setups = tuple(replace(setup, step_s=part * limit.value) for part in (_WITHIN, _BEYOND))
         within, beyond = run_from_near(setups[0], at, budget), run_from_near(setups[1], at, budget, not iterates)
     except RobotDynError as error:
@@ -218,17 +218,17 @@ def _judged_step(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: i
     confirmed = within.stays and beyond.leaves(within) and not beyond.misleads
     if iterates:
         confirmed = False if any(not run.stays and isfinite(run.growth) for run in (within, beyond)) else None
-    said = beyond.description + " AND DOES NOT SAY SO" * beyond.misleads
-    return replace(limit, within=within.description, beyond=said, confirmed=confirmed, setups=setups)
+    text = beyond.description + " AND DOES NOT REPORT IT" * beyond.misleads
+    return replace(limit, within=within.description, beyond=text, confirmed=confirmed, setups=setups)
 
 
 def gain_limit(setup: Setup, seed: int, budget: Budget) -> Limit:
-    """Return the largest frequency of a PD with ticks of 1 ms, with what advisor and runs report on both sides of it.
+    """Return the largest frequency of a PD with ticks of 1 ms, with reports of advisor and runs on both sides of it.
 
     Args:
-        setup: As of `held`.
-        seed: Of the push.
-        budget: Of search and runs.
+        setup: Setup from `held`.
+        seed: Seed of the perturbation.
+        budget: Time budget of search and runs.
     """
     setup = replace(setup, duration_s=_TICKS * _PERIOD_S, engine="auto")
     at, y = setup.q0, np.concatenate([setup.q0, setup.v0])
@@ -249,13 +249,13 @@ def gain_limit(setup: Setup, seed: int, budget: Budget) -> Limit:
     except RobotDynError as error:
         return replace(limit, within=f"not run: {error}")
     agrees = periods[0] >= _PERIOD_S > periods[1]
-    said = beyond.description + f"; THE ADVISOR TAKES IT FOR STABLE UP TO {periods[1]:.3g} s" * (not agrees)
+    text = beyond.description + f"; THE ADVISOR REPORTS IT AS STABLE UP TO {periods[1]:.3g} s" * (not agrees)
     confirmed = agrees and within.stays and beyond.leaves(within)
-    return replace(limit, within=within.description, beyond=said, confirmed=confirmed)
+    return replace(limit, within=within.description, beyond=text, confirmed=confirmed)
 
 
 def _sampled(setup: Setup, omega: float) -> Setup:
-    """The setup under a sampled PD of another frequency."""
+    """Return the setup under a sampled PD of another frequency."""
     law = setup.controller
     inertia = law.kd**2 / (4 * law.kp)
     sampled = PDGravity(law.model, law.reference, inertia * omega**2, 2 * inertia * omega, _PERIOD_S)
@@ -263,14 +263,14 @@ def _sampled(setup: Setup, omega: float) -> Setup:
 
 
 def _largest_frequency(setup: Setup, y: np.ndarray, budget: Budget) -> float:
-    """The largest stable ω, by bisection; inf or 0 if there is none."""
+    """Return the largest stable ω, by bisection; inf if all are stable, 0 if none."""
 
     def stable(omega: float) -> bool:
         budget.check()
         try:
             loop = linearised(setup.plant, _sampled(setup, omega).controller, 0.0, y)
             return loop.growth(_PERIOD_S).verdict is not Stability.UNSTABLE
-        except np.linalg.LinAlgError:  # it is not finite
+        except np.linalg.LinAlgError:  # the matrix is not finite
             return False
 
     low, high = _RANGE
@@ -285,12 +285,12 @@ def _largest_frequency(setup: Setup, y: np.ndarray, budget: Budget) -> float:
 
 
 def _pushed(setup: Setup, matrix: np.ndarray, seed: int) -> Setup:
-    """The setup with its start moved off the equilibrium: along what grows fastest, and a little along all positions.
+    """Move the start off the equilibrium: along the fastest growing mode, and slightly along all positions.
 
     Args:
-        setup: At an equilibrium.
-        matrix: Of (q, v, ...) from a step or tick to the next: its largest eigenvalue is of what grows fastest.
-        seed: Of the other positions.
+        setup: Setup at an equilibrium.
+        matrix: Map of (q, v, ...) from a step or tick to the next; the mode belongs to its largest eigenvalue.
+        seed: Seed of the other positions.
     """
     n, units = len(setup.q0), _units(setup, setup.q0)
     values, modes = np.linalg.eig(matrix)
@@ -309,12 +309,12 @@ def _units(setup: Setup, q: np.ndarray) -> np.ndarray:
 @final
 @dataclass(frozen=True)
 class PushedRun:
-    """What a run from near an equilibrium did, and what it reports about itself.
+    """The outcome of a run from near an equilibrium, and its own report.
 
     Attributes:
-        growth: As above; inf if the run ended before its time.
-        misleads: Whether it has left an equilibrium that the motion does not leave, and reports nothing of it.
-        description: Both as text.
+        growth: Growth of the perturbation, see above; inf if the run ended early.
+        misleads: True if the run left an equilibrium that the motion does not leave, without reporting it.
+        description: Outcome and report as text.
     """
 
     growth: float
@@ -323,25 +323,25 @@ class PushedRun:
 
     @property
     def stays(self) -> bool:
-        """Whether it stays near the equilibrium."""
+        """True if the run stays near the equilibrium."""
         return self.growth < _MOST
 
     def leaves(self, within: PushedRun) -> bool:
-        """Whether it leaves the equilibrium, and a run within the limit does not."""
+        """Return True if the run leaves the equilibrium, and a run within the limit does not."""
         return self.growth > _LEFT * max(within.growth, 1.0)
 
 
 def run_from_near(setup: Setup, at: np.ndarray, budget: Budget, numerical: bool = False) -> PushedRun:
-    """Run a setup and look how far it goes from an equilibrium.
+    """Run a setup and measure its distance from an equilibrium.
 
     Args:
-        setup: From near the equilibrium.
+        setup: Setup that starts near the equilibrium.
         at: The equilibrium, (n,).
-        budget: Of the run.
-        numerical: Whether only errors of the method can make it go, so that its error estimate is looked at.
+        budget: Time budget of the run.
+        numerical: True if only errors of the method can move it away, so that its error estimate is checked.
 
     Raises:
-        OvertimeError: If the budget ends.
+        OvertimeError: If the budget is exceeded.
     """
     run, units = simulate(replace(setup, estimate_error=numerical), on_progress=budget.check), _units(setup, at)
     with np.errstate(over="ignore"):  # a run that diverged may be off by inf
@@ -350,19 +350,19 @@ def run_from_near(setup: Setup, at: np.ndarray, budget: Budget, numerical: bool 
     finished = run.outcome.ending is Ending.FINISHED and bool(np.isfinite(late).all())
     growth = float(late.max() / np.linalg.norm((setup.q0 - at) * units)) if finished else inf
     how = f"the push grew {growth:.2g}-fold" if finished else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
-    said = says(run)
+    report = says(run)
     estimated = 0.0 if run.error is None else run.error.largest
-    silent = not said and estimated < LEAST * float(np.abs(run.q - at).max())
+    silent = not report and estimated < LEAST * float(np.abs(run.q - at).max())
     misleads = numerical and finished and growth > _LEFT and silent
-    return PushedRun(growth, misleads, f"{how}{f' ({said})' if said else ''}")
+    return PushedRun(growth, misleads, f"{how}{f' ({report})' if report else ''}")
 
 
 def says(run: Trajectory) -> str:
-    """What a run says against itself, or of what it met; empty if its summary is clean."""
-    description = [str(kind).replace("_", " ") for kind in dict.fromkeys(each.kind for each in run.remarks)]
+    """Return the remarks and warnings of a run; empty if its summary is clean."""
+    description = [str(kind).replace("_", " ") for kind in dict.fromkeys(remark.kind for remark in run.remarks)]
     if run.error is not None and run.error.note:
         until = run.error.until_s
-        description.append(f"error told up to {until:.3g} s only" if until else "no error told")
+        description.append(f"error estimated up to {until:.3g} s only" if until else "no error estimate")
     if "does not close" in run.summary:
         description.append("the ledger does not close")
     return ", ".join(description)

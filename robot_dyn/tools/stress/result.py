@@ -1,4 +1,4 @@
-"""The result of a stress test: worst configurations, limits, and runs that were judged; each with what repeats it."""
+"""The result of a stress test: worst configurations, limits and judged runs, with the data to repeat them."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ class WorstCase:
     """The configuration at which a quantity is largest.
 
     Attributes:
-        what: The quantity.
-        joint: It is of, or empty.
-        unit: Of the values; empty for numbers.
-        typical: Median of random states.
-        random: The largest of them.
-        searched: The largest that was found.
-        minimal: At `state`, at least 0.9 of that.
-        state: A state of few digits and few entries that are not zero, q, v, a, tau by name.
-        note: More about it.
+        what: Name of the quantity.
+        joint: Name of its joint, or empty.
+        unit: Unit of the values; empty for dimensionless ones.
+        typical: Median over random states.
+        random: Largest value over random states.
+        searched: Largest value found by the search.
+        minimal: Value at `state`, at least 0.9 of the largest.
+        state: A state with few digits and few nonzero entries: q, v, a, tau by name.
+        note: Further description.
     """
 
     what: str
@@ -58,32 +58,32 @@ class WorstCase:
     def at(
         self, typical: float, random: float, searched: float, state: Mapping[str, np.ndarray], minimal: float
     ) -> WorstCase:
-        """Return the case with its sizes; the largest that was found may lie at few digits."""
+        """Return the case with its values; the largest one may be at the state of few digits."""
         sizes = {"typical": typical, "random": random, "searched": max(searched, minimal), "minimal": minimal}
         return replace(self, **sizes, state={name: x.tolist() for name, x in state.items()})
 
     @reported
     def found(self) -> bool:
-        """Whether the search found a worse state than the random ones."""
+        """Return True if the search found a worse state than the random ones."""
         return self.searched > self.random
 
 
 @final
 @dataclass(frozen=True)
 class Limit:
-    """Where something breaks first.
+    """A limit at which something fails first.
 
     Attributes:
         of: "step", "gain", "speed" or "payload".
-        what: What breaks.
-        joint: That breaks, or empty.
+        what: Description of the failure.
+        joint: Name of the failing joint, or empty.
         value: The limit; inf without one.
-        unit: Of it.
-        within: What happened at 0.98 of it.
-        beyond: What happened at 1.02 of it.
-        confirmed: Whether both came as predicted; None if there is nothing to confirm.
-        state: Where it was looked for, q and v by name.
-        setups: Of the runs that confirm it, at 0.98 and at 1.02 of it; nothing without runs.
+        unit: Unit of the limit.
+        within: Outcome at 0.98 of the limit.
+        beyond: Outcome at 1.02 of the limit.
+        confirmed: True if both outcomes were as predicted; None if there is nothing to confirm.
+        state: State at which the limit holds, q and v by name.
+        setups: Setups of the runs at 0.98 and 1.02 of the limit; empty without runs.
     """
 
     of: str
@@ -105,13 +105,13 @@ class JudgedRun:
 
     Attributes:
         what: Effects, control and method.
-        duration_s: In [s].
-        estimated: Error of q by its own estimate; nan without one.
-        true: The largest distance from the better run, up to where the estimate holds.
-        unsure: How far two better runs are apart there.
-        report: What the run says of its error, or how it ended.
-        misleads: Whether nothing warns, and the estimate is below 0.3 of the true error.
-        setup: Of the run.
+        duration_s: Duration, in [s].
+        estimated: Estimated error of q, in [rad] or [m]; nan without an estimate.
+        true: Largest distance from the better run, up to the end of the estimate.
+        unsure: Largest distance of two better runs from each other in this time.
+        report: Report of the run about its error, or its outcome.
+        misleads: True if there is no warning, and the estimate is below 0.3 of the true error.
+        setup: Setup of the run.
     """
 
     what: str
@@ -130,19 +130,20 @@ Finding = WorstCase | Limit | JudgedRun
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Stress(Result):
-    """The worst cases of an arm, what breaks first, and what of that the library fails to report.
+    """The worst cases and first limits of an arm, and failures of the library to report them.
 
     Attributes:
-        robot: Its name.
-        joints: Their names.
+        robot: Name of the robot.
+        joints: Names of the joints.
         worst: Worst configurations.
-        limits: Of step, gain, speed and payload, each confirmed at 0.98 and 1.02 of it.
-        runs: Random runs whose error estimates were judged.
-        left_out: What was left out, and why.
-        out_of_time: Names of what was not looked at, or not to its end, for lack of time.
+        limits: Limits of step, gain, speed and payload, checked at 0.98 and 1.02 of their values.
+        runs: Random runs with checked error estimates.
+        left_out: Omitted parts, with reasons.
+        out_of_time: Names of parts that were not finished in time.
         environment: Versions and processor.
-        samples, seed: Number of random states; of the random generator.
-        spent_s: Time that it took, in [s].
+        samples: Number of random states.
+        seed: Seed of the random generator.
+        spent_s: Elapsed time, in [s].
     """
 
     robot: str
@@ -158,7 +159,7 @@ class Stress(Result):
     spent_s: float
 
     def tables(self) -> Iterator[Block]:
-        """What it fails at, and a line for each finding."""
+        """Yield the failures, and a table for each kind of finding."""
         yield from (f"FAILURE: {failure}" for failure in self.failures)
         yield from [""] * bool(self.failures)
         for title, (part, columns) in _TABLES.items():
@@ -166,29 +167,26 @@ class Stress(Result):
             if rows:
                 heading = tuple(_HEADINGS.get(str(name), str(name)) for name in columns)
                 yield from (title, Table(heading, rows, right=_NUMBERS, wrap=True), "")
-        yield from (f"not looked at for lack of time: {name}" for name in self.out_of_time)
+        yield from (f"not finished in time: {name}" for name in self.out_of_time)
 
     @reported
     def failures(self) -> tuple[str, ...]:
-        """What the library fails at: limits that runs refute, and runs that mislead."""
+        """Return the failures of the library: refuted limits, and misleading runs."""
         refuted = (limit for limit in self.limits if limit.confirmed is False)
         misleading = (run for run in self.runs if run.misleads)
         return (
             *(f"{x.of} {x.what}: {x.value:.4g} [{x.unit}] is refuted: {x.within}; {x.beyond}" for x in refuted),
-            *(
-                f"run, {x.what}: estimated {x.estimated:.1e}, true {x.true:.1e}, and nothing says so"
-                for x in misleading
-            ),
+            *(f"run, {x.what}: estimated {x.estimated:.1e}, true {x.true:.1e}, without a warning" for x in misleading),
         )
 
     @reported
     def ok(self) -> bool:
-        """Whether there are no failures."""
+        """Return True if there are no failures."""
         return not self.failures
 
     @reported
     def sentence(self) -> str:
-        """The worst of each kind, in a sentence."""
+        """Return the worst case of each kind, in one sentence."""
         parts = []
         for what in dict.fromkeys(case.what for case in self.worst):
             top = max((case for case in self.worst if case.what == what), key=lambda case: case.searched)
@@ -197,7 +195,7 @@ class Stress(Result):
         checked = sum(limit.confirmed is not None for limit in self.limits) + len(self.runs)
         failed = len(self.failures)
         if late := len(self.out_of_time):
-            parts.append(f"{late} not looked at for lack of time")
+            parts.append(f"{late} not finished in time")
         return f"{self.robot}: {failed or 'no'} failure{'s' * (failed != 1)} in {checked} checks; {'; '.join(parts)}"
 
 

@@ -1,8 +1,8 @@
-"""Random runs, each error estimate held against two better runs: one that is too small and says nothing misleads.
+"""Random runs whose error estimates are compared with two better runs: a small estimate without a warning misleads.
 
-Scenes are a free swing, friction, stops and control, with a random method. The better runs share the equations with the
-run, and neither its method nor its steps: DOP853 and an implicit method near rounding. What both miss is found by
-`compare` and by energy alone.
+Scenes are a free swing, friction, stops and control, with a random method. The better runs have the same equations as
+the run, but other methods and steps: DOP853 and an implicit method near rounding. Only `compare` and the energy reveal
+errors of the equations themselves.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ _METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8
 _DRAWS = 20  # attempts to draw a method that the scene accepts
 _RECORDS = 20
 _BETTER = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-11, 1e-13))
-_ROUNDING = 1e-12  # of 1 + |q|: below it neither can tell
+_ROUNDING = 1e-12  # relative to 1 + |q|: smaller errors cannot be measured
 _ONE_TIME = 1e-12  # [s]
-_MOST_TRIES = 25  # of the start of a run that misleads
+_MOST_TRIES = 25  # attempts to simplify the start of a misleading run
 
 
 def scenes(
     robot: Robot, states: Batch, count: int, rng: np.random.Generator
 ) -> Iterator[Callable[[], tuple[Setup, str]]]:
-    """Yield `count` scenes, each built when called; the families take turns."""
+    """Yield functions that build `count` scenes; the families alternate."""
     scale = np.median(np.diagonal(evaluate(robot, M, {"q": states["q"][:200]}), axis1=-2, axis2=-1), axis=0)
     for k in range(count):
         own = np.random.default_rng(rng.integers(2**63))
@@ -48,7 +48,7 @@ def scenes(
 
 
 def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generator) -> tuple[Setup, str]:
-    """A setup, and a description of what acts in it."""
+    """Build a setup, and its description."""
     q, n = robot.random_configuration(rng), robot.n
     v = rng.uniform(-1, 1, n) * np.where(np.isfinite(robot.velocity_limit), np.minimum(robot.velocity_limit, 1.0), 1.0)
     duration = float(np.round(rng.uniform(0.1, 0.3), 3))
@@ -75,7 +75,7 @@ def _effects(robot: Robot, family: str, q: np.ndarray, scale: np.ndarray, rng: n
     if family == "dry friction":
         return [DryFriction(scale * rng.uniform(0.3, 8, robot.n))]
     if "stops" in family:
-        reach = rng.uniform(0.01, 0.3, (2, robot.n))  # within the file's limits, so that the arm reaches the stops
+        reach = rng.uniform(0.01, 0.3, (2, robot.n))  # small, so that the arm reaches the stops
         lower, upper = np.maximum(robot.lower, q - reach[0]), np.minimum(robot.upper, q + reach[1])
         if family == "rigid stops":
             return [RigidStops(lower, upper, rng.uniform(0, 0.9, robot.n))]
@@ -92,7 +92,7 @@ def _control(family: str, q: np.ndarray, scale: np.ndarray, duration: float, rng
 
 
 def _method(rng: np.random.Generator) -> tuple[Any, dict[str, Any]]:
-    """A random method, with a step or with tolerances."""
+    """Draw a random method, with a step or with tolerances."""
     if rng.random() < 0.4:
         rtol = float(f"{10 ** rng.uniform(-10, -5):.0e}")
         return Adaptive(str(rng.choice(["DOP853", "Rosenbrock"])), rtol, rtol / 100), {}
@@ -116,11 +116,11 @@ def judged_runs(
 
 
 def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
-    """A run beside two better ones.
+    """Compare a run with two better ones.
 
     Raises:
-        RobotDynError: If one of these cannot be made.
-        OvertimeError: If the budget ends.
+        RobotDynError: If a better run fails.
+        OvertimeError: If the budget is exceeded.
     """
     run = simulate(setup, on_progress=budget.check)
     finished, error = run.outcome.ending is Ending.FINISHED, run.error
@@ -128,13 +128,13 @@ def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
     if error is None or not finished or not error.until_s:
         return JudgedRun(what, setup.duration_s, np.nan, np.nan, np.nan, report, False, setup)
     sure = replace(setup, step_s=None, estimate_error=False, integrator=_BETTER[0])
-    better = [simulate(replace(sure, integrator=each), on_progress=budget.check) for each in _BETTER]
-    if any(each.outcome.ending is not Ending.FINISHED for each in better):
+    better = [simulate(replace(sure, integrator=integrator), on_progress=budget.check) for integrator in _BETTER]
+    if any(x.outcome.ending is not Ending.FINISHED for x in better):
         raise RobotDynError("a better run did not finish")
-    if any(each.t.shape != run.t.shape or np.abs(each.t - run.t).max() > _ONE_TIME for each in better):
+    if any(x.t.shape != run.t.shape or np.abs(x.t - run.t).max() > _ONE_TIME for x in better):
         raise RobotDynError("the better runs have other samples")
-    known, estimate = run.t <= error.until_s, error.at(error.until_s)
-    true, unsure = (float(np.abs(q - better[0].q)[known].max()) for q in (run.q, better[1].q))
+    covered, estimate = run.t <= error.until_s, error.at(error.until_s)
+    true, unsure = (float(np.abs(q - better[0].q)[covered].max()) for q in (run.q, better[1].q))
     floor = _ROUNDING * (1 + float(np.abs(run.q).max())) + unsure
     warns = bool(error.note) or "does not close" in run.summary
     misleads = not warns and max(estimate, floor) < LEAST * max(true, floor)
@@ -142,10 +142,7 @@ def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
 
 
 def shrunk_run(run: JudgedRun, name: str, work: Work) -> JudgedRun:
-    """Return a run that misleads too, from the start of fewest digits that is found before the time ends.
-
-    It is the run itself if there is none.
-    """
+    """Return a misleading run from a start with fewer digits, or the run itself if the search fails."""
     small = run
 
     def fails(budget: Budget, x: np.ndarray) -> bool:

@@ -1,4 +1,4 @@
-"""A stress test of an arm: its worst configurations, what breaks first, and runs that are judged."""
+"""A stress test of an arm: worst configurations, first limits, and judged runs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import BY_PD, FASTEST, HELD, lost_digits, pd_gains, worst_configurations
 
 _LEAST_SAMPLES, _MOST_SAMPLES, _MOST_RUNS = 100, 10**6, 10**5
-_PIECES = 8  # of the budget; one piece of work may take this part of it
+_PIECES = 8  # one piece of work may take at most this part of the budget
 
 
 def stress(
@@ -30,25 +30,25 @@ def stress(
     budget_s: float = 90.0,
     on_progress: Callable[[float, str], object] | None = None,
 ) -> Stress:
-    """The worst configurations of an arm, the step, gain, speed and payload at which it breaks, and runs judged.
+    """Find the worst configurations of an arm, its limits of step, gain, speed and payload, and misleading runs.
 
-    Worst configurations are searched for from random states on: κ of M, the fastest motion, gravity torque over effort
-    limit, and digits lost by each implementation. Limits are confirmed at 0.98 and 1.02 of them. Estimated errors of
-    random runs are compared with better runs; a run misleads if its estimate is too small and nothing warns.
+    The search for worst configurations begins at random states: κ of M, the fastest motion, gravity torque over effort
+    limit, and digits lost by each implementation. Limits are checked at 0.98 and 1.02 of their values. Estimated errors
+    of random runs are compared with better runs; a run misleads if its estimate is too small and there is no warning.
 
     Args:
         robot: The robot.
         samples: Number of random states.
         runs: Number of random runs.
-        seed: Of the random generator.
-        budget_s: Time to spend, in [s]. What is to come when it ends, or takes more than an eighth of it, is named in
-            `out_of_time`; with time enough for all, what is found depends on the seed alone.
-        on_progress: Called with the time spent, in [s], and with what is being done.
+        seed: Seed of the random generator.
+        budget_s: Time to spend, in [s]. Parts that remain at its end, or take more than an eighth of it, are listed in
+            `out_of_time`; with enough time for all parts, the result depends only on the seed.
+        on_progress: Function of the elapsed time, in [s], and the name of the current part.
 
     Raises:
-        QueryError: If an argument is wrong.
+        QueryError: If an argument is invalid.
     """
-    robot = warn_below(instance("robot", robot, Robot, "give one of rd.load"), None)
+    robot = warn_below(instance("robot", robot, Robot, "give a robot, such as rd.load('ur5')"), None)
     samples = integer("samples", samples, least=_LEAST_SAMPLES, most=_MOST_SAMPLES)
     runs, seed = integer("runs", runs, most=_MOST_RUNS), integer("seed", seed, most=2**128 - 1)
     seconds = number("budget_s", budget_s, above=0)
@@ -60,17 +60,26 @@ def stress(
     except KeyboardInterrupt:
         work.left_out.append(INTERRUPTED)
 
-    def of(kind: type) -> tuple[Any, ...]:
+    def of_kind(kind: type) -> tuple[Any, ...]:
         return tuple(finding for finding in findings if isinstance(finding, kind))
 
     return Stress(
-        robot.name, robot.joint_names, of(WorstCase), of(Limit), of(JudgedRun), (*_unlimited(robot), *work.left_out),
-        tuple(work.out_of_time), processor_and_versions(), samples, seed, budget.spent,
-    )  # fmt: skip
+        robot=robot.name,
+        joints=robot.joint_names,
+        worst=of_kind(WorstCase),
+        limits=of_kind(Limit),
+        runs=of_kind(JudgedRun),
+        left_out=(*_unlimited(robot), *work.left_out),
+        out_of_time=tuple(work.out_of_time),
+        environment=processor_and_versions(),
+        samples=samples,
+        seed=seed,
+        spent_s=budget.spent,
+    )
 
 
 def _findings(robot: Robot, samples: int, runs: int, seed: int, work: Work) -> Iterator[Finding | None]:
-    """The findings of all parts, None for what was skipped; each part has a random generator of its own."""
+    """Yield the findings of all parts, None for skipped ones; the parts have independent random generators."""
     streams = [np.random.default_rng(stream) for stream in np.random.SeedSequence(seed).spawn(6)]
     states = work.do("random states", lambda _: random_states(robot, samples, streams[0]), ("all at these",))
     if states is None:
@@ -98,9 +107,9 @@ def _findings(robot: Robot, samples: int, runs: int, seed: int, work: Work) -> I
 
 
 def _unlimited(robot: Robot) -> Iterator[str]:
-    """What the file does not limit."""
-    taken = "; 1 rad/s or 1 m/s is taken"
-    for what, limit, instead in (("an effort", robot.effort_limit, ""), ("a velocity", robot.velocity_limit, taken)):
+    """Yield a message about joints without limits in the file."""
+    default = "; 1 rad/s or 1 m/s is assumed"
+    for kind, limit, note in (("an effort", robot.effort_limit, ""), ("a velocity", robot.velocity_limit, default)):
         without = [name for name, x in zip(robot.joint_names, limit, strict=True) if not (np.isfinite(x) and x > 0)]
         if without:
-            yield f"joints without {what} limit: {', '.join(without)}{instead}"
+            yield f"joints without {kind} limit: {', '.join(without)}{note}"

@@ -13,8 +13,8 @@ from robot_dyn.report import Budget, OvertimeError
 T = TypeVar("T")
 FAILURES = (RobotDynError, np.linalg.LinAlgError, FloatingPointError)
 _REASONS = {
-    np.linalg.LinAlgError: "; M is near a singular one",
-    FloatingPointError: "; its numbers are beyond those of a float64",
+    np.linalg.LinAlgError: "; M is nearly singular",
+    FloatingPointError: "; numbers exceed the range of float64",
 }
 
 
@@ -57,12 +57,12 @@ class Work:
             why = next((why for kind, why in _REASONS.items() if isinstance(error, kind)), "")
             self.left_out.append(f"{name}: {error}{why}")
             if needed_for:
-                self.left_out.append(f"{', '.join(needed_for)}: not without {name}")
+                self.left_out.append(f"{', '.join(needed_for)}: needs {name}")
         return None
 
     @property
     def over(self) -> bool:
-        """Whether there is no time left."""
+        """True if no time remains."""
         return self._budget.left <= 0
 
     def skip(self, *names: str) -> None:

@@ -1,10 +1,10 @@
-"""The states at which an arm is hardest: κ of M, the fastest motion, gravity torque over effort limit, lost digits.
+"""The worst states of an arm: κ of M, the fastest motion, gravity torque over effort limit, lost digits.
 
-    lost = −log₁₀(2⁻⁵³) − digits, judged by balls
+    lost = −log₁₀(2⁻⁵³) − digits, computed with balls
 
-Each is searched for from the worst of random states on. A greedy search then finds a state with fewer entries that are
-not zero and fewer digits, which is nearly as bad. [Zeller and Hildebrandt, Simplifying and isolating failure-inducing
-input, IEEE TSE 28, 2002]
+A search begins at the worst of random states. A greedy search then finds a state with fewer nonzero entries and fewer
+digits that is nearly as bad. [Zeller and Hildebrandt, Simplifying and isolating failure-inducing input, IEEE TSE 28,
+2002]
 """
 
 from __future__ import annotations
@@ -34,67 +34,67 @@ from robot_dyn.tools.stress.result import WorstCase
 from robot_dyn.tools.stress.work import FAILURES, Work
 
 FASTEST = "fastest motion"
-HELD = ("steps", "gain")  # limits that are looked for where the motion is fastest under a PD
-KEPT = 0.9  # of what was found, that a shrunk state keeps
-NOTHING = 1e-12  # of an effort limit: rounding of zero
-_ROUNDS = 3  # of a search that finds nothing worse
-_FREQUENCY = 20.0  # [rad/s], of the gains of a PD
+HELD = ("steps", "gain")  # limits at the state where the motion is fastest under a PD
+KEPT = 0.9  # fraction of the largest value that a simplified state keeps
+NOTHING = 1e-12  # relative to an effort limit: smaller torques are rounding of zero
+_ROUNDS = 3  # attempts of a search that finds nothing worse
+_FREQUENCY = 20.0  # [rad/s], for the gains of a PD
 _MOST_DIGITS = 17
 _OF_FLOAT64 = -log10(2.0**-53)
-_FEW_TRIES = 60  # of a state that balls judge
+_FEW_TRIES = 60  # attempts for a state whose value needs balls
 _OTHER_NUMBERS = ("Lagrangian, float32", "Lagrangian, longdouble")
 BY_PD = f"PD of ω = {_FREQUENCY:g} rad/s, ζ = 1 for the median of M_ii, gravity balanced"
 
-Measure = Callable[[Batch], np.ndarray]  # at each of S states, (S,); nan where there is none
+Measure = Callable[[Batch], np.ndarray]  # values at S states, (S,); nan for missing values
 Gains = tuple[np.ndarray, np.ndarray]  # stiffness and damping of a PD
-State = dict[str, np.ndarray]  # (n,) each
+State = dict[str, np.ndarray]  # arrays (n,)
 
 
 def worst(
     case: WorstCase, states: Batch, rng: np.random.Generator, arguments: tuple[str, ...], measure: Measure,
     budget: Budget,
 ) -> WorstCase:  # fmt: skip
-    """Search for the state at which a measure is largest, and shrink it while there is time.
+    """Search for the state at which a measure is largest, and simplify it while time remains.
 
     Args:
-        case: Its quantity, joint, unit and note.
-        states: Random ones.
-        rng: Of the search.
-        arguments: Names of those coordinates that the measure depends on.
-        measure: What is made large.
-        budget: Of the search.
+        case: Quantity, joint, unit and note.
+        states: Random states.
+        rng: Random generator of the search.
+        arguments: Names of the coordinates that the measure depends on.
+        measure: Function to maximise.
+        budget: Time budget of the search.
 
     Raises:
-        OverflowedError: If the measure is finite at none of the random states.
-        OvertimeError: If the budget ends before the search does.
+        OverflowedError: If the measure is not finite at any random state.
+        OvertimeError: If the budget ends before the search.
     """
 
     def timed(batch: Batch) -> np.ndarray:
         budget.check()
         return measure(batch)
 
-    known = measure(states)
-    if np.isnan(known).all():
-        raise OverflowedError("it has a finite value at none of the random states")
-    random, searched, best = float(np.nanmax(known)), -np.inf, states
+    values = measure(states)
+    if np.isnan(values).all():
+        raise OverflowedError("it is not finite at any random state")
+    random, searched, best = float(np.nanmax(values)), -np.inf, states
     for _ in range(_ROUNDS):
-        at, size = worst_state(states, rng, timed, known, arguments)
+        at, size = worst_state(states, rng, timed, values, arguments)
         if size > searched:
             best, searched = at, size
         if searched > random:
             break
     state = {name: best[name][0] for name in arguments}
     return case.at(
-        float(np.nanmedian(known)), random, searched, *shrunk_state(state, states, measure, searched, budget)
+        float(np.nanmedian(values)), random, searched, *shrunk_state(state, states, measure, searched, budget)
     )
 
 
 def shrunk_state(
     state: State, states: Batch, measure: Measure, size: float, budget: Budget, tries: int = 400
 ) -> tuple[State, float]:
-    """Return a state of few digits, within the range of random ones, at which a measure keeps 0.9 of its size.
+    """Return a state with few digits, within the range of random states, that keeps 0.9 of a measure, and the measure.
 
-    It is the smallest one that is found before the budget ends; with it comes the measure there.
+    The state is the simplest one that is found before the budget ends.
     """
     names, n = tuple(state), len(next(iter(state.values())))
     low, high = (np.concatenate([end(states[name], axis=0) for name in names]) for end in (np.min, np.max))
@@ -106,7 +106,7 @@ def shrunk_state(
     def is_as_bad(x: np.ndarray) -> bool:
         try:
             return bool(budget.left > 0 and (low <= x).all() and (x <= high).all() and at(x) >= least)
-        except FAILURES:  # where an entry is 0, say
+        except FAILURES:  # for example if an entry is 0
             return False
 
     small = shrunk(np.concatenate([state[name] for name in names]), is_as_bad, tries)
@@ -114,12 +114,12 @@ def shrunk_state(
 
 
 def shrunk(state: np.ndarray, fails: Callable[[np.ndarray], bool], most: int = 400) -> np.ndarray:
-    """Return a state that fails too, with as few entries and digits as a greedy search finds.
+    """Return a failing state with as few nonzero entries and digits as a greedy search finds.
 
     Args:
-        state: One that fails, (k,); it is returned as it is if it does not.
-        fails: Whether a state (k,) has the property.
-        most: How many states are tried at most.
+        state: A failing state, (k,); a state that does not fail is returned unchanged.
+        fails: Function that returns True if a state, (k,), fails.
+        most: Largest number of attempts.
     """
     best, tries = np.array(state, dtype=float), iter(range(most))
 
@@ -130,13 +130,13 @@ def shrunk(state: np.ndarray, fails: Callable[[np.ndarray], bool], most: int = 4
         return best
     best = _zeroed(best, holds)
     entries = np.flatnonzero(best)
-    for part in (entries, *entries[:, None]):  # all of them first, then each alone
+    for part in (entries, *entries[:, None]):  # first all together, then one by one
         best = _rounded(best, part, holds)
     return _zeroed(best, holds)
 
 
 def _zeroed(best: np.ndarray, holds: Callable[[np.ndarray], bool]) -> np.ndarray:
-    """Set entries to zero, one at a time, until no other one can be."""
+    """Set entries to zero, one at a time, as long as the state fails."""
     before = None
     while before is not best:
         before = best
@@ -162,21 +162,21 @@ def worst_configurations(
 ) -> Iterator[WorstCase]:
     """Yield κ, the fastest motion, and gravity torque of each joint with an effort limit."""
     for case, measure in _measures(robot, gains, work):
-        of = case.note if case.what == FASTEST else case.joint
-        name, needed_for = f"worst {case.what}{f', {of}' if of else ''}", HELD if case.note == BY_PD else ()
-        found = work.do(name, partial(worst, case, states, rng, ("q",), measure), needed_for)
-        if found is not None and found.searched > NOTHING:  # else gravity has no torque on the joint
-            yield found
+        detail = case.note if case.what == FASTEST else case.joint
+        name, needed_for = f"worst {case.what}{f', {detail}' if detail else ''}", HELD if case.note == BY_PD else ()
+        result = work.do(name, partial(worst, case, states, rng, ("q",), measure), needed_for)
+        if result is not None and result.searched > NOTHING:  # otherwise gravity has no torque on the joint
+            yield result
 
 
 def _measures(robot: Robot, gains: Gains | None, work: Work) -> Iterator[tuple[WorstCase, Measure]]:
-    """Yield what is looked for; the fastest decay is that where gravity is balanced."""
+    """Yield the quantities to maximise; the fastest decay is computed with gravity compensated."""
     if robot.joint_without_inertia is None:
         yield WorstCase("κ of M"), lambda batch: unit_diagonal_conditions(evaluate(robot, M, batch))
         damping = work.do("friction at rest", lambda _: _slopes(robot))
         if damping is not None and damping.any():
-            of_file = WorstCase(FASTEST, unit="1/s", note="friction of the file, at rest")
-            yield of_file, lambda batch: _rates(robot, batch, damping)
+            by_friction = WorstCase(FASTEST, unit="1/s", note="friction of the file, at rest")
+            yield by_friction, lambda batch: _rates(robot, batch, damping)
         if gains is not None:
             yield WorstCase(FASTEST, unit="1/s", note=BY_PD), lambda batch: _rates_of_pd(robot, batch, gains[1])
     for i, joint in enumerate(robot.joint_names):
@@ -187,32 +187,32 @@ def _measures(robot: Robot, gains: Gains | None, work: Work) -> Iterator[tuple[W
 
 
 def _slopes(robot: Robot) -> np.ndarray:
-    """−∂τ/∂v of the friction of the file at rest, (n,)."""
+    """Return −∂τ/∂v of the friction of the file at rest, (n,)."""
     plant, zeros = Plant(robot, "urdf"), np.zeros(robot.n)
     h = 1e-9  # far below the velocities over which friction is regularised
     return np.array([-plant.torque(0.0, zeros, h * unit)[i] / h for i, unit in enumerate(np.eye(robot.n))])
 
 
 def _rates(robot: Robot, batch: Batch, damping: np.ndarray) -> np.ndarray:
-    """The largest eigenvalue of M⁻¹ diag(b) at each state, that of b^½ M⁻¹ b^½."""
+    """Return the largest eigenvalue of M⁻¹ diag(b) at each state, by b^½ M⁻¹ b^½."""
     inertia, root = evaluate(robot, M, batch), np.sqrt(damping)
     return np.linalg.eigvalsh(root[:, None] * np.linalg.solve(inertia, np.diag(root)[None]))[:, -1]
 
 
 def _rates_of_pd(robot: Robot, batch: Batch, kd: np.ndarray) -> np.ndarray:
-    """The fastest decay at each state under the gains of `pd_gains`."""
+    """Return the fastest decay at each state under the gains of `pd_gains`."""
     mu = _rates(robot, batch, kd) / (2 * _FREQUENCY)
     return _FREQUENCY * np.where(mu > 1, mu + np.sqrt(np.maximum(mu * mu - mu, 0)), np.sqrt(mu))
 
 
 def pd_gains(robot: Robot, states: Batch) -> Gains:
-    """Stiffness and damping of a critically damped PD for the median of M_ii at random states."""
+    """Return stiffness and damping of a critically damped PD for the median of M_ii at random states."""
     few = {name: x[:1000] for name, x in states.items()}
     return gains_from(np.median(np.diagonal(evaluate(robot, M, few), axis1=-2, axis2=-1), axis=0), _FREQUENCY)
 
 
 def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, work: Work) -> Iterator[WorstCase | None]:
-    """Yield the states at which each implementation in float64 loses most digits of inverse and forward dynamics."""
+    """Yield the states at which implementations in float64 lose most digits of inverse and forward dynamics."""
     names = {quantity: f"digits lost in {quantity.name}" for quantity in (INVERSE_DYNAMICS, FORWARD_DYNAMICS)}
     built = work.do("implementations, machine code among them", lambda _: implementations(robot), tuple(names.values()))
     if built is None:
@@ -230,7 +230,7 @@ def lost_digits(robot: Robot, states: Batch, rng: np.random.Generator, work: Wor
 def _lost(
     digit_count: DigitCount, implementation: Implementation, quantity: Quantity, what: str, budget: Budget
 ) -> WorstCase:
-    """The fewest digits of some searches."""
+    """Return the case with the fewest digits of several searches."""
 
     def losses(batch: Batch) -> np.ndarray:
         state = {name: batch[name][0] for name in quantity.arguments}
@@ -239,9 +239,9 @@ def _lost(
     counts = [digit_count.count(implementation, quantity, budget.check)]
     while counts[-1].searched >= counts[-1].random and len(counts) < _ROUNDS:
         counts.append(digit_count.count(implementation, quantity, budget.check))
-    held = min(counts, key=lambda count: count.searched)
-    typical, random, lost = (_OF_FLOAT64 - digits for digits in (held.typical, held.random, held.searched))
-    state = {name: np.array(x) for name, x in held.state.items()}
-    note = f"{implementation.name}: {held.searched:.1f} digits hold, {held.typical:.1f} typically"
+    lowest = min(counts, key=lambda count: count.searched)
+    typical, random, lost = (_OF_FLOAT64 - digits for digits in (lowest.typical, lowest.random, lowest.searched))
+    state = {name: np.array(x) for name, x in lowest.state.items()}
+    note = f"{implementation.name}: {lowest.searched:.1f} digits hold, {lowest.typical:.1f} typically"
     small = shrunk_state(state, digit_count.states, losses, lost, budget, _FEW_TRIES)
     return WorstCase(what, unit="digits", note=note).at(typical, random, lost, *small)

@@ -1,6 +1,6 @@
-"""Fill a folder: submit the chunks that it lacks to an executor, until it has all of them.
+"""Fill a folder: submit missing chunks to an executor until the folder has all of them.
 
-Whether a chunk is done is asked of the folder alone, not of the executor.
+Only the folder shows whether a chunk is done, not the executor.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from robot_dyn.foundations import SweepError, shown
 from robot_dyn.tools.sweeps.work import Stopped
 
-_ATTEMPTS = 20  # rounds without a new file, after which a chunk is held to end its worker
+_ATTEMPTS = 20  # rounds without a new file, after which a chunk is assumed to kill its worker
 _LOOK_S = 0.5
 
 
@@ -30,21 +30,21 @@ def fill(
     """Submit chunks until the folder has all of them.
 
     Args:
-        submit: Begins to make a chunk.
-        missing: Numbers of the chunks that are left to do.
-        capacity: Number of chunks that may be submitted at one time.
-        look: Called meanwhile; an error of it, or Ctrl-C, ends the work.
-        lost: Errors of workers that died, whose chunks are submitted again.
+        submit: Function that starts the work on a chunk.
+        missing: Function that returns the indices of missing chunks.
+        capacity: Function that returns the number of chunks that may be submitted at a time.
+        look: Function that is called regularly; an error in it, or Ctrl-C, ends the work.
+        lost: Errors of workers that died; their chunks are submitted again.
 
     Raises:
-        SweepError: If a chunk always ends its worker.
-        Exception: The first that making a chunk raised.
+        SweepError: If a chunk repeatedly kills its worker.
+        Exception: The first exception of a chunk.
     """
     left, attempts = missing(), 0
     while left:
         waiting, pending = iter(left), set[Future[Any]]()
         try:
-            while True:  # until each chunk was submitted once, and has ended in some way
+            while True:  # until each chunk was submitted once and has ended
                 pending |= {submit(chunk) for chunk in islice(waiting, max(0, capacity() - len(pending)))}
                 if not pending:
                     break
@@ -61,8 +61,8 @@ def fill(
         attempts = attempts + 1 if len(left) == before else 0
         if attempts == _ATTEMPTS:
             raise SweepError(
-                f"chunk {left[0]} ended its worker {_ATTEMPTS} times; make it in this process to see why, with"
-                " the same folder and cluster=None"
+                f"chunk {left[0]} ended its worker {_ATTEMPTS} times; to see the cause, run it in this process with the"
+                " same folder and cluster=None"
             )
 
 
@@ -72,14 +72,14 @@ def fill_by_threads(
     count: int,
     look: Callable[[], object],
 ) -> None:
-    """Fill a folder by threads of this process; errors as in `fill`.
+    """Fill a folder by threads of this process; for errors, see `fill`.
 
     Args:
-        make: Makes a chunk and writes it, called with its number and a function to be called meanwhile, which raises
-            `Stopped` when it is to end.
-        missing: Numbers of the chunks that are left to do.
+        make: Function that runs and writes a chunk; its arguments are the index of the chunk and a function that it
+            must call regularly, which raises `Stopped` to end the work.
+        missing: Function that returns the indices of missing chunks.
         count: Number of threads.
-        look: As in `fill`.
+        look: Function that is called regularly; see `fill`.
     """
     stop = threading.Event()
 
@@ -103,7 +103,7 @@ def share_of(text: Any) -> tuple[int, int]:
     """Return job and number of jobs of a share such as "3/16"; None means all chunks.
 
     Raises:
-        SweepError: If it is not a share.
+        SweepError: If the text is not a share.
     """
     if text is None:
         return 1, 1

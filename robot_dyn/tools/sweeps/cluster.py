@@ -1,8 +1,8 @@
 """Chunks by workers of Dask.distributed, on this machine or others that share the folder.
 
-A task makes one chunk and returns nothing: the folder shows what is done. A few tasks for each worker are submitted at
-a time, since a scheduler keeps some 15 kB for each. Workers that die are replaced by Dask, and chunks without a file
-are submitted again.
+A task runs one chunk and returns nothing: the folder shows which chunks are done. Only a few tasks per worker are
+submitted at a time, because a scheduler stores about 15 kB for each. Dask replaces workers that die, and chunks without
+a file are submitted again.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from robot_dyn.tools.sweeps.imported import Named
 from robot_dyn.tools.sweeps.specification import stated_in, versions
 from robot_dyn.tools.sweeps.work import Work
 
-_WINDOW = 3  # tasks a thread of a worker
-_WAIT_S = 60.0  # for the first worker
-# what a process of Dask does beside its tasks, a profile and a look at itself each 20 ms, is 4 % of two processors
+_WINDOW = 3  # submitted tasks per thread of a worker
+_WAIT_S = 60.0  # longest time until the first worker is there
+# by default Dask profiles and monitors its processes every 20 ms, which takes 4 % of two processors
 _LOCAL = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
@@ -40,13 +40,13 @@ _LOCAL = {
 @final
 @dataclass(frozen=True)
 class Ticket:
-    """What a worker must agree on before it makes a chunk.
+    """Data that a worker must agree on before it runs a chunk.
 
     Attributes:
         folder: Path of the folder, the same on all hosts.
-        digest: Of the specification in it.
-        versions: Of the driver.
-        names: What the driver names.
+        digest: SHA-256 of the specification in the folder.
+        versions: Versions of packages at the driver.
+        names: Scene and functions that the driver names.
     """
 
     folder: str
@@ -57,15 +57,15 @@ class Ticket:
 
 @contextmanager
 def client_of(cluster: Any) -> Iterator[Any]:
-    """A client of a cluster: "local:2" and "local:2x4" are so many processes, of so many threads, on this machine.
+    """Connect to a cluster; "local:2x4" starts 2 processes with 4 threads each on this machine.
 
     Args:
-        cluster: Such a text; the address of a scheduler, "tls://…", or "tcp://127.0.0.1:…" of this machine; or a client
-            of the user, which is left open.
+        cluster: "local:2", "local:2x4"; the address of a scheduler, "tls://…", or "tcp://127.0.0.1:…" on this machine;
+            or a client of the user, which is left open.
 
     Raises:
-        SweepError: If it is none of these, or an address of another machine without TLS.
-        MissingExtraError: Without Dask.distributed.
+        SweepError: If the argument is none of these, or an address of another machine without TLS.
+        MissingExtraError: If Dask.distributed is not installed.
     """
     distributed = needs("distributed", extra="cluster")
     if isinstance(cluster, distributed.Client):
@@ -89,14 +89,14 @@ def client_of(cluster: Any) -> Iterator[Any]:
 
 
 def _started(distributed: Any, processes: int, threads: int) -> Any:
-    """A cluster on this machine; SweepError if it cannot start, as where there is no shared memory."""
+    """Start a cluster on this machine; raise a SweepError if that fails, for example without shared memory."""
     try:
         return distributed.LocalCluster(
             n_workers=processes, threads_per_worker=threads, host="127.0.0.1", dashboard_address="127.0.0.1:0",
             protocol="tcp://", memory_limit=0, processes=True, silence_logs=50,
         )  # fmt: skip
     except (OSError, RuntimeError) as error:
-        raise SweepError(f"cluster: Dask cannot start here ({error}); leave cluster out, to use threads") from None
+        raise SweepError(f"cluster: Dask cannot start here ({error}); remove cluster to use threads") from None
 
 
 def _connected(distributed: Any, address: str) -> Any:
@@ -109,7 +109,7 @@ def _connected(distributed: Any, address: str) -> Any:
 
 
 def _local(text: str) -> tuple[int, int]:
-    """Processes and threads of each."""
+    """Return the number of processes, and of threads of each."""
     match = re.fullmatch(r"local:([1-9]\d*)(?:x([1-9]\d*))?", text)
     if match is None:
         raise SweepError(f"cluster: 'local:2' is 2 processes, 'local:2x4' has 4 threads in each; got {shown(text)}")
@@ -118,15 +118,15 @@ def _local(text: str) -> tuple[int, int]:
 
 
 def _check_address(address: str) -> None:
-    """Refuse an address at which whoever reaches the port could run code."""
+    """Raise a SweepError for an address at which anybody who reaches the port could run code."""
     parts = urlsplit(address)
     with suppress(ValueError):
         if parts.hostname and ip_address(parts.hostname).is_loopback:
             return
     if parts.scheme not in ("tls", "wss") and parts.hostname != "localhost":
         raise SweepError(
-            f"cluster: {address} is not encrypted, and whoever reaches an open port of a scheduler runs code on it:"
-            " give tls://…, or a distributed.Client with security=, which you made yourself (SECURITY.md)"
+            f"cluster: {address} is not encrypted, so anybody who reaches the port of the scheduler can run code on it:"
+            " give tls://…, or your own distributed.Client with security= (SECURITY.md)"
         )
 
 
@@ -136,14 +136,14 @@ def fill_by_cluster(
     """Fill a folder by the workers of a cluster.
 
     Args:
-        client: Of the cluster.
-        folder: That is filled.
+        client: Client of the cluster.
+        folder: Folder to fill.
         names: Scene and functions that workers may import.
-        missing: Numbers of the chunks that are left to do.
-        look: As in `fill`.
+        missing: Function that returns the indices of missing chunks.
+        look: Function that is called regularly; see `fill`.
 
     Raises:
-        SweepError: If a worker sees another folder or has other versions; others as in `fill`.
+        SweepError: If a worker sees another folder or has other versions; for other errors, see `fill`.
     """
     distributed = needs("distributed", extra="cluster")
     lost = distributed.KilledWorker, distributed.comm.CommClosedError, OSError
@@ -158,12 +158,12 @@ def fill_by_cluster(
 
 
 def ticket_of(folder: Folder, names: Named) -> Ticket:
-    """Return the ticket of a folder and of what workers may import."""
+    """Return the ticket of a folder, with the functions that workers may import."""
     return Ticket(str(folder.path.absolute()), folder.digest, tuple(versions().items()), names)
 
 
 def _check_workers(client: Any, folder: Folder, ticket: Ticket) -> None:
-    """Let each worker write a file into the folder, which is found here."""
+    """Let each worker write a file into the folder, and check that the file exists here."""
     client.wait_for_workers(1, timeout=_WAIT_S)
     answers = client.run(_answer, ticket, on_error="return")
     files = {worker: folder.path / name for worker, name in answers.items() if isinstance(name, str)}
@@ -176,7 +176,7 @@ def _check_workers(client: Any, folder: Folder, ticket: Ticket) -> None:
             raise SweepError(f"worker {worker}: {why}")
     if strangers:
         raise SweepError(
-            f"worker {strangers[0]} writes to another folder than {folder.path}: give one that all hosts share"
+            f"worker {strangers[0]} writes to another folder than {folder.path}: give a folder that all hosts share"
         )
 
 
@@ -184,14 +184,14 @@ def _check_workers(client: Any, folder: Folder, ticket: Ticket) -> None:
 
 
 def make_chunk(ticket: Ticket, chunk: int) -> None:
-    """Make a chunk and write it, unless its file is there."""
+    """Run a chunk and write it, unless its file exists."""
     folder, work, t = _work(ticket)
     if not folder.file(chunk).exists():
         folder.write(chunk, *work.made(*folder.of(chunk), t))
 
 
 def _answer(ticket: Ticket) -> str:
-    """Write a file into the folder; its name."""
+    """Write a file into the folder and return its name."""
     _check(ticket)
     name = f".{os.urandom(8).hex()}.unfinished"
     (Path(ticket.folder) / name).touch()
@@ -200,18 +200,18 @@ def _answer(ticket: Ticket) -> str:
 
 @lru_cache(maxsize=1)
 def _work(ticket: Ticket) -> Any:
-    """The folder, the work and the times of samples of a sweep, made once in a worker."""
+    """Return folder, work and times of samples of a sweep, created once per worker."""
     _check(ticket)
     folder, sweep = opened(Path(ticket.folder), ticket.names)
     return folder, Work(sweep), None if folder.samples is None else folder.samples.times()
 
 
 def _check(ticket: Ticket) -> None:
-    """Refuse another folder, and other versions, by name."""
+    """Raise a SweepError if folder or versions differ from the driver's."""
     here, host, digest = versions(), socket.gethostname(), ""
     for name, version in ticket.versions:
         if here.get(name) != version:
-            raise SweepError(f"{name} is {here.get(name)} on {host}, {version} at the driver; install it there")
+            raise SweepError(f"{name} is {here.get(name)} on {host}, but {version} at the driver; install it there")
     with suppress(SweepError):
         digest = stated_in(Path(ticket.folder)).digest
     if digest != ticket.digest:

@@ -1,4 +1,4 @@
-"""The command that runs a scene many times into a folder, and what is asked of the folder: sweep."""
+"""The command sweep: run a scene many times into a folder, and evaluate the folder."""
 
 from __future__ import annotations
 
@@ -39,28 +39,28 @@ def sweep(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Run a scene many times, with what varies, into a folder.
+    """Run a scene many times with varying parameters.
 
-    Repeat the command to resume. Ctrl-C drops the chunks under way, and the folder keeps the others. `sweep run FOLDER`
-    resumes it, `status` says what is left, `verify` reads all files, `report` writes a page, `export` a table as .csv
-    or .parquet.
+    Repeat the command to resume. Ctrl-C drops unfinished chunks; the folder keeps finished ones. `sweep run FOLDER`
+    resumes a sweep, `status` prints the remaining work, `verify` reads all files, `report` writes a page, `export` a
+    table as .csv or .parquet.
 
     Options:
         what (SCENE.toml|ACTION): A scene to sweep; or run, status, verify, report, export of a FOLDER.
-        folder (FOLDER): Of a sweep, for an action.
+        folder (FOLDER): Folder of a sweep, for an action.
         output (PATH): Folder to fill; or the file of report, export.
         runs: Number of runs.
-        vary (NAME=DISTRIBUTION): What varies, as 'kp=uniform(low=50, high=100)'; repeated.
-        figure (NAME=FIGURE): What is kept of each run, as 'peak=peak("u")'; repeated.
+        vary (NAME=DISTRIBUTION): Varying parameter, such as 'kp=uniform(low=50, high=100)'; may be repeated.
+        figure (NAME=FIGURE): Figure of each run, such as 'peak=peak("u")'; may be repeated.
         samples (SAMPLES): Samples to keep: q, v or u of all runs, or 'samples("q", every=10)'.
         design: random, sobol, halton, latin, saltelli or grid.
-        seed: Of the design.
-        threads: Of this process; all processors unless given.
-        cluster: Workers of Dask in place of threads: local:2, or tls://host:8786.
-        share (3/16): The part of one job of an array.
-        scene: Of a folder: where its scene lies now, or the function module:function that makes it.
-        chunk: Runs of a file; about 2 s of work unless given.
-        probability (EVENT): Say how likely it is, as 'failed | error > 0.1'; repeated.
+        seed: Seed of the design.
+        threads: Threads of this process; by default one for each processor.
+        cluster: Workers of Dask instead of threads: local:2, or tls://host:8786.
+        share (3/16): Part of one job of an array.
+        scene: For a folder: present path of its scene, or the function module:function that returns the setup.
+        chunk: Runs in a file; by default about 2 s of work.
+        probability (EVENT): Estimate the probability of an event such as 'failed | error > 0.1'; may be repeated.
     """
     from robot_dyn.tools import sweeps as sw
 
@@ -70,8 +70,8 @@ def sweep(
     if what.lower().endswith(".toml"):
         if folder is not None or output is None:
             raise SweepError("give the folder to fill with -o FOLDER")
-        given = {"runs": runs, "design": design, "seed": seed, "samples": samples}
-        changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        settings = {"runs": runs, "design": design, "seed": seed, "samples": samples}
+        changes: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
         stated = sw.from_scene(what, vary=arguments.pairs("--vary", vary), figures=figures, **changes)
         result = _run(stated, output, options | {"chunk": chunk})
     else:
@@ -80,7 +80,7 @@ def sweep(
                 f"{what!r} is neither a scene, which ends with .toml, nor an action; {nearest(what, ACTIONS)}"
             )
         if folder is None:
-            raise SweepError(f"{what}: of which folder? robot-dyn sweep {what} FOLDER")
+            raise SweepError(f"{what}: give the folder of a sweep, robot-dyn sweep {what} FOLDER")
         result = sw.read(folder, scene, figures)
         if what == "run":
             result = _run(result.sweep, folder, options)
@@ -102,7 +102,7 @@ def sweep(
 
 
 def _run(stated: Sweep, folder: str, options: dict[str, Any]) -> SweepResult:
-    """Fill the folder, with a bar of the time left."""
+    """Fill the folder, with a progress bar."""
     from robot_dyn.tools import sweeps as sw
 
     to_stderr(f"{stated.runs} runs, {stated.bytes_expected / 2**20:.3g} MiB on disk")

@@ -1,12 +1,13 @@
 """Designs of experiments: N rows of d numbers in [0, 1), drawn once by `scipy.stats.qmc` or SALib and kept as a table.
 
     random                  independent rows
-    sobol, halton, latin    16 independent scramblings, each of N/16 rows
+    sobol, halton, latin    16 independent scramblings of N/16 rows
     saltelli                16 scramblings of blocks of d + 2 rows, for Sobol' indices
     grid                    every combination of k levels: not random
-    a table                 rows that are given: how they were drawn is not known
+    a table                 rows from the user, of unknown origin
 
-Row i belongs to scrambling (i mod 16), a block of "saltelli" as one row, so that the first rows hold a part of each.
+Row i belongs to scrambling (i mod 16), where a block of "saltelli" counts as one row, so that the first rows include
+all scramblings.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ SCRAMBLINGS = 16
 """Independent scramblings of a design, from which intervals come: Student's t with 15 degrees of freedom."""
 MOST_ROWS = 10_000_000
 NAMES = ("random", "sobol", "halton", "latin", "saltelli", "grid")
-_BITS = 53  # of Sobol' numbers, exact in float64; SciPy's 30 would repeat values in long sweeps
+_BITS = 53  # bits of Sobol' numbers, exact in float64; SciPy's 30 would repeat values in long sweeps
 
 
 @final
@@ -35,7 +36,7 @@ class Design(Value):
     Attributes:
         name: One of `NAMES`, or "table".
         rows: Numbers in [0, 1), shape (N, d).
-        block: Consecutive rows that belong together: d + 2 of "saltelli", else 1.
+        block: Number of consecutive rows that belong together: d + 2 for "saltelli", else 1.
     """
 
     name: str
@@ -47,7 +48,7 @@ class Design(Value):
 
     @property
     def independent(self) -> bool:
-        """Whether the rows are independent, so that formulas for independent runs hold."""
+        """True if the rows are independent, so that formulas for independent runs hold."""
         return self.name == "random"
 
     @property
@@ -58,16 +59,16 @@ class Design(Value):
 
 
 def design(name: str | Any, runs: int, dimensions: int, seed: int = 0) -> Design:
-    """Draw a design by its name, or take the rows that are given.
+    """Draw a design by name, or use a table of rows.
 
     Args:
         name: One of `NAMES`, or a table of numbers in [0, 1), shape (N, d).
-        runs: N, the number of rows, 10 million at most.
-        dimensions: d, the numbers of a row.
-        seed: Of random numbers; with the same versions of SciPy and SALib the same seed gives the same rows.
+        runs: N, the number of rows, at most 10 million.
+        dimensions: d, the number of columns.
+        seed: Seed of random numbers; with the same versions of SciPy and SALib the same seed gives the same rows.
 
     Raises:
-        SweepError: If the name is unknown, or the design cannot have so many rows; names the two nearest counts.
+        SweepError: If the name is unknown, or the design cannot have N rows; the message has the two nearest counts.
     """
     runs = integer("runs", runs, least=1, most=MOST_ROWS, error=SweepError)
     if isinstance(name, np.ndarray | list | tuple):
@@ -77,7 +78,7 @@ def design(name: str | Any, runs: int, dimensions: int, seed: int = 0) -> Design
 
 
 def given(table: Any, runs: int, dimensions: int, name: str = "table") -> Design:
-    """The design of a table of rows; SweepError unless it has N rows of d numbers in [0, 1)."""
+    """Return the design of a table of rows; raise a SweepError unless it has N rows of d numbers in [0, 1)."""
     rows = numbers("the table of a design", table, ("N", "d"), error=SweepError, least=0.0)
     if (rows >= 1).any():
         row, column = np.argwhere(rows >= 1)[0]
@@ -97,22 +98,22 @@ def _design(name: str, rows: np.ndarray) -> Design:
 
 
 def _drawn(name: str, runs: int, d: int, seed: int) -> np.ndarray:
-    """The rows of a design, (N, d)."""
+    """Draw the rows of a design, (N, d)."""
     if name == "random":
         return np.random.default_rng(seed).random((runs, d))
     if name == "grid":
         return _grid(runs, d)
     block = d + 2 if name == "saltelli" else 1
-    each = _engine(name, d)
+    draw = _engine(name, d)
     _check_scrambled(name, runs, SCRAMBLINGS * block)
     seeds = np.random.SeedSequence(seed).spawn(SCRAMBLINGS)
-    rows = [each(runs // block // SCRAMBLINGS, np.random.default_rng(child)) for child in seeds]
+    rows = [draw(runs // block // SCRAMBLINGS, np.random.default_rng(child)) for child in seeds]
     return np.minimum(np.stack([x.reshape(-1, block, d) for x in rows], 1).reshape(runs, d), np.nextafter(1.0, 0.0))
 
 
 def _engine(name: str, d: int) -> Callable[[int, np.random.Generator], np.ndarray]:
     """Return a function that draws points, or blocks of "saltelli", of one scrambling."""
-    from scipy.stats import qmc  # late: it takes a second
+    from scipy.stats import qmc  # imported here because it takes a second
 
     most = {"sobol": qmc.Sobol.MAXDIM, "saltelli": qmc.Sobol.MAXDIM // 2}.get(name, d)  # A and B are one point
     if d > most:
@@ -128,7 +129,7 @@ def _engine(name: str, d: int) -> Callable[[int, np.random.Generator], np.ndarra
 
 
 def _check_scrambled(name: str, runs: int, unit: int) -> None:
-    """Raise SweepError unless each scrambling has 2 points or blocks or more, for balance a power of two."""
+    """Raise a SweepError unless each scrambling has at least 2 points or blocks, or a power of two for balance."""
     if name in ("sobol", "saltelli"):
         count = unit << max((runs // unit).bit_length() - 1, 1)
         _check_count(name, runs, f"{unit} times a power of two, {2 * unit} at least", count, 2 * count)
@@ -138,13 +139,13 @@ def _check_scrambled(name: str, runs: int, unit: int) -> None:
 
 
 def _check_count(name: str, runs: int, allowed: str, count: int, above: int) -> None:
-    """Raise SweepError unless `runs` is the nearest count that is allowed; names it and the next one."""
+    """Raise a SweepError unless `runs` is the nearest allowed count; the message has this count and the next one."""
     if runs != count:
         raise SweepError(f"design {name!r} takes {allowed}, got {runs} runs; nearest: {count} or {above}")
 
 
 def _grid(runs: int, d: int) -> np.ndarray:
-    """Levels (2m + 1) / 2k, m = 0, …, k − 1; the last dimension changes first."""
+    """Return levels (2m + 1) / 2k, m = 0, …, k − 1; the last dimension changes first."""
     k = round(runs ** (1 / d)) + 1
     while k**d > runs:
         k -= 1

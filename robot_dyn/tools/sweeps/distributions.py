@@ -1,4 +1,4 @@
-"""Distributions of what varies: F⁻¹ of the rows of a design, by `scipy.stats`; stored by name and numbers."""
+"""Distributions of varying parameters: F⁻¹ of the rows of a design, by `scipy.stats`; stored by name and numbers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robot_dyn.foundations import SweepError, Value, numbers, shown
 from robot_dyn.tools.sweeps.texts import call_of, called
 
 LEAST, MOST = 2.0**-54, 1 - 2.0**-53
-"""Between which numbers are taken: F⁻¹(0) may be infinite."""
+"""Range of the arguments of F⁻¹: F⁻¹(0) may be infinite."""
 _SCIPY = "scipy.stats."
 _ORDERED = {"uniform": ("low", "high"), "triangular": ("low", "mode", "high")}
 _BOUNDS: dict[str, Any] = {"sd": {"least": 0.0}, "sigma_of_log": {"least": 0.0}, "median": {"above": 0.0}}
@@ -27,8 +27,8 @@ class Distribution(Value):
 
     Attributes:
         name: "uniform", "normal", "lognormal", "triangular", "choice", or "scipy.stats.gamma" for one of SciPy.
-        parameters: By name, each a number or of shape (n,); of "choice" the values, shape (m,) or (m, n). Those that
-            SciPy takes by position are named "0", "1", ….
+        parameters: Parameters by name, numbers or arrays (n,); for "choice" the values, shape (m,) or (m, n).
+            Positional parameters of SciPy have the names "0", "1", ….
     """
 
     name: str
@@ -38,16 +38,16 @@ class Distribution(Value):
         shapes = ((), ("n",)) if self.name != "choice" else (("m",), ("m", "n"))
         checked = {}
         for key, x in self.parameters.items():
-            what = f"the {key} of choice" if self.name == "choice" else f"{key} of {self.name}"
-            array = numbers(what, x, *shapes, error=SweepError, **_BOUNDS.get(key, {}))
-            if self.name.startswith(_SCIPY) and np.asarray(x).dtype.kind in "iu":  # SciPy may need whole numbers
+            label = f"the {key} of choice" if self.name == "choice" else f"{key} of {self.name}"
+            array = numbers(label, x, *shapes, error=SweepError, **_BOUNDS.get(key, {}))
+            if self.name.startswith(_SCIPY) and np.asarray(x).dtype.kind in "iu":  # SciPy may need integers
                 array = np.array(x)
                 array.setflags(write=False)
             checked[key] = array
         object.__setattr__(self, "parameters", checked)
         if self.name == "choice":
             return
-        _ = self.shape  # refused if lengths differ
+        _ = self.shape  # raises if lengths differ
         for low, high in pairwise(_ORDERED.get(self.name, ())):
             a, b = np.broadcast_arrays(checked[low], checked[high])
             if (wrong := a > b).any():
@@ -61,7 +61,7 @@ class Distribution(Value):
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """Of one value: () or (n,)."""
+        """Shape of one value: () or (n,)."""
         if self.name == "choice":
             return self.parameters["values"].shape[1:]
         try:
@@ -71,19 +71,19 @@ class Distribution(Value):
 
     @property
     def size(self) -> int:
-        """The columns of a design that it takes."""
+        """Number of columns of a design that it uses."""
         return 1 if self.name == "choice" or not self.shape else self.shape[0]
 
     @property
     def width(self) -> int:
-        """The numbers of one value."""
+        """Number of entries of one value."""
         return self.shape[0] if self.shape else 1
 
     def values(self, u: np.ndarray) -> np.ndarray:
-        """F⁻¹(u), shape (k,) or (k, n), of numbers in [0, 1), shape (k, size); 0 is taken for 2⁻⁵⁴."""
+        """Return F⁻¹(u), shape (k,) or (k, n), for numbers in [0, 1), shape (k, size); 2⁻⁵⁴ replaces 0."""
         if self.name == "choice":
-            of = self.parameters["values"]
-            return of[np.minimum((u[:, 0] * len(of)).astype(int), len(of) - 1)]
+            values = self.parameters["values"]
+            return values[np.minimum((u[:, 0] * len(values)).astype(int), len(values) - 1)]
         return self._inverse(np.clip(u, LEAST, MOST).reshape(-1, *self.shape))
 
     def _inverse(self, u: np.ndarray) -> np.ndarray:
@@ -94,7 +94,7 @@ class Distribution(Value):
     def _ppf(self) -> Any:
         if not self.name.startswith(_SCIPY):
             return partial(_INVERSES[self.name], **self.parameters)
-        from scipy import stats  # late: it takes a second
+        from scipy import stats  # imported here because it takes a second
 
         name = self.name.removeprefix(_SCIPY)
         kind = getattr(stats, name, None)
@@ -103,51 +103,51 @@ class Distribution(Value):
         args = [self.parameters[key] for key in sorted(filter(str.isdigit, self.parameters), key=int)]
         try:
             return kind(*args, **{key: x for key, x in self.parameters.items() if not key.isdigit()}).ppf
-        except TypeError as found:
-            raise SweepError(f"scipy.stats does not take {self}: {found}") from None
+        except TypeError as error:
+            raise SweepError(f"scipy.stats does not accept {self}: {error}") from None
 
     def __str__(self) -> str:
-        said = (f"{'' if key.isdigit() else f'{key}='}{x.tolist()}" for key, x in self.parameters.items())
-        return f"{self.name}({', '.join(said)})"
+        arguments = (f"{'' if key.isdigit() else f'{key}='}{x.tolist()}" for key, x in self.parameters.items())
+        return f"{self.name}({', '.join(arguments)})"
 
     def to_dict(self) -> dict[str, Any]:
-        """Its name and numbers, for JSON; `from_dict` returns an equal distribution."""
+        """Return name and numbers, for JSON; `from_dict` returns an equal distribution."""
         return {"distribution": self.name} | {key: x.tolist() for key, x in self.parameters.items()}
 
 
 def uniform(*, low: Any, high: Any) -> Distribution:
-    """Uniform from low to high; numbers or arrays of shape (n,), in the unit of the parameter."""
+    """Return a uniform distribution from low to high; numbers or arrays (n,), in the unit of the parameter."""
     return Distribution("uniform", {"low": low, "high": high})
 
 
 def normal(*, mean: Any, sd: Any) -> Distribution:
-    """Normal, of mean and standard deviation; numbers or arrays of shape (n,), in the unit of the parameter."""
+    """Return a normal distribution; mean and standard deviation are numbers or arrays (n,), in the parameter's unit."""
     return Distribution("normal", {"mean": mean, "sd": sd})
 
 
 def lognormal(*, median: Any, sigma_of_log: Any) -> Distribution:
-    """Log-normal, of median and of the standard deviation of the logarithm; numbers or arrays of shape (n,)."""
+    """Return a log-normal distribution with median and standard deviation of the logarithm; numbers or arrays (n,)."""
     return Distribution("lognormal", {"median": median, "sigma_of_log": sigma_of_log})
 
 
 def triangular(*, low: Any, mode: Any, high: Any) -> Distribution:
-    """Triangular from low to high with its peak at mode; numbers or arrays of shape (n,)."""
+    """Return a triangular distribution from low to high with the peak at mode; numbers or arrays (n,)."""
     return Distribution("triangular", {"low": low, "mode": mode, "high": high})
 
 
 def choice(values: Any) -> Distribution:
-    """One of the values, each as likely: numbers, shape (m,), or rows of n numbers, shape (m, n)."""
+    """Return a distribution of equally likely values: numbers, shape (m,), or rows of n numbers, shape (m, n)."""
     return Distribution("choice", {"values": values})
 
 
-CONSTRUCTORS = {each.__name__: each for each in (uniform, normal, lognormal, triangular, choice)}
+CONSTRUCTORS = {constructor.__name__: constructor for constructor in (uniform, normal, lognormal, triangular, choice)}
 
 
 def distribution(value: Any) -> Distribution:
-    """A distribution of this module as it is or as a text; a frozen one of scipy.stats by its name and numbers.
+    """Return a distribution from one of this module, its text, or a frozen one of scipy.stats.
 
     Raises:
-        SweepError: If the value is none of them.
+        SweepError: If the value is none of these.
     """
     if isinstance(value, Distribution):
         return value
@@ -168,17 +168,17 @@ def distribution(value: Any) -> Distribution:
 
 
 def from_dict(stored: Mapping[str, Any]) -> Distribution:
-    """The distribution of a dictionary that `to_dict` made.
+    """Return the distribution of a dictionary from `to_dict`.
 
     Raises:
-        SweepError: If it names no distribution, or lacks a parameter or has another one.
-        KeyError, TypeError or ValueError: If it is no dictionary, or has no name.
+        SweepError: If the name is not a distribution, or a parameter is missing or unknown.
+        KeyError, TypeError or ValueError: If the value is not a dictionary, or has no name.
     """
-    given = dict(stored)
-    name = given.pop("distribution")
+    parameters = dict(stored)
+    name = parameters.pop("distribution")
     if str(name).startswith(_SCIPY):
-        return Distribution(name, given)
-    return call_of("distribution", name, CONSTRUCTORS, (), given)
+        return Distribution(name, parameters)
+    return call_of("distribution", name, CONSTRUCTORS, (), parameters)
 
 
 def _uniform(u: np.ndarray, low: Any, high: Any) -> np.ndarray:
@@ -186,7 +186,7 @@ def _uniform(u: np.ndarray, low: Any, high: Any) -> np.ndarray:
 
 
 def _normal(u: np.ndarray, mean: Any, sd: Any) -> np.ndarray:
-    from scipy.special import ndtri  # late: only runs need it
+    from scipy.special import ndtri  # imported here because only runs need it
 
     return mean + sd * ndtri(u)
 
@@ -202,5 +202,5 @@ def _triangular(u: np.ndarray, low: Any, mode: Any, high: Any) -> np.ndarray:
     return np.clip(np.where(u * width < rise, left, right), low, high)
 
 
-# unlike SciPy's, they take a width of 0: one joint of several may be known exactly
+# unlike SciPy's, these accept a width of 0: one joint of several may be known exactly
 _INVERSES = {"uniform": _uniform, "normal": _normal, "lognormal": _lognormal, "triangular": _triangular}

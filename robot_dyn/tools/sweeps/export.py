@@ -18,14 +18,14 @@ _CSV, _PARQUET = FileKind("a table of runs", ".csv", b'"run",'), FileKind("a tab
 
 
 def export(sweep: Sweep, folder: Folder, path: str | Path, force: bool) -> Path:
-    """Write the rows of a complete folder to a .csv or .parquet file; SweepError if it cannot be written."""
+    """Write the rows of a complete folder to a .csv or .parquet file; raise a SweepError if that fails."""
     path = target(path, (_CSV, _PARQUET), SweepError, inputs_of(folder, path), force)
     is_csv = path.suffix.lower() == ".csv"
     return save(path, lambda stream: _write(sweep, folder, stream, is_csv), SweepError)
 
 
 def inputs_of(folder: Folder, path: str | Path) -> list[Path]:
-    """Return files that an export or a report may not replace: those of the folder, even under another name."""
+    """Return files that an export or a report must not replace: the files of the folder, even under other names."""
     chunks = filter(Path.exists, map(folder.file, range(folder.count))) if file_path(path, SweepError).exists() else ()
     return [folder.path, *chunks]
 
@@ -55,7 +55,7 @@ def _writer(stream: BinaryIO, stated: Any, is_csv: bool) -> Any:
 
 
 def _about_columns(sweep: Sweep) -> dict[str, dict[str, str]]:
-    """Unit and meaning of columns, distribution of what varies, and how a figure is computed."""
+    """Return units and meanings of columns, distributions of parameters, and definitions of figures."""
     varied = {name: name if name in sweep.vary else parameter_of(name) for name in sweep.columns}
     about = {column: {"distribution": json.dumps(sweep.vary[name].to_dict())} for column, name in varied.items()}
     about |= {name: {"computed by": json.dumps(figure.to_dict())} for name, figure in sweep.figures.items()}

@@ -1,9 +1,8 @@
 """Events as texts over columns, such as "diverged | error > 0.1", read by Python's parser and never evaluated by it.
 
-Comparisons of names and numbers are joined by |, & and !, for which `or`, `and` and `not` may be written, and
-parentheses; they bind in this order, the last the most. Columns whose names are no words stand in quotes.
-A comparison with nan is unknown, and so is what depends on it: the logic is Kleene's, so that
-`diverged | error > 0.1` is known of a run that diverged.
+Comparisons of names and numbers are joined by |, & and ! (or `or`, `and` and `not`) and parentheses, in the order of
+increasing precedence. Names that are not single words are quoted. A comparison with nan is unknown, by Kleene's logic:
+`diverged | error > 0.1` is true for a run that diverged.
 """
 
 from __future__ import annotations
@@ -31,18 +30,18 @@ _COMPARE = {
 }  # fmt: skip
 _REMEDIES: dict[type[ast.AST], str] = {
     ast.Compare: "0.1 < x < 0.2 is x > 0.1 & x < 0.2",
-    ast.Call: "functions are not known: a figure may compute what is to be compared",
+    ast.Call: "functions are not supported: compute the value as a figure, and compare that",
 }
 _COMPARES = "compare the number with a column, by <, <=, >, >=, == or !="
-_REMEDY = "a name of several words stands in quotes, and units are left out"
-_MOST = 1000  # characters
+_REMEDY = "put names of several words in quotes, and omit units"
+_MOST = 1000  # largest number of characters
 _DEEPEST = 50
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """Of each run, whether an event is certain and whether it is possible, (N,): these differ where it is unknown."""
+    """True for runs in which an event is certain, and possible, (N,); they differ where the event is unknown."""
 
     certain: np.ndarray
     possible: np.ndarray
@@ -50,20 +49,20 @@ class Truth:
 
 @final
 class Expression:
-    """An expression, parsed.
+    """A parsed expression.
 
     Args:
-        text: As above.
+        text: The expression; see above.
 
     Raises:
-        SweepError: If it is not one; marks the place.
+        SweepError: If the text is not an expression; the message marks the place.
     """
 
     def __init__(self, text: str) -> None:
         if not isinstance(text, str) or len(text) > _MOST:
             raise SweepError(f"an event is a text such as 'diverged | error > 0.1', got {shown(text)}")
         self.text = text
-        self._operands: dict[str, str | float] = {}  # names and numbers, by the names that they have for Python
+        self._operands: dict[str, str | float] = {}  # names and numbers, by their names in the parsed Python code
         words, self._places, self._columns, depth = [], [], [0], 0
         for kind, value, place in _tokens(text):
             depth += (value == "(") - (value == ")")
@@ -75,7 +74,7 @@ class Expression:
             words.append(_WORDS.get(value, value))
             self._places.append(place)
             self._columns.append(self._columns[-1] + len(words[-1]) + 1)
-        if not words or words[-1][0] not in "_)":  # it ends with an operator
+        if not words or words[-1][0] not in "_)":  # ends with an operator
             raise self._wrong(self._columns[-1], "a name or a number is missing")
         if depth > 0:
             raise self._wrong(self._columns[-1], "a ) is missing")
@@ -89,11 +88,11 @@ class Expression:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the columns that it needs."""
+        """Names of the required columns."""
         return tuple(dict.fromkeys(value for value in self._operands.values() if isinstance(value, str)))
 
     def of(self, columns: Mapping[str, np.ndarray]) -> Truth:
-        """The event in each run; SweepError if a name is not that of a column."""
+        """Evaluate the event in each run; raise a SweepError if a name is not a column."""
         for name in self.names:
             if name not in columns:
                 raise SweepError(f"no column {name!r}; {nearest(name, columns)}")
@@ -103,7 +102,7 @@ class Expression:
             raise SweepError(f"{shown(self.text)}: is nested too deeply") from None
 
     def _check(self, tree: ast.AST) -> None:
-        """Raise SweepError unless a tree is an event."""
+        """Raise a SweepError unless a tree is an event."""
         match tree:
             case ast.BoolOp(values=values):
                 for value in values:
@@ -127,13 +126,13 @@ class Expression:
                 join = np.logical_or if isinstance(operator, ast.Or) else np.logical_and
                 return Truth(reduce(join, [x.certain for x in parts]), reduce(join, [x.possible for x in parts]))
             case ast.UnaryOp(operand=operand):
-                of = self._truth(operand, columns)
-                return Truth(~of.possible, ~of.certain)
+                truth = self._truth(operand, columns)
+                return Truth(~truth.possible, ~truth.certain)
             case ast.Compare(left=ast.Name(id=a), ops=[operator], comparators=[ast.Name(id=b)]):
                 return self._compared(operator, self._operands[a], self._operands[b], columns)
         column = str(self._operands[tree.id])
         if (x := columns[column]).dtype != bool:
-            raise SweepError(f"{column!r} is a number: compare it, as {column} > 0.1")
+            raise SweepError(f"{column!r} is a number: compare it, such as {column} > 0.1")
         return Truth(x, x)
 
     def _compared(
@@ -141,21 +140,21 @@ class Expression:
     ) -> Truth:
         left, right = (columns[x] if isinstance(x, str) else np.float64(x) for x in (a, b))
         if bool in (left.dtype, right.dtype):
-            raise SweepError("an outcome is true or false: it is not compared with a number")
+            raise SweepError("an outcome is true or false and cannot be compared with a number; remove the comparison")
         with np.errstate(invalid="ignore"):
             x = np.asarray(_COMPARE[type(operator)](left, right))
-        known = np.asarray(~(np.isnan(left) | np.isnan(right)))
-        return Truth(x & known, x | ~known)
+        is_known = np.asarray(~(np.isnan(left) | np.isnan(right)))
+        return Truth(x & is_known, x | ~is_known)
 
     def _wrong(self, column: int, remedy: str = _REMEDY) -> SweepError:
-        """The error at a column of what Python parsed."""
+        """Return the error at a column of the parsed Python code."""
         k = bisect(self._columns, column) - 1
         place = self._places[k] if k < len(self._places) else len(self.text)
         return SweepError(f"{self.text[:place]}⟨here⟩{self.text[place:]}: is not an event; {remedy}")
 
 
 def _tokens(text: str) -> Iterator[tuple[str, str, int]]:
-    """Kind, value and place of each."""
+    """Yield kind, value and place of each token."""
     at, end = 0, len(text.rstrip())
     while at < end:
         match = _TOKEN.match(text, at)

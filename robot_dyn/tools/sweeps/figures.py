@@ -1,7 +1,7 @@
 """Figures: numbers of a run that a sweep keeps, f(run) → float, and the runs that they are computed from.
 
-`rms_error`, `peak` and `final` are computed for a batch at once; functions that users write are named by import path.
-Sums go one term after the other, so that their bits do not depend on the runs next to a run.
+`rms_error`, `peak` and `final` are computed for a batch at once; functions of users are named by import path. Sums add
+one term after the other, so that their bits do not depend on other runs in the batch.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from robot_dyn.simulation import tracking_of
 from robot_dyn.tools.sweeps.imported import digest_of, imported, is_import_path, path_of
 from robot_dyn.tools.sweeps.texts import call_of, called
 
-_STATES = ("q", "v", "u")  # in the order of what is observed of a run
+_STATES = ("q", "v", "u")  # in the order of `extremes`
 _RECORDS = (*_STATES, "energy", "work")
 
 
 @typing.final
 @dataclass(frozen=True, eq=False)
 class Run(Value):
-    """One run, as figures see it: what was recorded of it, up to its end.
+    """The recorded data of one run, up to its end, for figures.
 
     Attributes:
-        t: Times of its samples, (m,), in [s].
+        t: Times of the samples, (m,), in [s].
         q, v, u: Position, velocity, actuation, (m, n); None where not recorded.
         kinetic, potential: Energies, (m,), in [J]; None where not recorded.
         desired, deviation: Same as in `Trajectory`; None without a reference.
-        extremes: The least and the largest of q, v and u over all steps, (3, 2, n).
-        ended: Time at which it ended, in [s].
-        params: Its start, "q0" and "v0", and its values of parameters that vary, by name, (size,).
+        extremes: Smallest and largest values of q, v and u over all steps, (3, 2, n).
+        ended: Time at which the run ended, in [s].
+        params: Start, "q0" and "v0", and values of varying parameters, by name, (size,).
     """
 
     t: np.ndarray
@@ -59,29 +59,29 @@ class Run(Value):
 
 @typing.final
 class Runs:
-    """Runs of a batch that finished, as figures of the library see them.
+    """The finished runs of a batch, for figures of the library.
 
     Attributes:
         t: Times of samples, (m,), in [s].
         q, v, u: Position, velocity, actuation, (B, m, n), nan after the end of a run; None where not recorded.
-        extremes: The least and the largest of q, v and u over all steps, (B, 3, 2, n).
-        ended: Times at which they ended, (B,), in [s].
-        known: Which samples each run has, (B, m).
-        joint_names: Of the n joints.
+        extremes: Smallest and largest values of q, v and u over all steps, (B, 3, 2, n).
+        ended: Times at which the runs ended, (B,), in [s].
+        known: True for samples that a run has, (B, m).
+        joint_names: Names of the n joints.
     """
 
     def __init__(self, rollouts: Rollouts, places: np.ndarray) -> None:
-        """Take the runs at these places of rollouts."""
-        chosen = slice(None) if len(places) == len(rollouts) else places  # all of them are not copied
+        """Select the runs at these places of rollouts."""
+        chosen = slice(None) if len(places) == len(rollouts) else places  # avoids a copy of all runs
 
-        def of(x: np.ndarray | None) -> np.ndarray | None:
+        def select(x: np.ndarray | None) -> np.ndarray | None:
             return None if x is None else x[chosen]
 
         assert rollouts.observed is not None
         self._rollouts, self._places = rollouts, places
         self.joint_names, self.t = rollouts.joint_names, rollouts.t
-        self.q, self.v, self.u = of(rollouts.q), of(rollouts.v), of(rollouts.u)
-        self.kinetic, self.potential = of(rollouts.kinetic), of(rollouts.potential)
+        self.q, self.v, self.u = select(rollouts.q), select(rollouts.v), select(rollouts.u)
+        self.kinetic, self.potential = select(rollouts.kinetic), select(rollouts.potential)
         self.extremes, self.ended = rollouts.observed.extremes[chosen], rollouts.ended[chosen]
         self.known = self.t <= self.ended[:, None] if self.q is None else np.isfinite(self.q[:, :, 0])
 
@@ -107,7 +107,7 @@ class Runs:
 
     @cached_property
     def deviation(self) -> np.ndarray | None:
-        """How far the joints, or the frame, are from the reference, (B, m, k); None without one, or without q."""
+        """Deviation of the joints, or the frame, from the reference, (B, m, k); None without a reference or q."""
         if self.q is None:
             return None
         q = self.q if self.known.all() else np.where(self.known[..., None], self.q, 0.0)
@@ -117,27 +117,36 @@ class Runs:
         return None if deviations[0] is None else np.stack(deviations)  # pyright: ignore[reportArgumentType, reportCallIssue]
 
     def run(self, i: int) -> Run:
-        """One of them."""
+        """Return one run."""
         runs, place, known = self._rollouts, self._places[i], self.known[i]
 
-        def of(x: np.ndarray | None) -> np.ndarray | None:
+        def select(x: np.ndarray | None) -> np.ndarray | None:
             return None if x is None else np.ascontiguousarray(x[i][known])
 
-        t, q = np.ascontiguousarray(self.t[known]), of(self.q)
+        t, q = np.ascontiguousarray(self.t[known]), select(self.q)
         desired, _, deviation = (None,) * 3 if q is None else tracking_of(self._setup_of(i), t, q)
         starts = {name: x for name, x in (("q0", runs.q0), ("v0", runs.v0)) if x is not None}
         values = {name: x[place] for name, x in (starts | runs.params).items()}
         return Run(
-            t, q, of(self.v), of(self.u), of(self.kinetic), of(self.potential), desired, deviation,
-            self.extremes[i], float(self.ended[i]), values,
-        )  # fmt: skip
+            t=t,
+            q=q,
+            v=select(self.v),
+            u=select(self.u),
+            kinetic=select(self.kinetic),
+            potential=select(self.potential),
+            desired=desired,
+            deviation=deviation,
+            extremes=self.extremes[i],
+            ended=float(self.ended[i]),
+            params=values,
+        )
 
     def only(self, i: int) -> Runs:
-        """One of them as a batch."""
+        """Return one run as a batch."""
         return Runs(self._rollouts, self._places[i : i + 1])
 
     def of_joint(self, x: np.ndarray | None, joint: str | None) -> np.ndarray:
-        """All joints of an array over joints, or one; SweepError if there is no such joint."""
+        """Return all joints of an array over joints, or one; raise a SweepError if the joint is unknown."""
         assert x is not None
         if joint is None:
             return x
@@ -155,7 +164,7 @@ class Figure(Value):
     Attributes:
         name: "rms_error", "peak" or "final".
         of_what: "q", "v", "u" or "error".
-        joint: Of one joint, or None for all.
+        joint: Name of a joint, or None for all joints.
     """
 
     name: str
@@ -165,33 +174,31 @@ class Figure(Value):
     def __post_init__(self) -> None:
         choice(self.name, self.of_what, (*_STATES, "error"), error=SweepError)
         if self.joint is not None and not isinstance(self.joint, str):
-            raise SweepError(f"{self.name}: joint must be the name of one, got {shown(self.joint)}")
+            raise SweepError(f"{self.name}: joint must be the name of a joint, got {shown(self.joint)}")
 
     @property
     def record(self) -> tuple[str, ...]:
-        """What it needs recorded, of "q", "v", "u", "energy", "work"."""
+        """Quantities to record, some of "q", "v", "u", "energy", "work"."""
         if self.of_what == "error":
             return ("q",)
         return ("q", self.of_what) if self.name == "final" else ()  # q shows where a run ends
 
     def unit(self, setup: Setup) -> str:
-        """That of the numbers, empty where it is not known; "m" for the error of a frame that follows a path."""
+        """Return the unit of the numbers; empty if unknown, "m" for the error of a frame that follows a path."""
         is_error, controller, dynamics = self.of_what == "error", setup.controller, setup.plant.dynamics
         if is_error and controller is not None and isinstance(controller.desired, CartesianReference):
             return "m"
         types = dict(zip(dynamics.joint_names, joint_types_of(dynamics), strict=True))
-        of = types.values() if self.joint is None else [types.get(self.joint)]
-        return joint_units("q" if is_error else self.of_what, of)
+        joint_types = types.values() if self.joint is None else [types.get(self.joint)]
+        return joint_units("q" if is_error else self.of_what, joint_types)
 
     def of(self, runs: Runs) -> np.ndarray:
-        """The numbers of finished runs, (B,)."""
+        """Compute the numbers of finished runs, (B,)."""
         if self.of_what != "error" and self.name == "peak":
             extremes = runs.extremes[:, _STATES.index(self.of_what)]
             return np.abs(runs.of_joint(extremes, self.joint)).max(axis=(1, 2))
         if self.of_what == "error" and runs.deviation is None:
-            raise SweepError(
-                f"{self.name}: there is no error, since no reference is followed; add a controller with one"
-            )
+            raise SweepError(f"{self.name}: there is no error without a reference; add a controller with a reference")
         x = runs.of_joint(runs.deviation if self.of_what == "error" else getattr(runs, self.of_what), self.joint)
         if self.name == "peak":
             return np.abs(np.where(runs.known[..., None], x, 0.0)).max(axis=(1, 2))
@@ -200,13 +207,13 @@ class Figure(Value):
         last = x[np.arange(len(runs)), runs.known.sum(axis=1) - 1]
         if self.of_what != "error" and last.shape[1] > 1:
             names = ", ".join(runs.joint_names)
-            raise SweepError(f"final({self.of_what!r}): of which joint? give joint=, one of {names}")
+            raise SweepError(f"final({self.of_what!r}) needs a joint; give joint=, one of {names}")
         return np.abs(last).max(axis=1) if self.of_what == "error" else last[:, 0]
 
     def to_dict(self) -> dict[str, Any]:
-        """Its name and arguments, for JSON."""
-        what = {} if self.name == "rms_error" else {"of_what": self.of_what}
-        return {"figure": self.name} | what | {"joint": self.joint}
+        """Return name and arguments, for JSON."""
+        quantity = {} if self.name == "rms_error" else {"of_what": self.of_what}
+        return {"figure": self.name} | quantity | {"joint": self.joint}
 
     def __str__(self) -> str:
         _, *arguments = self.to_dict().items()
@@ -214,23 +221,23 @@ class Figure(Value):
 
 
 def _root_mean_square(x: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Of the known samples of each run, (B,), from x (B, m, k)."""
+    """Return the root mean square over the known samples of each run, (B,), from x, (B, m, k)."""
     total = np.zeros((len(x), x.shape[2]))
-    for of_runs, sample in zip(known.T, x.swapaxes(0, 1), strict=True):
-        total += sample * sample if of_runs.all() else np.where(of_runs[:, None], sample, 0.0) ** 2
+    for has_sample, sample in zip(known.T, x.swapaxes(0, 1), strict=True):
+        total += sample * sample if has_sample.all() else np.where(has_sample[:, None], sample, 0.0) ** 2
     return np.sqrt(reduce(np.add, total.T) / (known.sum(axis=1) * x.shape[2]))
 
 
 @typing.final
 @dataclass(frozen=True)
 class UserFigure(Value):
-    """A function f(run) → float of a `Run`, by import path; methods as of `Figure`.
+    """A function f(run) → float of a `Run`, by import path; same methods as `Figure`.
 
-    Its attributes, if it has them: `record`, names of what is to be recorded, ("q", "v") otherwise; `unit`, a text.
+    The function may have the attributes `record`, names of quantities to record, by default ("q", "v"), and `unit`.
 
     Attributes:
-        path: Its import path.
-        stated: In a folder that was read without naming the function, SHA-256 of its module and its unit.
+        path: Import path of the function.
+        stated: SHA-256 of the module and unit, if a folder was read without naming the function; else None.
     """
 
     path: str
@@ -238,7 +245,7 @@ class UserFigure(Value):
 
     @property
     def function(self) -> Any:
-        """The function; SweepError if a folder names it and its reader has not."""
+        """The function; a SweepError if a folder names it, but its reader has not."""
         if self.stated is not None:
             raise SweepError(
                 f"the folder names the function {self.path} as a figure, which is called only if you name it:"
@@ -248,7 +255,7 @@ class UserFigure(Value):
 
     @property
     def record(self) -> tuple[str, ...]:
-        """Return the names of what the function needs recorded."""
+        """Quantities to record."""
         names = getattr(self.function, "record", ("q", "v"))
         return tuple(choice(f"record of {self.path}", name, _RECORDS, error=SweepError) for name in names)
 
@@ -257,11 +264,11 @@ class UserFigure(Value):
         return str(getattr(self.function, "unit", "")) if self.stated is None else self.stated[1]
 
     def of(self, runs: Runs) -> np.ndarray:
-        """Return the numbers of finished runs, (B,); SweepError if the function returns no number."""
+        """Compute the numbers of finished runs, (B,); raise a SweepError if the function does not return a number."""
         values = list(map(self.function, runs))
         for value in values:
             if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
-                raise SweepError(f"{self.path}: returned {shown(value)}; return a number, nan where a run has none")
+                raise SweepError(f"{self.path}: returned {shown(value)}; return a number, or nan")
         return np.array(values, float)
 
     def __str__(self) -> str:
@@ -274,38 +281,38 @@ class UserFigure(Value):
 
 
 def rms_error(joint: str | None = None) -> Figure:
-    """Root mean square of q − q_d over the samples, which are a `record_period_s` apart, and the joints, or of one.
+    """Return the figure: root mean square of q − q_d over the samples, and over the joints or for one.
 
-    In [rad] or [m]; of a frame that follows a path in [m].
+    Samples are `record_period_s` apart. The unit is [rad] or [m]; for a frame that follows a path, [m].
     """
     return Figure("rms_error", "error", joint)
 
 
 def peak(of_what: str, joint: str | None = None) -> Figure:
-    """Largest absolute value of "q", "v" or "u" over all steps, or of "error" over the samples; of one joint or all."""
+    """Return the figure: largest |q|, |v| or |u| over all steps, or |error| over the samples; of one joint or all."""
     return Figure("peak", of_what, joint)
 
 
 def final(of_what: str, joint: str | None = None) -> Figure:
-    """Last value of "q", "v" or "u" of a joint, or of the "error", the largest absolute one over the joints."""
+    """Return the figure: last "q", "v" or "u" of a joint, or largest absolute last "error" over the joints."""
     return Figure("final", of_what, joint)
 
 
-FIGURES: Mapping[str, Callable[..., Figure]] = {each.__name__: each for each in (rms_error, peak, final)}
+FIGURES: Mapping[str, Callable[..., Figure]] = {function.__name__: function for function in (rms_error, peak, final)}
 
 
-def figure(name: str, given: Any) -> Figure | UserFigure:
-    """Return a figure as it is or as a text; of a function, or its import path, one that calls it.
+def figure(name: str, value: Any) -> Figure | UserFigure:
+    """Return a figure from a figure, its text, a function, or the import path of a function.
 
     Raises:
-        SweepError: If it is none of them.
+        SweepError: If the value is none of these.
     """
-    if isinstance(given, Figure | UserFigure):
-        return given
+    if isinstance(value, Figure | UserFigure):
+        return value
     try:
-        if isinstance(given, str) and not is_import_path(given):
-            return called("figure", given, FIGURES)
-        user = UserFigure(path_of(given))
+        if isinstance(value, str) and not is_import_path(value):
+            return called("figure", value, FIGURES)
+        user = UserFigure(path_of(value))
         imported(user.path)
     except SweepError as error:
         raise SweepError(f"figures: {name}: {error}") from None
@@ -313,14 +320,14 @@ def figure(name: str, given: Any) -> Figure | UserFigure:
 
 
 def from_dict(stored: Mapping[str, Any], may_import: bool = False) -> Figure | UserFigure:
-    """The figure of a dictionary that `to_dict` made; SweepError, KeyError or TypeError if it has another form.
+    """Return the figure of a dictionary from `to_dict`; raise SweepError, KeyError or TypeError for other forms.
 
     Args:
         stored: The dictionary.
-        may_import: Whether a function may be imported, since the reader of the folder named it.
+        may_import: True if a function may be imported, because the reader of the folder named it.
     """
-    given = dict(stored)
-    kind = given.pop("figure")
+    arguments = dict(stored)
+    kind = arguments.pop("figure")
     if ":" in kind:
-        return UserFigure(path_of(kind), None if may_import else (str(given["sha256"]), str(given["unit"])))
-    return call_of("figure", kind, FIGURES, (), given)
+        return UserFigure(path_of(kind), None if may_import else (str(arguments["sha256"]), str(arguments["unit"])))
+    return call_of("figure", kind, FIGURES, (), arguments)

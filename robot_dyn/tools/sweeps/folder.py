@@ -1,11 +1,11 @@
-"""The folder of a sweep: its specification, and a file for each chunk that is done. What has no file is left to do.
+"""The folder of a sweep: its specification, and a file for each finished chunk of runs.
 
 sweep.json                   the specification
 design-0123456789abcdef.npy  rows of the design, with the start of their SHA-256
-rows/000123.parquet          a chunk; of more than 20 000 chunks rows/0004/080123.parquet
-samples/                     samples of runs, where they are kept
+rows/000123.parquet          a chunk; with more than 20 000 chunks rows/0004/080123.parquet
+samples/                     samples of runs, if they are kept
 
-Files are written whole or not at all. Two writers of one file harm nothing: the later one writes the same rows.
+Files are written completely or not at all. Two writers of one file do no harm: both write the same rows.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from robot_dyn.tools.sweeps.sample_store import SampleStore, make_folder
 from robot_dyn.tools.sweeps.specification import FILE, Specification, processor, specification, stated_in, versions
 from robot_dyn.tools.sweeps.sweep import Sweep
 
-MOST_FILES = 20_000  # of a folder
-OLD_S = 86_400.0  # age of a file that its writer has not finished, after which it is removed
+MOST_FILES = 20_000  # largest number of files in a folder
+OLD_S = 86_400.0  # age in [s] after which an unfinished file is removed
 _MOST_TABLE = 2**34
 _SUFFIX, _FOOTER, _UNFINISHED = ".parquet", b"footer", ".unfinished"
 _REMEDY = "run the sweep again, after removing this file"
@@ -45,13 +45,13 @@ class Folder:
     """Chunks of the runs 0, …, N − 1 as files.
 
     Attributes:
-        path: Of the folder.
-        runs: N.
-        chunk: Runs of a chunk; the last one may have fewer.
-        digest: Of the specification.
-        names: Of varied parameters and of figures.
-        about: What footers state next to the digest: versions and processor.
-        samples: Where samples of runs are; None where none are kept.
+        path: Path of the folder.
+        runs: Number of runs, N.
+        chunk: Number of runs in a chunk; the last chunk may have fewer.
+        digest: SHA-256 of the specification.
+        names: Names of varying parameters and of figures.
+        about: Versions and processor, stored in footers.
+        samples: Store of samples of runs; None if samples are not kept.
     """
 
     path: Path
@@ -68,11 +68,11 @@ class Folder:
         return -(-self.runs // self.chunk)
 
     def of(self, chunk: int) -> tuple[int, int]:
-        """The first run of a chunk, and that after its last."""
+        """Return the first run of a chunk, and the run after its last."""
         return chunk * self.chunk, min((chunk + 1) * self.chunk, self.runs)
 
     def file(self, chunk: int) -> Path:
-        """The file of a chunk."""
+        """Return the file of a chunk."""
         return self._subfolder(chunk) / f"{chunk:06d}{_SUFFIX}"
 
     def _subfolder(self, chunk: int) -> Path:
@@ -84,7 +84,7 @@ class Folder:
         return [self._subfolder(chunk) for chunk in range(0, self.count, MOST_FILES)]
 
     def present(self) -> np.ndarray:
-        """Whether each chunk has a file, (count,)."""
+        """Return True for chunks with a file, (count,)."""
         present = np.zeros(self.count, bool)
         for folder in self._subfolders:
             try:
@@ -102,20 +102,20 @@ class Folder:
         return present
 
     def missing(self) -> np.ndarray:
-        """Numbers of the chunks without a file."""
+        """Return the indices of chunks without a file."""
         return np.flatnonzero(~self.present())
 
     def prepare(self) -> None:
-        """Make the folders, and remove files that killed writers left a day ago; later ones go when written again."""
+        """Create the folders, and remove files that killed writers left more than a day ago."""
         for folder in self._subfolders:
             make_folder(folder)
         for path in (path for folder in (self.path, *self._subfolders) for path in folder.glob(f".*{_UNFINISHED}")):
-            with suppress(OSError):  # removed meanwhile, or another user's
+            with suppress(OSError):  # removed meanwhile, or owned by another user
                 if time() - path.lstat().st_mtime > OLD_S:
                     path.unlink()
 
     def write(self, chunk: int, rows: Rows, samples: Mapping[str, np.ndarray] = MappingProxyType({})) -> None:
-        """Write a chunk, its samples first; SweepError if it cannot be written, with what is there unchanged."""
+        """Write a chunk, its samples first; raise a SweepError, with existing files unchanged, if that fails."""
         pa, parquet = needs("pyarrow", extra="sweeps"), needs("pyarrow.parquet", extra="sweeps")
         start, stop = self.of(chunk)
         footer = {"sweep": self.digest, "chunk": chunk, "start": start, "stop": stop, "rows": digest_of([rows])}
@@ -132,15 +132,14 @@ class Folder:
             )
         except SweepError as error:
             raise SweepError(
-                f"chunk {chunk} (runs {start} to {stop - 1}): {error}; the chunks that are there are kept: run the"
-                " sweep again"
+                f"chunk {chunk} (runs {start} to {stop - 1}): {error}; finished chunks are kept: run the sweep again"
             ) from None
 
     def read(self, chunk: int) -> Rows:
-        """The rows of a chunk.
+        """Return the rows of a chunk.
 
         Raises:
-            SweepError: If its file is missing, damaged, or of another sweep.
+            SweepError: If the file is missing, damaged, or belongs to another sweep.
         """
         rows, footer = self._read(chunk, [name for name in schema(self.names).names if name != "run"])
         if digest_of([rows]) != footer["rows"]:
@@ -148,21 +147,21 @@ class Folder:
         return rows
 
     def digest_of_rows(self) -> str:
-        """SHA-256 of all rows; errors as in `read`."""
+        """Return the SHA-256 of all rows; for errors, see `read`."""
         return digest_of(map(self.read, range(self.count)))
 
     def footer(self, chunk: int) -> dict[str, Any]:
-        """The footer of a chunk; errors as in `read`."""
+        """Return the footer of a chunk; for errors, see `read`."""
         return self._read(chunk, [])[1]
 
     def check_samples(self) -> None:
-        """Raise SweepError where samples that were written are missing or have changed."""
+        """Raise a SweepError if samples that were written are missing or have changed."""
         if self.samples is not None:
             for chunk in range(self.count):
                 self.samples.check(chunk, self.footer(chunk)["samples"])
 
     def columns(self, names: Iterable[str]) -> Rows:
-        """Columns of all rows, (N,); errors as in `read`."""
+        """Return columns of all rows, (N,); for errors, see `read`."""
         names = list(dict.fromkeys(names))
         columns = {name: np.empty(self.runs, type_of(name)) for name in names}
         for chunk in range(self.count):
@@ -179,7 +178,7 @@ class Folder:
                 return self._parsed(parquet.ParquetFile(stream, page_checksum_verification=True), chunk, names)
             except _DamagedError as error:
                 raise SweepError(f"{path}: {error}; {_REMEDY}") from None
-            except Exception as error:  # pyarrow promises no kinds
+            except Exception as error:  # pyarrow does not document the types of its errors
                 raise SweepError(f"{path}: is not a complete chunk ({type(error).__name__}); {_REMEDY}") from None
 
     def _parsed(self, file: Any, chunk: int, names: list[str]) -> tuple[Rows, dict[str, Any]]:
@@ -207,20 +206,20 @@ class Folder:
 
 
 class _DamagedError(Exception):
-    """What is wrong with a chunk."""
+    """A fault of the file of a chunk."""
 
 
 def read_design(path: Path, digest: str) -> np.ndarray:
-    """The rows of the design of a folder.
+    """Return the rows of the design of a folder.
 
     Raises:
-        SweepError: If their file is missing or damaged, or has another SHA-256 than the specification states.
+        SweepError: If the file is missing or damaged, or its SHA-256 differs from the specification.
     """
     file = _design(path, digest)
     data = read(file, _MOST_TABLE, SweepError, _AGAIN)
     try:
         rows = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
-    except Exception as error:  # of a damaged header NumPy promises no kinds
+    except Exception as error:  # NumPy does not document the types of errors for a damaged header
         raise SweepError(f"{file}: is not a table of numbers ({why(error)}); {_AGAIN}") from None
     if sha256(np.ascontiguousarray(rows).tobytes()).hexdigest() != digest:
         raise SweepError(f"{file}: was changed after it was written; {_AGAIN}")
@@ -230,10 +229,10 @@ def read_design(path: Path, digest: str) -> np.ndarray:
 def begin(path: Path, stated: Specification, rows: np.ndarray) -> None:
     """Write the specification of a new sweep, unless another process was first.
 
-    The file of a design is named after its rows, so that two sweeps that begin at one time do not mix.
+    The file of a design is named after its rows, so that two sweeps that begin at the same time do not mix.
 
     Raises:
-        SweepError: If the folder holds other files, or cannot be written.
+        SweepError: If the folder contains other files, or cannot be written.
     """
     make_folder(path)
     names = {entry.name for entry in path.iterdir() if not entry.name.endswith(_UNFINISHED)}
@@ -245,7 +244,7 @@ def begin(path: Path, stated: Specification, rows: np.ndarray) -> None:
     save(own, lambda stream: stream.write(stated.text.encode()), SweepError)
     try:
         with suppress(FileExistsError):
-            os.link(own, path / FILE)  # which refuses one that exists, as os.replace does not
+            os.link(own, path / FILE)  # unlike os.replace, fails if the file exists
         sync_folder(path)
     except OSError as error:
         raise SweepError(f"{path}: cannot be written ({why(error)}); give another folder") from None
@@ -254,7 +253,7 @@ def begin(path: Path, stated: Specification, rows: np.ndarray) -> None:
 
 
 def write_design(path: Path, rows: np.ndarray, digest: str) -> None:
-    """Write the rows of a design; SweepError if they cannot be written."""
+    """Write the rows of a design; raise a SweepError if that fails."""
     save(_design(path, digest), lambda stream: np.save(stream, rows, allow_pickle=False), SweepError)
 
 
@@ -263,13 +262,14 @@ def _design(path: Path, digest: str) -> Path:
 
 
 def opened(path: Path, names: Named = NOTHING) -> tuple[Folder, Sweep]:
-    """The folder of a sweep, and the sweep; arguments and errors as in `read`."""
+    """Return the folder of a sweep, and the sweep; for arguments and errors, see `run_sweep.read`."""
     check_places(path)
     stored = stated_in(path)
     try:
         sweep = stored.sweep(read_design(path, stored.rows_sha256), path, names)
     except SceneError as error:
-        raise SweepError(f"{path / FILE}: {error}; sw.read(folder, scene=…), --scene, where it lies now") from None
+        remedy = "pass the present path of the scene, sw.read(folder, scene=…) or --scene"
+        raise SweepError(f"{path / FILE}: {error}; {remedy}") from None
     stored.check_same(specification(sweep, stored.chunk), path, versions=False)
     return folder_of(path, sweep, stored), sweep
 

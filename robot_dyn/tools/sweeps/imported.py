@@ -1,7 +1,7 @@
 """Functions by import path, such as "my_figures:settling", with the digest of their module.
 
-A folder may come from somebody else, so nothing that it names is imported unless its reader names it too. The digest
-of the file is compared before the import, and no place from which Python imports may lie in the folder.
+A folder may come from somebody else, so a function named in it is imported only if the reader of the folder names it,
+too. The digest of the file is compared before the import, and Python must not import from the folder itself.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Named:
 
     Attributes:
         scene: Scene file, or import path of a function; None for the scene that the folder names.
-        figures: Names of figures, each with the import path of its function.
+        figures: Names of figures, with the import paths of their functions.
     """
 
     scene: str | None = None
@@ -40,21 +40,21 @@ NOTHING = Named()
 
 
 def named(scene: Any, figures: Any) -> Named:
-    """Return the scene and figures that a reader of a folder names; errors as in `source_of` and `path_of`."""
+    """Return the scene and figures that a reader names; for errors, see `source_of` and `path_of`."""
     functions = by_name("figures", {} if figures is None else figures, "settling")
     paths = tuple((name, path_of(function)) for name, function in functions.items())
     return Named(None if scene is None else source_of(scene), paths)
 
 
 def by_name(what: str, given: Any, example: str) -> dict[str, Any]:
-    """Distributions, figures or functions by name; SweepError if they are given otherwise."""
+    """Return distributions, figures or functions by name; raise a SweepError unless they are a mapping."""
     if not isinstance(given, Mapping) or not all(isinstance(name, str) and name for name in given):
         raise SweepError(f"{what}: give them by name, as {{{example!r}: …}}, got {shown(given)}")
     return dict(given)
 
 
 def source_of(scene: Any) -> str:
-    """The absolute path of a scene file, or the import path of a function; SweepError if it is neither."""
+    """Return the absolute path of a scene file, or the import path of a function; raise a SweepError for others."""
     if isinstance(scene, Path) or (isinstance(scene, str) and is_scene(scene)):
         return str(Path(scene).absolute())
     try:
@@ -77,14 +77,14 @@ def is_import_path(text: str) -> bool:
 
 
 def path_of(function: Any) -> str:
-    """The import path of a function, or of a text that is one.
+    """Return the import path of a function, or check a text that is one.
 
     Raises:
-        SweepError: If it has none: it is neither, or is defined in a script, a notebook or another function.
+        SweepError: If there is none, because the function is defined in a script, a notebook or another function.
     """
     if isinstance(function, str):
         if not _PATH.fullmatch(function):
-            raise SweepError(f"an import path is such as 'my_figures:settling', got {shown(function)}")
+            raise SweepError(f"give an import path such as 'my_figures:settling', got {shown(function)}")
         return function
     module, name = getattr(function, "__module__", None), getattr(function, "__qualname__", None)
     if not callable(function) or isinstance(function, type) or not isinstance(module, str) or not isinstance(name, str):
@@ -99,26 +99,26 @@ def path_of(function: Any) -> str:
 
 
 def imported(path: str) -> Callable[..., Any]:
-    """The function of an import path; modules are also looked for in the working directory.
+    """Import the function of an import path; modules may be in the working directory.
 
     Raises:
-        SweepError: If there is none.
+        SweepError: If there is no such function.
     """
     module, _, name = path_of(path).partition(":")
     try:
-        found = getattr(_module(module), name)
+        function = getattr(_module(module), name)
     except (ImportError, AttributeError) as error:
         raise SweepError(
             f"{path} cannot be imported ({error}): name a function of a module in the working directory or on"
             " PYTHONPATH"
         ) from None
-    if not callable(found) or isinstance(found, type):
-        raise SweepError(f"{path} is not a function, but {shown(found)}")
-    return found
+    if not callable(function) or isinstance(function, type):
+        raise SweepError(f"{path} is not a function, but {shown(function)}")
+    return function
 
 
 def digest_of(path: str) -> str:
-    """The SHA-256 of the file of the module of an import path."""
+    """Return the SHA-256 of the module's file of an import path."""
     module = _module(path.partition(":")[0])
     return _digest(path, getattr(module, "__file__", None))
 
@@ -127,10 +127,10 @@ def check_named(path: str, digest: Any, folder: Path) -> None:
     """Compare the file of a function with the digest that a folder states, before the function is imported.
 
     Raises:
-        SweepError: If the file is missing, lies in the folder or has another digest, or Python would import from there.
+        SweepError: If the file is missing, lies in the folder or has another digest, or Python imports from the folder.
     """
     if not isinstance(digest, str):
-        raise SweepError(f"{path}: the folder states no function here; leave it out, or name the scene file it states")
+        raise SweepError(f"{path}: the folder states no function here; remove it, or name the scene file it states")
     check_places(folder, str(Path.cwd()))
     file = _file_of(path.partition(":")[0])
     if file is None:
@@ -145,7 +145,7 @@ def check_named(path: str, digest: Any, folder: Path) -> None:
 
 
 def check_places(folder: Path, *more: str) -> None:
-    """Raise SweepError if Python imports from a folder of results, such as from a working directory that is one."""
+    """Raise a SweepError if Python imports from a folder of results, for example as the working directory."""
     real = os.path.realpath(folder)
     for place in (*sys.path, *more):
         if isinstance(place, str) and _lies_in(place or os.curdir, real):
@@ -160,7 +160,7 @@ def _lies_in(place: str, folder: str) -> bool:
 
 
 def _file_of(name: str) -> str | None:
-    """The file of a module, found without importing it or the packages that it is in."""
+    """Return the file of a module, without importing the module or its packages."""
     if name in sys.modules:
         return getattr(sys.modules[name], "__file__", None)
     places: list[str] | None = [*sys.path, str(Path.cwd())]
@@ -177,7 +177,7 @@ def _file_of(name: str) -> str | None:
 
 def _digest(path: str, file: str | None) -> str:
     if file is None or not Path(file).is_file():
-        raise SweepError(f"{path}: its module has no file, so that a change of it would not be seen; write it to one")
+        raise SweepError(f"{path}: its module has no file, so changes cannot be detected; write it to a file")
     return sha256(Path(file).read_bytes()).hexdigest()
 
 

@@ -1,4 +1,4 @@
-"""What the report of a sweep draws: distributions, and failures over two parameters; one HTML page without scripts."""
+"""Drawings of a sweep's report: distributions, and failures over two parameters; one HTML page without scripts."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ _HEAD = (
 
 
 def document(title: str, sections: Iterable[tuple[str, str, Iterable[Block]]]) -> str:
-    """The page of sections, each a heading, a drawing, and texts and tables."""
+    """Return the page of sections; a section has a heading, a drawing, and texts and tables."""
     parts = (f"<h2>{escape(heading)}</h2>{drawing}{''.join(html_of(blocks))}" for heading, drawing, blocks in sections)
     return _HEAD.format(title=escape(title), body=page(title, *parts))
 
 
 def strongest(failed: np.ndarray, x: np.ndarray) -> tuple[int, int]:
-    """The two columns of x (N, d) on which failure depends most: least p-values of the chi-square test over bins."""
+    """Return the two columns of x, (N, d), with the smallest p-values of the chi-square test of failure over bins."""
     from scipy.stats import chi2_contingency
 
-    found: list[tuple[Any, Any]] = []
+    scores: list[tuple[Any, Any]] = []
     for column in x.T:
-        counts = np.array([np.bincount(bins(column), weights=each) for each in (failed, ~failed)])
+        counts = np.array([np.bincount(bins(column), weights=weights) for weights in (failed, ~failed)])
         if counts.shape[1] > 1:
             statistic, p, freedom = map(float, tuple(chi2_contingency(counts))[:3])
         else:
             statistic, p, freedom = 0.0, 1.0, 1
-        found.append((p, -statistic / freedom))  # many strong ones have a p-value of 0
-    first, second = sorted(range(len(found)), key=found.__getitem__)[:2]
+        scores.append((p, -statistic / freedom))  # several strong columns may have a p-value of 0
+    first, second = sorted(range(len(scores)), key=scores.__getitem__)[:2]
     return first, second
 
 
@@ -62,7 +62,7 @@ def histogram(name: str, x: np.ndarray) -> str:
 def failure_map(names: tuple[str, ...], x: list[np.ndarray], failed: np.ndarray) -> str:
     """The share of runs that failed in cells over two parameters."""
     figure, axes = _figure(5.6, 3.8)
-    edges = [_edges(each) for each in x]
+    edges = [_edges(values) for values in x]
     count = np.histogram2d(*x, bins=edges)[0]
     of_failed = np.histogram2d(x[0][failed], x[1][failed], bins=edges)[0]
     share = np.where(count > 0, of_failed / np.maximum(count, 1), np.nan)

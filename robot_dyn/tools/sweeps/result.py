@@ -1,4 +1,4 @@
-"""`SweepResult`: what a folder holds, and the questions to it; statistics say how many runs failed."""
+"""`SweepResult`: the rows in the folder of a sweep, and statistics of them with the number of failed runs."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ from robot_dyn.tools.sweeps.statistics import text as number_text
 from robot_dyn.tools.sweeps.sweep import Sweep, heading
 from robot_dyn.tools.sweeps.work import Work
 
-_SHOWN = 5  # reasons
-_WORST = 10  # runs in a report
+_SHOWN = 5  # number of listed reasons
+_WORST = 10  # number of runs in a report
 _PROBABILITIES = (0.05, 0.5, 0.95, 0.99)
 _GIVEN = "finished", "known"
 
@@ -51,8 +51,8 @@ class SweepResult(Answer):
     """The rows of a sweep in its folder.
 
     Attributes:
-        sweep: What was swept.
-        folder: What holds the rows.
+        sweep: The sweep.
+        folder: The folder with the rows.
     """
 
     sweep: Sweep = field(metadata=UNREPORTED)
@@ -60,26 +60,26 @@ class SweepResult(Answer):
 
     @property
     def path(self) -> Path:
-        """Of the folder."""
+        """Path of the folder."""
         return self.folder.path
 
     @property
     def missing(self) -> np.ndarray:
-        """Numbers of the chunks that are left to do."""
+        """Indices of missing chunks."""
         return self.folder.missing()
 
     @property
     def columns(self) -> dict[str, str]:
-        """Meaning of each column of the table, by name; units are in `units`."""
+        """Meanings of the columns of the table, by name; units are in `units`."""
         varied = dict.fromkeys(self.sweep.columns, "value of a varied parameter")
         figures = dict.fromkeys(self.sweep.figures, "figure of the run; nan if it failed")
         fixed = {column.name: column.meaning for column in FIXED}
         return {"run": "number of the run"} | varied | figures | fixed
 
     def table(self, *names: str) -> dict[str, np.ndarray]:
-        """Columns of all runs, (N,), by their names in `columns`; all of them unless names are given.
+        """Return columns of all runs, (N,), by their names in `columns`; by default all of them.
 
-        Their units are in `units`, and in the headings of `export`.
+        Units are in `units`, and in the headings of `export`.
         """
         self._check_complete()
         names = names or tuple(self.columns)
@@ -92,91 +92,91 @@ class SweepResult(Answer):
     def quantiles(
         self, figure: str, probabilities: Any = (0.05, 0.5, 0.95), level: float = 0.95, given: str | None = None
     ) -> tuple[Estimate, ...]:
-        """Quantiles of a figure with their intervals; a run that failed and has no value counts as +∞.
+        """Estimate quantiles of a figure with intervals; a failed run without a value counts as +∞.
 
         Args:
-            figure: Its name, or that of another column.
-            probabilities: Of the quantiles, each in (0, 1).
-            level: Of the intervals.
-            given: "finished" for those among the runs that finished, "known" among those that have a value.
+            figure: Name of the figure, or of another column.
+            probabilities: Probabilities of the quantiles, in (0, 1).
+            level: Confidence level of the intervals.
+            given: "finished" for finished runs only, "known" for runs with a value only.
 
         Raises:
-            SweepError: If an argument is not allowed, or a run that finished has no value and `given` is not "known".
+            SweepError: If an argument is invalid, or a finished run has no value and `given` is not "known".
         """
         x, keep, failed = self._values(figure, given)
         x = np.where(np.isnan(x), np.inf, x)[keep]
-        found = statistics.quantiles(x, probabilities, level, self._scrambling(keep), failed=failed)
-        return tuple(self._named(each, figure, given) for each in found)
+        estimates = statistics.quantiles(x, probabilities, level, self._scrambling(keep), failed=failed)
+        return tuple(self._named(estimate, figure, given) for estimate in estimates)
 
     def probability(self, event: str, level: float = 0.95, given: str | None = None) -> Estimate:
-        """Probability of an event, such as "diverged | error > 0.1", with its interval.
+        """Estimate the probability of an event, such as "diverged | error > 0.1", with an interval.
 
         Args:
-            event: Of names of columns and outcomes, numbers, comparisons, | & ! and parentheses. "failed" is a run that
+            event: Names of columns and outcomes, numbers, comparisons, | & ! and parentheses. "failed" means that a run
                 diverged or raised.
-            level: Of the interval.
-            given: "finished" for that among the runs that finished, "known" among those in which it is known.
+            level: Confidence level of the interval.
+            given: "finished" for finished runs only, "known" for runs in which the event is known only.
 
         Raises:
-            SweepError: If the event is unknown in a run, of which there is no figure.
+            SweepError: If the event is unknown in a run, because a figure has no value.
         """
         self._check_complete()
         truth, failed = self._happened(event), self._failed
         known = truth.certain == truth.possible
-        keep = _some(self._asked(known, given), given)
+        keep = _some(self._included(known, given), given)
         if (unknown := ~known & keep).any():
-            remedy = f"write 'failed | {event}', or ask with given='finished'"
+            remedy = f"write 'failed | {event}', or pass given='finished'"
             if (unknown & ~failed).any():
-                remedy = "some finished, and have no figure: ask with given='known'"
+                remedy = "some finished, but have no figure: pass given='known'"
             raise SweepError(
                 f"{event!r} is unknown in {int(unknown.sum())} runs, such as run {int(unknown.argmax())}: {remedy}"
             )
         count = int((failed & keep).sum())
-        found = statistics.probability(truth.certain[keep], level, self._scrambling(keep), failed=count)
-        return replace(found, statistic=f"probability of {event}{_among(given)}")
+        estimate = statistics.probability(truth.certain[keep], level, self._scrambling(keep), failed=count)
+        return replace(estimate, statistic=f"probability of {event}{_among(given)}")
 
     def mean(self, figure: str, level: float = 0.95, given: str | None = None) -> Estimate:
-        """Mean of a figure with its interval; `given` as in `quantiles`, needed where runs have no value."""
+        """Estimate the mean of a figure with an interval; `given`, see `quantiles`, is needed if runs have no value."""
         x, keep, failed = self._values(figure, given, "mean")
-        found = statistics.mean(x[keep], level, self._scrambling(keep), failed=failed)
-        return self._named(found, figure, given)
+        estimate = statistics.mean(x[keep], level, self._scrambling(keep), failed=failed)
+        return self._named(estimate, figure, given)
 
     def sensitivity(self, figure: str, level: float = 0.95, given: str | None = None) -> Sensitivity:
-        """What matters of what varies; `given` as in `mean`.
+        """Compute the sensitivity of a figure to the varying parameters; for `given`, see `mean`.
 
-        First-order and total Sobol' indices of design "saltelli", else rank correlations and PAWN indices.
+        Design "saltelli" gives first-order and total Sobol' indices, other designs rank correlations and PAWN indices.
         """
         level = statistics.check_level(level)
         x, keep, failed = self._values(figure, given, "sensitivity")
         if self.sweep.points.name == "saltelli":
             scrambling = self.sweep.points.scrambling
-            found = saltelli(x, keep, self.sweep.dimensions, scrambling, level, failed=failed)
+            indices = saltelli(x, keep, self.sweep.dimensions, scrambling, level, failed=failed)
         else:
             values = self.folder.columns(self.sweep.columns)
             columns = np.column_stack([values[name] for name in self.sweep.columns])
-            found = by_values(x[keep], columns[keep], self.sweep.columns, failed=failed)
-        return replace(found, figure=heading(self.sweep, figure), given=given)
+            indices = by_values(x[keep], columns[keep], self.sweep.columns, failed=failed)
+        return replace(indices, figure=heading(self.sweep, figure), given=given)
 
     def worst(self, figure: str, count: int = 5, given: str | None = None) -> tuple[int, ...]:
-        """Numbers of the runs with the largest values of a figure; `run(i)` repeats one.
+        """Return the numbers of the runs with the largest values of a figure; `run(i)` repeats one.
 
-        Runs without a value come first, in their order, but those that failed if `given` is "finished", and none if
-        it is "known".
+        Runs without a value come first, in their order, unless `given` excludes them: "finished" excludes failed runs,
+        "known" all runs without a value.
         """
         count = integer("count", count, least=1, most=self.sweep.runs, error=SweepError)
         x = self._figure(figure)
-        keep = self._asked(np.isfinite(x), given)
+        keep = self._included(np.isfinite(x), given)
         runs, x = np.flatnonzero(keep), x[keep]
         order = np.argsort(-np.where(np.isnan(x), np.inf, x), kind="stable")
         return tuple(runs[order[:count]].tolist())
 
     def samples(self) -> Any:
-        """Samples of runs as a lazy `xarray.Dataset` over run, t and joint, nan where a run was not kept.
+        """Return samples of runs as a lazy `xarray.Dataset` over run, t and joint, nan where a run was not kept.
 
         Each file is read once, to compare its digest.
 
         Raises:
-            SweepError: If the sweep keeps none, or a file of them is missing or was changed.
+            SweepError: If the sweep keeps no samples, or a file is missing or was changed.
         """
         if self.folder.samples is None:
             raise SweepError("no samples are kept: give the Sweep samples='q', or sw.samples('q', every=100)")
@@ -185,13 +185,13 @@ class SweepResult(Answer):
         return self.folder.samples.open(self.sweep.joint_types)
 
     def export(self, path: str | Path, *, force: bool = False) -> Path:
-        """Write the table of all runs to a .csv or .parquet file, whole or not at all.
+        """Write the table of all runs to a .csv or .parquet file, completely or not at all.
 
-        Another table is replaced only with `force`, and no file in the folder. Texts that a spreadsheet would compute,
-        such as "=1+1", get an apostrophe before them in a .csv.
+        An existing table is replaced only with `force`, and files in the folder never. In a .csv, texts that a
+        spreadsheet would compute, such as "=1+1", are prefixed with an apostrophe.
 
         Raises:
-            SweepError: If it cannot be written, or would replace a file.
+            SweepError: If the file cannot be written, or would replace another one.
         """
         self._check_complete()
         return export(self.sweep, self.folder, path, truth("force", force, error=SweepError))
@@ -199,7 +199,7 @@ class SweepResult(Answer):
     def save_report(self, path: str | Path, *, force: bool = False) -> Path:
         """Write one HTML page: distributions, failures over the two strongest parameters, worst runs.
 
-        `path` and `force` as in `export`; SweepError if it cannot be written.
+        For `path`, `force` and errors, see `export`.
         """
         from robot_dyn.tools.sweeps.report import KIND, document
 
@@ -211,12 +211,12 @@ class SweepResult(Answer):
 
     @property
     def _repeat(self) -> str:
-        """Python that repeats a run, without its number."""
+        """Python code that repeats a run, without the number of the run."""
         source = "" if is_scene(self.sweep.scene) else f", scene={self.sweep.scene!r}"
         return f"sw.read({str(self.path)!r}{source}).run"
 
     def _failures(self) -> tuple[str, str, list[Block]]:
-        """The section of the report on runs that failed."""
+        """Return the section of the report on failed runs."""
         from robot_dyn.tools.sweeps.report import failure_map, strongest
 
         varied, failed, table = self.sweep.columns, self._failed, self.table()
@@ -229,18 +229,18 @@ class SweepResult(Answer):
             first, second = (varied[k] for k in strongest(failed, np.column_stack([table[name] for name in varied])))
             headings = heading(self.sweep, first), heading(self.sweep, second)
             drawing = failure_map(headings, [table[first], table[second]], failed)
-            blocks.insert(0, "cells without runs are empty, each cross is a run that failed")
-            blocks.insert(0, f"share of runs that failed over {first} and {second}, the two that it depends on most:")
+            blocks.insert(0, "cells without runs are empty, each cross is a failed run")
+            blocks.insert(0, f"share of failed runs over {first} and {second}, the two strongest parameters:")
         return "Failures", drawing, blocks
 
     def _of_figure(self, name: str) -> tuple[str, str, list[Block]]:
-        """The section of the report on a figure: distribution, quantiles, worst runs, sensitivity."""
+        """Return the section of the report on a figure: distribution, quantiles, worst runs, sensitivity."""
         from robot_dyn.tools.sweeps.report import histogram
 
         label, x = heading(self.sweep, name), self._figure(name)
         given = "known" if (np.isnan(x) & ~self._failed).any() else None
         quantiles = self.quantiles(name, _PROBABILITIES, given=given)
-        rows = tuple((of.statistic, *map(number_text, (of.estimate, of.low, of.high))) for of in quantiles)
+        rows = tuple((x.statistic, *map(number_text, (x.estimate, x.low, x.high))) for x in quantiles)
         first, finite = quantiles[0], x[np.isfinite(x)]
         numbers = "estimate", f"{100 * first.level:g} % interval from", "to"
         worst = self.worst(name, min(_WORST, len(x)), given="known")
@@ -254,27 +254,27 @@ class SweepResult(Answer):
         ]
         try:
             blocks += self.sensitivity(name, given="known").blocks()
-        except SweepError as error:  # of a figure that is the same in all runs
+        except SweepError as error:  # the figure is the same in all runs
             blocks.append(f"no sensitivity: {error}")
         return label, histogram(label, finite) if len(finite) else "", blocks
 
     def run(self, i: int) -> Trajectory:
-        """Repeat run i alone, with all that rollouts record: the same bits.
+        """Repeat run i, recording all quantities of rollouts; the bits are the same.
 
         Raises:
-            SweepError: If there is no such run, or it raised; says why.
+            SweepError: If the run does not exist, or raised an error; with the reason.
         """
         return Work(self.sweep).run(integer("run", i, most=self.sweep.runs - 1, error=SweepError))
 
     def setup_of(self, i: int) -> Setup:
-        """The setup of run i, as for `rd.simulate`, which estimates its error; SweepError as of `run`."""
+        """Return the setup of run i, for example for `rd.simulate` with an error estimate; for errors, see `run`."""
         return Work(self.sweep).setup_of(integer("run", i, most=self.sweep.runs - 1, error=SweepError))
 
     def verify(self) -> str:
-        """Read every file, and return the digest of all rows; that of another folder of the same sweep is the same.
+        """Read every file, and return the digest of all rows, which is equal for all folders of the same sweep.
 
         Raises:
-            SweepError: If a file is missing, damaged, or was changed.
+            SweepError: If a file is missing, damaged or was changed.
         """
         self._check_complete()
         self.folder.check_samples()
@@ -282,7 +282,7 @@ class SweepResult(Answer):
 
     @property
     def processors(self) -> dict[str, int]:
-        """Number of chunks by processor; the last bits of rows may differ between processors of other features."""
+        """Number of chunks by processor; the last bits of rows may differ between processors with other features."""
         count = Counter[str]()
         for chunk in np.flatnonzero(self.folder.present()).tolist():
             footer = self.folder.footer(chunk)
@@ -292,22 +292,22 @@ class SweepResult(Answer):
 
     @reported
     def status(self) -> dict[str, int]:
-        """Runs, chunks, and chunks that are left to do."""
+        """Return the numbers of runs, chunks and missing chunks."""
         return {"runs": self.sweep.runs, "chunks": self.folder.count, "missing": len(self.missing)}
 
     @reported
     def specification(self) -> dict[str, Any]:
-        """As the folder states it."""
+        """Return the specification in the folder."""
         return specification(self.sweep, self.folder.chunk).model_dump(mode="json")
 
     @reported
     def units(self) -> dict[str, str]:
-        """Of each column that has one."""
+        """Return the units of columns that have one, by name."""
         return self.sweep.units
 
     @reported
     def outcomes(self) -> dict[str, int] | None:
-        """Number of runs by outcome; None where chunks are left to do."""
+        """Return the number of runs by outcome; None if chunks are missing."""
         if len(self.missing):
             return None
         outcome = self.folder.columns(("outcome",))["outcome"]
@@ -315,7 +315,7 @@ class SweepResult(Answer):
 
     @reported
     def remarks(self) -> dict[str, int] | None:
-        """Number of runs by remark, as of `Rollouts.remarks`, the most frequent first; None where chunks are left."""
+        """Return the number of runs by remark, see `Rollouts.remarks`, by frequency; None if chunks are missing."""
         if len(self.missing):
             return None
         count = Counter[str]()
@@ -324,7 +324,7 @@ class SweepResult(Answer):
         return dict(count.most_common())
 
     def reasons(self) -> dict[str, int]:
-        """Number of failed runs by reason, the most frequent first."""
+        """Return the number of failed runs by reason, most frequent first."""
         return dict(Counter(self.folder.columns(("reason",))["reason"][self._failed].tolist()).most_common())
 
     @property
@@ -334,7 +334,7 @@ class SweepResult(Answer):
     def blocks(self) -> Iterator[Block]:
         yield from self.sweep.blocks()
         if len(missing := self.missing):
-            yield f"{len(missing)} of {self.folder.count} chunks are left to do: sw.run(sweep, {str(self.path)!r})"
+            yield f"{len(missing)} of {self.folder.count} chunks are missing: sw.run(sweep, {str(self.path)!r})"
             return
         yield ", ".join(f"{count} {name}" for name, count in (self.outcomes or {}).items())
         if len(processors := self.processors) > 1:
@@ -344,28 +344,28 @@ class SweepResult(Answer):
             yield f"{count} times {reason}, first: {why[self._failed & (reasons == reason)][0]}"
         for text, count in (self.remarks or {}).items():
             yield f"remark on {count} of {self.sweep.runs} runs: {text}"
-        yield "rd.simulate(done.setup_of(i)) makes run i by itself, with the error of its method and its energy ledger"
+        yield "rd.simulate(done.setup_of(i)) repeats run i, with an error estimate and its energy ledger"
 
     def _check_complete(self) -> None:
         if len(missing := self.missing):
             raise SweepError(
-                f"{self.path}: {len(missing)} of {self.folder.count} chunks are left to do, the first is {missing[0]};"
-                " run the sweep again, which does them alone"
+                f"{self.path}: {len(missing)} of {self.folder.count} chunks are missing, the first is {missing[0]};"
+                " run the sweep again, which only makes missing chunks"
             )
 
     def _figure(self, name: str) -> np.ndarray:
-        """A figure or a number that varies, of all runs, (N,); nan where a run has no value."""
+        """Return a figure or a varying number for all runs, (N,); nan if a run has no value."""
         self._check_complete()
         names = (*self.sweep.figures, *self.sweep.columns, *NUMBERS)
         return self.folder.columns((choice("figure", name, names, error=SweepError),))[name]
 
     @property
     def _failed(self) -> np.ndarray:
-        """Which runs diverged or raised, (N,)."""
+        """True for runs that diverged or raised an error, (N,)."""
         return self.folder.columns(("outcome",))["outcome"] != FINISHED
 
     def _happened(self, event: str) -> Truth:
-        """Whether an event happened in each run; SweepError if it is not one, or a name is unknown."""
+        """Evaluate an event in each run; raise a SweepError if it is invalid, or a name is unknown."""
         expression = Expression(event)
         numbers, outcomes = {*self.sweep.figures, *self.sweep.columns, *NUMBERS}, {*OUTCOMES, "failed"}
         for name in expression.names:
@@ -376,35 +376,34 @@ class SweepResult(Answer):
         columns |= {name: outcome == name for name in OUTCOMES} | {"failed": outcome != FINISHED}
         return expression.of(columns)
 
-    def _asked(self, known: np.ndarray, given: str | None) -> np.ndarray:
-        """Which runs are asked about, (N,): all, those that finished, or those whose value is known."""
+    def _included(self, known: np.ndarray, given: str | None) -> np.ndarray:
+        """Return True for included runs, (N,): all, finished ones, or finished ones with a known value."""
         if given is None:
             return np.ones(len(known), bool)
         return known if choice("given", given, _GIVEN, error=SweepError) == "known" else ~self._failed
 
     def _values(self, name: str, given: str | None, finite: str = "") -> tuple[np.ndarray, np.ndarray, int]:
-        """A figure of all runs, which of them are asked about, and how many of these failed.
+        """Return a figure of all runs, the included runs, and the number of failed runs.
 
         Args:
-            name: Of the figure.
-            given: As in `quantiles`.
-            finite: A statistic that needs finite values; or empty.
+            name: Name of the figure.
+            given: Condition on runs; see `quantiles`.
+            finite: Name of a statistic that needs finite values; or empty.
 
         Raises:
-            SweepError: If a run that is asked about finished and has no value; or if its value must be finite and is
-                not.
+            SweepError: If an included run finished without a value, or its value must be finite and is not.
         """
         x, failed = self._figure(name), self._failed
         unknown = np.isnan(x)
-        keep = _some(self._asked(~unknown, given), given)
+        keep = _some(self._included(~unknown, given), given)
         if (none := keep & unknown & ~failed).any():
             raise SweepError(
-                f"{name!r} has no value in {int(none.sum())} runs that finished, such as run {int(none.argmax())}: ask"
-                " with given='known', which leaves them out"
+                f"{name!r} has no value in {int(none.sum())} runs that finished, such as run {int(none.argmax())}: pass"
+                " given='known', which omits them"
             )
         if finite and (lost := int((keep & unknown).sum())):
             raise SweepError(
-                f"{lost} of {len(x)} runs failed: a {finite} of those that finished is given='finished', of those with"
+                f"{lost} of {len(x)} runs failed: for the {finite} of finished runs pass given='finished', of runs with"
                 " a value given='known'"
             )
         if finite and (infinite := keep & np.isinf(x)).any():
@@ -414,20 +413,20 @@ class SweepResult(Answer):
             )
         return x, keep, int((failed & (keep if given is None else ~keep)).sum())
 
-    def _named(self, found: Estimate, figure: str, given: str | None) -> Estimate:
-        """With the figure it is of, its unit, and which runs were asked about."""
-        return replace(found, statistic=f"{found.statistic} of {heading(self.sweep, figure)}{_among(given)}")
+    def _named(self, estimate: Estimate, figure: str, given: str | None) -> Estimate:
+        """Add the figure, its unit and the condition on runs to the name of an estimate."""
+        return replace(estimate, statistic=f"{estimate.statistic} of {heading(self.sweep, figure)}{_among(given)}")
 
     def _scrambling(self, keep: np.ndarray) -> np.ndarray | None:
-        """The scrambling of each run that is asked about; None of independent ones."""
+        """Return the scrambling of each included run; None for independent runs."""
         design = self.sweep.points
         return None if design.independent else design.scrambling[keep]
 
 
 def _some(keep: np.ndarray, given: str | None) -> np.ndarray:
-    """The runs that are asked about; SweepError if there are none."""
+    """Return the included runs; raise a SweepError if there are none."""
     if not keep.any():
-        raise SweepError(f"no run is left with given={given!r}; leave it out, or see the reasons of failure")
+        raise SweepError(f"no run is left with given={given!r}; remove it, or see the reasons of failure")
     return keep
 
 

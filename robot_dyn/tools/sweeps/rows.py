@@ -1,6 +1,6 @@
 """Rows of a sweep's table as columns by name, and the columns that every sweep has.
 
-A column more is an entry of `FIXED`: files, `table()`, exports, reports, events, units and `columns` follow from it.
+To add a column, add an entry to `FIXED`: files, `table()`, exports, reports, events, units and `columns` follow.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ class Column:
     """A column that every sweep has.
 
     Attributes:
-        name: In files, tables and events.
-        type: Of its values in memory: float, or a type of texts.
-        unit: Of its numbers, or empty.
-        meaning: For readers of tables.
-        missing: Its value in a run that raised.
-        values: Its values in runs that were made, (B,).
+        name: Name in files, tables and events.
+        type: Type of values in memory: float, or a type of texts.
+        unit: Unit of the numbers, or empty.
+        meaning: Description for readers of tables.
+        missing: Value for a run that raised an error.
+        values: Function that returns the values for a batch of runs, (B,).
     """
 
     name: str
@@ -73,25 +73,25 @@ def type_of(name: str) -> Any:
 
 
 def schema(names: Iterable[str]) -> Any:
-    """Return the schema of the files of rows; `names` are those of varied parameters and of figures."""
+    """Return the schema of the files of rows; `names` are the varying parameters and the figures."""
     pa = needs("pyarrow", extra="sweeps")
     types = {name: pa.string() if name in TEXTS else pa.float64() for name in (*names, *TYPES)}
     return pa.schema({"run": pa.int64()} | types)
 
 
 def empty(count: int, varied: Mapping[str, np.ndarray], figures: Iterable[str]) -> Rows:
-    """Return rows to be filled; as they are, those of runs that raised without a reason."""
+    """Return rows to be filled; initially they describe runs that raised an error without a reason."""
     missing = dict.fromkeys(figures, np.nan) | {column.name: column.missing for column in FIXED}
     return {**varied} | {name: np.full(count, value, type_of(name)) for name, value in missing.items()}
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
-    """Return rows that follow each other, as one."""
+    """Concatenate rows."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def digest_of(parts: Iterable[Rows]) -> str:
-    """SHA-256 of rows that follow each other, to the bit; it does not depend on how they are parted."""
+    """Return the SHA-256 of consecutive rows, independent of their division into parts."""
     digests: dict[str, Any] = {}
     for rows in parts:
         for name, x in rows.items():
@@ -99,5 +99,5 @@ def digest_of(parts: Iterable[Rows]) -> str:
             if name in TEXTS:
                 digest.update(b"".join(text.encode() + b"\0" for text in x.tolist()))
             else:
-                digest.update(np.where(np.isnan(x), np.nan, x).tobytes())  # the bits of nan are many
+                digest.update(np.where(np.isnan(x), np.nan, x).tobytes())  # nan has many bit patterns
     return sha256(b"".join(digest.digest() for digest in digests.values())).hexdigest()

@@ -1,7 +1,7 @@
 """`run` fills the folder of a sweep by threads, a cluster or a job of an array, or resumes it; `read` opens it.
 
-A folder begins with a pilot of 64 runs, from which the size of chunks follows: about 2 s of work, then fixed for ever.
-Its time is that of the processor: a busy machine would give small chunks.
+A new folder begins with a pilot of 64 runs, which determines the size of chunks: about 2 s of work, constant from then
+on. The pilot measures processor time, because wall time on a busy machine would lead to small chunks.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from robot_dyn.tools.sweeps.sweep import Sweep
 from robot_dyn.tools.sweeps.work import Work
 
 Progress = Callable[[int, int], object]
-_SCAN_S = 1.0  # between looks into the folder
+_SCAN_S = 1.0  # time between scans of the folder
 _RUNS = 64
 _CHUNK_S = 2.0
 _MOST = 16_384
@@ -51,87 +51,87 @@ def run(
     chunk: int | None = None,
     on_progress: Progress | None = None,
 ) -> SweepResult:
-    """Make the runs of a sweep that a folder lacks, and return what it holds.
+    """Make the missing runs of a sweep in a folder, and return the result.
 
-    Several processes, on this machine or others, may fill one folder. Rows have the same bits whatever fills it.
-    Ctrl-C ends the work and drops the chunks under way.
+    Several processes, on this machine or others, may fill one folder. Rows have the same bits in all cases. Ctrl-C ends
+    the work and drops unfinished chunks.
 
     Args:
-        sweep: What to run.
-        folder: A new folder, or that of the same sweep.
-        threads: Of this process; None for all processors.
-        cluster: Workers of Dask.distributed in place of them: "local:2", the address of a scheduler, or a `Client`.
-        share: In the third of 16 jobs "3/16": only a part of the chunks.
-        chunk: Runs of a file; None for about 2 s of work, by a pilot of 64 runs. Fixed once the folder is begun.
-        on_progress: Called with the number of runs that are done, and of all.
+        sweep: The sweep.
+        folder: A new folder, or the folder of the same sweep.
+        threads: Number of threads of this process; None for one for each processor.
+        cluster: Workers of Dask.distributed instead of threads: "local:2", the address of a scheduler, or a `Client`.
+        share: Part of the chunks, for example "3/16" in the third of 16 jobs.
+        chunk: Number of runs in a file; None for about 2 s of work, by a pilot of 64 runs. Constant for a folder.
+        on_progress: Function of the number of finished runs, and of all runs.
 
     Raises:
-        SweepError: If an argument is not allowed, the folder holds another sweep, or a file cannot be written.
+        SweepError: If an argument is invalid, the folder contains another sweep, or a file cannot be written.
     """
-    instance("run takes a Sweep", sweep, Sweep, "sw.read(folder).sweep is that of a folder", error=SweepError)
+    instance("sweep", sweep, Sweep, "give a Sweep, such as sw.read(folder).sweep", error=SweepError)
     function("on_progress", on_progress, "the runs that are done and of all", error=SweepError)
     path, (job, jobs), work = file_path(folder, SweepError), share_of(share), Work(sweep)
     count = thread_count(threads)
     if cluster is not None and (share is not None or threads is not None):
-        raise SweepError("cluster: its scheduler shares out the chunks; leave out share and threads")
+        raise SweepError("cluster: its scheduler distributes the chunks; remove share and threads")
     check_places(path)
     check_folder(path, SweepError)
-    _ = sweep.setup, work.record  # refused if a folder names functions that its reader has not named
-    known = begun(sweep, path, chunk)
-    known.prepare()
-    t, last = None if known.samples is None else known.samples.times(), 0.0
+    _ = sweep.setup, work.record  # raises if a folder names functions that its reader has not named
+    store = begun(sweep, path, chunk)
+    store.prepare()
+    t, last = None if store.samples is None else store.samples.times(), 0.0
 
-    def tell() -> None:
+    def report_progress() -> None:
         nonlocal last
         if on_progress is not None and perf_counter() - last > _SCAN_S:
             last = perf_counter()
-            on_progress(min(int(known.present().sum()) * known.chunk, known.runs), known.runs)
+            on_progress(min(int(store.present().sum()) * store.chunk, store.runs), store.runs)
 
     def missing() -> list[int]:
-        chunks = known.missing()
+        chunks = store.missing()
         return chunks[chunks % jobs == job - 1].tolist()
 
     def make(number: int, look: Callable[[float], object]) -> None:
-        if not known.file(number).exists():  # another driver was first
-            known.write(number, *work.made(*known.of(number), t, look))
+        if not store.file(number).exists():  # another driver was first
+            store.write(number, *work.made(*store.of(number), t, look))
 
     with suppress(KeyboardInterrupt):
         if cluster is None:
-            fill_by_threads(make, missing, count, tell)
+            fill_by_threads(make, missing, count, report_progress)
         else:
             from robot_dyn.tools.sweeps.cluster import client_of, fill_by_cluster
 
             with client_of(cluster) as client:
-                fill_by_cluster(client, known, names_of(sweep), missing, tell)
+                fill_by_cluster(client, store, names_of(sweep), missing, report_progress)
     last = -_SCAN_S
-    tell()
-    return SweepResult(sweep, known)
+    report_progress()
+    return SweepResult(sweep, store)
 
 
 def read(
     folder: str | Path, scene: str | Path | Callable[..., Any] | None = None, figures: Mapping[str, Any] | None = None
 ) -> SweepResult:
-    """Return what the folder of a sweep holds.
+    """Return the result in the folder of a sweep.
 
-    Functions that the folder names are imported only if you name them too; tables and statistics need none of them.
-    Before the import, the file of each is compared with the SHA-256 that the folder states.
+    Functions that the folder names are imported only if you name them, too; tables and statistics do not need them.
+    Before the import, their files are compared with the SHA-256 in the folder.
 
     Args:
-        folder: It may have been moved.
-        scene: Where the scene file lies now, None where it was. Of a sweep whose scene is a function: the function,
-            or its import path "my_arm:setup", to repeat runs or to resume.
-        figures: Functions, or their import paths, by name of figure, to resume a sweep with figures of your own.
+        folder: Path of the folder, which may have been moved.
+        scene: Present path of the scene file; None if it was not moved. For a sweep whose scene is a function: the
+            function, or its import path "my_arm:setup", to repeat runs or to resume.
+        figures: Functions, or their import paths, by name of figure, to resume a sweep with your own figures.
 
     Raises:
-        SweepError: If it holds none; if its scene is missing, or it or a named function has changed since; if Python
-            imports from the folder.
+        SweepError: If the folder has no sweep, its scene is missing, the scene or a named function has changed, or
+            Python imports from the folder.
     """
-    known, sweep = opened(file_path(folder, SweepError), named(scene, figures))
-    return SweepResult(sweep, known)
+    store, sweep = opened(file_path(folder, SweepError), named(scene, figures))
+    return SweepResult(sweep, store)
 
 
 def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
-    """The folder of a sweep, begun now unless it was; arguments and errors as in `run`."""
+    """Return the folder of a sweep, begin it if it is new; for arguments and errors, see `run`."""
     if chunk is not None:
         chunk = integer("chunk", chunk, least=1, most=2**31, error=SweepError)
     needs("pyarrow", extra="sweeps")
@@ -139,9 +139,9 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
     if not (path / FILE).is_file():
         _check_room(sweep, path)
         stated = stated.model_copy(update={"chunk": pilot(sweep, chunk)})
-        t = None if sweep.samples is None else _times(sweep)  # before the folder holds a sweep that is refused
+        t = None if sweep.samples is None else _times(sweep)  # raises before the folder contains an invalid sweep
         begin(path, stated, sweep.points.rows)
-    stored = stated_in(path)  # of another driver, if it was first
+    stored = stated_in(path)  # written by another driver, if that was first
     stored.check_same(stated.model_copy(update={"chunk": chunk or stored.chunk}), path)
     try:
         read_design(path, stored.rows_sha256)
@@ -154,13 +154,13 @@ def begun(sweep: Sweep, path: Path, chunk: int | None = None) -> Folder:
 
 
 def _times(sweep: Sweep) -> np.ndarray:
-    """Times of the samples, (m,), in [s]; errors where samples cannot be kept."""
+    """Return the times of the samples, (m,), in [s]; raise an error if samples cannot be kept."""
     needs("zarr", extra="sweeps")
     return Work(sweep).times()
 
 
 def _check_room(sweep: Sweep, path: Path) -> None:
-    """Raise SweepError if the disk has not as much room as the sweep will take."""
+    """Raise a SweepError if the disk has less free space than the sweep needs."""
     there = next(folder for folder in (path.absolute(), *path.absolute().parents) if folder.exists())
     free = disk_usage(there).free
     if sweep.bytes_expected > free:
@@ -169,19 +169,19 @@ def _check_room(sweep: Sweep, path: Path) -> None:
 
 
 def pilot(sweep: Sweep, chunk: int | None = None) -> int:
-    """The number of runs of a chunk, from the time of the pilot's runs unless it is given.
+    """Run the pilot, and return the number of runs of a chunk from its time, unless `chunk` is passed.
 
-    It is in whole tiles, and its samples take at most 64 MiB unless those of one tile take more.
+    The number is a multiple of the tile size, and samples take at most 64 MiB unless one tile takes more.
 
     Raises:
-        SweepError: If none of them finishes and some raise, themselves or figures of them; says why.
+        SweepError: If no run finishes and some runs or their figures raise; with the first reason.
     """
     work, count = Work(sweep), min(_RUNS, sweep.runs)
-    rows = work.rows(0, count)  # with what is compiled first
+    rows = work.rows(0, count)  # includes compiling
     raised = rows["outcome"] == RAISED
     if raised.any() and not (rows["outcome"] == FINISHED).any():
         raise SweepError(
-            f"none of the {count} runs of the pilot finishes, and {raised.sum()} raise; the first:"
+            f"none of the {count} pilot runs finishes, and {raised.sum()} raise errors; the first:"
             f" {rows['why'][raised][0]}"
         )
     if chunk is not None:

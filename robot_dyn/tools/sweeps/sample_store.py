@@ -1,8 +1,8 @@
-"""Samples of runs: which a sweep keeps, and their files.
+"""Samples of runs: the selection that a sweep keeps, and their files.
 
-These are Zarr v3: an array over run, t and joint for each quantity, a shard for each chunk of the sweep. A shard is
-encoded in memory and written whole, before the rows of its chunk: a chunk with rows has its samples. The place of a run
-in an array is its number; runs that are not kept are nan, and take no room.
+The files are Zarr v3: an array over run, t and joint for each quantity, with a shard for each chunk of the sweep. A
+shard is encoded in memory and written completely before the rows of its chunk, so a chunk with rows has its samples.
+The index of a run in an array is its number; runs that are not kept are nan and take no space.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from robot_dyn.simulation import SAMPLED
 from robot_dyn.tools.sweeps.texts import called
 
 RECORDED = ("q", "v", "u")
-_INNER = 64  # runs that are read together, where all are kept
+_INNER = 64  # runs that are read together, if all are kept
 _TIMES = "t/c/0"
 
 
 @final
 @dataclass(frozen=True)
 class Samples(Value):
-    """Samples of runs.
+    """A selection of samples of runs.
 
     Attributes:
-        names: Of "q", "v" and "u".
-        every: Of run 0, k, 2 k, ….
-        failed: Of those among them alone that diverge, up to their end.
+        names: Some of "q", "v" and "u".
+        every: k, for the runs 0, k, 2 k, ….
+        failed: True to keep only runs among them that diverge, up to their end.
     """
 
     names: tuple[str, ...]
@@ -43,36 +43,36 @@ class Samples(Value):
 
     def __post_init__(self) -> None:
         if not self.names:
-            raise SweepError(f"samples: of what? give some of {', '.join(RECORDED)}")
+            raise SweepError(f"samples: no quantity is named; give some of {', '.join(RECORDED)}")
         for name in self.names:
             choice("samples", name, RECORDED, error=SweepError)
         integer("every", self.every, least=1, most=2**53, error=SweepError)
         truth("failed", self.failed, error=SweepError)
 
     def of(self, runs: np.ndarray, diverged: np.ndarray) -> np.ndarray:
-        """Which of these runs are kept, (k,)."""
+        """Return True for runs whose samples are kept, (k,)."""
         return (runs % self.every == 0) & (diverged | (not self.failed))
 
 
 def samples(*names: str, every: int = 1, failed: bool = False) -> Samples:
-    """Samples to keep of runs: of every k-th, or of those among them alone that diverge.
+    """Select the samples to keep: of every k-th run, or only of those among them that diverge.
 
     Args:
-        *names: Of "q", "v" and "u".
+        *names: Some of "q", "v" and "u".
         every: k.
-        failed: Whether only of runs that diverge.
+        failed: True to keep only runs that diverge.
 
     Raises:
-        SweepError: If an argument is not allowed.
+        SweepError: If an argument is invalid.
     """
     return Samples(tuple(dict.fromkeys(names)), every, failed)
 
 
-def samples_of(given: Any) -> Samples | None:
-    """What `Sweep.samples` may be: None, a name, or `samples(…)`, also as a text; SweepError otherwise."""
-    if isinstance(given, str) and "(" in given:
-        return called("samples", given, {"samples": samples})
-    return given if given is None or isinstance(given, Samples) else samples(given)
+def samples_of(value: Any) -> Samples | None:
+    """Return the value of `Sweep.samples`: from None, a name, or `samples(…)`, also as a text."""
+    if isinstance(value, str) and "(" in value:
+        return called("samples", value, {"samples": samples})
+    return value if value is None or isinstance(value, Samples) else samples(value)
 
 
 @final
@@ -81,10 +81,10 @@ class SampleStore:
     """The arrays of a sweep.
 
     Attributes:
-        path: Of the group.
-        runs: Of the sweep.
-        chunk: Runs of a shard.
-        kept: Which samples are kept.
+        path: Path of the group.
+        runs: Number of runs of the sweep.
+        chunk: Number of runs in a shard.
+        kept: The selection of samples.
     """
 
     path: Path
@@ -93,7 +93,7 @@ class SampleStore:
     kept: Samples
 
     def create(self, t: np.ndarray, joint_names: tuple[str, ...]) -> None:
-        """Write what describes the arrays, and the times of samples, (m,), unless they are there."""
+        """Write the descriptions of the arrays, and the times of samples, (m,), unless they exist."""
         if (self.path / _TIMES).is_file():
             return
         zarr = needs("zarr", extra="sweeps")
@@ -103,20 +103,20 @@ class SampleStore:
             self._array(zarr, memory, name, (len(t), len(joint_names)))
         times = group.create_array("t", data=t, dimension_names=("t",), compressors=None)
         times.attrs["units"] = "s"
-        for name in sorted(memory._store_dict, key=_TIMES.__eq__):  # the times are last: then all is there
+        for name in sorted(memory._store_dict, key=_TIMES.__eq__):  # the times last, as a mark that all files exist
             _write(self.path / name, memory._store_dict[name].to_bytes())
 
     def times(self) -> np.ndarray:
-        """Of the samples, (m,), in [s]."""
+        """Return the times of the samples, (m,), in [s]."""
         zarr = needs("zarr", extra="sweeps")
         with self._reading():
             return zarr.open_group(self.path, mode="r")["t"][:]
 
     def write(self, chunk: int, samples: Mapping[str, np.ndarray]) -> dict[str, str]:
-        """Write the samples (k, m, n) of the runs of a chunk, nan where they are not kept; SweepError if that fails.
+        """Write the samples of a chunk, (k, m, n), nan where not kept; raise a SweepError if that fails.
 
         Returns:
-            SHA-256 of the file of each quantity that has some.
+            SHA-256 of the file of each quantity with samples.
         """
         zarr, digests = needs("zarr", extra="sweeps"), dict[str, str]()
         for name, x in samples.items():
@@ -124,14 +124,14 @@ class SampleStore:
             start = chunk * self.chunk
             self._array(zarr, memory, name, x.shape[1:])[start : start + len(x)] = x
             shard = memory._store_dict.get(f"{name}/c/{chunk}/0/0")
-            if shard is not None:  # it has something
+            if shard is not None:  # there are samples
                 data = shard.to_bytes()
                 _write(self._shard(name, chunk), data)
                 digests[name] = sha256(data).hexdigest()
         return digests
 
     def check(self, chunk: int, digests: Mapping[str, str]) -> None:
-        """Raise SweepError where a file of a chunk is missing, or is not what was written."""
+        """Raise a SweepError if a file of a chunk is missing or was changed."""
         remedy = f"remove the rows of chunk {chunk}, and run the sweep again"
         for name, digest in digests.items():
             path = self._shard(name, chunk)
@@ -141,8 +141,8 @@ class SampleStore:
 
     @contextmanager
     def _reading(self) -> Iterator[None]:
-        """What is wrong with the files that describe the arrays, as a SweepError; Zarr opens pipes and devices too."""
-        remedy = "take it from a copy of the folder, or run the sweep into a new one"
+        """Raise a SweepError about faulty descriptions of the arrays; Zarr itself would open pipes and devices."""
+        remedy = "restore it from a copy of the folder, or run the sweep into a new folder"
         for name in ("zarr.json", *(f"{array}/zarr.json" for array in ("t", *self.kept.names)), _TIMES):
             with reading(self.path / name, SweepError, remedy):
                 pass
@@ -150,14 +150,14 @@ class SampleStore:
             yield
         except SweepError:
             raise
-        except Exception as error:  # Zarr and xarray promise no kinds
+        except Exception as error:  # Zarr and xarray do not document the types of their errors
             raise SweepError(f"{self.path}: are not the samples of the sweep ({why(error)}); {remedy}") from None
 
     def _shard(self, name: str, chunk: int) -> Path:
         return self.path / name / "c" / str(chunk) / "0" / "0"
 
     def open(self, joint_types: tuple[str | None, ...]) -> Any:
-        """All as a lazy `xarray.Dataset` over run, t and joint, with units."""
+        """Return all samples as a lazy `xarray.Dataset` over run, t and joint, with units."""
         xarray = needs("xarray", extra="sweeps")
         needs("zarr", extra="sweeps")
         with self._reading():
@@ -167,7 +167,7 @@ class SampleStore:
             return data.assign_coords(run=np.arange(self.runs), joint=list(data.attrs.pop("joint")))
 
     def _array(self, zarr: Any, store: Any, name: str, shape: tuple[int, ...]) -> Any:
-        """An array of the store without numbers; `shape` (m, n) is that of a run."""
+        """Create an empty array of the store; a run has the shape (m, n)."""
         dense = self.kept.every == 1 and not self.kept.failed
         inner = min(_INNER, self.chunk) if dense and self.chunk % _INNER == 0 else 1
         return zarr.create_array(
@@ -178,11 +178,11 @@ class SampleStore:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder, and those above it; SweepError if it cannot be made."""
+    """Create a folder and its parents; raise a SweepError if that fails."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise SweepError(f"{path}: the folder cannot be made ({why(error)}); give another path") from None
+        raise SweepError(f"{path}: the folder cannot be created ({why(error)}); give another path") from None
 
 
 def _write(path: Path, data: bytes) -> None:

@@ -1,4 +1,4 @@
-"""The table `[sweep]` of a scene: what varies in many runs of it, and what is kept of each."""
+"""The table `[sweep]` of a scene: varying parameters and figures of many runs."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from robot_dyn.scene import Part
 
 
 class SweepTable(Part):
-    """What varies in many runs of the scene, and what is kept of each: `robot-dyn sweep scene.toml -o FOLDER`.
+    """Varying parameters and figures of many runs of the scene: `robot-dyn sweep scene.toml -o FOLDER`.
 
-    Values of `vary` and `figures` are texts, which are parsed and not run: distributions `uniform(low=0, high=3)`,
+    Values of `vary` and `figures` are texts, which are parsed but not executed: distributions `uniform(low=0, high=3)`,
     `normal(mean=1, sd=0.1)`, `lognormal(median=1, sigma_of_log=0.2)`, `triangular(low=0, mode=1, high=3)`,
     `choice([50, 100])`, of lists of numbers for arrays; figures `rms_error()`, `peak('u')`, `final('q', 'joint')`.
     """
 
     runs: Annotated[int, Field(gt=0, strict=True)]
-    """How many."""
+    """Number of runs."""
     vary: dict[str, str]
     """Distributions by the names of `robot-dyn sweepable`, and of `q0` and `v0`."""
     figures: dict[str, str] = Field(default={})
-    """What is kept of each run, by name."""
+    """Figures of each run, by name."""
     design: str = "random"
     """One of "random", "sobol", "halton", "latin", "saltelli", "grid"."""
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
-    """Of the design."""
+    """Seed of the design."""
     samples: str | None = None
-    """Samples that are kept: `q`, `v` or `u` of all runs, or `samples('q', 'v', every=10, failed=True)`."""
+    """Samples to keep: `q`, `v` or `u` of all runs, or `samples('q', 'v', every=10, failed=True)`."""

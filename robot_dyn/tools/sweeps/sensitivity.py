@@ -2,10 +2,10 @@
 
     S_j = Var(E[y | x_j]) / Var(y)             first order: what x_j explains alone
     T_j = 1 − Var(E[y | x_k, k ≠ j]) / Var(y)  total: with all interactions of x_j
-    ρ_j = Spearman's rank correlation of y and x_j: the monotone part only
+    ρ_j = Spearman's rank correlation of y and x_j: only the monotone part
     PAWN_j = median over x_j of sup_y |F(y | x_j) − F(y)|
 
-Design "saltelli" gives S and T, by SALib; any other gives ρ and PAWN of the values that vary.
+Design "saltelli" gives S and T, by SALib; other designs give ρ and PAWN of the varying values.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ class Sensitivity(Answer):
     """Sensitivity of a figure to each parameter.
 
     Attributes:
-        names: Of the parameters.
-        first: First-order indices S, of design "saltelli"; else empty.
-        total: Total indices T, in the same way.
-        rank_correlation: Spearman's ρ, of other designs; it sees the monotone part only. Empty of "saltelli".
-        pawn: PAWN indices, in the same way.
-        pawn_noise: The PAWN index of a parameter without influence, of as many runs.
-        n: Runs.
-        failed: Runs that failed.
-        method: How the indices were computed.
-        left_out: Blocks of design "saltelli" with a run without a value, which are left out.
-        figure: What is sensitive.
-        given: As in `SweepResult.sensitivity`.
+        names: Names of the parameters.
+        first: First-order indices S, for design "saltelli"; else empty.
+        total: Total indices T, for design "saltelli"; else empty.
+        rank_correlation: Spearman's ρ, for other designs; it measures only the monotone part. Empty for "saltelli".
+        pawn: PAWN indices, for other designs; empty for "saltelli".
+        pawn_noise: The PAWN index of a parameter without influence, for the same number of runs.
+        n: Number of runs.
+        failed: Number of failed runs.
+        method: Method of computation, in words.
+        left_out: Number of omitted blocks of design "saltelli", because a run has no value.
+        figure: Name of the figure.
+        given: Condition on runs; see `SweepResult.sensitivity`.
     """
 
     names: tuple[str, ...]
@@ -58,14 +58,14 @@ class Sensitivity(Answer):
     given: str | None = None
 
     def blocks(self) -> Iterator[Block]:
-        what = f"sensitivity{f' of {self.figure}' * bool(self.figure)}{f' given {self.given}' if self.given else ''}"
-        yield f"{what}: {self.method}; {self.n} runs, {self.failed} failed"
+        title = f"sensitivity{f' of {self.figure}' * bool(self.figure)}{f' given {self.given}' if self.given else ''}"
+        yield f"{title}: {self.method}; {self.n} runs, {self.failed} failed"
         columns: dict[str, list[str]] = {"parameter": list(self.names)}
         for index, estimates in (("first order", self.first), ("total", self.total)):
             if estimates:
-                columns[index] = [text(each.estimate) for each in estimates]
+                columns[index] = [text(x.estimate) for x in estimates]
                 columns[f"{index}, {100 * estimates[0].level:g} %"] = [
-                    f"{text(each.low)} … {text(each.high)}" for each in estimates
+                    f"{text(x.low)} … {text(x.high)}" for x in estimates
                 ]
         if self.pawn:
             columns["rank correlation (monotone part only)"] = [text(x) for x in self.rank_correlation]
@@ -73,7 +73,7 @@ class Sensitivity(Answer):
         yield Table(tuple(columns), tuple(zip(*columns.values(), strict=True)), right=tuple(columns)[1:])
         if self.pawn:
             yield (
-                "PAWN: how far the distribution of the figure, given the parameter, is from that of all runs, 0 to 1;"
+                "PAWN: distance of the figure's distribution, given the parameter, from that of all runs, 0 to 1;"
                 f" {text(self.pawn_noise)} without influence. Shares of variance need design 'saltelli'"
             )
 
@@ -87,18 +87,18 @@ def saltelli(
     *,
     failed: int = 0,
 ) -> Sensitivity:
-    """First-order and total Sobol' indices from the runs of design "saltelli", in its order, by SALib.
+    """Compute first-order and total Sobol' indices from the runs of design "saltelli", in its order, by SALib.
 
-    Intervals: the jackknife over scramblings, s² = (R − 1)/R Σ (θ_(r) − mean θ_(r))², with Student's t of R − 1
-    degrees of freedom. A bootstrap of blocks would take them as independent.
+    Intervals use the jackknife over scramblings, s² = (R − 1)/R Σ (θ_(r) − mean θ_(r))², with Student's t of R − 1
+    degrees of freedom. A bootstrap of blocks would treat them as independent.
 
     Args:
         y: The figure of each run, shape (N,).
-        known: Whether a run has a value, shape (N,); blocks with a run that failed are left out.
-        names: Of the d parameters.
+        known: True for runs with a value, shape (N,); blocks with a failed run are omitted.
+        names: Names of the d parameters.
         scrambling: The scrambling of each run, shape (N,).
-        level: Of the intervals.
-        failed: How many runs failed.
+        level: Confidence level of the intervals.
+        failed: Number of failed runs.
 
     Raises:
         SweepError: If the level is not between 0 and 1, too few scramblings are left, or the figure does not vary.
@@ -106,22 +106,22 @@ def saltelli(
     analyze = needs("SALib.analyze.sobol", extra="sweeps").analyze
     level, block = check_level(level), len(names) + 2
     whole = known.reshape(-1, block).all(axis=1)
-    rows, of = y.reshape(-1, block)[whole], scrambling.reshape(-1, block)[whole, 0]
-    left = np.unique(of)
+    rows, group = y.reshape(-1, block)[whole], scrambling.reshape(-1, block)[whole, 0]
+    left = np.unique(group)
     if len(left) < _LEAST_SCRAMBLINGS:
         raise SweepError(f"sensitivities need runs of {_LEAST_SCRAMBLINGS} scramblings or more, got {len(left)}")
     _check_varies(rows)
     problem = {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
 
     def indices(some: np.ndarray) -> np.ndarray:
-        found = analyze(problem, some.ravel(), calc_second_order=False, num_resamples=2, seed=1)
-        return np.array([found["S1"], found["ST"]])
+        result = analyze(problem, some.ravel(), calc_second_order=False, num_resamples=2, seed=1)
+        return np.array([result["S1"], result["ST"]])
 
-    theta, without = indices(rows), np.array([indices(rows[of != r]) for r in left])
+    theta, without = indices(rows), np.array([indices(rows[group != r]) for r in left])
     half = student_quantile(level, len(left) - 1) * np.sqrt((len(left) - 1) * without.var(axis=0))
     left_out = int((~whole).sum())
     stated = partial(Estimate, level=level, n=len(y), failed=failed, method="SALib")
-    made = [
+    estimates = [
         stated(f"{kind} index of {name}", float(x), float(x - h), float(x + h))
         for kind, row, halves in zip(("first-order", "total"), theta, half, strict=True)
         for name, x, h in zip(names, row, halves, strict=True)
@@ -129,18 +129,18 @@ def saltelli(
     method = f"Sobol' indices by SALib, jackknife over {len(left)} scramblings"
     if left_out:
         method += f", without {left_out} blocks of {block} runs in which one has no value"
-    first, total = tuple(made[: len(names)]), tuple(made[len(names) :])
+    first, total = tuple(estimates[: len(names)]), tuple(estimates[len(names) :])
     return Sensitivity(names, first, total, n=len(y), failed=failed, method=method, left_out=left_out)
 
 
 def by_values(y: np.ndarray, x: np.ndarray, names: tuple[str, ...], *, failed: int = 0) -> Sensitivity:
-    """Spearman's rank correlation and PAWN indices of the values that vary, of the runs of any design.
+    """Compute Spearman's rank correlation and PAWN indices of the varying values, from the runs of any design.
 
     Args:
         y: The figure of each run that has one, shape (N,).
         x: The values of the parameters, shape (N, d).
-        names: Of the d parameters.
-        failed: How many runs failed.
+        names: Names of the d parameters.
+        failed: Number of failed runs.
 
     Raises:
         SweepError: If the figure does not vary.
@@ -156,24 +156,24 @@ def by_values(y: np.ndarray, x: np.ndarray, names: tuple[str, ...], *, failed: i
     binned = [bins(column) for column in x.T]
     noise = _pawn(y, bins(np.random.default_rng(0).random(len(y))))
     method = "Spearman's rank correlation; PAWN, median over values, or over up to 32 bins of them"
-    pawn = tuple(_pawn(y, each) for each in binned)
+    pawn = tuple(_pawn(y, bins_of_column) for bins_of_column in binned)
     return Sensitivity(
         names, rank_correlation=correlation, pawn=pawn, pawn_noise=noise, n=len(y), failed=failed, method=method
     )
 
 
 def bins(x: np.ndarray) -> np.ndarray:
-    """The bin of each run, 0, …, M − 1: one for each of few values, else of one number of runs each."""
-    values, of = np.unique(x, return_inverse=True)
+    """Return the bin of each run, 0, …, M − 1: one bin per value if there are few, else bins of equal size."""
+    values, index = np.unique(x, return_inverse=True)
     count = min(max(len(x) // _RUNS_OF_A_BIN, 2), _MOST_BINS)
     if len(values) <= max(count, len(x) // 8):
-        return of
+        return index
     edges = np.quantile(x, np.arange(1, count) / count)
     return np.unique(np.searchsorted(edges, x, side="right"), return_inverse=True)[1]
 
 
 def _pawn(y: np.ndarray, bins: np.ndarray) -> float:
-    """The median over bins of the Kolmogorov–Smirnov distance of y in a bin from all y."""
+    """Return the median over bins of the Kolmogorov–Smirnov distance of y in a bin from all y."""
     from scipy.stats import ks_2samp
 
     distance: Any = ks_2samp

@@ -1,6 +1,6 @@
-"""The specification of a sweep as JSON: all that its rows depend on, and how the folder stores them.
+"""The specification of a sweep as JSON: everything that its rows depend on, and their storage.
 
-A folder has one, `sweep.json`; another sweep in it is refused with the first difference by name.
+A folder has one specification, `sweep.json`; another sweep in it is an error that names the first difference.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ FILE = "sweep.json"
 FORMAT = 5
 _MOST_BYTES = 2**26
 _NONE = "run one into it with robot-dyn sweep SCENE.toml … -o FOLDER"
-_PLACE = "scene"  # where it lies may differ
+_PLACE = "scene"  # its path may differ
 
 
 def versions() -> dict[str, str]:
-    """Versions of what the bits of rows depend on."""
+    """Return the versions of packages that the bits of rows depend on."""
     return {name: version_of(name) for name in ("robot-dyn", "numpy", "scipy", "pin", "salib")}
 
 
 def processor() -> dict[str, str]:
-    """Name and features of the processor."""
+    """Return name and features of the processor."""
     name, features = processor_of_code()
     return {"processor": name, "features": ",".join(text[1:] for text in features.split(",") if text.startswith("+"))}
 
 
 class _SetupOfFunction(BaseModel):
-    """What a folder states of the setup of a function, for reading results without calling it."""
+    """Data about the setup of a function, with which results can be read without calling the function."""
 
     model_config = ConfigDict(strict=True)
 
@@ -56,7 +56,7 @@ class _SetupOfFunction(BaseModel):
 
 @final
 class Specification(BaseModel):
-    """What `sweep.json` holds."""
+    """The content of `sweep.json`."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -76,41 +76,41 @@ class Specification(BaseModel):
 
     @property
     def text(self) -> str:
-        """As the file has it."""
+        """Text of the file."""
         return json.dumps(self.model_dump(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
     @property
     def digest(self) -> str:
-        """SHA-256 of all but where the scene lies."""
+        """SHA-256 of everything except the path of the scene."""
         return sha256(json.dumps(self.model_dump(exclude={_PLACE}), sort_keys=True).encode()).hexdigest()
 
     def check_same(self, other: Specification, folder: Path, versions: bool = True) -> None:
-        """Raise SweepError unless another specification has all that this one states; names the first difference.
+        """Raise a SweepError that names the first difference unless two specifications agree.
 
         Args:
-            other: The specification.
-            folder: That of this one, for the message.
-            versions: Whether versions of packages are compared too: they matter where rows are computed.
+            other: The other specification.
+            folder: Folder of this specification, for the message.
+            versions: True to compare versions of packages, too: they matter if rows are computed.
         """
         for name, here, there in _differences(self.model_dump(), other.model_dump(), ""):
             if name != _PLACE and (versions or not name.startswith("versions.")):
                 raise SweepError(
-                    f"{folder / FILE}: holds another sweep: {name} is {shorten(here)} there, {shorten(there)} here;"
-                    " give another folder, or the sweep that was begun"
+                    f"{folder / FILE}: contains another sweep: {name} is {shorten(here)} there, {shorten(there)} here;"
+                    " give another folder, or the same sweep"
                 )
 
     def sweep(self, rows: np.ndarray, folder: Path, named: Named = NOTHING) -> Sweep:
-        """Return the sweep, with its scene as it is now.
+        """Return the sweep, with the present content of its scene.
 
-        Functions that the specification names are imported only if `named` has them too.
+        Functions in the specification are imported only if `named` has them, too.
 
         Args:
-            rows: Of the design.
-            folder: The folder, from which nothing is imported.
-            named: What the reader of the folder names.
+            rows: Rows of the design.
+            folder: The folder; nothing is imported from it.
+            named: Scene and functions that the reader of the folder names.
 
         Raises:
-            SweepError: If it states no sweep; if the file of a named function has changed.
+            SweepError: If the specification is invalid, or the file of a named function has changed.
         """
         try:
             scene, stated = named.scene or self.scene, None
@@ -127,15 +127,19 @@ class Specification(BaseModel):
                     )
                 check_named(path, self.figures[name].get("sha256"), folder)
             vary = {name: distributions.from_dict(self.vary[name]) for name in self.order}
-            kept = {name: figures.from_dict(of, name in dict(named.figures)) for name, of in self.figures.items()}
+            sweep_figures = {
+                name: figures.from_dict(x, name in dict(named.figures)) for name, x in self.figures.items()
+            }
             design, drawn = (rows, None) if self.design == "table" else (self.design, rows)
-            return Sweep(scene, self.runs, vary, kept, design, self.seed, self.samples, drawn=drawn, stated=stated)
+            return Sweep(
+                scene, self.runs, vary, sweep_figures, design, self.seed, self.samples, drawn=drawn, stated=stated
+            )
         except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise SweepError(f"{folder / FILE}: is not the specification of a sweep ({error!r})") from None
 
 
 def stated_in(folder: Path) -> Specification:
-    """The specification in a folder; SweepError with the key and the value if there is none, or of another format."""
+    """Return the specification in a folder; raise a SweepError if it is missing, invalid or of another format."""
     path = folder / FILE
     try:
         return Specification.model_validate_json(read(path, _MOST_BYTES, SweepError, _NONE))
@@ -144,17 +148,17 @@ def stated_in(folder: Path) -> Specification:
     key, got = ".".join(map(str, first["loc"])), first["input"]
     if key == "format" and isinstance(got, int):
         raise SweepError(
-            f"{path}: has format {got}, this version reads {FORMAT}; read it with the version that wrote it, or run"
-            " the sweep into a new folder"
+            f"{path}: has format {got}, but this version reads {FORMAT}; read it with the version that wrote it, or"
+            " run the sweep into a new folder"
         )
     raise SweepError(
-        f"{path}: is not the specification of a sweep: {key}{': ' * bool(key)}{first['msg']}, got {shown(got)}; take"
-        " that of a copy, or give a new folder"
+        f"{path}: is not the specification of a sweep: {key}{': ' * bool(key)}{first['msg']}, got {shown(got)};"
+        " restore it from a copy, or give a new folder"
     )
 
 
 def specification(sweep: Sweep, chunk: int) -> Specification:
-    """The specification of a sweep in chunks of so many runs."""
+    """Return the specification of a sweep with `chunk` runs per file."""
     data = {
         "format": FORMAT,
         "scene": sweep.scene,
@@ -162,7 +166,7 @@ def specification(sweep: Sweep, chunk: int) -> Specification:
         "runs": int(sweep.runs),
         "design": sweep.points.name,
         "seed": int(sweep.seed),
-        "vary": {name: of.to_dict() for name, of in sweep.vary.items()},
+        "vary": {name: distribution.to_dict() for name, distribution in sweep.vary.items()},
         "order": list(sweep.vary),
         "figures": {name: figure.to_dict() for name, figure in sweep.figures.items()},
         "samples": None if sweep.samples is None else asdict(sweep.samples),
@@ -170,17 +174,17 @@ def specification(sweep: Sweep, chunk: int) -> Specification:
         "rows_sha256": sha256(np.ascontiguousarray(sweep.points.rows).tobytes()).hexdigest(),
         "chunk": chunk,
     }
-    return Specification.model_validate_json(json.dumps(data))  # as it is read again
+    return Specification.model_validate_json(json.dumps(data))  # equal to the specification read from the file
 
 
 def names_of(sweep: Sweep) -> Named:
-    """The scene and functions that a sweep names, for the processes that run it."""
+    """Return the scene and functions that a sweep names, for the processes that run it."""
     functions = {name: figure for name, figure in sweep.figures.items() if isinstance(figure, UserFigure)}
     return Named(sweep.scene, tuple((name, figure.path) for name, figure in functions.items()))
 
 
 def _setup(sweep: Sweep) -> dict[str, Any]:
-    """What a sweep integrates, as texts and numbers; for a function also everything that reading results needs."""
+    """Return the setup of a sweep as texts and numbers; for a function, also the data needed to read results."""
     if sweep.stated is not None:
         return dict(sweep.stated)
     setup: Setup = sweep.setup
@@ -205,7 +209,7 @@ def _setup(sweep: Sweep) -> dict[str, Any]:
 
 
 def _differences(a: Any, b: Any, name: str) -> Iterator[tuple[str, Any, Any]]:
-    """Where two values differ: name, first, second; "—" where there is none."""
+    """Yield name, first and second value of each difference; "—" for a missing value."""
     if isinstance(a, dict) and isinstance(b, dict):
         for key in dict.fromkeys([*a, *b]):
             yield from _differences(a.get(key, "—"), b.get(key, "—"), f"{name}.{key}" if name else str(key))

@@ -1,4 +1,4 @@
-"""`Sweep`: what varies in the runs of a scene, how many there are, and which figures of each are kept. A value."""
+"""`Sweep`: a value with the varying parameters, the number and the figures of many runs of a scene."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ RESERVED = ("run", *NUMBERS, *TEXTS, "failed", *OUTCOMES)
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Sweep(Answer, Value):
-    """Runs 0, …, N − 1 of a setup. Run i is a function of this value and i alone: start, parameters and noise.
+    """Runs 0, …, N − 1 of a setup. Start, parameters and noise of run i depend only on this value and i.
 
     Attributes:
         scene: A scene file, or the import path of a function that returns a `Setup`, such as "my_arm:setup".
-        runs: N.
-        vary: Distributions by name: a parameter of `rollouts(params=…)`, "q0" or "v0". A frozen distribution of
-            scipy.stats is one, and a text such as "uniform(low=0, high=3)".
-        figures: What to keep of each run, by name: `rms_error()`, `peak("u")`, `final("q", joint)`, or a function of a
-            `Run` by import path. Texts such as "peak('u')" are figures too.
-        design: "random", "sobol", "halton", "latin", "saltelli", "grid"; or rows in [0, 1), (N, d), a column for each
-            number that varies.
-        seed: Of the design.
-        samples: What to keep of the motion: "q", or `samples("q", "u", every=100)`; nothing by default.
-        drawn: The rows of the design, (N, d), as a folder keeps them; None to draw them by name and seed.
-        stated: The setup as a folder states it, if its reader has not named the function that makes it; else None.
+        runs: Number of runs, N.
+        vary: Distributions by name: a parameter of `rollouts(params=…)`, "q0" or "v0". Frozen distributions of
+            scipy.stats and texts such as "uniform(low=0, high=3)" are allowed, too.
+        figures: Figures of each run, by name: `rms_error()`, `peak("u")`, `final("q", joint)`, or a function of a `Run`
+            by import path. Texts such as "peak('u')" are allowed, too.
+        design: "random", "sobol", "halton", "latin", "saltelli", "grid"; or rows in [0, 1), (N, d), with a column for
+            each varying number.
+        seed: Seed of the design.
+        samples: Samples to keep: "q", or `samples("q", "u", every=100)`; none by default.
+        drawn: The rows of the design, (N, d), as stored in a folder; None to draw them by name and seed.
+        stated: The setup as stated in a folder, if its reader has not named the function that returns it; else None.
 
     Raises:
-        SweepError: If an argument is not allowed; names it.
+        SweepError: If an argument is invalid; the message names it.
         SceneError: If the scene cannot be read.
     """
 
@@ -61,37 +61,37 @@ class Sweep(Answer, Value):
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         set_(self, "scene", source_of(self.scene))
-        set_(self, "vary", {name: _varied(name, of) for name, of in by_name("vary", self.vary, "kp").items()})
+        set_(self, "vary", {name: _varied(name, x) for name, x in by_name("vary", self.vary, "kp").items()})
         if not self.vary:
             raise SweepError(
                 "vary: nothing varies; give distributions by name, such as {'kp': sw.uniform(low=1, high=2)}"
             )
         figures = by_name("figures", self.figures, "settling")
         if taken := sorted(figures.keys() & {*RESERVED, *self.columns}):
-            raise SweepError(f"figures: {taken[0]!r} is the name of another column of a sweep; take another one")
-        set_(self, "figures", {name: figure(name, given) for name, given in figures.items()})
+            raise SweepError(f"figures: {taken[0]!r} is the name of another column of a sweep; choose another name")
+        set_(self, "figures", {name: figure(name, value) for name, value in figures.items()})
         set_(self, "seed", integer("seed", self.seed, most=2**63 - 1, error=SweepError))
         set_(self, "samples", samples_of(self.samples))
-        _ = self.points  # refused if the design does not have so many rows
-        if self.stated is None:  # else the folder was begun by a sweep that was checked
+        _ = self.points  # raises if the design cannot have N rows
+        if self.stated is None:  # otherwise the folder contains a sweep that was checked
             self._check_names()
 
     @cached_property
     def setup(self) -> Setup:
-        """Return the setup without varied parameters; SweepError for a function that the reader has not named."""
+        """The setup without varied parameters; a SweepError for a function that the reader has not named."""
         if self.stated is not None:
             raise SweepError(
                 f"the folder names the function {self.scene} as its scene, which is called only if you name it:"
                 f" sw.read(folder, scene={self.scene!r}), or --scene {self.scene}"
             )
         if is_scene(self.scene):
-            from robot_dyn.scene import read_both  # late: functions need none of it
+            from robot_dyn.scene import read_both  # imported here because functions do not need it
 
             return read_both(self.scene)[1]
-        made = imported(self.scene)()
-        if not isinstance(made, Setup):
-            raise SweepError(f"{self.scene}: returned {shown(made)}; return a robot_dyn.Setup")
-        return made
+        setup = imported(self.scene)()
+        if not isinstance(setup, Setup):
+            raise SweepError(f"{self.scene}: returned {shown(setup)}; return a robot_dyn.Setup")
+        return setup
 
     @cached_property
     def points(self) -> Design:
@@ -103,7 +103,7 @@ class Sweep(Answer, Value):
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """Names of the numbers that vary: of an array such as "q0", numbered from 0."""
+        """Names of the varying numbers; entries of an array such as "q0" are numbered from 0."""
         return tuple(f"{name}[{k}]" if of.shape else name for name, of in self.vary.items() for k in range(of.width))
 
     @cached_property
@@ -116,21 +116,23 @@ class Sweep(Answer, Value):
         """Units of the columns that have one, by name."""
         if self.stated is not None:
             return dict(self.stated["units"])
-        of = {parameter.name: parameter.unit for parameter in sweepable(self.setup).parameters}
-        of |= {f"{name}[{k}]": unit(name[0], kind) for name in STARTS for k, kind in enumerate(self.joint_types)}
-        units = {name: of.get(name, of.get(parameter_of(name), "")) for name in self.columns}
+        by_parameter = {parameter.name: parameter.unit for parameter in sweepable(self.setup).parameters}
+        by_parameter |= {
+            f"{name}[{k}]": unit(name[0], kind) for name in STARTS for k, kind in enumerate(self.joint_types)
+        }
+        units = {name: by_parameter.get(name, by_parameter.get(parameter_of(name), "")) for name in self.columns}
         units |= {name: figure.unit(self.setup) for name, figure in self.figures.items()}
         units |= {column.name: column.unit for column in FIXED}
         return {name: text for name, text in units.items() if text}
 
     @property
     def joint_types(self) -> tuple[str | None, ...]:
-        """Types of the joints, "revolute", "continuous" or "prismatic"; None where the dynamics do not state one."""
+        """Types of the joints, "revolute", "continuous" or "prismatic"; None if unknown."""
         return tuple(joint_types_of(self.setup.plant.dynamics) if self.stated is None else self.stated["joint_types"])
 
     @cached_property
     def bytes_expected(self) -> int:
-        """What its rows and samples take on disk, at most but for footers and texts."""
+        """Upper bound of the size on disk, in bytes, without footers and texts."""
         if self.stated is not None:
             return self.stated["bytes_expected"]
         rows = 8 * (len(self.columns) + len(self.figures) + len(NUMBERS)) + 4 * len(TEXTS)
@@ -140,7 +142,7 @@ class Sweep(Answer, Value):
         return self.runs * rows + 8 * numbers * -(-self.runs // self.samples.every)
 
     def values(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """What varies in runs start, …, stop − 1, by name; SweepError if there are no such runs.
+        """Return the varying values in runs start, …, stop − 1, by name; raise a SweepError for other runs.
 
         Starts have shape (k, n), numbers (k,), arrays (k, size).
         """
@@ -149,7 +151,7 @@ class Sweep(Answer, Value):
         return self._values(self.points.rows[start:stop])
 
     def _values(self, u: np.ndarray) -> dict[str, np.ndarray]:
-        """Values at points u (k, d) of the design."""
+        """Return the values at points u, (k, d), of the design."""
         first, values = 0, {}
         for name, of in self.vary.items():
             x = of.values(np.ascontiguousarray(u[:, first : first + of.size]))
@@ -158,7 +160,7 @@ class Sweep(Answer, Value):
         return values
 
     def _check_names(self) -> None:
-        """Raise SweepError if what varies has no name or not the size that the setup knows."""
+        """Raise a SweepError if a varying parameter is unknown to the setup, or has another size."""
         from robot_dyn.simulation.rollouts.rollouts import batch_of
 
         n, values = self.setup.plant.dynamics.n, self._values(np.full((2, len(self.dimensions)), 0.5))
@@ -185,27 +187,27 @@ class Sweep(Answer, Value):
             yield Table(("figure", "computed by"), tuple(rows))
 
     def _varies(self, name: str) -> str:
-        """A name in `vary` with its unit, each once where those of the numbers of an array differ."""
+        """Return a name in `vary` with its unit, or all units of an array with different units."""
         columns = [column for column in self.columns if name in (column, parameter_of(column))]
-        of = dict.fromkeys(self.units[column] for column in columns if column in self.units)
-        return f"{name} [{' or '.join(of)}]" if of else name
+        units = dict.fromkeys(self.units[column] for column in columns if column in self.units)
+        return f"{name} [{' or '.join(units)}]" if units else name
 
 
 def heading(sweep: Sweep, column: str) -> str:
-    """The name of a column with its unit, as "torque [N m]"."""
+    """Return the name of a column with its unit, such as "torque [N m]"."""
     return f"{column} [{sweep.units[column]}]" if column in sweep.units else column
 
 
 def from_scene(path: str | Path, **changes: Any) -> Sweep:
-    """The sweep that a scene states in its table `[sweep]`.
+    """Return the sweep in the table `[sweep]` of a scene.
 
     Args:
-        path: Of the scene.
-        **changes: Attributes of `Sweep`, which replace those that are stated.
+        path: Path of the scene.
+        **changes: Attributes of `Sweep` that replace those in the table.
 
     Raises:
         SceneError: If the scene cannot be read.
-        SweepError: If it states no sweep, or one that is not allowed.
+        SweepError: If the sweep is missing or invalid.
     """
     from robot_dyn.scene import read_both
 
@@ -214,30 +216,31 @@ def from_scene(path: str | Path, **changes: Any) -> Sweep:
     for name, text in table.get("figures", {}).items():
         if is_import_path(text):
             raise SweepError(
-                f"figures: {name}: {shorten(text)} runs code, and a scene is data; give it in Python or --figure"
+                f"figures: {name}: {shorten(text)} would run code, but a scene is data; pass it in Python or by"
+                " --figure"
             )
     stated = table | changes
     for name, example in (("vary", "kp"), ("figures", "settling")):
         stated[name] = {**table.get(name, {}), **by_name(name, changes.get(name, {}), example)}
     if "runs" not in stated:
-        raise SweepError(f"{path}: how many runs? give runs=, or a table [sweep] with them")
+        raise SweepError(f"{path}: the number of runs is missing; give runs=, or a table [sweep] with it")
     return Sweep(str(path), **stated)
 
 
 def samples_of_run(setup: Setup) -> int:
-    """Number of samples of a run, at most."""
+    """Return the largest number of samples of a run."""
     if setup.record_period_s:
         return int(setup.duration_s / setup.record_period_s) + 2
     return 1000 if setup.integrator.controls_error else setup.steps + 1
 
 
 def parameter_of(column: str) -> str:
-    """The name in `vary` of a column that is a number of an array."""
+    """Return the name in `vary` of a column that is an entry of an array."""
     return column.rpartition("[")[0]
 
 
-def _varied(name: str, given: Any) -> Distribution:
+def _varied(name: str, value: Any) -> Distribution:
     try:
-        return distribution(given)
+        return distribution(value)
     except RobotDynError as error:
         raise SweepError(f"vary: {name}: {error}") from None

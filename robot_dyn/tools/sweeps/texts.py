@@ -1,4 +1,4 @@
-"""Distributions, figures and samples as texts such as "uniform(low=0, high=3)", of scenes and the command line.
+"""Distributions, figures and samples as texts such as "uniform(low=0, high=3)", in scenes and on the command line.
 
 A text is a name with literal arguments. It is parsed, never evaluated.
 """
@@ -12,7 +12,7 @@ from typing import Any
 
 from robot_dyn.foundations import SweepError, nearest, shorten, shown
 
-_MOST = 10_000  # characters
+_MOST = 10_000  # largest number of characters
 _EXAMPLES = {
     "distribution": "uniform(low=0, high=3)",
     "figure": "rms_error() or peak('u'), or an import path such as 'my_figures:settling'",
@@ -21,15 +21,15 @@ _EXAMPLES = {
 
 
 def called(what: str, text: Any, functions: Mapping[str, Callable[..., Any]]) -> Any:
-    """Return what a function returns of the literal arguments of a text.
+    """Call a function with the literal arguments of a text, and return its result.
 
     Args:
-        what: Its kind, "distribution", "figure" or "samples".
+        what: Kind of the text, "distribution", "figure" or "samples".
         text: A call, or a name without arguments.
-        functions: By name.
+        functions: Functions by name.
 
     Raises:
-        SweepError: If the text is not a call, its name is unknown, or the arguments are not allowed.
+        SweepError: If the text is not a call, its name is unknown, or the arguments are invalid.
     """
     wrong = SweepError(f"{what}: {shorten(text)!r} is not a name with numbers, such as {_EXAMPLES[what]}")
     if not isinstance(text, str) or len(text) > _MOST:
@@ -49,7 +49,7 @@ def called(what: str, text: Any, functions: Mapping[str, Callable[..., Any]]) ->
 def call_of(
     what: str, name: str, functions: Mapping[str, Callable[..., Any]], arguments: Sequence[Any], by_name: dict[str, Any]
 ) -> Any:
-    """Return what a function returns by its name; SweepError if there is none, or it does not take the arguments."""
+    """Call a function by name; raise a SweepError if it is unknown or does not accept the arguments."""
     if name not in functions:
         raise SweepError(f"no {what} {shorten(name)!r}; {nearest(name, functions)}; such as {_EXAMPLES[what]}")
     function = functions[name]

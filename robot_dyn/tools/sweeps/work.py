@@ -1,6 +1,6 @@
-"""The work of a chunk: runs start, …, stop − 1 of a sweep, as rows. A run that fails is a row with its reason.
+"""The work of a chunk: runs start, …, stop − 1 of a sweep, as rows. The row of a failed run contains the reason.
 
-Bits of a row depend on the sweep and the number of the run alone: not on the chunk, its parts or the threads.
+The bits of a row depend only on the sweep and the number of the run, not on the chunk, its parts or the threads.
 """
 
 from __future__ import annotations
@@ -21,42 +21,42 @@ from robot_dyn.tools.sweeps.figures import Runs
 from robot_dyn.tools.sweeps.rows import FIXED, RAISED, Rows, empty, joined
 from robot_dyn.tools.sweeps.sweep import STARTS, Sweep, samples_of_run
 
-_PART_BYTES = 2**23  # that the runs of a part record; memory does not grow with the chunk, and allocators reuse blocks
+_PART_BYTES = 2**23  # bytes recorded by the runs of a part: memory is independent of the chunk, and blocks are reused
 _RECORDS = ("q", "v", "u", "energy", "work")
 Look = Callable[[float], object]
 
 
-class Stopped(Exception):  # noqa: N818  it is not an error
-    """The work is to end, and what was under way is dropped."""
+class Stopped(Exception):  # noqa: N818  not an error
+    """A request to end the work and drop unfinished chunks."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Work:
-    """How the runs of a sweep are made; one is used by all threads of a process.
+    """Execution of the runs of a sweep, shared by all threads of a process.
 
     Attributes:
-        sweep: What is swept.
+        sweep: The sweep.
     """
 
     sweep: Sweep
 
     @property
     def record(self) -> tuple[str, ...]:
-        """What figures and samples need recorded."""
+        """Quantities to record for figures and samples."""
         names = {name for figure in self.sweep.figures.values() for name in figure.record}
         names |= set(self.sweep.samples.names if self.sweep.samples else ())
         return tuple(name for name in _RECORDS if name in names)
 
     @property
     def part(self) -> int:
-        """Number of runs that are made together: whole tiles, as many as memory is for."""
+        """Number of runs that are made together: a multiple of the tile size, limited by memory."""
         n, samples = self.sweep.setup.plant.dynamics.n, samples_of_run(self.sweep.setup)
         numbers = sum({"energy": 2, "work": 8}.get(name, n) for name in self.record)
         return LANES * max(1, min(256, _PART_BYTES // (8 * LANES * samples * max(1, numbers))))
 
     def rows(self, start: int, stop: int) -> Rows:
-        """The rows of runs start, …, stop − 1."""
+        """Return the rows of runs start, …, stop − 1."""
         return self.made(start, stop, None)[0]
 
     def made(
@@ -67,16 +67,16 @@ class Work:
         Args:
             start: The first run.
             stop: The run after the last.
-            t: Times of samples, (m,), in [s]; None if no samples are kept.
-            look: Called some ten times a second; ends the work by raising.
+            t: Times of samples, (m,), in [s]; None if samples are not kept.
+            look: Function called about ten times a second; it ends the work by raising.
 
         Returns:
-            The rows of the runs, and their samples by name, (k, m, n), nan where they are not kept.
+            The rows of the runs, and their samples by name, (k, m, n), nan where not kept.
         """
-        kept, n = self.sweep.samples, self.sweep.setup.plant.dynamics.n
+        selection, n = self.sweep.samples, self.sweep.setup.plant.dynamics.n
         samples, parts = dict[str, np.ndarray](), []
-        if kept is not None and t is not None:
-            samples = {name: np.full((stop - start, len(t), n), np.nan) for name in kept.names}
+        if selection is not None and t is not None:
+            samples = {name: np.full((stop - start, len(t), n), np.nan) for name in selection.names}
         for first in range(start, stop, self.part):
             last = min(first + self.part, stop)
             values = self.sweep.values(first, last)
@@ -87,24 +87,24 @@ class Work:
                     rows["why"][runs - first] = result
                     continue
                 self._write(rows, runs - first, result)
-                if kept is not None and t is not None:
-                    which = kept.of(runs, result.diverged)
+                if selection is not None and t is not None:
+                    selected = selection.of(runs, result.diverged)
                     _check_times(result.t, t)
                     for name, x in samples.items():
-                        x[runs[which] - start, : len(result.t)] = getattr(result, name)[which]
+                        x[runs[selected] - start, : len(result.t)] = getattr(result, name)[selected]
             parts.append(rows)
         return joined(parts), samples
 
     def times(self) -> np.ndarray:
-        """Of the samples of the first run that finishes among 64, (m,), in [s]."""
+        """Return the times of samples, (m,), in [s], from the first of 64 runs that finishes."""
         count = min(64, self.sweep.runs)
         for _, result in self._results(np.arange(count), self.sweep.values(0, count)):
             if not isinstance(result, str) and not result.diverged.all():
                 return result.t
-        raise SweepError(f"samples: none of the first {count} runs finishes, so that their times are not known")
+        raise SweepError(f"samples: none of the first {count} runs finishes, so their times are unknown")
 
     def setup_of(self, i: int) -> Setup:
-        """The setup of run i; SweepError with its reason if there is none."""
+        """Return the setup of run i; raise a SweepError with the reason if it is invalid."""
         setup, values = self.sweep.setup, {name: x[0] for name, x in self.sweep.values(i, i + 1).items()}
         starts = {name: values.pop(name) for name in STARTS if name in values}
         try:
@@ -114,7 +114,7 @@ class Work:
             raise SweepError(f"run {i} raised: {error}") from None
 
     def run(self, i: int) -> Trajectory:
-        """Run i as a trajectory; SweepError with its reason if it raised."""
+        """Return run i as a trajectory; raise a SweepError with the reason if it raised an error."""
         batch, reasons = self._batch(np.array([i]), self.sweep.values(i, i + 1), _RECORDS)
         if batch is None:
             raise SweepError(f"run {i} raised: {reasons[0]}")
@@ -122,7 +122,7 @@ class Work:
         return run_batch(batch, passed, True, 1, MOST_BYTES)[0]
 
     def _write(self, rows: Rows, at: np.ndarray, result: Rollouts) -> None:
-        """Rows of runs that were made; figures of those that finished."""
+        """Write the results of runs into rows, with figures for runs that finished."""
         for column in FIXED:
             rows[column.name][at] = column.values(result)
         places = np.flatnonzero(~result.diverged)
@@ -132,7 +132,7 @@ class Work:
         for name, figure in self.sweep.figures.items():
             try:
                 rows[name][at] = figure.of(runs)
-            except Exception:  # of a user's function: of which runs it raises
+            except Exception:  # in a user's function: find the runs for which it raises
                 for i, place in enumerate(at.tolist()):
                     try:
                         rows[name][place] = figure.of(runs.only(i))[0]
@@ -143,7 +143,7 @@ class Work:
     def _results(
         self, runs: np.ndarray, values: dict[str, np.ndarray], look: Look | None = None
     ) -> Iterator[tuple[np.ndarray, Rollouts | str]]:
-        """The rollouts of runs by their numbers; of one that raises, the reason."""
+        """Yield the rollouts of runs with their numbers; the reason for a run that raises."""
         batch, reasons = self._batch(runs, values, self.record)
         yield from ((runs[[i]], reason) for i, reason in reasons.items())
         if batch is None:
@@ -153,7 +153,7 @@ class Work:
             some, results = batch.some(places), []
             for at, passed in manners(some):
                 result = run_batch(some.some(at), passed, True, 1, MOST_BYTES, look)
-                if result.stopped.any():  # Ctrl-C came inside
+                if result.stopped.any():  # Ctrl-C during the runs
                     raise Stopped
                 results.append((some.number_of(at), result))
             return results
@@ -164,7 +164,7 @@ class Work:
     def _batch(
         self, runs: np.ndarray, values: dict[str, np.ndarray], record: tuple[str, ...]
     ) -> tuple[Batch | None, dict[int, str]]:
-        """The batch of the runs whose values are allowed; why those of the others are not, by place."""
+        """Return the batch of runs with valid values, and the reasons for the others, by index."""
         setup = replace(self.sweep.setup, estimate_error=False, accuracy=None)
 
         def batch(at: np.ndarray) -> Batch:
@@ -172,21 +172,21 @@ class Work:
             q0, v0 = (chosen.pop(name, None) for name in STARTS)
             return batch_of(setup, q0, v0, chosen, record, runs[at])
 
-        tried = list(_in_halves(np.arange(len(runs)), batch))
-        reasons = {int(at[0]): because(found) for at, found in tried if isinstance(found, Exception)}
+        attempts = list(_in_halves(np.arange(len(runs)), batch))
+        reasons = {int(at[0]): because(result) for at, result in attempts if isinstance(result, Exception)}
         if not reasons:
-            return tried[0][1], {}
+            return attempts[0][1], {}
         allowed = [i for i in range(len(runs)) if i not in reasons]
         return (batch(np.array(allowed)) if allowed else None), reasons
 
 
 def _in_halves(places: np.ndarray, attempt: Callable[[np.ndarray], Any]) -> Iterator[tuple[np.ndarray, Any]]:
-    """What `attempt` returns of places, or of their halves where it raises; of one place that raises, the error."""
+    """Yield the results of `attempt` for places, or for their halves if it raises; the error for a single place."""
     try:
         result = attempt(places)
     except (Stopped, MemoryError):
         raise
-    except Exception as error:  # of the library, or of a user's code in a run
+    except Exception as error:  # in the library, or in user code
         if len(places) == 1:
             yield places, error
         else:
@@ -198,6 +198,6 @@ def _in_halves(places: np.ndarray, attempt: Callable[[np.ndarray], Any]) -> Iter
 
 
 def _check_times(t: np.ndarray, known: np.ndarray) -> None:
-    """Raise SweepError unless the times of a batch are the first of those that all runs have."""
+    """Raise a SweepError unless the times of a batch are the first times of all runs."""
     if len(t) > len(known) or (t != known[: len(t)]).any():
         raise SweepError("samples: the runs are not sampled at the same times; give the scene a record_period_s")

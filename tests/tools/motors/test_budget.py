@@ -168,7 +168,7 @@ def test_a_limit_that_is_passed_is_named_with_the_cause_that_asks_for_it() -> No
     assert all(kinds[-1] == "speed" for kinds in small.values() if "speed" in kinds)
     lift = found.joints[1]
     assert f"shoulder_lift_joint needs {lift.peak:.4g} of 60 N m" in found.sentence and "for gravity" in found.sentence
-    assert any("no limit of peak torque is known of shoulder_pan_joint" in each for each in found.findings)
+    assert any("the peak torque limit of shoulder_pan_joint" in each for each in found.findings)
     free = budget(rd.control.quintic([0.0], [1.0], 1.0), FREE, effort=np.inf, velocity=np.inf)
     assert free.fits and "no limit is known" in free.sentence
     some = budget(PLAN, UR5)  # its file states no continuous torque
@@ -227,7 +227,7 @@ def test_no_payload_fits_where_speed_is_passed_and_any_where_nothing_limits() ->
     fast = max_payload(budget(motion, ROD, effort=100.0, velocity=1.0), "bar")
     assert fast.mass is None and fast.limit == "speed" and "no payload" in repr(fast)
     free = max_payload(budget(motion, ROD, effort=np.inf, velocity=np.inf), "bar")
-    assert free.mass == np.inf and "no limit" in repr(free)
+    assert free.mass == np.inf and "no known limit" in repr(free)
     with pytest.raises(EditError, match="no frame 'nowhere'"):
         max_payload(budget(motion, ROD, effort=9.0), "nowhere")
 
@@ -280,9 +280,9 @@ def test_what_has_no_budget_is_refused() -> None:
     run = rd.simulate(rd.Plant(ROD), [0.4], duration_s=0.05)
     lugre = rd.effects.LuGreFriction(100.0, 1.0, 0.1, 1.0, 1.5, 0.1)
     for call, error, message in (
-        (lambda: budget(PLAN), QueryError, "a plan does not know its arm"),
-        (lambda: budget(PLAN, ROD), QueryError, "of 6 joints, shoulder_pan_joint.*has 1"),
-        (lambda: budget(PLAN.reference, ROD), QueryError, "of 6 joints; .* has 1"),
+        (lambda: budget(PLAN), QueryError, "a plan has no arm"),
+        (lambda: budget(PLAN, ROD), QueryError, "has 6 joints, shoulder_pan_joint.*has 1"),
+        (lambda: budget(PLAN.reference, ROD), QueryError, "has 6 joints; .* has 1"),
         (lambda: budget(POINTS, UR5), QueryError, "motion: give a plan"),  # pyright: ignore
         (lambda: budget(PLAN, UR5, motors="motors.csv"), PlanError, "read them with"),  # pyright: ignore
         (lambda: budget(PLAN, UR5, effort=-1.0), PlanError, "effort"),
@@ -290,16 +290,16 @@ def test_what_has_no_budget_is_refused() -> None:
         (
             lambda: budget(PLAN, rd.Plant(UR5, [lugre])),
             EffectError,
-            "lugre_friction has states.*give the run",
+            "lugre_friction has states.*pass the run",
         ),
         (lambda: budget(run, ROD), QueryError, "has its own plant"),
         (lambda: budget(run, payload=LOAD), QueryError, "has its own payload"),
         (
             lambda: max_payload(budget(run), "bar"),
             QueryError,
-            "this budget is of a run: give its motion",
+            "this is the budget of a run: pass its motion",
         ),
-        (lambda: fastest(budget(run)), QueryError, "this budget is of a run"),
+        (lambda: fastest(budget(run)), QueryError, "this is the budget of a run"),
         (lambda: budget(replace(run, t=run.t[:1], v=run.v[:1])), QueryError, "one sample"),
     ):
         with pytest.raises(error, match=message):
@@ -408,7 +408,7 @@ def test_the_given_motion_is_the_answer_where_it_fits_and_none_that_is_faster_do
     assert (
         fast.given and fast.budget is given and fast.duration == fast.before and fast.plan.reference is PLAN.reference
     )
-    assert "the given one fits, and is the answer" in repr(fast)
+    assert "the original motion, which fits" in repr(fast)
     half = fastest(given, share=0.4)
     assert not half.given and "at 40 % of the peak torques" in repr(half)
 
@@ -439,9 +439,9 @@ def test_the_command_ends_with_1_if_a_motor_is_too_small(files: Path) -> None:
     assert ran("budget", "ur5", plan).returncode == 0
     heavy = ran("budget", "ur5", plan, "--payload", "wrist_3_link=5kg@0.12,0.03,0.05", "--limits", motors)
     assert (heavy.returncode, heavy.stderr) == (1, "") and "too small: shoulder_lift_joint needs" in heavy.stdout
-    assert refusal(["budget", "ur5"]).startswith("ur5: give its motion as well")
+    assert refusal(["budget", "ur5"]).startswith("ur5: give a motion as well")
     assert "is for a robot with a plan" in refusal(["budget", "s.toml", plan])
-    assert "--share is of the fastest motion: add --fastest" in refusal(["budget", "ur5", plan, "--share", "0.9"])
+    assert "--share is for the fastest motion: add --fastest" in refusal(["budget", "ur5", plan, "--share", "0.9"])
     assert "--joint must be JOINT=COLUMN" in refusal(["budget", "ur5", plan, "--joint", "J1"])
     assert "--max-payload must be LINK@X,Y,Z" in refusal(["budget", "ur5", plan, "--max-payload", "tool0@1"])
 

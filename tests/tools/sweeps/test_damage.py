@@ -190,7 +190,7 @@ def test_a_damaged_chunk_is_made_again_once_it_is_removed(copy: Path, whole: sw.
         with pytest.raises(SweepError, match=r"000001\.parquet"):
             question()
     (copy / ROWS).unlink()
-    with pytest.raises(SweepError, match="1 of 3 chunks are left to do, the first is 1"):
+    with pytest.raises(SweepError, match="1 of 3 chunks are missing, the first is 1"):
         done.table()
     assert sw.run(whole.sweep, copy).verify() == digest(whole.sweep)
 
@@ -198,7 +198,7 @@ def test_a_damaged_chunk_is_made_again_once_it_is_removed(copy: Path, whole: sw.
 @pytest.mark.parametrize("found", [4, 6])
 def test_a_folder_of_another_format_is_refused_with_both(copy: Path, found: int) -> None:
     key("format", found)(copy)
-    with pytest.raises(SweepError, match=f"has format {found}, this version reads 5; read it with the version"):
+    with pytest.raises(SweepError, match=f"has format {found}, but this version reads 5; read it with the version"):
         sw.read(copy)
 
 

@@ -146,7 +146,7 @@ def test_few_tasks_wait_at_a_scheduler(filled: Any) -> None:
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ("tcp://10.0.0.3:8786", r"not encrypted, and whoever reaches an open port .* runs code"),
+        ("tcp://10.0.0.3:8786", r"not encrypted, so anybody who reaches the port .* can run code"),
         ("ws://example.org:8786", "not encrypted"),
         ("local:0", "'local:2' is 2 processes"),
         ("local:2x0", "'local:2x4' has 4 threads"),
@@ -199,7 +199,7 @@ def test_ctrl_c_drops_the_chunks_under_way_and_keeps_the_rest(tmp_path: Path) ->
             raise KeyboardInterrupt
 
     done = sw.run(sweep, tmp_path / "out", chunk=5, threads=2, on_progress=interrupted)
-    assert 0 < len(done.missing) <= 120 and f"{len(done.missing)} of 120 chunks are left to do" in repr(done)
+    assert 0 < len(done.missing) <= 120 and f"{len(done.missing)} of 120 chunks are missing" in repr(done)
     assert not list((tmp_path / "out" / "rows").glob(".*"))
     again = sw.run(sweep, tmp_path / "out")
     assert again.verify() == digest(sweep)

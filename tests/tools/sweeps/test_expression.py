@@ -62,7 +62,7 @@ def test_anything_else_is_refused(text: str) -> None:
         Expression(text).of(COLUMNS)
 
 
-CALL, NUMBER = "functions are not known", "compare the number"
+CALL, NUMBER = "functions are not supported", "compare the number"
 
 
 @pytest.mark.parametrize(

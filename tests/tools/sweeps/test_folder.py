@@ -38,7 +38,9 @@ def test_a_full_disk_names_the_chunk_and_keeps_the_rest(tmp_path: Path, monkeypa
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    said = r"^chunk 3 \(runs 60 to 79\): .*000003\.parquet.*\(No space left on device\).*make room.* are kept: run"
+    said = (
+        r"^chunk 3 \(runs 60 to 79\): .*000003\.parquet.*\(No space left on device\).*free disk space.* are kept: run"
+    )
     with monkeypatch.context() as patch, pytest.raises(SweepError, match=said):
         patch.setattr(os, "fsync", full)
         folder.write(3, work.rows(60, 80))
@@ -124,7 +126,7 @@ def test_what_killed_writers_left_is_removed_and_what_others_write_is_not(tmp_pa
     ],
 )
 def test_another_sweep_in_the_folder_is_refused_with_the_first_difference(begun_100: Path, change, named) -> None:
-    with pytest.raises(SweepError, match=f"holds another sweep: {named}"):
+    with pytest.raises(SweepError, match=f"contains another sweep: {named}"):
         begun(swept(begun_100.parent, **{"runs": 100} | change), begun_100)
 
 
@@ -192,7 +194,7 @@ def test_another_sweep_that_begins_at_the_same_time_changes_nothing(tmp_path: Pa
         return pilot(sweep, chunk)
 
     monkeypatch.setattr(run_sweep, "pilot", pilot_of_the_second)
-    with pytest.raises(SweepError, match="holds another sweep: seed"):
+    with pytest.raises(SweepError, match="contains another sweep: seed"):
         sw.run(second, out, chunk=20)
     assert len(sw.read(out).missing) == 2
     done = sw.run(first, out)
@@ -204,11 +206,11 @@ def test_a_folder_is_moved_with_its_scene(tmp_path: Path) -> None:
     digest = sw.run(swept(tmp_path / "here", 40), tmp_path / "here" / "out").verify()
     (tmp_path / "here").rename(tmp_path / "there")
     folder, scene = tmp_path / "there" / "out", tmp_path / "there" / "scene.toml"
-    with pytest.raises(SweepError, match=r"no such file.*sw.read\(folder, scene=…\), --scene, where it lies now"):
+    with pytest.raises(SweepError, match=r"no such file.*sw.read\(folder, scene=…\) or --scene"):
         sw.read(folder)
     assert sw.read(folder, scene).verify() == digest
     scene.write_text(scene.read_text().replace("0.9", "0.8"))
-    with pytest.raises(SweepError, match="holds another sweep: setup"):
+    with pytest.raises(SweepError, match="contains another sweep: setup"):
         sw.read(folder, scene)
 
 

@@ -86,7 +86,7 @@ def test_a_figure_that_finished_runs_have_not_is_no_failure(tmp_path: Path, monk
             ask("late", given="finished")
     assert done.mean("late", given="known").estimate == pytest.approx(x[some].mean(), rel=1e-12)
     assert "mean of late given known" in str(done.mean("late", given="known"))
-    with pytest.raises(SweepError, match=r"some finished, and have no figure: ask with given='known'"):
+    with pytest.raises(SweepError, match=r"some finished, but have no figure: pass given='known'"):
         done.probability("failed | late > 0.45")
     assert done.probability("late > 0.45", given="known").estimate == (x[some] > 0.45).mean()
     assert set(done.worst("late", 200, given="known")) == set(np.flatnonzero(some))
@@ -284,7 +284,7 @@ def test_a_figure_that_raises_makes_its_run_one_that_raised(tmp_path: Path, modu
 
 CODE = "figures_of_a_test"
 WRONG: dict[str, dict[str, Any]] = {
-    "none of the 64 runs of the pilot finishes.*return a number": {"figures": {"mine": f"{CODE}:text"}},
+    "none of the 64 pilot runs finishes.*return a number": {"figures": {"mine": f"{CODE}:text"}},
     "figures_of_a_test:absent cannot be imported": {"figures": {"mine": f"{CODE}:absent"}},
     "no_such_module_here:f cannot be imported": {"figures": {"mine": "no_such_module_here:f"}},
     "'a.settling' is not .*or an import path such as 'my_figures:settling'": {"figures": {"mine": "a.settling"}},
@@ -292,7 +292,7 @@ WRONG: dict[str, dict[str, Any]] = {
     "which other processes cannot import: write it to my_figures.py": {"figures": {"mine": lambda run: 0.0}},
     "'diverged' is the name of another column": {"figures": {"diverged": sw.rms_error()}},
     "'q0.0.' is the name of another column": {"figures": {"q0[0]": sw.rms_error()}},
-    "of which joint": {"figures": {"mine": sw.final("q")}},
+    "needs a joint": {"figures": {"mine": sw.final("q")}},
     "no joint 'elbow'; known: joint_1, joint_2": {"figures": {"mine": sw.peak("u", "elbow")}},
     "the arm carries no payload": {"vary": {"payload_mass:tool0": sw.uniform(low=0, high=3)}},
     "no 'kq'; ": {"vary": {"kq": sw.uniform(low=0, high=3)}},
@@ -346,7 +346,7 @@ def test_a_scene_states_a_sweep_as_data(tmp_path: Path) -> None:
     sweep = sw.from_scene(path, seed=3)
     assert (sweep.runs, sweep.seed, sweep.figures) == (70, 3, {"worst": sw.peak("error")})
     for text, said in (
-        ('"my_module:f"', "runs code, and a scene is data"),
+        ('"my_module:f"', "would run code, but a scene is data"),
         ("\"peak(__import__('os'))\"", "is not a name with numbers"),
         ("\"peek('u')\"", "no figure 'peek'; nearest: peak"),
     ):

@@ -84,7 +84,7 @@ def test_what_cannot_be_kept_is_refused(tmp_path: Path) -> None:
 def test_a_sweep_refused_for_its_samples_leaves_a_folder_that_takes_the_corrected_one(tmp_path: Path) -> None:
     """All runs of the first diverge at once, so that times of samples are not known."""
     out = tmp_path / "out"
-    with pytest.raises(SweepError, match="times are not known"):
+    with pytest.raises(SweepError, match="times are unknown"):
         sw.run(swept(tmp_path, 20, vary={"kd": sw.choice([4e6])}, samples="q"), out, chunk=10)
     sw.run(swept(tmp_path, 20, vary={"kd": sw.choice([4.0])}, samples="q"), out, chunk=10)
     assert np.isfinite(sw.read(out).samples().q.values).all()

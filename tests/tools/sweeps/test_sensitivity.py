@@ -167,5 +167,5 @@ def test_the_report_shows_failures_over_the_parameter_that_decides_them(tmp_path
     vary = {"q0": sw.normal(mean=[0.4, 0.9], sd=0.1)}
     done = of_figure(tmp_path, "fails", sw.choice(np.arange(64.0)), design="sobol", vary=vary)
     page = done.save_report(tmp_path / "report.html").read_text(encoding="utf-8")
-    shown = re.search(r"failed over (\S+) and (\S+),", page)
+    shown = re.search(r"failed runs over (\S+) and (\S+),", page)
     assert shown is not None and "kp" in shown.groups()

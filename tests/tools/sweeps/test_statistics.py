@@ -147,7 +147,7 @@ def test_points_that_are_not_random_have_no_interval() -> None:
 def test_runs_that_do_not_bound_a_quantile_say_how_many_would() -> None:
     """1 − pᴺ ≥ 97.5 %: from N = 3688 on at p = 0.999."""
     (made,) = statistics.quantiles(X, 0.999)
-    assert made.high == inf and "independent ones need 3688 at least" in made.note
+    assert made.high == inf and "at least 3688 independent runs are needed" in made.note
     (made,) = statistics.quantiles(np.arange(3688.0), 0.999)
     assert made.high == 3687 and not made.note
 

@@ -1,9 +1,9 @@
-"""The torque at which joints with static friction leave rest, or go on where they reverse.
+"""The torque at which joints with static friction leave rest, or continue after a reversal.
 
     τ_b = τ − τ_sliding + f_s sign(v⁺)
 
-τ is that of the motion just after, τ_sliding the part that overcomes dry friction, f_s the static friction, and v⁺ the
-velocity after. A motor that does not reach τ_b does not start the joint.
+τ is the torque of the motion just after, τ_sliding its part against dry friction, f_s the static friction, and v⁺ the
+velocity just after. A motor that does not reach τ_b does not start the joint.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from robot_dyn import Plant
 from robot_dyn.effects import SetValued, numbered, torques_by_cause
 from robot_dyn.tools.motors.motor_budget.cells import Cells
 
-_RESTS = 1e-9  # of the largest velocity of a joint
+_RESTS = 1e-9  # relative to the largest velocity of a joint: slower is rest
 
 
 class Breakaway(NamedTuple):
-    """Torques τ_b, (b,), of joints by number, at times in [s]."""
+    """Torques τ_b, with the index of the joint and the time in [s], all (b,)."""
 
     joint: np.ndarray
     t: np.ndarray
@@ -31,7 +31,7 @@ NO_BREAKAWAY = Breakaway(np.zeros(0, int), np.zeros(0), np.zeros(0))
 
 
 def static_friction(plant: Plant) -> np.ndarray:
-    """Return f_s of each joint, of all dry friction, (n,), in [N m] or [N]."""
+    """Return the static friction f_s of each joint, (n,), in [N m] or [N]."""
     n = plant.dynamics.n
     most = [force.at_rest(np.zeros(n)).most for force in plant.forces if isinstance(force, SetValued) and force.rubs]
     return np.sum(most, axis=0) if most else np.zeros(n)

@@ -1,4 +1,4 @@
-"""Whether motors suffice for a motion: what each joint needs, its limits, and which cause asks for it."""
+"""The motor budget of a motion: the demand on each joint, its limits, and its causes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from robot_dyn.tools.motors.motor_budget.result import MotorBudget
 from robot_dyn.tools.motors.motors_file import Motors
 from robot_dyn.tools.motors.planning.path_plan import PathPlan
 
-_DRIVES = "series_elastic", "rigid_backlash"  # whose motors turn at other speeds than their joints
+_DRIVES = "series_elastic", "rigid_backlash"  # their motors turn at other speeds than their joints
 
 
 def budget(
@@ -34,30 +34,30 @@ def budget(
     velocity: Any = None,
     continuous: Any = None,
 ) -> MotorBudget:
-    """What a motion asks of the motors: torque by cause, speed, power and energy of each joint, and its headroom.
+    """Compute the demand of a motion on the motors: torque by cause, speed, power and energy, and the headroom.
 
         τ = M(q) a + C(q, v) v + ∂V/∂q − Σ τ_effect
 
-    Along a plan τ is that of the inverse dynamics; of a run it is the actuation that was recorded. It is compared with
-    peak torque, its root mean square over the motion with continuous torque. Powers are those at the joint, τ v,
-    without losses of motor and gear. A rotor inertia of `motors` acts as armature where the arm has none. A run that
-    simulates its gears has its own rotors; those of `motors` must be the same, to 1 %.
+    For a plan, τ is computed by inverse dynamics; for a run, it is the recorded actuation. |τ| is compared with the
+    peak torque, its root mean square over the motion with the continuous torque. Powers are τ v at the joint, without
+    losses of motor and gear. A rotor inertia in `motors` acts as armature if the arm has none. A run that simulates
+    gears has its own rotors; those in `motors` must agree to 1 %.
 
     Args:
         motion: A plan, a `PiecewisePolynomial`, or a run of `rd.simulate`.
-        plant: The arm, or a plant with effects; of a run it is known.
-        payload: What a plan's arm carries, a `Payload` or several.
-        motors: Of `rd.tools.motors.read_motors`: peak and continuous torques, speeds and rotors.
-        effort: Peak torques, one number, by joint name or (n,), in [N m] or [N]; those of the motors or, without them,
-            of the robot's file unless given.
-        velocity: Speed limits, likewise, in [rad/s] or [m/s].
-        continuous: Continuous torques, likewise, in [N m] or [N]; those of the motors unless given.
+        plant: The arm, or a plant with effects; only for plans.
+        payload: A `Payload` or several, carried along a plan.
+        motors: Motors of `rd.tools.motors.read_motors`, with peak and continuous torques, speeds and rotors.
+        effort: Peak torques, one number, by joint name or (n,), in [N m] or [N]; by default those of the motors or,
+            without motors, of the robot's file.
+        velocity: Speed limits, one number, by joint name or (n,), in [rad/s] or [m/s]; same default.
+        continuous: Continuous torques, one number, by joint name or (n,), in [N m] or [N]; by default of the motors.
 
     Raises:
-        QueryError: If the motion is of other joints, or a run is given with a plant or a payload, has diverged or
-            cannot be split by cause.
-        PlanError: If a limit is not allowed, or a rotor is not that of the arm.
-        EffectError: If an effect has states, which a plan does not determine: give a run.
+        QueryError: If the motion has other joints, or a run is passed with a plant or a payload, has diverged or cannot
+            be split by cause.
+        PlanError: If a limit is invalid, or a rotor differs from the arm's.
+        EffectError: If an effect has states, which a plan does not determine: pass a run.
 
     Source: Siciliano et al. 2009, sec. 5.2; Armstrong-Hélouvry 1991 for breaking away.
     """
@@ -66,21 +66,21 @@ def budget(
     if isinstance(motion, Trajectory):
         if plant is not None or payload is not None:
             raise QueryError(
-                f"a run has its own {'plant' if plant is not None else 'payload'}: leave it out and simulate again, or"
-                " give its motion, budget(rd.control.from_samples(arm, run.table(), ends='measured'), plant, payload=…)"
+                f"a run has its own {'plant' if plant is not None else 'payload'}: simulate again without it, or pass"
+                " the motion, budget(rd.control.from_samples(arm, run.table(), ends='measured'), plant, payload=…)"
             )
         return _of_run(motion, motors, given)
     if not isinstance(motion, PiecewisePolynomial | Plan | PathPlan):
         raise QueryError(f"motion: give a plan, a PiecewisePolynomial, or a run of rd.simulate, got {shown(motion)}")
     if plant is None:
         raise QueryError(
-            "plant: a plan does not know its arm; give it, rd.tools.motors.budget(plan, arm), or a plant with effects"
+            "plant: a plan has no arm; give the arm, rd.tools.motors.budget(plan, arm), or a plant with effects"
         )
     return _of_plan(motion, _loaded(plant, payload, motors), motors, given)
 
 
 def _sources(motors: Motors | None, given: Mapping[str, Any]) -> str:
-    """Return where limits come from, in words."""
+    """Return the sources of the limits, in words."""
     stated = [
         ("continuous torque", "continuous", motors and motors.continuous, "not known"),
         ("peak torque", "effort", motors, "the robot's file"),
@@ -90,13 +90,13 @@ def _sources(motors: Motors | None, given: Mapping[str, Any]) -> str:
     for name, key, of_motors, otherwise in stated:
         source = "given" if given[key] is not None else motors.source if motors and of_motors else otherwise
         names.setdefault(source, []).append(name)
-    return "; ".join(f"{', '.join(of)}: {source}" for source, of in names.items())
+    return "; ".join(f"{', '.join(limits)}: {source}" for source, limits in names.items())
 
 
 def _loaded(plant: Any, payload: Any, motors: Motors | None) -> Plant:
-    """Return the plant with a payload, and with the rotors of motors where the arm has none."""
+    """Return the plant with a payload, and with the rotors of motors for joints without armature."""
     plant = plant if isinstance(plant, Plant) else Plant(plant)
-    robot = instance("plant", plant.dynamics, Robot, "give that of a robot, such as rd.Plant(rd.load('ur5'))")
+    robot = instance("plant", plant.dynamics, Robot, "give the plant of a robot, such as rd.Plant(rd.load('ur5'))")
     if payload is not None:
         robot = robot.with_(payload=payload)
     if motors is not None and motors.armature:
@@ -114,16 +114,14 @@ def _of_plan(
     joints = robot.joint_names if plan is None else plan.joint_names
     if reference.n != robot.n or joints != robot.joint_names:
         raise QueryError(
-            f"the motion is of {reference.n} joints{'' if plan is None else ', ' + ', '.join(joints)}; {robot.name} has"
-            f" {robot.n}, {', '.join(robot.joint_names)}"
+            f"the motion has {reference.n} joints{'' if plan is None else ', ' + ', '.join(joints)}; {robot.name} has"
+            f" {robot.n}, {', '.join(robot.joint_names)}; use a motion of this arm"
         )
     limits, demand = limits_of(plant, motors, **given), of_motion(reference, plant)
     outside = (f"{where}; check the motion" for where in outside_positions(robot, reference))
     findings = [*robot.findings, *(() if plan is None else plan.findings), *outside]
     if any(isinstance(effect, EffortLimit) for effect in plant.effects):
-        findings.append(
-            "peak torques are never above the EffortLimit of the plant; leave it out for those of the motors"
-        )
+        findings.append("the EffortLimit of the plant bounds the peak torques; remove it to use those of the motors")
     return _budget(
         robot, "motion" if plan is None else plan.method, demand, tuple(joint_budgets(demand, limits)),
         _sources(motors, given), findings, [], (plant, reference, limits),
@@ -136,23 +134,23 @@ def _of_run(run: Trajectory, motors: Motors | None, given: Mapping[str, Any]) ->
     motors = _with_rotors(motors, simulated)
     cut = frozenset(remark.joint for remark in run.remarks if remark.kind == RemarkKind.EFFORT_REACHED)
     joints = tuple(joint_budgets(demand, limits_of(Plant(robot), motors, **given), cut))
-    told = RemarkKind.EFFORT_REACHED, RemarkKind.COARSE
-    findings = remark_lines(remark for remark in run.remarks if remark.kind in told)
+    reported = RemarkKind.EFFORT_REACHED, RemarkKind.COARSE
+    findings = remark_lines(remark for remark in run.remarks if remark.kind in reported)
     if run.outcome.ending == Ending.STOPPED:
-        findings.append(f"the run was stopped at {run.outcome.t:.6g} s; the budget is of what was simulated")
-    left = ["torque at which joints break away: a run does not hold its static friction"]
+        findings.append(f"the run was stopped at {run.outcome.t:.6g} s; the budget covers the simulated part")
+    left = ["torque at which joints break away: a run does not contain its static friction"]
     if driven := [name for name in run.effect_torques or {} if name.startswith(_DRIVES)]:
         left.append(f"power at the motors of {', '.join(driven)}, which turn at other speeds than their joints")
     if simulated:
-        findings.append(f"the rotors of {', '.join(simulated)} are those of the run, which simulates its gears")
+        findings.append(f"the run simulates the gears of {', '.join(simulated)}, so their rotors come from the run")
     return _budget(robot, "run of", demand, joints, _sources(motors, given), findings, left, None)
 
 
 def _simulated_rotors(run: Trajectory, robot: Robot) -> dict[str, float]:
-    """Return the inertia at its joint of each rotor that the drives of a run simulate.
+    """Return the inertias, at the joints, of the rotors that a run simulates.
 
     Raises:
-        PlanError: If the arm has the same inertia as armature, which counts the rotor twice.
+        PlanError: If the arm has the same inertia as armature, so that the rotor counts twice.
     """
     rotors: dict[str, float] = json.loads(run.about.get("rotors", "{}"))
     for name, armature in zip(robot.joint_names, robot.armature.tolist(), strict=True):
@@ -165,40 +163,40 @@ def _simulated_rotors(run: Trajectory, robot: Robot) -> dict[str, float]:
 
 
 def _with_rotors(motors: Motors | None, simulated: Mapping[str, float]) -> Motors | None:
-    """Return motors without the rotors that a run simulates itself.
+    """Return motors without the rotors that a run simulates.
 
     Raises:
-        PlanError: If a motor states another inertia than the run simulates.
+        PlanError: If the inertia of a motor differs from the one in the run.
     """
     if motors is None:
         return None
     for name, stated in motors.armature.items():
         if name in simulated and not same_rotor(stated, simulated[name]):
             raise PlanError(
-                f"{motors.source}: the rotor of {name!r} is felt as {stated:.6g} kg m² at the joint, the gears of the"
-                f" run simulate {simulated[name]:.6g} kg m²; correct the file, or simulate with that inertia"
+                f"{motors.source}: the rotor of {name!r} has {stated:.6g} kg m² at the joint, but the run simulates"
+                f" {simulated[name]:.6g} kg m²; correct the file, or simulate with that inertia"
             )
     return replace(motors, armature={name: x for name, x in motors.armature.items() if name not in simulated})
 
 
 def _budget(
-    robot: Robot, what: str, demand: Demand, joints: tuple[JointBudget, ...], limits: str, findings: Iterable[str],
+    robot: Robot, method: str, demand: Demand, joints: tuple[JointBudget, ...], limits: str, findings: Iterable[str],
     left_out: Iterable[str], case: Any,
 ) -> MotorBudget:  # fmt: skip
-    what = f"{what}{'' if case is None else ','} {demand.duration:.6g} s"
+    motion = f"{method}{'' if case is None else ','} {demand.duration:.6g} s"
     carried = ", ".join(f"{payload.mass:g} kg on {payload.frame}" for payload in robot.edits.payloads)
     unknown = {
         "peak torque": [x.joint for x in joints if x.peak_limit == inf and x.peak > 0],
         "speed": [x.joint for x in joints if x.speed_limit == inf and x.speed > 0],
     }
     not_judged = (
-        f"no limit of {kind} is known of {', '.join(names)}, so it is not judged; give motors or limits"
+        f"the {kind} limit of {', '.join(names)} is unknown, so it is not checked; give motors or limits"
         for kind, names in unknown.items()
         if names
     )
     return MotorBudget(
         robot=robot.name,
-        motion=f"{what}, carrying {carried}" if carried else what,
+        motion=f"{motion}, carrying {carried}" if carried else motion,
         duration=demand.duration,
         joints=joints,
         limits=limits,

@@ -1,6 +1,6 @@
-"""A motion in cells in which it is smooth, and the rule that integrates over each: Kronrod's with 7 points.
+"""Cells in which a motion is smooth, and the rule of integration over each: Kronrod's with 7 points.
 
-    ∫ f dt ≈ Σ h/2 Σⱼ wⱼ f(xⱼ),   of degree 11; Gauss's rule with 3 of the points, of degree 5, shows its error
+    ∫ f dt ≈ Σ h/2 Σⱼ wⱼ f(xⱼ),   of degree 11; Gauss's rule with 3 of the points, of degree 5, estimates its error
 
 [Kronrod, Nodes and Weights of Quadrature Formulas, 1965; Piessens et al., QUADPACK, 1983]
 """
@@ -17,13 +17,13 @@ from robot_dyn import Plant
 from robot_dyn.control import PiecewisePolynomial, polynomial
 from robot_dyn.tools.motors.planning.geometric_path import at_rest_exactly, turning_points
 
-FEWEST = 400  # cells of a motion
-_NEAR = 1e-12  # of a cell: places at its ends are as far inside, where friction has its sign
-_RESTS, _NOTHING = 1e-9, 1e-300  # of the largest velocity: its sign may be rounding; a velocity with a sign alone
-_CLOSE = 1e-6  # of a piece: a reversal so near its end is that of the end, where the velocity has a multiple root
+FEWEST = 400  # smallest number of cells of a motion
+_NEAR = 1e-12  # relative to a cell: places at its ends lie this far inside, where friction has its sign
+_RESTS, _NOTHING = 1e-9, 1e-300  # relative velocity whose sign may be rounding; a velocity that has only a sign
+_CLOSE = 1e-6  # relative to a piece: a reversal nearer to its end is at the end, where the velocity has a multiple root
 _HALF = np.array([0.9604912687080202, 0.7745966692414834, 0.4342437493468026])
 X = np.array([-1.0, *-_HALF, 0.0, *_HALF[::-1], 1.0])
-"""Places in a cell from −1 to 1: both ends, which no rule counts, and the 7 points."""
+"""Places in a cell from −1 to 1: both ends, with weight 0, and the 7 points."""
 KRONROD = np.array([0.0, *(k := (0.1046562260264673, 0.2684880898683334, 0.4013974147759622)), 0.4509165386584741,
                     *k[::-1], 0.0])  # fmt: skip
 GAUSS = np.array([0.0, 0.0, 5 / 9, 0.0, 8 / 9, 0.0, 5 / 9, 0.0, 0.0])
@@ -32,12 +32,12 @@ GAUSS = np.array([0.0, 0.0, 5 / 9, 0.0, 8 / 9, 0.0, 5 / 9, 0.0, 0.0])
 @final
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Cells of a motion, c of them, in the order of time.
+    """The c cells of a motion, in the order of time.
 
     Attributes:
         motion: The motion.
-        piece: The piece of the motion that each is in, (c,).
-        t0, t1: Its ends, (c,), in [s].
+        piece: Index of the piece of the motion around each cell, (c,).
+        t0, t1: Ends of the cells, (c,), in [s].
     """
 
     motion: PiecewisePolynomial
@@ -47,21 +47,21 @@ class Cells:
 
     @property
     def length(self) -> np.ndarray:
-        """Of each, (c,), in [s]."""
+        """Length of each cell, (c,), in [s]."""
         return self.t1 - self.t0
 
     @cached_property
     def _middle(self) -> np.ndarray:
-        """The middle of each, after the start of its piece, (c,), in [s]."""
+        """Time from the start of the piece to the middle of each cell, (c,), in [s]."""
         return (self.t0 + self.t1) / 2 - self.motion.breaks[self.piece]
 
     @cached_property
     def largest_speed(self) -> np.ndarray:
-        """Of each joint in the middle of cells, (n,), in [rad/s] or [m/s]."""
+        """Largest speed of each joint in the middle of cells, (n,), in [rad/s] or [m/s]."""
         return np.abs(polynomial(self.motion.coefficients[self.piece], self._middle[:, None])[1]).max(axis=0)
 
     def states(self, cell: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Times and motion at places x of cells, (k,) and three of (k, n): at the ends the limits from inside."""
+        """Return times, (k,), and q, v, a, (k, n), at places x of cells; at the ends, limits from inside."""
         inside = np.clip(x, -1 + 2 * _NEAR, 1 - 2 * _NEAR)
         start = self.motion.breaks[self.piece[cell]]
         s = self.t0[cell] - start + self.length[cell] * (1 + inside) / 2
@@ -69,30 +69,30 @@ class Cells:
         q, v, a = polynomial(table, s[:, None])
         middle = polynomial(table, (self._middle[cell])[:, None])[1]
         noise = (np.abs(v) <= _RESTS * self.largest_speed) & (np.sign(v) != np.sign(middle))
-        v = np.where(noise, _NOTHING * np.sign(middle), v)  # a joint that comes to rest does not reverse before
+        v = np.where(noise, _NOTHING * np.sign(middle), v)  # a joint that comes to rest does not reverse first
         t = np.clip(start + s, self.t0[cell], np.nextafter(self.t1[cell], -np.inf))
         return t, q, v, a
 
 
 def cells(motion: PiecewisePolynomial, plant: Plant) -> Cells:
-    """Cells that end at the breaks of a motion, where effects switch, and, with effects, where a joint reverses."""
+    """Return cells that end at the breaks of a motion, where effects switch and, with effects, at reversals."""
     motion = at_rest_exactly(motion)
-    inner = [each for effect in plant.effects for each in effect.switches]
+    inner = [t for effect in plant.effects for t in effect.switches]
     inner += turning_points(motion).tolist() if plant.forces else []
     ends = _ends(motion.breaks, np.array(inner))
     longest = (motion.end - motion.start) / FEWEST
     parts = np.ceil(np.diff(ends) / longest).astype(int)
-    each = np.repeat(np.arange(len(parts)), parts)
-    k = np.arange(len(each)) - np.repeat(np.cumsum(parts) - parts, parts)
-    step = np.diff(ends)[each]
-    t0 = ends[each] + step * (k / parts[each])
-    t1 = np.where(k + 1 == parts[each], ends[each + 1], ends[each] + step * ((k + 1) / parts[each]))
+    interval = np.repeat(np.arange(len(parts)), parts)
+    k = np.arange(len(interval)) - np.repeat(np.cumsum(parts) - parts, parts)
+    step = np.diff(ends)[interval]
+    t0 = ends[interval] + step * (k / parts[interval])
+    t1 = np.where(k + 1 == parts[interval], ends[interval + 1], ends[interval] + step * ((k + 1) / parts[interval]))
     piece = np.clip(np.searchsorted(motion.breaks, (t0 + t1) / 2, side="right") - 1, 0, len(motion.coefficients) - 1)
     return Cells(motion, piece, t0, t1)
 
 
 def _ends(breaks: np.ndarray, inner: np.ndarray) -> np.ndarray:
-    """All breaks, and the inner ends that are not as close to one as roots are known."""
+    """Return all breaks, and the inner ends that differ from them by more than the error of roots."""
     inner = inner[(inner > breaks[0]) & (inner < breaks[-1])]
     k = np.clip(np.searchsorted(breaks, inner) - 1, 0, len(breaks) - 2)
     piece = np.diff(breaks)[k]

@@ -1,7 +1,7 @@
-"""What a motion asks of the joints: torque by cause and speed, along a plan or at the samples of a run.
+"""The demand of a motion on the joints: torque by cause and speed, along a plan or at the samples of a run.
 
-Along a plan they are taken in cells in which it is smooth, and near their largest values again and again, closer and
-closer. At a place where the torque jumps, as at a break of the acceleration, both sides are taken.
+A plan is evaluated in cells in which it is smooth, and repeatedly, at decreasing distances, near the largest values.
+Where the torque jumps, for example at a break of the acceleration, both sides are evaluated.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from robot_dyn.simulation import Ending
 from robot_dyn.tools.motors.motor_budget.breakaway import NO_BREAKAWAY, Breakaway, breakaway, static_friction
 from robot_dyn.tools.motors.motor_budget.cells import GAUSS, KRONROD, Cells, X, cells
 
-_PEAKS = 4  # local maxima of a quantity that are refined
-_ROUNDS, _POINTS = 7, 9  # of doing so, and points of each: every round is 4 times closer
+_PEAKS = 4  # number of local maxima of a quantity that are refined
+_ROUNDS, _POINTS = 7, 9  # rounds of refinement, and points of each: a round divides distances by 4
 
 
 @final
@@ -32,14 +32,15 @@ class Demand:
     Attributes:
         split: The torque by cause.
         v: Velocities, (k, n), in [rad/s] or [m/s].
-        weights: Of an integral over time, (k,), in [s].
-        coarse: Those of a coarser rule, whose difference shows the error.
+        weights: Weights of an integral over time, (k,), in [s].
+        coarse: Weights of a coarser rule, for an estimate of the error, (k,), in [s].
         peak: Largest |τ| of each joint, (n,), in [N m] or [N].
-        speed: Largest |v|, (n,), and when, (n,).
-        resolution: What it was taken at, in words.
-        friction: Static friction f_s of dry friction, (n,), in [N m] or [N]; nan of a run.
-        starts: Torques at which joints break away; none of a run.
-        cells, cell, x: Of a plan: its cells, and in which and where in it each time is, (k,); else None.
+        speed: Largest |v|, (n,), and its time, (n,).
+        resolution: Description of the times, in words.
+        friction: Static friction f_s of dry friction, (n,), in [N m] or [N]; nan for a run.
+        starts: Torques at which joints break away; none for a run.
+        cells: The cells of a plan; None for a run.
+        cell, x: Index of the cell, and place in it, of each time of a plan, (k,); None for a run.
     """
 
     split: Causes
@@ -62,18 +63,18 @@ class Demand:
 
     @property
     def duration(self) -> float:
-        """Of the motion, in [s]."""
+        """Duration of the motion, in [s]."""
         return float(self.weights.sum())
 
     def mean(self, y: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
-        """The mean over time of columns (k, n), or of one (k,)."""
+        """Return the mean over time of columns, (k, n), or of one column, (k,)."""
         weights = self.weights if weights is None else weights
         total = weights.sum()
         return weights @ y / total if total > 0 else y[0]
 
     @cached_property
     def error(self) -> float:
-        """Largest difference between both rules of the means of τ² and of |P|, as a part of the largest mean."""
+        """Largest difference between both rules for the means of τ² and |P|, relative to the largest mean."""
         tau, size = self.split.tau, np.abs(self.split.tau).max(initial=0.0)
         parts = ((tau / (size or 1.0)) ** 2, np.abs(self.power))
         off = [np.abs(self.mean(y) - self.mean(y, self.coarse)).max() / (self.mean(y).max() or 1.0) for y in parts]
@@ -81,7 +82,7 @@ class Demand:
 
 
 def of_motion(motion: PiecewisePolynomial, plant: Plant) -> Demand:
-    """The demand along a plan.
+    """Compute the demand along a plan.
 
     Raises:
         EffectError: If an effect has states, which a motion does not determine.
@@ -89,34 +90,44 @@ def of_motion(motion: PiecewisePolynomial, plant: Plant) -> Demand:
     for effect in plant.forces:
         if isinstance(effect, Stateful):
             raise EffectError(
-                f"budget: {effect.name} has states, which a motion alone does not determine; simulate it, and give the"
-                " run"
+                f"budget: {effect.name} has states, which a motion does not determine; simulate the motion, and pass"
+                " the run"
             )
-    made = cells(motion, plant)
-    count = len(made.piece)
+    grid = cells(motion, plant)
+    count = len(grid.piece)
     cell, x = np.repeat(np.arange(count), len(X)), np.tile(X, count)
-    tau, v = torques(made, plant, cell, x)
-    closer = _closer(made, plant, tau, v)
+    tau, v = torques(grid, plant, cell, x)
+    closer = _closer(grid, plant, tau, v)
     cell, x = np.concatenate([cell, closer[0]]), np.concatenate([x, closer[1]])
     rules = [
-        np.concatenate([np.outer(made.length / 2, rule).ravel(), np.zeros(len(closer[0]))]) for rule in (KRONROD, GAUSS)
+        np.concatenate([np.outer(grid.length / 2, rule).ravel(), np.zeros(len(closer[0]))]) for rule in (KRONROD, GAUSS)
     ]
     order = np.lexsort((x, cell))
     cell, x = cell[order], x[order]
-    t, q, v, a = made.states(cell, x)
+    t, q, v, a = grid.states(cell, x)
     split = torques_by_cause(plant, t, q, v, a)
-    fastest = extreme_values(made.motion, 1)
+    fastest = extreme_values(grid.motion, 1)
     at = np.where(-fastest.least > fastest.greatest, fastest.at_least, fastest.at_greatest)
-    gap = float(made.length.max() * np.diff(X).max() / 2)
+    gap = float(grid.length.max() * np.diff(X).max() / 2)
     return Demand(
-        split, v, rules[0][order], rules[1][order], np.abs(split.tau).max(axis=0), (fastest.largest, at),
-        f"peaks are the largest of {len(t)} times, at most {gap:.2g} s apart, and closer around the {_PEAKS} largest of"
-        " each joint", static_friction(plant), breakaway(made, plant), made, cell, x,
-    )  # fmt: skip
+        split=split,
+        v=v,
+        weights=rules[0][order],
+        coarse=rules[1][order],
+        peak=np.abs(split.tau).max(axis=0),
+        speed=(fastest.largest, at),
+        resolution=f"peaks are the largest of {len(t)} times, at most {gap:.2g} s apart, and closer around the {_PEAKS}"
+        " largest of each joint",
+        friction=static_friction(plant),
+        starts=breakaway(grid, plant),
+        cells=grid,
+        cell=cell,
+        x=x,
+    )
 
 
 def torques(cells: Cells, plant: Plant, cell: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Torque and velocity at places of cells, (k, n) each: the torque of `torques_by_cause`, without its parts."""
+    """Return torque and velocity at places of cells, both (k, n): the sum of `torques_by_cause` only."""
     t, q, v, a = cells.states(cell, x)
     acts = plant.forces or plant.equation_of_motion.payloads
     exerted = exerted_torques(plant, t, q, v, a).values() if acts else ()
@@ -124,16 +135,16 @@ def torques(cells: Cells, plant: Plant, cell: np.ndarray, x: np.ndarray) -> tupl
 
 
 def root_mean_squares(motion: PiecewisePolynomial, plant: Plant) -> np.ndarray:
-    """√(1/T ∫ τ² dt) of each joint along a motion, (n,), in [N m] or [N]."""
-    made = cells(motion, plant)
-    count = len(made.piece)
-    tau, _ = torques(made, plant, np.repeat(np.arange(count), len(X)), np.tile(X, count))
-    weights = np.outer(made.length / 2, KRONROD).ravel()
+    """Compute √(1/T ∫ τ² dt) of each joint along a motion, (n,), in [N m] or [N]."""
+    grid = cells(motion, plant)
+    count = len(grid.piece)
+    tau, _ = torques(grid, plant, np.repeat(np.arange(count), len(X)), np.tile(X, count))
+    weights = np.outer(grid.length / 2, KRONROD).ravel()
     return np.sqrt(weights @ tau**2 / weights.sum())
 
 
 def _closer(cells: Cells, plant: Plant, tau: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Cells and places of the largest |τ| and |τ v| of each joint, close to the largest of the points of the rule."""
+    """Return cells and places of the largest |τ| and |τ v| of each joint, refined from the points of the rule."""
     y = np.abs(np.concatenate([tau, tau * v], axis=1)).reshape(len(cells.piece), len(X), -1)
     padded = np.pad(y, ((0, 0), (1, 1), (0, 0)), constant_values=-np.inf)
     highest = np.where((y >= padded[:, :-2]) & (y >= padded[:, 2:]), y, -np.inf).reshape(-1, y.shape[-1])
@@ -144,8 +155,8 @@ def _closer(cells: Cells, plant: Plant, tau: np.ndarray, v: np.ndarray) -> tuple
     best = X[node]
     for _ in range(_ROUNDS):
         x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _POINTS)
-        found, speed = torques(cells, plant, np.repeat(cell, _POINTS), x.ravel())
-        all_of = np.abs(np.concatenate([found, found * speed], axis=1)).reshape(len(cell), _POINTS, -1)
+        torque, speed = torques(cells, plant, np.repeat(cell, _POINTS), x.ravel())
+        all_of = np.abs(np.concatenate([torque, torque * speed], axis=1)).reshape(len(cell), _POINTS, -1)
         k = all_of[np.arange(len(cell)), :, column].argmax(axis=1)
         row = np.arange(len(cell))
         best, low, high = x[row, k], x[row, np.maximum(k - 1, 0)], x[row, np.minimum(k + 1, _POINTS - 1)]
@@ -153,15 +164,15 @@ def _closer(cells: Cells, plant: Plant, tau: np.ndarray, v: np.ndarray) -> tuple
 
 
 def of_run(run: Trajectory) -> Demand:
-    """The demand at the samples of a run, with its extremes over all steps.
+    """Compute the demand at the samples of a run, with extremes over all steps.
 
     Raises:
-        QueryError: If it diverged, has one sample, or does not hold what its effects exerted.
+        QueryError: If the run diverged, has one sample, or does not contain the torques of its effects.
     """
     if run.outcome.ending == Ending.DIVERGED:
-        raise QueryError(f"the run diverged at {run.outcome.t:.6g} s: what it asks of motors says nothing")
+        raise QueryError(f"the run diverged at {run.outcome.t:.6g} s, so its torques are meaningless; correct the run")
     if len(run.t) < 2:
-        raise QueryError("the run has one sample: record more of it")
+        raise QueryError("the run has one sample: record more samples")
     split = run.causes()
     weights = _trapezoidal(run.t, np.arange(len(run.t)))
     every_other = np.unique(np.append(np.arange(0, len(run.t), 2), len(run.t) - 1))
@@ -171,13 +182,13 @@ def of_run(run: Trajectory) -> Demand:
     if run.extremes is not None:
         largest = np.abs(run.extremes).max(axis=1)
         peak, speed = (np.fmax(x, y) for x, y in ((peak, largest[2]), (speed, largest[1])))
-        resolution += "; peaks of torque and speed are those of all steps"
+        resolution += "; peaks of torque and speed are over all steps"
     coarse = _trapezoidal(run.t, every_other)
     return Demand(split, run.v, weights, coarse, peak, (speed, run.t[row]), resolution, np.full(len(peak), np.nan))
 
 
 def _trapezoidal(t: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Weights of the trapezoidal rule with the times of these numbers, (k,)."""
+    """Return the weights, (k,), of the trapezoidal rule over the times with these indices."""
     weights, half = np.zeros(len(t)), np.diff(t[at]) / 2
     weights[at[:-1]] += half
     weights[at[1:]] += half

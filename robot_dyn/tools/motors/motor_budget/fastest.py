@@ -1,9 +1,9 @@
 """The path of a motion at its limits: from stop to stop as fast as they allow; pauses keep their length.
 
-Between two stops the path is taken through places at equal distances along it, and `rd.tools.motors.path` moves along
-it. A stop stays one, since the path may have a corner there. What then needs more than the continuous torque is slowed
-down as a whole, by the least factor that keeps it. If the given motion fits and this one does not, or is no faster, the
-given one is the answer.
+Between two stops, `rd.tools.motors.path` plans a motion along a spline through equidistant places on the path. Stops
+are kept, because the path may have a corner there. If the result exceeds continuous torques, it is slowed down as a
+whole by the smallest sufficient factor. If the original motion fits and the new one does not, or is slower, the
+original one is returned.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
 from robot_dyn.tools.motors.planning.geometric_path import at_rest_exactly, through
 from robot_dyn.tools.motors.planning.path_at_limits import path
 
-_RESTS = 1e-3  # of the largest velocity of a joint: slower is a stop
-_TIMES, _PLACES = 4000, 80  # of the motion, and of a path between two stops
-_STILL = 1e-12  # of the largest velocity, or [rad] or [m] that a joint moves: at rest but for rounding
-_SHORT = 1e-6  # of the longest way between two stops: rounding, or what a spline does in a pause
+_RESTS = 1e-3  # relative to the largest velocity of a joint: slower is a stop
+_TIMES, _PLACES = 4000, 80  # numbers of times of the motion, and of places of a path between two stops
+_STILL = 1e-12  # relative velocity, or [rad] or [m] of motion, that counts as rest
+_SHORT = 1e-6  # relative to the longest stroke: a shorter one is rounding, or an artefact of a spline in a pause
 
 
 @final
@@ -39,15 +39,14 @@ class FastestMotion(Answer):
     """The path of a motion at its limits.
 
     Attributes:
-        before: Duration of the motion, in [s].
-        strokes: How often it moves from stop to stop.
-        distance: How far it is from the path at most, in [rad] or [m].
-        slowed: λ, by which the motion at peak torques and speeds is slowed down to keep continuous torques; 1 if it
-            keeps them, or no pace does.
-        no_pace: Which joint passes its continuous torque at every pace, in words; empty if a pace fits.
-        given: Whether it is the given motion, which fits, and no faster one that fits was found.
-        share: Of the peak torques that it may take.
-        budget: What it asks of the motors.
+        before: Duration of the original motion, in [s].
+        strokes: Number of movements from stop to stop.
+        distance: Largest distance from the path, in [rad] or [m].
+        slowed: Factor λ on the duration that satisfies continuous torques; 1 if it is not needed, or no λ suffices.
+        no_pace: The joint that exceeds its continuous torque at every pace, in words; empty if a pace fits.
+        given: True if the original motion fits, and no faster one that fits was found.
+        share: Fraction of the peak torques that it may use.
+        budget: Motor budget of the motion.
         plan: The motion.
     """
 
@@ -63,21 +62,21 @@ class FastestMotion(Answer):
 
     @reported
     def duration(self) -> float:
-        """In [s]."""
+        """Return the duration of the motion, in [s]."""
         return self.plan.duration
 
     def blocks(self) -> Iterator[Block]:
         _, *rest = self.plan.blocks()
         share = "" if self.share == 1 else f" at {100 * self.share:.6g} % of the peak torques"
         if self.given:
-            yield f"no faster motion along the path that fits was found{share}; the given one fits, and is the answer:"
+            yield f"found no faster motion along the path that fits{share}; the original motion, which fits:"
         else:
             stops = "without a stop" if self.strokes == 1 else f"in {self.strokes} strokes, with the same pauses"
-            times = f"{self.duration:.4g} s in place of {self.before:.4g} s"
-            yield f"the same path in {times}{share}, {stops}, at most {self.distance:.1g} rad or m beside it:"
+            times = f"{self.duration:.4g} s instead of {self.before:.4g} s"
+            yield f"the same path in {times}{share}, {stops}, within {self.distance:.1g} rad or m of it:"
         yield from rest
         if self.slowed > 1:
-            yield f"slowed down by {self.slowed:.4g} from peak torques and speeds, to keep continuous torque"
+            yield f"slowed down by {self.slowed:.4g} to satisfy continuous torques"
         if self.no_pace:
             yield self.no_pace
         yield self.budget.verdict
@@ -86,19 +85,18 @@ class FastestMotion(Answer):
 def fastest(motor_budget: MotorBudget, share: float = 1.0) -> FastestMotion:
     """Plan the path of a motion as fast as the limits of its budget allow, from stop to stop; pauses keep their length.
 
-    It keeps the path and gives up the timing, which a uniform factor would keep: then the slowest place would
-    decide for all. Only what needs more than continuous torques at that pace is slowed down as a whole,
-    pauses as well, by the least factor that keeps them, if one does. If the given motion fits and this one does
-    not, or is no faster, the given one is returned.
+    The path is kept, but not the timing: with a uniform factor, the slowest place would limit the whole motion. If the
+    result exceeds continuous torques, it is slowed down as a whole, with its pauses, by the smallest sufficient factor,
+    if there is one. If the original motion fits and the new one does not, or is slower, the original one is returned.
 
     Args:
         motor_budget: The budget of a plan.
-        share: Of the peak torques that it may take, up to 1.
+        share: Fraction of the peak torques that the motion may use, up to 1.
 
     Raises:
         QueryError: If the budget is of a run.
         PlanError: If an effect depends on time, or no motion is within the limits.
-        MissingExtraError: Without toppra.
+        MissingExtraError: If toppra is not installed.
     """
     plant, motion, limits = case_of(motor_budget, "the fastest motion")
     plan, strokes, distance = _planned(plant, at_rest_exactly(motion), limits, share)
@@ -107,34 +105,37 @@ def fastest(motor_budget: MotorBudget, share: float = 1.0) -> FastestMotion:
     if pace.fits and pace.factor > 1:
         method = f"{plan.method}, slowed down by {pace.factor:.4g}"
         plan = replace(plan, reference=at_pace(plan.reference, pace.factor), method=method)
-    of_it = replace(budget(plan, plant, **bounds), limits=motor_budget.limits)
-    if _fits(motor_budget, share) and (not of_it.fits or plan.duration >= before):
-        given = replace(plan, reference=motion, method="the given motion", findings=motor_budget.findings)
-        return FastestMotion(before, strokes, 0.0, 1.0, "", True, share, motor_budget, given)
-    slowed, no_pace = (pace.factor, "") if pace.fits else (1.0, _no_pace(pace, of_it))
-    return FastestMotion(before, strokes, distance, slowed, no_pace, False, share, of_it, plan)
+    new_budget = replace(budget(plan, plant, **bounds), limits=motor_budget.limits)
+    result = {"before": before, "strokes": strokes, "share": share}
+    if _fits(motor_budget, share) and (not new_budget.fits or plan.duration >= before):
+        plan = replace(plan, reference=motion, method="the given motion", findings=motor_budget.findings)
+        return FastestMotion(**result, distance=0.0, slowed=1.0, no_pace="", given=True, budget=motor_budget, plan=plan)
+    slowed, no_pace = (pace.factor, "") if pace.fits else (1.0, _no_pace(pace, new_budget))
+    return FastestMotion(
+        **result, distance=distance, slowed=slowed, no_pace=no_pace, given=False, budget=new_budget, plan=plan
+    )
 
 
-def _fits(found: MotorBudget, share: float) -> bool:
-    """Whether a motion is within all limits, and within a share of the peak torques."""
-    return found.fits and all(each.shares["peak"] <= share * (1 + TOLERANCE) for each in found.joints)
+def _fits(motor_budget: MotorBudget, share: float) -> bool:
+    """Return True if a motion is within all limits, and within a share of the peak torques."""
+    return motor_budget.fits and all(x.shares["peak"] <= share * (1 + TOLERANCE) for x in motor_budget.joints)
 
 
-def _no_pace(pace: Pace, found: MotorBudget) -> str:
-    """What is passed at the best pace, in words."""
-    joint = found.joints[pace.joint]
+def _no_pace(pace: Pace, motor_budget: MotorBudget) -> str:
+    """Return the exceeded limit at the best pace, in words."""
+    joint = motor_budget.joints[pace.joint]
     limit = joint.continuous_limit
     return (
         f"no pace fits: {joint.joint} needs {pace.share * limit:.4g} of {limit:.4g} {of_joint('N m', joint.type)} rms"
-        f" at the best, {pace.factor:.4g} times as slow"
+        f" at the best pace, {pace.factor:.4g} times slower"
     )
 
 
 def _planned(plant: Plant, motion: PiecewisePolynomial, limits: Limits, share: float) -> tuple[Plan, int, float]:
-    """The plan, how many strokes it has, and how far it is from the path."""
+    """Return the plan, its number of strokes, and its largest distance from the path."""
     strokes = _strokes(motion)
     if not strokes:
-        raise PlanError("the motion rests from its start to its end: there is no path to be faster on")
+        raise PlanError("the motion is at rest throughout, so it has no path; give a motion that moves")
     q, since, off = motion.at(np.array([motion.start]))[0][0], motion.start, 0.0
     parts, findings = list[PiecewisePolynomial | None](), dict[str, None]()
     bounds = {"effort": limits.effort, "velocity": limits.velocity, "acceleration": limits.acceleration}
@@ -143,11 +144,11 @@ def _planned(plant: Plant, motion: PiecewisePolynomial, limits: Limits, share: f
         points = np.array([np.interp(np.linspace(0, way[-1], _PLACES), way, column) for column in places.T]).T
         still = np.ptp(places, axis=0) <= _STILL
         points[:, still] = q[still]
-        points[0] = q  # where the last stroke ended
-        made = path(plant, points, share=share, **bounds)
-        parts += [_pause(q, start - since), made.reference]
+        points[0] = q  # end of the previous stroke
+        stroke = path(plant, points, share=share, **bounds)
+        parts += [_pause(q, start - since), stroke.reference]
         off, since, q = max(off, _distance(points, way, places)), end, points[-1]
-        findings |= dict.fromkeys(made.findings)
+        findings |= dict.fromkeys(stroke.findings)
     parts.append(_pause(q, motion.end - since))
     robot: Any = plant.dynamics
     by_kind = {"velocity": limits.velocity, "torque": limits.effort * share}
@@ -156,34 +157,34 @@ def _planned(plant: Plant, motion: PiecewisePolynomial, limits: Limits, share: f
 
 
 def _strokes(motion: PiecewisePolynomial) -> list[tuple[float, float]]:
-    """From stop to stop: start and end of each, in [s]."""
+    """Return start and end of each movement from stop to stop, in [s]."""
     t = np.unique(np.concatenate([motion.breaks, np.linspace(motion.start, motion.end, _TIMES)]))
     v = motion.at(t)[1]
     largest = np.abs(v).max(axis=0)
     v = v / np.where(largest > 0, largest, 1.0)
     speed = np.abs(v).max(axis=1)
-    stops = [_rest(speed, *each) for each in _runs(speed <= _RESTS)]
+    stops = [_rest(speed, start, end) for start, end in _runs(speed <= _RESTS)]
     turns = np.flatnonzero((np.sum(v[1:] * v[:-1], axis=1) < 0) & (speed[1:] > _RESTS) & (speed[:-1] > _RESTS))
     stops = sorted([*stops, *((int(k), int(k)) for k in turns), (0, 0), (len(t) - 1, len(t) - 1)])
     strokes = [(float(t[end]), float(t[start])) for (_, end), (start, _) in pairwise(stops) if start > end]
-    ways = [float(_way(motion, *each)[0][-1]) for each in strokes]
-    return [each for each, way in zip(strokes, ways, strict=True) if way > _SHORT * max(ways)]
+    ways = [float(_way(motion, *stroke)[0][-1]) for stroke in strokes]
+    return [stroke for stroke, way in zip(strokes, ways, strict=True) if way > _SHORT * max(ways)]
 
 
 def _runs(where: np.ndarray) -> list[tuple[int, int]]:
-    """First and last index of each run of what is true."""
+    """Return the first and last index of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(int), [0]])))
     return [(int(start), int(end) - 1) for start, end in edges.reshape(-1, 2)]
 
 
 def _rest(speed: np.ndarray, start: int, end: int) -> tuple[int, int]:
-    """The part of a slow time that is at rest, if any is."""
+    """Return the part of a slow interval that is at rest, or all of it if it never rests."""
     still = start + np.flatnonzero(speed[start : end + 1] <= _STILL)
     return (int(still[0]), int(still[-1])) if len(still) else (start, end)
 
 
 def _way(motion: PiecewisePolynomial, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
-    """The length of the path up to places on it, (k,), and the places, (k, n)."""
+    """Return the length of the path up to places on it, (k,), and the places, (k, n)."""
     places = motion.at(np.linspace(start, end, _TIMES))[0]
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
     moved = np.concatenate([[True], np.diff(way) > 0])
@@ -191,7 +192,7 @@ def _way(motion: PiecewisePolynomial, start: float, end: float) -> tuple[np.ndar
 
 
 def _distance(points: np.ndarray, way: np.ndarray, places: np.ndarray) -> float:
-    """How far the spline through points is beside the path at most, in [rad] or [m]."""
+    """Return the largest distance of the spline through points from the path, in [rad] or [m]."""
     spline = through(points)
     q, slope, _ = spline.at(way / way[-1] * spline.end)
     along = slope / np.linalg.norm(slope, axis=1, keepdims=True)
@@ -204,9 +205,9 @@ def _pause(q: np.ndarray, duration: float) -> PiecewisePolynomial | None:
 
 
 def _joined(parts: list[PiecewisePolynomial | None]) -> PiecewisePolynomial:
-    """One after the other, from time 0."""
-    there = [each for each in parts if each is not None]
-    degree = max(each.coefficients.shape[1] for each in there)
-    tables = [np.pad(x.coefficients, ((0, 0), (0, degree - x.coefficients.shape[1]), (0, 0))) for x in there]
-    steps = np.concatenate([np.diff(each.breaks) for each in there])
+    """Return the parts in sequence, from time 0."""
+    motions = [part for part in parts if part is not None]
+    degree = max(motion.coefficients.shape[1] for motion in motions)
+    tables = [np.pad(x.coefficients, ((0, 0), (0, degree - x.coefficients.shape[1]), (0, 0))) for x in motions]
+    steps = np.concatenate([np.diff(motion.breaks) for motion in motions])
     return PiecewisePolynomial(np.concatenate([[0.0], np.cumsum(steps)]), np.concatenate(tables))

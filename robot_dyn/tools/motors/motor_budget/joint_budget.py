@@ -1,4 +1,4 @@
-"""What a motion asks of the motor of each joint, beside its limits, and which cause asks for it."""
+"""The demand of a motion on the motor of each joint, with limits and causes."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from robot_dyn.queries import of_joint
 from robot_dyn.tools.motors.limits import Limits
 from robot_dyn.tools.motors.motor_budget.demand import Demand
 
-TOLERANCE = 1e-3  # of a limit, by which plans at their limits may pass it
-_DIGITS = 12  # of times in [s]: places at the ends of cells are a little inside
+TOLERANCE = 1e-3  # relative to a limit, by which plans at their limits may exceed it
+_DIGITS = 12  # decimals of times in [s]: places at the ends of cells lie slightly inside
 KINDS: Mapping[str, str] = {"peak": "peak torque", "continuous": "continuous torque", "speed": "speed"}
 
 
 @final
 @dataclass(frozen=True)
 class JointBudget:
-    """What a motion asks of the motor of a joint; [N m] is [N] and [rad] is [m] where it slides.
+    """The demand of a motion on the motor of a joint; for a prismatic joint read [N] for [N m] and [m] for [rad].
 
     Attributes:
-        joint, type: Its name, and a type such as "revolute".
-        peak, peak_at: Largest |τ|, in [N m], and when, in [s]; of a run the time is that of the largest sample.
+        joint, type: Name of the joint, and its type, such as "revolute".
+        peak, peak_at: Largest |τ|, in [N m], and its time, in [s]; for a run, the time of the largest sample.
         rms: √(1/T ∫ τ² dt), in [N m].
-        speed, speed_at: Largest |v|, in [rad/s], and when.
-        power, power_at: Largest |τ v|, in [W], and when.
+        speed, speed_at: Largest |v|, in [rad/s], and its time, in [s].
+        power, power_at: Largest |τ v|, in [W], and its time, in [s].
         mean_power: 1/T ∫ τ v dt, in [W].
-        energy: ∫ max(τ v, 0) dt, that the motor gives, in [J].
-        regenerated: ∫ max(−τ v, 0) dt, that it takes back, in [J].
-        static_friction: f_s of dry friction, in [N m]; 0 without, nan of a run.
-        breakaway, breakaway_at: Largest |τ| at which the joint leaves rest against f_s, and when; nan if it never does.
-        peak_limit, continuous_limit, speed_limit: Inf for none.
-        of_peak: τ at `peak_at` by cause; the parts add up to it.
-        of_rms: Part of `rms` that each cause asks for, 1/(T rms) ∫ τ_cause τ dt; they add up to it, and are negative of
-            a cause that relieves the motor.
-        cut: Whether the actuation of a run was cut at an effort limit: more was asked for than that.
+        energy: ∫ max(τ v, 0) dt, delivered by the motor, in [J].
+        regenerated: ∫ max(−τ v, 0) dt, returned to the motor, in [J].
+        static_friction: f_s of dry friction, in [N m]; 0 without dry friction, nan for a run.
+        breakaway, breakaway_at: Largest |τ| at which the joint leaves rest against f_s, and its time; nan if it never
+            leaves rest.
+        peak_limit, continuous_limit, speed_limit: The limits; inf for none.
+        of_peak: Parts of τ at `peak_at` by cause.
+        of_rms: Parts of `rms` by cause, 1/(T rms) ∫ τ_cause τ dt; negative for a cause that relieves the motor.
+        cut: True if an effort limit cut the actuation of a run, so that the demand was higher.
     """
 
     joint: str
@@ -67,27 +67,27 @@ class JointBudget:
 
     @property
     def shares(self) -> dict[str, float]:
-        """What is used of the limits of "peak", "continuous" and "speed"; 0 of one that is not known."""
+        """Used fractions of the limits "peak", "continuous" and "speed"; 0 for unknown limits."""
         peak = max(self.peak, 0.0 if isnan(self.breakaway) else self.breakaway)
         used = peak / self.peak_limit, self.rms / self.continuous_limit, self.speed / self.speed_limit
         return dict(zip(KINDS, used, strict=True))
 
     @reported
     def headroom(self) -> dict[str, float]:
-        """What is left of each limit, as a part of it; 1 where it is not known, negative where it is passed."""
+        """Return the unused fraction of each limit; 1 for unknown limits, negative for exceeded ones."""
         return {kind: 1 - used for kind, used in self.shares.items()}
 
     @reported
     def too_small(self) -> tuple[str, ...]:
-        """The limits that are passed, by more than a thousandth: "peak", "continuous" or "speed".
+        """Return the limits that are exceeded by more than a thousandth: "peak", "continuous" or "speed".
 
-        Also a peak torque that is reached where more was asked for.
+        A peak torque at which the actuation was cut is included.
         """
         most = {"peak": 1 - TOLERANCE} if self.cut else {}
         return tuple(kind for kind, used in self.shares.items() if used > most.get(kind, 1 + TOLERANCE))
 
     def says(self, kind: str) -> str:
-        """The need and the limit of a kind in words, with the cause that asks for most of it."""
+        """Return demand and limit of a kind in words, with the largest cause."""
         unit = of_joint("rad/s" if kind == "speed" else "N m", self.type)
         if kind == "continuous":
             return f"{self.rms:.4g} of {self.continuous_limit:.4g} {unit} rms{_most(self.of_rms)}"
@@ -103,11 +103,11 @@ def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozense
     """Yield the budget of each joint; `cut` names joints whose actuation was cut at an effort limit."""
     split, power, row = demand.split, demand.power, np.arange(len(demand.peak))
     rms = np.sqrt(demand.mean(split.tau**2))
-    given, taken = (demand.duration * demand.mean(x.clip(0.0)) for x in (power, -power))
+    delivered, regenerated = (demand.duration * demand.mean(x.clip(0.0)) for x in (power, -power))
     at_peak, strongest = (np.abs(x).argmax(axis=0) for x in (split.tau, power))
     parts = {cause: demand.mean(torque * split.tau) for cause, torque in split.torques.items()}
     by_joint = [[(abs(tau), t) for joint, t, tau in zip(*demand.starts, strict=True) if joint == i] for i in row]
-    starts = [max(of, key=itemgetter(0), default=(nan, nan)) for of in by_joint]
+    starts = [max(torques, key=itemgetter(0), default=(nan, nan)) for torques in by_joint]
     values: dict[str, Sequence[float] | np.ndarray] = {
         "peak": demand.peak,
         "peak_at": split.t[at_peak],
@@ -117,8 +117,8 @@ def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozense
         "power": np.abs(power[strongest, row]),
         "power_at": split.t[strongest],
         "mean_power": demand.mean(power),
-        "energy": given,
-        "regenerated": taken,
+        "energy": delivered,
+        "regenerated": regenerated,
         "static_friction": demand.friction,
         "breakaway": [torque for torque, _ in starts],
         "breakaway_at": [t for _, t in starts],
@@ -139,7 +139,7 @@ def joint_budgets(demand: Demand, limits: Limits, cut: frozenset[str] = frozense
 
 
 def _most(parts: Mapping[str, float]) -> str:
-    """The cause with the largest part of a sum, in words."""
+    """Return the cause with the largest part of a sum, in words."""
     sign = 1.0 if sum(parts.values()) >= 0 else -1.0
     cause = max(parts, key=lambda name: sign * parts[name])
     return f", {sign * parts[cause]:.4g} for {cause}"

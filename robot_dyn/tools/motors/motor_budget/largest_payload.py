@@ -4,8 +4,8 @@
 
     |τ₀ + m τ₁| ≤ τ_max at each time,     ⟨τ₀²⟩ + 2 m ⟨τ₀ τ₁⟩ + m² ⟨τ₁²⟩ ≤ τ_continuous²
 
-Each of these leaves an interval of m, and so do all of them: no mass between two that fit is missed. Speed does not
-depend on it. Peaks between the times are found with the mass at hand, and added, until no limit is passed.
+Each inequality allows an interval of m, and so do all together: every mass between two that fit also fits. Speed does
+not depend on m. Peaks between the times are computed with the current mass and added until no limit is exceeded.
 """
 
 from __future__ import annotations
@@ -28,27 +28,28 @@ from robot_dyn.tools.motors.motor_budget.joint_budget import TOLERANCE
 from robot_dyn.tools.motors.motor_budget.result import MotorBudget, case_of
 
 _ROUNDS = 12
-_CLOSE = 1e-9  # of a limit, by which a peak between the times may pass it
-_AFFINE = 1e-9  # of the torque, by which effects may depart from it
-_NONE = 1e-12  # of the largest torque of a unit mass: rounding of none
+_CLOSE = 1e-9  # relative to a limit, by which a peak between the times may exceed it
+_AFFINE = 1e-9  # relative to the torque, its largest deviation from an affine function
+_NONE = 1e-12  # relative to the largest torque of a unit mass: smaller torques are rounding
 
 
 @final
 @dataclass(frozen=True, repr=False)
 class LargestPayload(Answer):
-    """The largest point mass on a link with which the motors suffice, and what says no to more.
+    """The largest point mass on a link with which the motors suffice, and the limit that determines it.
 
     Attributes:
-        link: The link.
-        com: Where on it, in its axes, in [m].
-        mass: In [kg], beside what the arm carries; None if no mass fits, inf if no limit that is known holds it back.
-        least: The smallest mass that fits, in [kg]: 0, unless the arm is too heavy without a counterweight.
-        joint: The joint that says no to more.
-        limit: Which limit of it: "peak torque", "continuous torque", "break-away torque" or "speed".
-        at: When, in [s]; nan of continuous torque, which is of the whole motion.
-        largest_share: Largest share of a limit of torque with that mass, by the inverse dynamics.
-        resolution: At which times it was looked at with that mass, in words.
-        carried: What the arm carries already, in [kg].
+        link: Name of the link.
+        com: Place of the mass in the axes of the link, in [m].
+        mass: The mass, in [kg], in addition to the arm's payloads; None if no mass fits, inf if no known limit bounds
+            it.
+        least: The smallest mass that fits, in [kg]: 0, unless the arm needs a counterweight.
+        joint: The limiting joint.
+        limit: The limit: "peak torque", "continuous torque", "break-away torque" or "speed".
+        at: Time at which the limit is reached, in [s]; nan for continuous torque, a mean over the motion.
+        largest_share: Largest share of a torque limit with this mass, by inverse dynamics.
+        resolution: Times of the check with this mass, in words.
+        carried: Mass of the arm's payloads, in [kg].
     """
 
     link: str
@@ -67,20 +68,20 @@ class LargestPayload(Answer):
         where = f"on {self.link} at ({x:g}, {y:g}, {z:g}) m"
         at = "" if np.isnan(self.at) else f" at {round(self.at, 9):.4g} s"
         if self.mass is None:
-            yield f"no payload {where} fits: the {self.limit} of {self.joint} is passed{at}"
+            yield f"no payload {where} fits: the {self.limit} of {self.joint} is exceeded{at}"
         elif self.mass == inf:
-            yield f"payload {where}: no limit that is known holds it back"
+            yield f"payload {where}: no known limit bounds it"
         else:
-            says_no = f"the {self.limit} of {self.joint}"
+            limit = f"the {self.limit} of {self.joint}{at}"
             more = f" more, {self.carried + self.mass:.5g} kg in all" if self.carried else ""
-            yield f"largest payload {where}: {self.mass:.5g} kg{more}; {says_no}{at} says no to more"
-            least = "every mass up to it fits" if not self.least else f"at least {self.least:.5g} kg are needed"
+            yield f"largest payload {where}: {self.mass:.5g} kg{more}; limited by {limit}"
+            least = "all smaller masses fit" if not self.least else f"at least {self.least:.5g} kg are needed"
             yield f"{least}: torque is affine in a point mass, so each time bounds it in closed form"
-            yield (f"with it the largest share of a limit is {self.largest_share:.6f}; {self.resolution}")
+            yield (f"with this mass the largest share of a limit is {self.largest_share:.6f}; {self.resolution}")
 
 
 class _Bound(NamedTuple):
-    """Masses that a limit allows, from `least` to `most`, and whose limit it is."""
+    """Masses that a limit allows, from `least` to `most`, with joint, limit and time."""
 
     least: float
     most: float
@@ -90,19 +91,19 @@ class _Bound(NamedTuple):
 
 
 def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)) -> LargestPayload:
-    """Return the largest point mass on a link with which the motors of a budget suffice, besides what the arm carries.
+    """Compute the largest point mass on a link with which the motors suffice, in addition to the arm's payloads.
 
-    Torque is affine in it, so the masses that fit are an interval, in closed form at each time; where the torque
-    peaks between times is found again with that mass, until no limit is passed.
+    Torque is affine in the mass, so the masses that fit are an interval, in closed form at each time. The peaks of the
+    torque between times are computed again with this mass, until no limit is exceeded.
 
     Args:
         motor_budget: The budget of a plan.
-        link: The link that carries it.
-        com: Where, in the axes of the link, (3,), in [m].
+        link: Name of the link that carries the mass.
+        com: Place of the mass in the axes of the link, (3,), in [m].
 
     Raises:
-        QueryError: If the budget is of a run, whose control would change as well.
-        EditError: If there is no such link.
+        QueryError: If the budget is of a run: its control would change as well.
+        EditError: If the link is unknown.
     """
     plant, motion, limits = case_of(motor_budget, "the largest payload")
     robot: Any = plant.dynamics
@@ -112,28 +113,28 @@ def max_payload(motor_budget: MotorBudget, link: str, com: Any = (0.0, 0.0, 0.0)
     def carrying(mass: float) -> Plant:
         return replace(plant, dynamics=robot.with_(payload=replace(unit, mass=mass)))
 
-    def answer(mass: float | None, least: float, bound: _Bound, share: float, of: Demand = bare) -> LargestPayload:
+    def result(mass: float | None, least: float, bound: _Bound, share: float, demand: Demand = bare) -> LargestPayload:
         joint = robot.joint_names[bound.joint] if bound.limit else ""
-        held = joint, bound.limit, bound.at
-        return LargestPayload(unit.frame, unit.com, mass, least, *held, share, of.resolution, carried)
+        limit = joint, bound.limit, bound.at
+        return LargestPayload(unit.frame, unit.com, mass, least, *limit, share, demand.resolution, carried)
 
     loaded, none = carrying(1.0), _Bound(-inf, inf)
     if (fast := bare.speed[0] > limits.velocity * (1 + TOLERANCE)).any():
         i = int(np.argmax(fast))
-        return answer(None, 0.0, _Bound(nan, nan, i, "speed", float(bare.speed[1][i])), inf)
+        return result(None, 0.0, _Bound(nan, nan, i, "speed", float(bare.speed[1][i])), inf)
     bounds = [none, *_of_means(bare, loaded, limits), *_of_starts(bare, loaded, limits)]
     bounds += _of_times(bare, plant, loaded, limits, 0.0)
     for turn in count(1):
         low, high = max(bounds, key=lambda x: x.least), min(bounds, key=lambda x: x.most)
         least, most = max(0.0, low.least), high.most
         if most > LARGEST:
-            return answer(inf, least, none, 0.0)
+            return result(inf, least, none, 0.0)
         if most < least:
-            return answer(None, 0.0, high if most < 0 else low, inf)
+            return result(None, 0.0, high if most < 0 else low, inf)
         there = of_motion(motion, carrying(most))
         share = _share(there, limits)
         if share <= 1 + _CLOSE or turn == _ROUNDS:
-            return answer(most, least, high, share, there)
+            return result(most, least, high, share, there)
         bounds += _of_times(there, plant, loaded, limits, most)
     raise AssertionError
 
@@ -142,15 +143,15 @@ def _of_times(there: Demand, plant: Plant, loaded: Plant, limits: Limits, mass: 
     """Yield the bounds of peak torque at the times of a demand with a mass.
 
     Raises:
-        QueryError: If the torque at that mass is not the affine one.
+        QueryError: If the torque at that mass is not affine.
     """
     assert there.cells is not None
-    bare, one = (torques(there.cells, each, there.cell, there.x)[0] for each in (plant, loaded))
+    bare, one = (torques(there.cells, x, there.cell, there.x)[0] for x in (plant, loaded))
     per_mass = one - bare
     size = np.abs(bare).max() + mass * np.abs(per_mass).max()
     if np.abs(bare + mass * per_mass - there.split.tau).max() > _AFFINE * size:
         raise QueryError(
-            "the torque is not affine in the mass of the payload: an effect depends on the dynamics of the arm; give"
+            "the torque is not affine in the mass of the payload: an effect depends on the dynamics of the arm; compute"
             " budgets with payload= instead"
         )
     m, n = bare.shape
@@ -198,7 +199,7 @@ def _of_means(bare: Demand, loaded: Plant, limits: Limits) -> Iterator[_Bound]:
 
 
 def _share(demand: Demand, limits: Limits) -> float:
-    """Return the largest share of a limit of torque."""
+    """Return the largest share of a torque limit."""
     rms = np.sqrt(demand.mean(demand.split.tau**2))
     broken = np.abs(demand.starts.torque) / limits.effort[demand.starts.joint]
     return float(max((demand.peak / limits.effort).max(), (rms / limits.continuous).max(), broken.max(initial=0.0)))

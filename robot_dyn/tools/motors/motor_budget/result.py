@@ -1,4 +1,4 @@
-"""What a motion asks of the motors of an arm, as text, tables and JSON."""
+"""The motor budget of a motion, as text, tables and JSON."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from robot_dyn.tools.motors.motor_budget.joint_budget import KINDS, JointBudget
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class MotorBudget(Result):
-    """What a motion asks of the motors of an arm.
+    """The demand of a motion on the motors of an arm, compared with their limits.
 
     Attributes:
-        robot: Its name.
+        robot: Name of the robot.
         motion: Plan or run, in words.
-        duration: In [s]; means and rms are over it, as if it were repeated without a pause.
-        joints: What each joint needs, its limits, and causes.
-        limits: Where the limits are from, in words.
-        resolution: At which times it was looked at, in words.
-        error: Largest difference of two rules of integration, as a part of the mean τ² or |τ v|; the better one counts.
-        findings: What is doubtful, each with its remedy.
-        demand: Torque by cause and velocity at the times that were looked at.
-        case: The plant, the motion and the limits of a plan; else None.
+        duration: Duration, in [s]; means and rms assume that the motion is repeated without a pause.
+        joints: Demand, limits and causes of each joint.
+        limits: Sources of the limits, in words.
+        resolution: Times at which the motion was evaluated, in words.
+        error: Largest difference of two rules of integration, relative to the mean τ² or |τ v|.
+        findings: Doubtful parts, with remedies.
+        demand: Torque by cause and velocity at these times.
+        case: The plant, the motion and the limits of a plan; None for a run.
     """
 
     diagram: ClassVar[str] = "robot_dyn.tools.motors.motor_budget.diagram"
@@ -55,37 +55,36 @@ class MotorBudget(Result):
 
     @reported
     def fits(self) -> bool:
-        """Whether no limit that is known is passed."""
-        return not any(each.too_small for each in self.joints)
+        """Return True if no known limit is exceeded."""
+        return not any(joint.too_small for joint in self.joints)
 
     @reported
     def sentence(self) -> str:
-        """Whether the motors suffice for the motion, in a sentence."""
+        """Return the verdict on the motors, in one sentence."""
         return f"{self.robot}, {self.motion}: {self.verdict}"
 
     @property
     def verdict(self) -> str:
-        """Whether the motors suffice, and what is nearest to its limit, or beyond."""
-        small = [(each, kind) for each in self.joints for kind in each.too_small]
+        """The verdict on the motors, with the exceeded limits or the nearest one."""
+        small = [(joint, kind) for joint in self.joints for kind in joint.too_small]
         if small:
-            return f"too small: {'; '.join(f'{each.joint} needs {each.says(kind)}' for each, kind in small)}"
-        used = [(share, each, kind) for each in self.joints for kind, share in each.shares.items()]
+            return f"too small: {'; '.join(f'{joint.joint} needs {joint.says(kind)}' for joint, kind in small)}"
+        used = [(share, joint, kind) for joint in self.joints for kind, share in joint.shares.items()]
         share, nearest, kind = max(used, key=lambda x: x[0])
         if not share:
-            return "no limit is known, so nothing is said of its motors"
-        known = "the motors suffice" if not self._unknown else "the motors suffice where limits are known"
-        return f"{known}; {nearest.joint} is nearest to its {KINDS[kind]}, {nearest.says(kind)} ({share:.0%})"
+            return "no limit is known, so the motors cannot be judged"
+        verdict = "the motors suffice" if not self._unknown else "the motors suffice where limits are known"
+        return f"{verdict}; {nearest.joint} is nearest to its {KINDS[kind]}, {nearest.says(kind)} ({share:.0%})"
 
     @property
     def _unknown(self) -> list[str]:
-        """Joints where no peak torque, continuous torque or speed is known."""
-        limits = ((x.joint, (x.peak_limit, x.continuous_limit, x.speed_limit)) for x in self.joints)
-        return [joint for joint, each in limits if inf in each]
+        """Joints with an unknown limit of peak torque, continuous torque or speed."""
+        return [x.joint for x in self.joints if inf in (x.peak_limit, x.continuous_limit, x.speed_limit)]
 
     @property
     def rows(self) -> Iterator[Mapping[str, Any]]:
         """A row for each joint."""
-        return (vars(each) | {"unit": of_joint("N m", each.type)} for each in self.joints)
+        return (vars(joint) | {"unit": of_joint("N m", joint.type)} for joint in self.joints)
 
     def tables(self) -> Iterator[Block]:
         joints = self.joints
@@ -122,18 +121,18 @@ class MotorBudget(Result):
         yield "torque by cause at the peak:"
         yield _table(torque | at_peak | _by_cause("torque", [x.of_peak for x in joints]))
         yield ""
-        yield "rms torque, and the part of it that each cause asks for:"
+        yield "rms torque, and its parts by cause:"
         yield _table(torque | _by_cause("rms", [x.of_rms for x in joints]))
         yield ""
         yield from (f"finding: {finding}" for finding in self.findings)
 
 
-def case_of(motor_budget: MotorBudget, what: str) -> tuple[Plant, PiecewisePolynomial, Limits]:
-    """Return the plant, the motion and the limits of the budget of a plan; QueryError for that of a run."""
-    instance("motor_budget", motor_budget, MotorBudget, "give that of a plan, as rd.tools.motors.budget(plan, arm)")
+def case_of(motor_budget: MotorBudget, query: str) -> tuple[Plant, PiecewisePolynomial, Limits]:
+    """Return the plant, the motion and the limits of a plan's budget; raise a QueryError for a run's budget."""
+    instance("motor_budget", motor_budget, MotorBudget, "give the budget of a plan, rd.tools.motors.budget(plan, arm)")
     if motor_budget.case is None:
         raise QueryError(
-            f"{what} is of a plan, this budget is of a run: give its motion,"
+            f"{query} needs the budget of a plan, but this is the budget of a run: pass its motion,"
             " rd.tools.motors.budget(rd.control.from_samples(arm, run.table(), ends='measured'), plant)"
         )
     return motor_budget.case
@@ -147,12 +146,12 @@ def _percent(free: float, limit: float) -> str:
     return f"{round(free, 3) + 0.0:.1%}" if limit < inf else "—"
 
 
-def _by_cause(what: str, parts: Sequence[Mapping[str, float]]) -> dict[str, Iterable[Any]]:
-    """Return columns of the sum of the parts of each joint, and of its parts."""
-    rows = [without_rounding([sum(of.values()), *of.values()]).tolist() for of in parts]
-    return dict(zip((what, *parts[0]), zip(*rows, strict=True), strict=True)) if parts else {what: ()}
+def _by_cause(total: str, parts: Sequence[Mapping[str, float]]) -> dict[str, Iterable[Any]]:
+    """Return columns of the total of each joint, and of its parts."""
+    rows = [without_rounding([sum(x.values()), *x.values()]).tolist() for x in parts]
+    return dict(zip((total, *parts[0]), zip(*rows, strict=True), strict=True)) if parts else {total: ()}
 
 
 def _table(columns: Mapping[str, Iterable[Any]]) -> Table:
-    """Return a table of columns, texts after those of joint and unit at the right."""
+    """Return a table of columns; all except joint and unit are aligned at the right."""
     return Table(tuple(columns), tuple(zip(*columns.values(), strict=True)), digits=4, right=tuple(columns)[2:])

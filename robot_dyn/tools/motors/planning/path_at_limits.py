@@ -1,4 +1,4 @@
-"""A path as fast as its limits allow, with what the plant asks for in full."""
+"""The fastest motion along a path within limits, by the full dynamics of the plant."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from robot_dyn.tools.motors.planning.path_plan import (
 from robot_dyn.tools.motors.planning.plannable import check_effects, check_limited, check_positions, why_not
 from robot_dyn.tools.motors.planning.time_scaling import Effects, Speed, cells, fastest, imposed
 
-_CELLS, _MOST_CELLS = 200, 8000  # of the grid, besides breaks of the path
+_CELLS, _MOST_CELLS = 200, 8000  # number of cells of the grid, in addition to breaks of the path
 _ROUNDS = 40
-_TIGHTER = 3  # times that limits are tightened where the judgement finds more than they allow
-_ERROR = 1e-4  # of linearised torque, as a share of its limit
-_REST = 1e-20  # of the greatest ṡ²: about which effects are linearised at rest, so that friction has a sign
-_SAME = 1e-9  # of the path: joints that reverse nearer to each other, or to a break, do so at one place
-_SHORTEST = 1e-5  # of the duration: shorter pieces are not halved
-_ABOVE, _REFUSED = 1.0005, 1.001  # share of a limit that is refined, and that is refused
-_AT_LIMITS, _ENOUGH = 0.985, 0.98  # share of time at a limit that is looked for, and below which there is a finding
-_INSIDE = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # where cells are judged for the next round
+_TIGHTER = 3  # number of attempts with tighter limits if the motion exceeds them
+_ERROR = 1e-4  # largest error of linearised torque, as a share of its limit
+_REST = 1e-20  # relative to the largest ṡ²: speed at which effects at rest are linearised, so that friction has a sign
+_SAME = 1e-9  # relative to the path: reversals nearer to each other, or to a break, are one
+_SHORTEST = 1e-5  # relative to the duration: shorter pieces are not halved
+_ABOVE, _REFUSED = 1.0005, 1.001  # shares of a limit that lead to refinement and to an error
+_AT_LIMITS, _ENOUGH = 0.985, 0.98  # target share of time at a limit, and the share below which there is a finding
+_INSIDE = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # places in cells that are checked for refinement
 _EXPECTED = 1.0, 0.2, 5.0, 0.04, 25.0  # factors on the expected duration: toppra's solver needs its scale
 
 
@@ -49,29 +49,29 @@ def path(
     acceleration: Any = None,
     motors: Motors | None = None,
 ) -> PathPlan:
-    """The fastest motion along a path, from rest to rest, within limits of torque, velocity and acceleration.
+    """Plan the fastest motion along a path, from rest to rest, within limits of torque, velocity and acceleration.
 
         minimise T over s(t):  |τ(q, q̇, q̈)| ≤ share · τ_max,  |q̇| ≤ v_max,  |q̈| ≤ a_max  on q = q(s(t))
 
-    τ is the plant's inverse dynamics, with all of its effects. The motion is a polynomial in each of some hundred
-    pieces, in which s̈ is constant: its acceleration and torque jump between pieces, as those of time-optimal motions
-    do. It is judged at 10 000 times. What follows it in a run needs torque for its feedback: take share=0.95.
+    τ is the plant's inverse dynamics, with all effects. The motion is a polynomial in each of a few hundred pieces, in
+    which s̈ is constant: acceleration and torque jump between pieces, as in all time-optimal motions. The limits are
+    checked at 10 000 times. A controller that follows the motion needs torque for feedback: pass share=0.95.
 
     Args:
         plant: A plant or an arm.
-        points: Way points, (m, n), in [rad] or [m], which a natural cubic spline joins; or a
-            `rd.control.PiecewisePolynomial`, of which the path alone counts.
-        share: Of the effort limits that the motion may take, up to 1.
-        effort: Effort limits, one number, by joint name or (n,), in [N m] or [N]; those of the motors or, without
-            them, of the robot's file unless given.
-        velocity: Velocity limits, likewise, in [rad/s] or [m/s].
-        acceleration: Acceleration limits, likewise, in [rad/s²] or [m/s²]; none unless given.
-        motors: Of `rd.tools.motors.read_motors`: peak torques and speeds.
+        points: Way points, (m, n), in [rad] or [m], joined by a natural cubic spline; or a
+            `rd.control.PiecewisePolynomial`, whose timing is ignored.
+        share: Fraction of the effort limits that the motion may use, up to 1.
+        effort: Effort limits, one number, by joint name or (n,), in [N m] or [N]; by default the limits of the motors
+            or, without motors, of the robot's file.
+        velocity: Velocity limits, one number, by joint name or (n,), in [rad/s] or [m/s]; same default.
+        acceleration: Acceleration limits, one number, by joint name or (n,), in [rad/s²] or [m/s²]; none by default.
+        motors: Motors of `rd.tools.motors.read_motors`, with peak torques and speeds.
 
     Raises:
-        PlanError: If points or limits are not allowed, the path leaves the joint limits, an effect depends on time or
-            has states, or no motion is within the limits; it names the joint or the effect.
-        MissingExtraError: Without toppra.
+        PlanError: If points or limits are invalid, the path leaves the joint limits, an effect depends on time or has
+            states, or no motion is within the limits; the message names the joint or the effect.
+        MissingExtraError: If toppra is not installed.
 
     Source: Bobrow, Dubowsky, Gibson, Time-Optimal Control of Robotic Manipulators Along Specified Paths, 1985; Pham,
     Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis, 2018.
@@ -87,8 +87,8 @@ def path(
     check_positions(plant, geometry)
     check_limited(plant, limits, geometry)
     names = plant.dynamics.joint_names
-    motion, found = _within(plant, limits, geometry)
-    largest, at_limits = float(found.most.max()), float((found.most >= BINDS).mean())
+    motion, judgement = _within(plant, limits, geometry)
+    largest, at_limits = float(judgement.most.max()), float((judgement.most >= BINDS).mean())
     moves = geometry.coefficients[:, 1:].any(axis=(0, 1))
     free = [name for i, name in enumerate(names) if moves[i] and np.isinf(limits.effort[i])]
     findings = [f"joint {name!r} moves without an effort limit; give effort={{{name!r}: …}}" for name in free]
@@ -103,31 +103,31 @@ def path(
         share,
         largest,
         at_limits,
-        elsewhere(found, motion.breaks),
-        tuple(bindings(found, limits, names)),
-        tuple(phases(found, names)),
-        {name: found.shares[0][:, i] for i, name in enumerate(names) if np.isfinite(limits.effort[i])},
+        elsewhere(judgement, motion.breaks),
+        tuple(bindings(judgement, limits, names)),
+        tuple(phases(judgement, names)),
+        {name: judgement.shares[0][:, i] for i, name in enumerate(names) if np.isfinite(limits.effort[i])},
     )
 
 
 def _within(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[PiecewisePolynomial, Judgement]:
-    """The fastest motion that the judgement finds within limits, and its judgement."""
+    """Return the fastest motion within limits, and its judgement."""
     allowed, largest, error = 1.0, inf, inf
     for _ in range(_TIGHTER):
         motion, error = _fastest_motion(plant, limits.times(allowed, allowed), path)
-        found = judged(plant, limits, motion, judged_times(motion.end))
-        largest = float(found.most.max())
+        judgement = judged(plant, limits, motion, judged_times(motion.end))
+        largest = float(judgement.most.max())
         if largest <= _REFUSED and error <= _ERROR:
-            return motion, found
+            return motion, judgement
         allowed /= max(1.0, largest)
     raise PlanError(
-        f"no motion was found within the limits: the best one takes {largest:.5f} of them, and the torque of its"
-        f" effects is known to {error:.2g} of the limits; take a smoother path or smoother effects"
+        f"no motion was found within the limits: the best one uses {largest:.5f} of them, and the error of the torque"
+        f" of effects is {error:.2g} of the limits; use a smoother path or smoother effects"
     )
 
 
 def _fastest_motion(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> tuple[PiecewisePolynomial, float]:
-    """The motion, and the error of its linearised effects, as a share of the effort limits."""
+    """Return the motion, and the error of its linearised effects as a share of the effort limits."""
     fixed = _apart(path.breaks, turning_points(path)) if plant.forces else path.breaks
     cosine = (1 - np.cos(np.linspace(0, np.pi, _CELLS + 1))) / 2
     grid = _merged(fixed, path.start + (path.end - path.start) * cosine)
@@ -138,7 +138,7 @@ def _fastest_motion(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> 
         last, error = _solved(plant, limits, path, grid, last, duration)
         motion = in_time(path, last.s, last.x)
         duration = motion.end
-        if turn == 0:  # pieces of about the same duration
+        if turn == 0:  # change to pieces of about the same duration
             grid = _merged(fixed, _places(last, motion.breaks, np.linspace(0, duration, _CELLS + 1)))
             continue
         bad, settled = _unsettled(plant, limits, motion)
@@ -151,17 +151,17 @@ def _fastest_motion(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> 
 def _solved(
     plant: Plant, limits: Limits, path: PiecewisePolynomial, grid: np.ndarray, last: Speed, duration: float
 ) -> tuple[Speed, float]:
-    """The fastest speed on a grid, with effects linearised about the last one, or about slower ones if none exists.
+    """Return the fastest speed on a grid, and the error of linearised effects as a share of the effort limits.
 
-    Also the error of what was linearised, as a share of the effort limits.
+    Effects are linearised about the last speed, or about slower ones if there is no solution.
     """
     places = imposed(grid).ravel()
-    known = np.maximum(np.interp(places, *last), _REST * last.x.max())
+    squares = np.maximum(np.interp(places, *last), _REST * last.x.max())
     for slower in 4.0 ** np.arange(6 if plant.forces else 1):
-        effects = Effects.about(plant, path, places, known / slower) if plant.forces else None
-        made = cells(plant, limits, path, grid, effects)
+        effects = Effects.about(plant, path, places, squares / slower) if plant.forces else None
+        limits_in_cells = cells(plant, limits, path, grid, effects)
         for factor in _EXPECTED:
-            if (x := fastest(made, factor * duration)) is not None:
+            if (x := fastest(limits_in_cells, factor * duration)) is not None:
                 speed = Speed(grid, x)
                 if effects is None:
                     return speed, 0.0
@@ -170,7 +170,7 @@ def _solved(
 
 
 def _unsettled(plant: Plant, limits: Limits, motion: PiecewisePolynomial) -> tuple[np.ndarray, bool]:
-    """The pieces to be halved, (k,), and whether none need be: enough of the motion is at a limit, and none above."""
+    """Return the pieces to halve, (k,), and True if enough of the motion is at a limit and none of it above."""
     h = np.diff(motion.breaks)
     most = judged(plant, limits, motion, (motion.breaks[:-1, None] + h[:, None] * _INSIDE).ravel()).most
     most = most.reshape(len(h), -1)
@@ -181,7 +181,7 @@ def _unsettled(plant: Plant, limits: Limits, motion: PiecewisePolynomial) -> tup
 
 
 def _apart(breaks: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The breaks, and the points that differ from them and from each other by more than rounding."""
+    """Return the breaks, and the points that differ from them and from each other by more than rounding."""
     least = _SAME * (breaks[-1] - breaks[0])
     points = points[np.diff(points, prepend=-inf) > least]
     near = np.abs(points[:, None] - breaks).min(axis=-1, initial=inf)
@@ -189,14 +189,14 @@ def _apart(breaks: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def _merged(fixed: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """A grid with all the fixed points, and the free ones that are not close to them."""
+    """Return a grid of all fixed points, and the free points that are not close to them."""
     near = np.abs(free[:, None] - fixed).min(axis=-1)
     cell = np.gradient(free)
     return np.unique(np.concatenate([fixed, free[near > 0.3 * cell]]))
 
 
 def _places(speed: Speed, breaks: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """S at times t."""
+    """Return s at times t."""
     piece = np.clip(np.searchsorted(breaks, t, side="right") - 1, 0, len(breaks) - 2)
     u = (np.diff(speed.x) / (2 * np.diff(speed.s)))[piece]
     h = t - breaks[piece]

@@ -1,4 +1,4 @@
-"""A motion at its limits, judged by the inverse dynamics of its plant: which limit binds, when, and where none does."""
+"""Analysis of a motion at its limits by the inverse dynamics of its plant: binding limits, and times without one."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from robot_dyn.control import PiecewisePolynomial, Plan
 from robot_dyn.foundations import UNREPORTED, Answer, Block, Table, Value, legend, plot, read_only
 from robot_dyn.tools.motors.limits import Limits
 
-JUDGED = 10_000  # times of a motion, in the middle of as many equal parts of it
-BINDS = 0.99  # of a limit
-_BRIEF = 2e-3  # of the duration: shorter phases are not listed
+JUDGED = 10_000  # number of times at which a motion is checked, in the middle of equal parts
+BINDS = 0.99  # share of a limit from which it binds
+_BRIEF = 2e-3  # relative to the duration: shorter phases are not listed
 KINDS = "torque", "velocity", "acceleration"
 
 
 @final
 @dataclass(frozen=True)
 class Phase:
-    """From one time to another, in [s], one limit binds: that of a kind, of a joint; "" where none does."""
+    """An interval of time, in [s], in which the limit of one kind and joint binds; both are "" if none does."""
 
     start: float
     end: float
@@ -34,7 +34,7 @@ class Phase:
 @final
 @dataclass(frozen=True)
 class Binding:
-    """How much of a limit is used: its greatest share, and the share of time in which it binds, to 1 %."""
+    """The use of a limit: its largest share, and the share of time in which it binds, to 1 %."""
 
     joint: str
     kind: str
@@ -46,17 +46,17 @@ class Binding:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class PathPlan(Answer, Value):
-    """The fastest motion along a path; `reference` is what controllers follow.
+    """The fastest motion along a path; pass `reference` to a controller.
 
     Attributes:
-        plan: The motion, from rest to rest, its limits, torques with `share`, and findings.
-        share: Of the effort limits that it may take.
-        largest: Greatest torque, velocity or acceleration, as a share of its limit; for torques of `share` times it.
-        at_limits: Share of the time in which at least one is within 1 % of it.
-        elsewhere: Why none is in the rest of the time, with the share of each reason.
-        bindings: Each limit that is finite.
-        phases: In the order of time, but for those shorter than 0.2 % of the duration.
-        ratios: Torque as a share of its limit in 10 000 equal parts of the time, (10 000,) by joint.
+        plan: The motion, from rest to rest, with limits (torques times `share`) and findings.
+        share: Fraction of the effort limits that it may use.
+        largest: Largest torque, velocity or acceleration as a share of its limit; for torques, of `share` times it.
+        at_limits: Share of the time in which at least one limit is reached to 1 %.
+        elsewhere: Reasons for no binding limit in the rest of the time, with the share of each reason.
+        bindings: Use of each finite limit.
+        phases: Phases in the order of time, except phases shorter than 0.2 % of the duration.
+        ratios: Torque as a share of its limit in 10 000 equal parts of the time, (10 000,), by joint.
     """
 
     plan: Plan
@@ -78,21 +78,21 @@ class PathPlan(Answer, Value):
 
     @property
     def duration(self) -> float:
-        """Of the motion, in [s]."""
+        """Duration of the motion, in [s]."""
         return self.plan.duration
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """What is doubtful in it, each with its remedy."""
+        """Findings about doubtful parts, with remedies."""
         return self.plan.findings
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.plan.arm}: {self.plan.method}: {self.duration:.6g} s from rest to rest"
         yield f"at a limit for {self.at_limits:.2%} of the time; largest share of a limit {self.largest:.5f}"
-        yield from (f"elsewhere, {each:.2%}: {why}" for why, each in self.elsewhere.items())
+        yield from (f"elsewhere, {part:.2%}: {why}" for why, part in self.elsewhere.items())
         rows = tuple((x.joint, x.kind, x.limit, x.largest, f"{x.binds:.1%}") for x in self.bindings)
         yield Table(("joint", "limit of", "value", "largest share", "binds"), rows, digits=4, right=("binds",))
-        yield from (f"finding: {each}" for each in self.findings)
+        yield from (f"finding: {finding}" for finding in self.findings)
 
     @property
     def drawing(self) -> str:
@@ -102,64 +102,64 @@ class PathPlan(Answer, Value):
 @final
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """Shares of limits at times t, (m,): of torque, velocity and acceleration, each (m, n), signed."""
+    """Signed shares of the limits of torque, velocity and acceleration, (m, n), at times t, (m,)."""
 
     t: np.ndarray
     shares: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     @property
     def most(self) -> np.ndarray:
-        """The greatest share at each time, (m,)."""
+        """The largest absolute share at each time, (m,)."""
         return np.abs(np.concatenate(self.shares, axis=-1)).max(axis=-1)
 
 
 def judged(plant: Plant, limits: Limits, motion: PiecewisePolynomial, t: np.ndarray) -> Judgement:
-    """What a motion takes of the limits of a plant, by its inverse dynamics."""
+    """Compute the shares of a plant's limits that a motion uses, by inverse dynamics."""
     q, v, a = motion.at(t)
     tau = plant.inverse_dynamics(0.0, q, v, a)
     return Judgement(t, (tau / limits.effort, v / limits.velocity, a / limits.acceleration))
 
 
 def judged_times(duration: float) -> np.ndarray:
-    """The times at which a motion is judged, (10 000,), in [s]."""
+    """Return the times at which a motion is checked, (10 000,), in [s]."""
     return (np.arange(JUDGED) + 0.5) * duration / JUDGED
 
 
-def bindings(found: Judgement, limits: Limits, joint_names: tuple[str, ...]) -> Iterator[Binding]:
-    """Each limit that is finite, with the share that the motion takes of it."""
+def bindings(judgement: Judgement, limits: Limits, joint_names: tuple[str, ...]) -> Iterator[Binding]:
+    """Yield each finite limit with the share that the motion uses."""
     values = limits.effort, limits.velocity, limits.acceleration
-    for kind, share, limit in zip(KINDS, found.shares, values, strict=True):
+    for kind, share, limit in zip(KINDS, judgement.shares, values, strict=True):
         for i, name in enumerate(joint_names):
             if np.isfinite(limit[i]):
-                each = np.abs(share[:, i])
-                yield Binding(name, kind, float(limit[i]), float(each.max()), float((each >= BINDS).mean()))
+                used = np.abs(share[:, i])
+                yield Binding(name, kind, float(limit[i]), float(used.max()), float((used >= BINDS).mean()))
 
 
-def phases(found: Judgement, joint_names: tuple[str, ...]) -> Iterator[Phase]:
-    """Which limit binds when: the nearest one, where one is within 1 %."""
-    n, all_of = len(joint_names), np.abs(np.concatenate(found.shares, axis=-1))
-    which = np.where(found.most >= BINDS, np.argmax(all_of, axis=-1), -1).tolist()
-    part, k = float(found.t[0] * 2), 0
-    for limit, group in groupby(which):
+def phases(judgement: Judgement, joint_names: tuple[str, ...]) -> Iterator[Phase]:
+    """Yield the intervals in which a limit binds to 1 %, the nearest limit if there are several."""
+    n, all_of = len(joint_names), np.abs(np.concatenate(judgement.shares, axis=-1))
+    binding = np.where(judgement.most >= BINDS, np.argmax(all_of, axis=-1), -1).tolist()
+    part, k = float(judgement.t[0] * 2), 0
+    for limit, group in groupby(binding):
         start, k = k, k + len(list(group))
-        if k - start > _BRIEF * len(which):
+        if k - start > _BRIEF * len(binding):
             joint, kind = ("", "") if limit < 0 else (joint_names[limit % n], KINDS[limit // n])
             yield Phase(start * part, k * part, joint, kind)
 
 
-def elsewhere(found: Judgement, breaks: np.ndarray) -> dict[str, float]:
-    """Why no limit binds, with the share of time: what is not said otherwise has no reason that is known."""
-    free = found.most < BINDS
-    cell = np.searchsorted(breaks, found.t, side="right") - 1
+def elsewhere(judgement: Judgement, breaks: np.ndarray) -> dict[str, float]:
+    """Return reasons why no limit binds, with the share of time; the last reason is unknown."""
+    free = judgement.most < BINDS
+    cell = np.searchsorted(breaks, judgement.t, side="right") - 1
     bound = np.zeros(len(breaks) + 1, dtype=bool)  # cells in which a limit binds, with one more at either end
     bound[cell[~free] + 1] = True
     at_ends = (cell == 0) | (cell == len(breaks) - 2)
-    beside = bound[cell] | bound[cell + 1] | bound[cell + 2]
+    next_to = bound[cell] | bound[cell + 1] | bound[cell + 2]
     reasons = {
         "in the first or last piece of the motion, at rest at one end": free & at_ends,
         "in a piece in which another limit takes over: the acceleration along the path is constant in each": free
         & ~at_ends
-        & beside,
-        "no reason known": free & ~at_ends & ~beside,
+        & next_to,
+        "no reason known": free & ~at_ends & ~next_to,
     }
     return {why: float(where.mean()) for why, where in reasons.items() if where.any()}

@@ -1,4 +1,4 @@
-"""What a path at its limits can be planned for: effects of position and velocity, and limits that suffice."""
+"""Requirements of a path at its limits: effects of position and velocity only, and sufficient limits."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from robot_dyn.effects import Bound, CarriedPayload, EffortLimit, Force, RigidSt
 from robot_dyn.foundations import PlanError
 from robot_dyn.tools.motors.limits import Limits, outside_positions
 
-_TIMES = 0.1234, 7.891  # at which torques must be the same
-_LEAST, _MOST = 1e-100, 1e100  # of limits, whose squares and ratios must not overflow
+_TIMES = 0.1234, 7.891  # times at which torques must be equal
+_LEAST, _MOST = 1e-100, 1e100  # range of limits, so that squares and ratios do not overflow
 
 
 def check_effects(plant: Plant) -> None:
-    """Refuse what depends on time, has states, or changes the torque of the motors."""
+    """Raise a PlanError for effects that depend on time, have states, or change the torque of the motors."""
     rng, n = np.random.default_rng(0), plant.dynamics.n
     q, v = rng.uniform(-1, 1, (2, 8, n))
     for effect in plant.effects:
@@ -24,7 +24,7 @@ def check_effects(plant: Plant) -> None:
             why = "has states"
         elif isinstance(effect, CarriedPayload):
             why = "comes and goes: give the arm with the payload, arm.with_(payload=…)"
-        elif any(0 < each < np.inf for each in effect.switches) or (
+        elif any(0 < t < np.inf for t in effect.switches) or (
             isinstance(effect, Force)
             and np.diff([Plant(plant.dynamics, [effect]).torque(t, q, v) for t in _TIMES], axis=0).any()
         ):
@@ -32,18 +32,18 @@ def check_effects(plant: Plant) -> None:
         elif isinstance(effect, Bound) and not isinstance(effect, EffortLimit):
             why = "changes the torque of the motors"
         if why:
-            raise PlanError(f"effect {effect.name!r} {why}; a path at its limits is planned without such effects")
+            raise PlanError(f"effect {effect.name!r} {why}; paths at limits need plants without such effects")
 
 
 def check_positions(plant: Plant, path: PiecewisePolynomial) -> None:
-    """Refuse a path that leaves the joint limits or passes rigid stops."""
+    """Raise a PlanError if a path leaves the joint limits or passes rigid stops."""
     for stops in (None, *(effect for effect in plant.effects if isinstance(effect, RigidStops))):
         for where in outside_positions(plant.dynamics, path, stops, "s = {:.4g}"):
-            raise PlanError(f"{where}; move the points, or give more of them where the spline swings out")
+            raise PlanError(f"{where}; move the points, or give more of them where the spline overshoots")
 
 
 def check_limited(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> None:
-    """Refuse limits whose squares overflow, and a path along which nothing limits the acceleration."""
+    """Raise a PlanError for limits whose squares overflow, and for a path without a limit on the acceleration."""
     for name, x in (("effort", limits.effort), ("velocity", limits.velocity), ("acceleration", limits.acceleration)):
         if (wrong := np.isfinite(x) & ((x < _LEAST) | (x > _MOST))).any():
             joint, value = plant.dynamics.joint_names[int(wrong.argmax())], x[wrong][0]
@@ -60,10 +60,10 @@ def check_limited(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> No
 
 
 def why_not(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> str:
-    """The joint that needs most to rest on the path, as the reason that no motion exists."""
+    """Return the reason why no motion exists: the joint that needs the largest share of its limit to move slowly."""
     s = _along(path)
     q, slope, _ = path.at(s)
-    slowly = 1e-9 * slope  # for the friction that acts when it moves
+    slowly = 1e-9 * slope  # includes friction in motion
     load = plant.inverse_dynamics(0.0, q, slowly, 0 * q) / limits.effort
     k, i = np.unravel_index(np.argmax(np.abs(load)), load.shape)
     name, limit = plant.dynamics.joint_names[i], float(limits.effort[i])
@@ -72,10 +72,10 @@ def why_not(plant: Plant, limits: Limits, path: PiecewisePolynomial) -> str:
     )
     if abs(load[k, i]) > 1:
         return f"no motion along the path is within the limits: {needs_it}"
-    return f"no motion along the path was found; at rest {needs_it}, which is most of all joints"
+    return f"no motion along the path was found; at rest {needs_it}, the largest share of all joints"
 
 
 def _along(path: PiecewisePolynomial) -> np.ndarray:
-    """Places along a path, one of them in each piece at least."""
+    """Return places along a path, at least one in each piece."""
     inside = np.array([0.05, 0.25, 0.5, 0.75, 0.95]) if len(path.coefficients) > 50 else np.linspace(0.01, 0.99, 50)
     return (path.breaks[:-1, None] + np.diff(path.breaks)[:, None] * inside).ravel()

@@ -1,10 +1,10 @@
-"""The fastest speed along a path under limits: toppra on cells of a grid, repeated for what depends on speed.
+"""The fastest speed along a path under limits: toppra on cells of a grid, repeated for effects that depend on speed.
 
     τ(s) = a(s) s̈ + b(s) ṡ² + c(s) + h(s, ṡ),    h ≈ h₀ + (∂h/∂x)₀ (x − x₀),  x = ṡ²
 
-a, b, c are of the rigid bodies; h is the torque of effects, linearised in x about the last solution x₀(s). Viscous
-friction taken as a part of b would be scaled by ṡ² in place of ṡ. In a cell s̈ is constant, and the limits are imposed
-just after its start, in its middle and just before its end. [Pham, Pham, A New Approach to Time-Optimal Path
+a, b, c belong to the rigid bodies; h is the torque of effects, linearised in x about the last solution x₀(s). Viscous
+friction as a part of b would be scaled by ṡ² instead of ṡ. In a cell s̈ is constant, and the limits are imposed just
+after its start, in its middle and just before its end. [Pham, Pham, A New Approach to Time-Optimal Path
 Parameterization Based on Reachability Analysis, 2018]
 """
 
@@ -21,26 +21,26 @@ from robot_dyn.control import PiecewisePolynomial
 from robot_dyn.foundations import needs
 from robot_dyn.tools.motors.limits import Limits
 
-IMPOSED = np.array([1e-6, 0.5, 1 - 1e-6])  # where in a cell; not at its ends, where the sign of a velocity may change
-_SLOW = 1e-3  # of the greatest ṡ²
+IMPOSED = np.array([1e-6, 0.5, 1 - 1e-6])  # places in a cell; not its ends, where the sign of a velocity may change
+_SLOW = 1e-3  # relative to the largest ṡ²
 _BEND = 1e-4  # step of the difference quotient ∂h/∂x, in x
 
 needs_plan = partial(needs, extra="plan")
 
 
 class Speed(NamedTuple):
-    """ṡ² = x at the points s of a grid, each (m + 1,), and linear between them: s̈ is constant there."""
+    """ṡ² = x at the points s of a grid, both (m + 1,), linear between them, so that s̈ is constant there."""
 
     s: np.ndarray
     x: np.ndarray
 
 
 class Cells(NamedTuple):
-    """What limits the motion in the cells of a grid, at some places of each: |A s̈ + B x + C| ≤ 1, with x at its start.
+    """The limits in the cells of a grid, at several places of each: |A s̈ + B x + C| ≤ 1, with x at the cell's start.
 
     Attributes:
         s: The grid, (m + 1,).
-        rows: A, B, C, each (m, r).
+        rows: A, B, C, all (m, r).
     """
 
     s: np.ndarray
@@ -48,9 +48,9 @@ class Cells(NamedTuple):
 
     @property
     def expected_duration(self) -> float:
-        """That of a motion with the mean acceleration and speed that the limits allow, in [s]: an order of size."""
+        """Duration with the mean acceleration and speed that the limits allow, in [s]: an order of magnitude."""
         (A, B, _), length = self.rows, self.s[-1] - self.s[0]
-        per_acceleration, per_squared_speed = (np.median(np.abs(each).max(axis=-1)) for each in (A, B))
+        per_acceleration, per_squared_speed = (np.median(np.abs(x).max(axis=-1)) for x in (A, B))
         return float(2 * np.sqrt(length * per_acceleration) + length * np.sqrt(per_squared_speed))
 
 
@@ -64,30 +64,30 @@ class Effects(NamedTuple):
 
     @classmethod
     def about(cls, plant: Plant, path: PiecewisePolynomial, s: np.ndarray, x0: np.ndarray) -> Effects:
-        """Linearised in x = ṡ² about x0, which is positive; near rest, where ∂h/∂x of friction is large, h₀ alone."""
+        """Linearise in x = ṡ² about x0 > 0; near rest, where ∂h/∂x of friction is large, the slope is 0."""
         h = partial(effects_load, plant, path, s)
         slope = (h(x0 * (1 + _BEND)) - h(x0 * (1 - _BEND))) / (2 * _BEND * x0)[:, None]
         slope[x0 < _SLOW * x0.max()] = 0.0
         return cls(s, x0, h(x0), slope)
 
     def error(self, plant: Plant, path: PiecewisePolynomial, x: np.ndarray) -> np.ndarray:
-        """What the linearised torque lacks at speeds x, (m, n)."""
+        """Return the error of the linearised torque at speeds x, (m, n)."""
         return effects_load(plant, path, self.s, x) - self.h0 - self.slope * (x - self.x0)[:, None]
 
 
 def effects_load(plant: Plant, path: PiecewisePolynomial, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The load h of the effects, −Σ τ_effect, at places s with ṡ² = x, each (m,): (m, n)."""
+    """Return the load h of the effects, −Σ τ_effect, (m, n), at places s with ṡ² = x, both (m,)."""
     q, slope, _ = path.at(s)
     return -plant.torque(0.0, q, slope * np.sqrt(x)[:, None])
 
 
 def imposed(grid: np.ndarray) -> np.ndarray:
-    """The places in the cells of a grid at which limits are imposed, (m, 3)."""
+    """Return the places in the cells of a grid at which limits are imposed, (m, 3)."""
     return grid[:-1, None] + np.diff(grid)[:, None] * IMPOSED
 
 
 def cells(plant: Plant, limits: Limits, path: PiecewisePolynomial, grid: np.ndarray, effects: Effects | None) -> Cells:
-    """The limits in the cells of a grid, with effects at its imposed places."""
+    """Return the limits in the cells of a grid, with effects linearised at its imposed places."""
     n, ahead = path.n, (np.diff(grid)[:, None] * IMPOSED).reshape(-1, 1)
     q, slope, bend = path.at(imposed(grid).ravel())
     rigid, zero = plant.dynamics.inverse_dynamics, np.zeros_like(q)
@@ -99,8 +99,8 @@ def cells(plant: Plant, limits: Limits, path: PiecewisePolynomial, grid: np.ndar
     torque = (A / limits.effort, B / limits.effort, C / limits.effort)
     acceleration = (slope / limits.acceleration, bend / limits.acceleration, zero)
     velocity = (0 * fast, fast, 0 * fast)
-    A, B, C = (np.concatenate(each, axis=-1) for each in zip(torque, acceleration, velocity, strict=True))
-    A = A + 2 * ahead * B  # x in the cell is that at its start, and 2 s̈ times the way from there
+    A, B, C = (np.concatenate(rows, axis=-1) for rows in zip(torque, acceleration, velocity, strict=True))
+    A = A + 2 * ahead * B  # x in the cell is x at its start plus 2 s̈ times the distance from there
     shape = len(grid) - 1, len(IMPOSED) * (2 * n + 1)
     return Cells(grid, (A.reshape(shape), B.reshape(shape), C.reshape(shape)))
 
@@ -110,12 +110,12 @@ def fastest(grid: Cells, duration: float) -> np.ndarray | None:
 
     Args:
         grid: The limits.
-        duration: About what is expected, in [s]: the mean ṡ is made about 1, since toppra rounds ṡ² to 1e-8.
+        duration: Expected duration, in [s]: ṡ is scaled to a mean of about 1, because toppra rounds ṡ² to 1e-8.
     """
     algorithm, constraint = needs_plan("toppra.algorithm"), _constraint(grid, duration)
     unit = duration / (grid.s[-1] - grid.s[0])
     scaled = (grid.s - grid.s[0]) * unit
-    path = SimpleNamespace(path_interval=scaled[[0, -1]], dof=1, waypoints=None)  # its limits are computed already
+    path = SimpleNamespace(path_interval=scaled[[0, -1]], dof=1, waypoints=None)  # limits are computed already
     solver = algorithm.TOPPRA([constraint], path, gridpoints=scaled, solver_wrapper="seidel")
     _, speed, _ = solver.compute_parameterization(0.0, 0.0)
     if speed is None or not np.isfinite(speed).all():
@@ -128,8 +128,8 @@ def fastest(grid: Cells, duration: float) -> np.ndarray | None:
 def _constraint(grid: Cells, duration: float) -> Any:
     """Return the rows of the cells in toppra's form, F (A s̈ + B x + C) ≤ g."""
     unit = duration / (grid.s[-1] - grid.s[0])
-    A, B, C = (np.concatenate([x, x[-1:]]) for x in grid.rows)  # toppra asks for a last row, and ignores it
-    used = np.any(A, axis=0) | np.any(B, axis=0) | np.any(C, axis=0)  # those without a limit are 0
+    A, B, C = (np.concatenate([x, x[-1:]]) for x in grid.rows)  # toppra requires a last row but ignores it
+    used = np.any(A, axis=0) | np.any(B, axis=0) | np.any(C, axis=0)  # rows without a limit are 0
     A, B, C = (x[:, used] for x in (A / unit, B / unit**2, C))
     both = np.concatenate([np.eye(A.shape[1]), -np.eye(A.shape[1])])
     constraint = needs_plan("toppra.constraint").LinearConstraint()
