@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -11,11 +11,22 @@ from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.run.outcome import Outcome
 from robot_dyn.simulation.setup.setup import Setup
 
-if TYPE_CHECKING:
-    from robot_dyn.simulation.rollouts.rollouts_data import RolloutsData
+
+class Runs(Protocol):
+    """Recorded runs of a batch; see `RolloutsData`."""
+
+    @property
+    def t(self) -> np.ndarray: ...
+    @property
+    def q(self) -> np.ndarray | None: ...
+    @property
+    def v(self) -> np.ndarray | None: ...
+    @property
+    def ends(self) -> tuple[Outcome, ...]: ...
+    def setup_of(self, run: int) -> Setup: ...
 
 
-def reason_of(runs: RolloutsData, run: int) -> Outcome:
+def reason_of(runs: Runs, run: int) -> Outcome:
     """Return the outcome of a run that diverged, with its step or its loop as the reason if that explains it.
 
     The search for a stable period or stable gains is left to `simulate`, since it takes most of the time.
@@ -25,7 +36,7 @@ def reason_of(runs: RolloutsData, run: int) -> Outcome:
     return explained(end, setup, (*step_too_long(setup, end.t), *loop))
 
 
-def states(runs: RolloutsData, setup: Setup, run: int) -> tuple[np.ndarray, np.ndarray]:
+def states(runs: Runs, setup: Setup, run: int) -> tuple[np.ndarray, np.ndarray]:
     """Return times (m,) and states (m, size) of a run; the start alone if not all of the state was recorded."""
     equation = setup.equation
     if runs.q is None or runs.v is None or equation.equation_of_motion.state_size:
