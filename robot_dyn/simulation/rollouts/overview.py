@@ -147,7 +147,7 @@ def _in_runs(remark: Remark, worst: int, some: np.ndarray) -> Remark:
 def _linearised(runs: RolloutsData, run: int) -> Iterator[Remark]:
     """The remark on the sampled loop of one run."""
     setup = runs.setup_of(run)
-    for remark in unstable(setup, *states(runs, setup, run), bool(runs.diverged[run])):
+    for remark in unstable(setup, *states(setup, *runs.samples_of(run)), bool(runs.diverged[run])):
         yield replace(remark, runs=(run,), looked=1)
 
 

@@ -17,7 +17,7 @@ from robot_dyn.foundations.values import Value, read_only
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.remarks import Remark
 from robot_dyn.simulation.results.run_data import SAMPLED, RunData
-from robot_dyn.simulation.rollouts.reasons import reason_of
+from robot_dyn.simulation.rollouts.reasons import Samples, reason_of
 from robot_dyn.simulation.rollouts.sweepable import parts_of_run
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.setup.setup import Setup
@@ -97,8 +97,12 @@ class RolloutsData(RunData):
         if self.setup is None or self.ends[run].ending is not Ending.DIVERGED:
             return self.ends[run]
         if run not in self._judged:
-            self._judged[run] = reason_of(self, run)
+            self._judged[run] = reason_of(self.setup_of(run), self.ends[run], self.samples_of(run))
         return self._judged[run]
+
+    def samples_of(self, run: int) -> Samples:
+        """Return times, positions and velocities of a run."""
+        return self.t, None if self.q is None else self.q[run], None if self.v is None else self.v[run]
 
     @cached_property
     def _judged(self) -> dict[int, Outcome]:
