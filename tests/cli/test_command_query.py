@@ -70,7 +70,7 @@ def test_findings_are_listed_by_info_and_warned_of_in_one_line_by_other_commands
     done = run("query", "iris", "--json")
     assert done.returncode == 0
     assert re.fullmatch(
-        r"robot-dyn: warning: iris: link .* \(the first of 3 findings; .*robot-dyn info\)\n", done.stderr
+        r"robot-dyn: warning: iris: link .* \(the first of 3 findings; .*robot-dyn info for all\)\n", done.stderr
     )
 
 

@@ -102,7 +102,7 @@ def test_ctrl_c_ends_the_measurement_and_keeps_what_was_measured(command: str, s
     repeats = ("--repeats", "1000") if command == "cost" else ()
     out = interrupted_at_work(command, scene, "--budget", "3000", *repeats, "--json", watched=WATCHED[command])
     written = json.loads(out)
-    assert written["interrupted"] and "interrupted" in written["left_out"][-1]
+    assert written["interrupted"] and "interruption" in written["left_out"][-1]
     assert written["ladders" if command == "accuracy" else "alternatives"]
 
 

@@ -71,7 +71,7 @@ def test_a_robot_with_findings_warns_once_and_says_how_many_and_where(name: str)
     with pytest.warns(ModelWarning) as caught:
         robot = rd.load(name)
     first, *others = robot.findings
-    more = f" (the first of {1 + len(others)} findings; all of them: Robot.findings, robot-dyn info)" if others else ""
+    more = f" (the first of {1 + len(others)} findings; see Robot.findings or robot-dyn info for all)" if others else ""
     assert [str(w.message) for w in caught] == [f"{robot.name}: {first}{more}"]
     assert {w.filename for w in caught} == {__file__}
 

@@ -734,7 +734,7 @@ def test_wrong_keys_of_an_effect_of_a_users_own_are_told(keys: str, said: str, t
     path.write_text(f'{SCENE}[[effect]]\nkind = "drag"\n{keys}\n', encoding="utf-8")
     with pytest.raises(SceneError, match=said):
         rd.read_scene(path, effects={"drag": Drag})
-    with pytest.raises(SceneError, match="'spring' is a kind that scenes have"):
+    with pytest.raises(SceneError, match="the kind 'spring' exists already"):
         rd.read_scene(path, effects={"spring": Drag})
 
 
@@ -774,12 +774,12 @@ def test_an_argument_that_cannot_be_a_key_of_a_scene_needs_a_default(factory: An
             {"controller": rd.control.ControlLaw(lambda t, q, v: ARM.N(q), len(Q))},
             "make it an attribute of a rd.control.S",
         ),
-        ({"events": [rd.Event(lambda t, q, v: ARM.total_energy(q, v))]}, "take engine='interpreted'"),
+        ({"events": [rd.Event(lambda t, q, v: ARM.total_energy(q, v))]}, "use engine='interpreted'"),
     ],
     ids=["controller", "event"],
 )
 def test_an_arm_inside_a_function_is_named_as_what_cannot_be_traced(options, remedy) -> None:
-    with pytest.raises(TraceError, match=rf"an arm inside a function cannot be traced[:;] {remedy}"):
+    with pytest.raises(TraceError, match=rf"a robot inside a function cannot be traced[:;] {remedy}"):
         rd.simulate(rd.Plant(ARM), Q, duration_s=0.1, engine="compiled", **options)
 
 

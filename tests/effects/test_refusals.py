@@ -65,7 +65,10 @@ CONSTRUCTED = [
 ]
 IN_A_PLANT = [
     *(
-        (lambda effect=effect: plant(effect, arm=CART), f"{effect.name}: {name} is of [13] joints?, the arm has 2")
+        (
+            lambda effect=effect: plant(effect, arm=CART),
+            f"{effect.name}: {name} has values for [13] joints?, but the arm has 2",
+        )
         for effect, name in (
             (ViscousFriction([1.0, 2.0, 3.0]), "damping"),
             (RegularisedCoulombFriction(1.0, [1.0, 2.0, 3.0]), "velocity_scale"),

@@ -106,3 +106,19 @@ def test_batches_are_the_states_one_by_one() -> None:
     np.testing.assert_array_equal(got, one_by_one)
     assert arm.M(0.0, np.zeros((0, 2)), np.zeros(2)).shape == (0, 2, 2)
     assert arm.energy(0.0, q, v).shape == (4, 3)
+
+
+def test_the_energy_of_a_system_at_rest_in_time_is_its_jacobi_integral() -> None:
+    """K + V = h where K = ½ vᵀ M v; a constraint that moves adds terms to K that are not quadratic in v."""
+    rng = np.random.default_rng(7)
+    q, v = rng.normal(size=(2, 20, 2))
+
+    def potential(t: Any, q: Any) -> Any:
+        return 9.81 * ca.cos(q[0]) + 2 * q[1] ** 2
+
+    fixed = euler_lagrange(lambda t, q, v: (2 + ca.cos(q[1])) * v[0] ** 2 + v[1] ** 2, potential, 2)
+    expected = (2 + np.cos(q[:, 1])) * v[:, 0] ** 2 + v[:, 1] ** 2 + 9.81 * np.cos(q[:, 0]) + 2 * q[:, 1] ** 2
+    np.testing.assert_allclose(fixed.energy(0.0, q, v), expected, rtol=1e-14, atol=1e-13)  # rounding of terms up to 50
+    np.testing.assert_allclose(fixed.jacobi_integral(0.0, q, v), expected, rtol=1e-14, atol=1e-13)
+    moving = euler_lagrange(lambda t, q, v: (v[0] + 3.0) ** 2 + v[1] ** 2, potential, 2)
+    assert np.abs(moving.energy(0.0, q, v) - moving.jacobi_integral(0.0, q, v)).min() > 1.0

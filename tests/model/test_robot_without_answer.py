@@ -343,7 +343,7 @@ def test_a_pivot_lost_in_rounding_accuses_no_joint(n: int, dtype: Any, rounding:
     robot = rd.Robot.from_text(chain(*[body(1, "0.5 0 0", (0.01, 0.08, 0.08))] * n, at=("0 0 0", "1 0 0")))
     q, v, tau = np.random.default_rng(2).uniform(-0.01, 0.01, (3, n))
     own = rd.Lagrangian(robot, dtype)
-    with pytest.raises(UndecidedError, match=f"not decided: whether joint 'j.*' .* lost in the rounding of {rounding}"):
+    with pytest.raises(UndecidedError, match=f"not decided: rounding of {rounding} hides whether joint 'j"):
         own.forward_dynamics(q, v, tau)
     assert own.arithmetic.asarray(own.forward_dynamics(np.stack([q, q]), v, tau, errors="nan")).shape == (2, n)
     answer = rd.Lagrangian(robot, enough).forward_dynamics(q, v, tau)

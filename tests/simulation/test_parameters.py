@@ -204,7 +204,7 @@ def test_a_reference_of_a_users_own_is_not_taken_for_its_polynomial() -> None:
     rd.simulate(base, engine="compiled")
     own = replace(base, controller=rd.control.PD(shaken, 40.0, 4.0))
     assert rd.simulate(own).statistics.engine.startswith("interpreted (Shaken declares no knots")
-    with pytest.raises(TraceError, match=r"Shaken cannot be compiled: its at\(t\) is not that of its polynomials"):
+    with pytest.raises(TraceError, match=r"Shaken cannot be compiled: its at\(t\) differs from its polynomials"):
         rd.simulate(own, engine="compiled")
 
 

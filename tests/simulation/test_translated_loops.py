@@ -147,7 +147,7 @@ def test_a_loop_is_compiled_once_for_arms_of_any_number_of_joints() -> None:
     for each in made:
         code: Any = choose(each)
         Run(each, code).record()
-        loops.append((code.machine_loop, {id(entry) for entry in code.machine_loop._known.values()}))
+        loops.append((code.machine_loop, {id(entry) for entry in code.machine_loop._entries.values()}))
     assert loops[0] == loops[1]
 
 

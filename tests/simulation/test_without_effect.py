@@ -43,14 +43,14 @@ def test_a_wrench_on_an_unknown_link_is_refused_also_where_its_window_is_not_ope
 @pytest.mark.parametrize(
     ("robot", "effect", "message"),
     [
-        (UR5, rd.effects.ViscousFriction("urdf"), "damping='urdf' has no effect: the file of ur5 states none"),
+        (UR5, rd.effects.ViscousFriction("urdf"), "damping='urdf' has no effect: the file of ur5 states no value"),
         (UR5, rd.effects.RegularisedCoulombFriction("urdf"), "friction='urdf' has no effect"),
         (rd.load("pendulum"), rd.effects.EffortLimit("urdf"), "limit='urdf' has no effect"),
         (rd.load("pendulum"), rd.effects.JointStopSpring("urdf", "urdf", 1e4), "lower='urdf' has no effect"),
     ],
 )
 def test_a_coefficient_that_the_file_does_not_state_is_no_effect(robot, effect, message: str) -> None:
-    with pytest.raises(EffectError, match=f"{message}.*; give numbers, or leave the effect out"):
+    with pytest.raises(EffectError, match=f"{message}.*; give numbers, or remove the effect"):
         rd.Plant(robot, [effect])
 
 
@@ -76,7 +76,7 @@ def test_an_edit_of_none_is_refused(name: str) -> None:
 def test_folders_of_packages_that_are_none_are_refused(tmp_path) -> None:
     with pytest.raises(CatalogError, match=r"package_dirs must be a list of folders, for example \['/opt/arms'\]"):
         rd.load("ur5", package_dirs="/opt/arms")
-    with pytest.raises(CatalogError, match=r"package_dirs: there is no folder .*/arm; correct it"):
+    with pytest.raises(CatalogError, match=r"package_dirs: there is no folder .*/arm; correct or remove it"):
         rd.load("ur5", package_dirs=[tmp_path, tmp_path / "arm"])
     assert rd.load("ur5", package_dirs=[tmp_path]).n == 6
 
@@ -121,10 +121,10 @@ CONTROL = '[control]\nkind = "{}"\nfrequency_rad_per_s = 10.0\n'
         (SCENE + "step_s = 0.001\n", "step_s: has no effect because auto chooses its own step; remove it, or name"),
         (SCENE + 'method = "rk4"\nrtol = 1e-8\n', "rtol: has no effect because rk4 has a fixed step"),
         (SCENE + 'method = "gauss_6"\natol = 1e-8\n', "atol: has no effect because gauss_6 has a fixed step"),
-        (SCENE + 2 * GRAVITY, "effect: gravity is named 2 times, and only the last would act; keep one"),
+        (SCENE + 2 * GRAVITY, "effect: gravity is named 2 times, but only the last would act; keep one"),
         (
             SCENE + 2 * '[[effect]]\nkind = "armature"\ninertia_kg_m2 = {joint_1 = 0.1}\n',
-            "effect: armature is named 2 times, and only the last would act",
+            "effect: armature is named 2 times, but only the last would act",
         ),
         (
             SCENE + CONTROL.format("pd_gravity") + 'model = {effects = [{kind = "gravity"}, {kind = "gravity"}]}\n',
@@ -138,7 +138,7 @@ CONTROL = '[control]\nkind = "{}"\nfrequency_rad_per_s = 10.0\n'
         (SCENE + CONTROL.format("pid") + 'frame = "tip"\n', "control.frame: has no effect on pid, only on operational"),
         (
             SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tip"\n',
-            "'tip': has no effect; give force_N or torque",
+            "'tip' has no effect; give force_N or torque",
         ),
         (
             SCENE + '[[effect]]\nkind = "external_wrench"\nframe = "tipp"\nforce_N = [1, 0, 0]\nstart_s = 0.05\n',

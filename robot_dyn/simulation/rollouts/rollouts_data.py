@@ -97,12 +97,8 @@ class RolloutsData(RunData):
         if self.setup is None or self.ends[run].ending is not Ending.DIVERGED:
             return self.ends[run]
         if run not in self._judged:
-            self._judged[run] = reason_of(self.setup_of(run), self.ends[run], self.samples_of(run))
+            self._judged[run] = reason_of(self.setup_of(run), self.ends[run], samples_of(self, run))
         return self._judged[run]
-
-    def samples_of(self, run: int) -> Samples:
-        """Return times, positions and velocities of a run."""
-        return self.t, None if self.q is None else self.q[run], None if self.v is None else self.v[run]
 
     @cached_property
     def _judged(self) -> dict[int, Outcome]:
@@ -127,3 +123,8 @@ class RolloutsData(RunData):
         """Return plant and controller of a run, with its parameters and noise."""
         number = run if self.numbers is None else int(self.numbers[run])
         return parts_of_run(setup, {name: x[run] for name, x in self.params.items()}, number)
+
+
+def samples_of(runs: RolloutsData, run: int) -> Samples:
+    """Return times, positions and velocities of one run of a batch."""
+    return runs.t, None if runs.q is None else runs.q[run], None if runs.v is None else runs.v[run]

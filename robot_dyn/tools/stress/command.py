@@ -25,7 +25,7 @@ def stress(
     options: RobotOptions = AS_STATED,
     as_json: Json = False,
 ) -> None:
-    """Find the first limits of an arm: worst configurations, step, gain, speed and payload.
+    """Find the limits of an arm: posture, step, gain, speed, payload.
 
     The exit code is 1 on failures. Ctrl-C ends the search and keeps the results.
 

@@ -105,7 +105,7 @@ def test_an_error_of_a_task_is_raised(filled: Any, monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"versions": (("scipy", "0.1"),)}, r"worker tcp://127.0.0.1:1: scipy is .* on .*, 0\.1 at the driver"),
+        ({"versions": (("scipy", "0.1"),)}, r"worker tcp://127.0.0.1:1: scipy is .* on .*, but 0\.1 at the driver"),
         ({"digest": "of another one"}, "worker tcp://127.0.0.1:1: .* is not the folder of the driver"),
         ({"folder": "/proc"}, "worker tcp://127.0.0.1:1: /proc .* is not the folder of the driver"),
     ],
