@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 204,
+    "opening": 203,
     "as of": 44,
     "what without noun": 181,
     "is told": 5,

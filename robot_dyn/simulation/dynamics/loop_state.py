@@ -23,7 +23,7 @@ class Ended(IntEnum):
     PAUSED = 1  # its budget of steps is spent
     NEEDS_REVIEW = 2  # the next step needs a check; y is the state before it
     TICK = 3  # the torque of the controller is not finite
-    GAINS = 4  # energy may grow without a source; y is the state after the step
+    ENERGY_GROWS = 4  # energy may grow without a source; y is the state after the step
     TOO_SMALL = 5  # no step large enough to change t in floating point is within the tolerance
     NOT_FINITE = 6  # the rate at y is not finite
     FAST = 7  # a joint moves without bound; y is the state after the step

@@ -187,7 +187,10 @@ def write_bodies(f: Functions, t: float, y: Array, p: Array, mode: ContactMode) 
 
 
 def apply_velocities(laws: ContactLaws, y: Array, v: Array) -> float:
-    """Write the velocities after an impact into y, with the works of gaps; return the sum of these works."""
+    """Write the velocities after an impact into y, and add −B (θ̇⁺ − θ̇)(v⁺ + v)/2, the work of each gap on its joint.
+
+    Return the sum of these works, which the work of the stops leaves out.
+    """
     total, n = 0.0, laws.n
     for k in range(len(laws.motors)):
         joint, motor = laws.joints[n + k], laws.motors[k]

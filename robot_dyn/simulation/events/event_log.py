@@ -12,7 +12,7 @@ import numpy as np
 
 from robot_dyn.foundations.arithmetic import Array
 
-CHATTER = 20  # events of one threshold within a very short time
+CHATTER = 20  # latest events; they chatter if all are of one joint, within a very short time
 _ROWS = 64  # before the loop returns
 
 

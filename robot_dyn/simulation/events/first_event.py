@@ -91,7 +91,7 @@ def scan(i: int) -> float:
 
 
 def root_of_function(table: EventTable, lanes: Lanes, F: Array, t: float, h: float, e: int, before: float) -> float:
-    """Return the first θ at which a function changes sign, by bisection; `NONE` unless it is below `before`."""
+    """Return the first θ at which a function changes sign, by bisection; `NONE` if at `before` or later."""
     low, high = bracket(table, lanes, F, t, h, e)
     if not (high < NONE and low < before):
         return NONE

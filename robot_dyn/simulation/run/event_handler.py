@@ -30,8 +30,8 @@ from robot_dyn.simulation.run.state import RunState
 from robot_dyn.simulation.run.watch import DivergedError
 from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
-_BRIEF = 1e-9  # of a run: events of one threshold within that part of it chatter
-_ACCUMULATED = 1000  # changes of the mode within that part of a run: no motion between them is resolved
+_BRIEF = 1e-9  # part of a run: events of one joint within it chatter
+_MOST_CHANGES = 1000  # of the mode within the part _BRIEF of a run: no motion between them is resolved
 
 
 @final
@@ -59,7 +59,7 @@ class EventHandler:
         self._bodies, functions = state.functions.bodies, state.functions.events
         if equation.impulses:
             parameters = state.lanes.run_parameters.copy()
-            contacts = contacts_of(equation, parameters, state.engine.places(), _ACCUMULATED, brief)
+            contacts = contacts_of(equation, parameters, state.engine.places(), _MOST_CHANGES, brief)
             contacts.start(state.start)
         is_usual = thresholds and contacts is None and not state.payloads.any
         self.switching = cached(setup, switching_of) if is_usual else Switching(equation, contacts=contacts)
@@ -72,7 +72,7 @@ class EventHandler:
             self.event_table = self.switching.at(0.0, state.start, degree, functions, state.held)
         self.log = event_log(state.config.n, 0, brief) if contacts is None else contacts.mode.log
         self._forget_regions()
-        self._change_mode()
+        self._apply_mode()
 
     def take_log(self) -> None:
         """Move the events that the loop has logged to the events of the run."""
@@ -92,7 +92,7 @@ class EventHandler:
                 self.control.next_h[0] = 0.0  # an L-stable step damps what is fast: to start with, it must be resolved
             if self._chatters():
                 self._drop(thresholds[index])
-            self._change_mode()
+            self._apply_mode()
             return None
         event = self.state.setup.events[index - len(thresholds)]
         if event.direction not in (0, int(side)):
@@ -100,17 +100,17 @@ class EventHandler:
         self._add(self.switching.occurrence(index, t, y, side))
         return event.name if event.terminal else None
 
-    def end_mode(self, ended: Ended, t: float, y: np.ndarray) -> Accumulation | None:
+    def after_mode(self, ended: Ended, t: float, y: np.ndarray) -> Accumulation | None:
         """Continue after the end of a mode; return why the run gives up, if it does. DivergedError ends the run."""
         contacts = self.switching.contacts
         assert contacts is not None
         if ended is Ended.UNSETTLED:
-            raise _unsettled(contacts)
+            raise self._unsettled(t, contacts)
         if ended is Ended.ACCUMULATED:
             guard = int(self.state.position.event[0]) - self.event_table.thresholds
             return self._accumulated(t, y, contacts.mode, contacts.joint(guard))
         self._renew_table(t)
-        self._change_mode()
+        self._apply_mode()
         return None
 
     def change_payload(self) -> None:
@@ -130,7 +130,7 @@ class EventHandler:
         self._renew_table(t)
         if state.setup.integrator.needs_jacobian:
             self.control.next_h[0] = 0.0
-        self._change_mode()
+        self._apply_mode()
 
     def _add(self, *happened: Occurrence) -> None:
         """Add events that Python handles to those of the run, and to the log of the loop."""
@@ -147,7 +147,7 @@ class EventHandler:
         y[: len(values)] = values
         return self.switching.occurrence(int(number), t, y, side)
 
-    def _change_mode(self) -> None:
+    def _apply_mode(self) -> None:
         """Take the functions of the sides on which the switching functions are, and of the contact mode."""
         state, switching = self.state, self.switching
         if switching.thresholds or switching.dropped or state.payloads.any:
@@ -205,7 +205,7 @@ class EventHandler:
         with np.errstate(all="ignore"):
             solved = change_mode(state.in_python, t, state.lanes, contacts.mode, -1)
         if not solved:
-            raise _unsettled(contacts)
+            raise self._unsettled(t, contacts)
 
     def _accumulated(self, t: float, y: np.ndarray, mode: ContactMode, joint: str) -> Accumulation:
         """Return why another method should make the run; DivergedError if none may."""
@@ -232,16 +232,16 @@ class EventHandler:
             )
         )
 
+    def _unsettled(self, t: float, contacts: Contacts) -> DivergedError:
+        """Return the end of a run whose contact problem has no solution that the solver finds."""
+        work = contacts.mode.work
+        error = not_found(work.M_all[:, : len(work.load)], work.load)
+        return self.state.watch.diverged(Reason.CANNOT_EVALUATE, t, self.state.y, error=str(error))
+
     def _renew_table(self, t: float) -> None:
         """Compute the switching functions of the state reached."""
         degree, functions = len(self.event_table.coefficients) - 1, self.event_table.functions
         self.event_table = self.switching.at(t, self.state.y, degree, functions, self.state.held)
-
-
-def _unsettled(contacts: Contacts) -> RobotDynError:
-    """Return the error of a convex problem without a solution."""
-    work = contacts.mode.work
-    return not_found(work.M_all[:, : len(work.load)], work.load)
 
 
 def switching_of(setup: Setup) -> Switching:

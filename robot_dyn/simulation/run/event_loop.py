@@ -61,7 +61,7 @@ def event_loop(
     begin: Callable[..., int],
     step: Callable[..., int],
     error: Callable[..., float],
-    accept: Callable[..., int],
+    rate_at_end: Callable[..., int],
     dense: Callable[..., int],
     end_mode: Callable[..., int],
 ) -> Callable[..., int]:
@@ -136,7 +136,7 @@ def event_loop(
         evaluations, taken = choose(f, c, work, control, t, end, lanes)
         position.evaluations[0] += evaluations
         if taken:
-            position.evaluations[0] += accept(f, c, work, t, control.h[0], lanes)
+            position.evaluations[0] += rate_at_end(f, c, work, t, control.h[0], lanes)
         return taken
 
     @inlined
@@ -157,11 +157,11 @@ def event_loop(
     def step_to_event(
         f: Functions, c: Any, work: Any, loop: Loop, table: EventTable, control: StepControl, event: int, theta: float
     ) -> tuple[float, float, float]:
-        """Repeat the step up to where a switching function vanishes after it, except for the last bit of its length.
+        """Shorten the step by Newton's iteration until it ends at the root of a switching function, minus a rest.
 
         Returns:
-            Its length; the length of that bit, over which y is a straight line; and its error, because it may pass
-            slowly through what the whole step jumped over, for example friction near v = 0.
+            Its length; the length of the rest, over which y is linear and which the caller adds; and its error,
+            because it may pass slowly through a range that the whole step jumped over, such as friction near v = 0.
         """
         lanes, position, t, whole = loop.lanes, loop.position, loop.position.time[0], control.h[0]
         h, e = theta * whole, 0.0
@@ -173,7 +173,7 @@ def event_loop(
             position.evaluations[0] += step(f, c, work, t, h, lanes)
             if controls_error(control):
                 e = error(c, work, h, lanes, control.rtol, control.atol)
-            position.evaluations[0] += accept(f, c, work, t, h, lanes)
+            position.evaluations[0] += rate_at_end(f, c, work, t, h, lanes)
             shift = correction(table, lanes, work, event, t, h, whole)
             if not abs(shift) > _SHORT * h:
                 return h, shift, e
@@ -294,5 +294,5 @@ def check_step(f: Functions, loop: Loop, events: Events) -> int:
         if not fastest < FASTEST:
             return Ended.FAST
     if position.steps[0] % _WATCHED == 0 and not conserves_energy(f, loop, position.time[0]):
-        return Ended.GAINS
+        return Ended.ENERGY_GROWS
     return Ended.DONE

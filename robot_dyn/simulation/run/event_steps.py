@@ -131,12 +131,12 @@ class EventSteps:
         if ended is Ended.EVENT:
             return self._event(t, y)
         if ended in (Ended.CHANGED, Ended.ACCUMULATED, Ended.UNSETTLED):
-            return handler.end_mode(ended, t, y)
+            return handler.after_mode(ended, t, y)
         if ended is Ended.PAYLOAD:
             handler.change_payload()
         elif ended is Ended.TICK:
             state.tick()
-        elif ended is Ended.GAINS:
+        elif ended is Ended.ENERGY_GROWS:
             state.watch.look(t, y)
         elif ended is Ended.TOO_SMALL and not state.setup.integrator.controls_error:
             self._review_step()

@@ -1,6 +1,7 @@
 """Outcomes of runs: reason, time and the numbers that explain it; and the one place that words them.
 
 To answer "why did this run end?": find the reason below, then search for `Reason.<NAME>` to see where it is raised.
+`explained` in diagnostics/unstable_loop.py and `judged` in diagnostics/runaway.py may replace it afterwards.
 """
 
 from __future__ import annotations

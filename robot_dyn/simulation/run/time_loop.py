@@ -57,7 +57,7 @@ def time_loop(step: Callable[..., int]) -> Callable[..., int]:
                 position.step[0] += 1
                 observe_lanes(functions, loop, work.K[len(work.K) - 1], t, t + h, acted)
                 if position.steps[0] % WATCHED == 0 and not conserves_energy(functions, loop, t + h):
-                    return Ended.GAINS
+                    return Ended.ENERGY_GROWS
                 if position.budget[0] <= 0 or stop[0] != 0:
                     return Ended.PAUSED
             position.segment[0] += 1
@@ -187,7 +187,7 @@ def erase_lanes(lanes: Lanes, config: LoopConfig) -> None:
 
 
 def observe_lanes(functions: Functions, loop: Loop, latest: Array, start: float, t: float, acted: bool) -> None:
-    """Observe a step: q, v and the torque in zero-order hold; in lock step at instants where it is not held.
+    """Observe q and v of each step, and the torque: each step if it is held, else every `apart` steps in lock step.
 
     Args:
         functions: Functions of the state equation.

@@ -56,7 +56,10 @@ def start_energies(setup: Setup) -> tuple[float, float]:
 
 @final
 class Watch:
-    """Detects energy growth without a source: the ledger's residual exceeds 1000 times the initial energy plus work."""
+    """Monitor of a run: checks energy, torques and the pace of steps, and evaluates what may fail.
+
+    Energy grows without a source if the ledger's residual exceeds 1000 times the initial energy plus work.
+    """
 
     def __init__(self, setup: Setup, equation: StateEquation) -> None:
         self.setup, self.equation = setup, equation
@@ -73,7 +76,7 @@ class Watch:
 
     def look(self, t: float, y: Array) -> None:
         """Raise DivergedError if energy grows without a source."""
-        if self.answer(t, y, lambda: self.gains(t, y)):
+        if self.answer(t, y, lambda: self.energy_grows(t, y)):
             raise self.diverged(Reason.ENERGY_WITHOUT_SOURCE, t, y)
 
     def answer(self, t: float, y: Array, ask: Callable[[], T]) -> T:
@@ -125,8 +128,8 @@ class Watch:
                     steepest = {"effect": effect.name, "effect_joint": names[i], "width": width, "unit": unit}
         return steepest
 
-    def gains(self, t: float, y: Array) -> bool:
-        """Whether the ledger's residual shows energy growth without a source."""
+    def energy_grows(self, t: float, y: Array) -> bool:
+        """Return True if the ledger's residual shows energy growth without a source."""
         q, v, _, W = self.equation.state(y)
         K, V = self.equation.energies(np.array([t]), q[None], v[None])
         return bool((K + V)[0] - self.energy - W.sum() > 1e3 * (self.scale + np.abs(W).sum()))
