@@ -8,7 +8,8 @@ from __future__ import annotations
 import gc
 import pickle
 import sys
-from collections import Counter
+from array import array
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy, deepcopy
@@ -398,6 +399,42 @@ def test_a_start_changed_in_place_is_another_start() -> None:
     assert first.q[0].tolist() == Q.tolist() and second.q[0].tolist() == start.tolist()
 
 
+class Start:
+    """A start that NumPy reads by its protocol."""
+
+    def __init__(self, values: list[float]) -> None:
+        self.values = values
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> np.ndarray:
+        return np.array(self.values, dtype)
+
+    def __setitem__(self, i: int, x: float) -> None:
+        self.values[i] = x
+
+
+class Positions(list[float]):
+    """A list of another class."""
+
+
+@pytest.mark.parametrize("kind", [list, np.array, Positions, Start, deque, lambda x: array("d", x),
+    lambda x: memoryview(array("d", x)), lambda x: np.ma.masked_array(x, [False] * len(x))])  # fmt: skip
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_start_of_any_kind_that_is_changed_in_place_is_another_start(kind: Any, whole: bool) -> None:
+    what, start = rd.Plant(ARM) if whole else ARM, kind([0.3, -0.4])
+    for x in (0.3, 1.5, -0.2):
+        start[0] = x
+        for options in ({"q0": start}, {"q0": Q, "v0": start}):
+            run = rd.simulate(what, **options, duration_s=0.02, estimate_error=False, engine="interpreted")
+            assert (run.v if "v0" in options else run.q)[0, 0] == x
+
+
+def test_texts_that_are_changed_in_place_are_other_texts() -> None:
+    plant, about = rd.Plant(ARM), OrderedDict(a="1")
+    for text in ("1", "2", "1"):
+        about["a"] = text
+        assert rd.simulate(plant, Q, duration_s=0.02, about=about).about["a"] == text
+
+
 def test_setups_of_parts_that_may_change_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """A user-defined controller or event may answer differently in each call."""
     event = rd.Event(lambda t, q, v: float(q[0] - 9.0), name="level")
@@ -422,7 +459,7 @@ def test_copies_and_pickles_of_a_plant_carry_no_setup() -> None:
 
 def test_what_a_setup_caches_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs of all kinds, one that the stiff method replaces and one that time stepping does, fill all of the list."""
-    monkeypatch.setattr(event_handler, "_ACCUMULATED", 12)
+    monkeypatch.setattr(event_handler, "_MOST_CHANGES", 12)
     monkeypatch.setattr(event_handler, "_BRIEF", 1e-2)
     stiff = rd.Setup(rd.Plant(ARM, [rd.effects.ViscousFriction(1e5)]), Q, duration_s=20.0, estimate_error=False)
     bounces = rd.Setup(rd.Plant(arms()["rail"], [rd.effects.RigidStops(0.0, 2.0, 0.5)]), [0.4], duration_s=2.0)

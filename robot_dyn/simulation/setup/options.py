@@ -13,10 +13,13 @@ from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 
+from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import QueryError, nearest
 from robot_dyn.foundations.signatures import takes
 from robot_dyn.foundations.values import Caching, cached
+from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.setup.setup import Setup, no_step, segments
@@ -99,9 +102,12 @@ def _latest_or_new(plant: Plant, options: Mapping[str, Any]) -> Setup:
     """Return the setup of a plant with options.
 
     The plant keeps its latest setup, which is returned again for equal options. A setup is not kept if one of its parts
-    may change, or if it has events, whose functions may change.
+    or options may change, or if it has events, whose functions may change.
     """
-    content = _content(dict(sorted(options.items())))
+    try:
+        content = _content(dict(sorted(options.items())))
+    except _MayChangeError:
+        return Setup(plant, **options)
     latest = plant.cache.get(Setup)
     if latest is not None and latest.content == content:
         return latest.setup
@@ -111,10 +117,18 @@ def _latest_or_new(plant: Plant, options: Mapping[str, Any]) -> Setup:
     return setup
 
 
+class _MayChangeError(Exception):
+    """Internal: an option may be changed in place without a trace in its content."""
+
+
 def _content(value: Any) -> Any:
-    """Return the types and bits of a value as a value to compare; an object of any other type by identity."""
+    """Return the types and bits of a value as a value to compare; a controller or a method by identity.
+
+    Raises:
+        _MayChangeError: If the value is of another type.
+    """
     kind: Any = type(value)
-    if issubclass(kind, np.ndarray | np.generic) and not value.dtype.hasobject:
+    if (kind is np.ndarray or issubclass(kind, np.generic)) and not value.dtype.hasobject:
         return kind, value.dtype.str, value.shape, value.tobytes()
     if kind in (tuple, list):
         return kind, tuple(map(_content, value))
@@ -122,4 +136,6 @@ def _content(value: Any) -> Any:
         return tuple((_content(key), _content(entry)) for key, entry in value.items())
     if kind in (bool, int, float, str, type(None)):
         return kind, repr(value)  # -0.0 is another number than 0.0
-    return kind, id(value)
+    if isinstance(value, Controller | Integrator | Adaptive):  # it may change unless `Setup.is_value`
+        return kind, id(value)
+    raise _MayChangeError
