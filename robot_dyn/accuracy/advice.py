@@ -209,13 +209,18 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
     factors = [after(each.factor(period), periods(duration, period)) for each in loops]
     factors += [exp(min(max(0.0, excess_rate(own, J, n)(step)) * duration, LARGEST)) for J in matrices if step]
     return Advice(
-        own.name, step, motion, at, limits, period,
-        min((each.longest_period(period) for each in loops), default=inf),
-        worst(each.growth(period) for each in loops).verdict if loops else Stability.STABLE,
-        max((each.factor(period) for each in loops), default=1.0),
-        max((each.grows_anyway() for each in loops), default=0.0),
-        max(1.0, *factors, 1.0),
-    )  # fmt: skip
+        method=own.name,
+        step_s=step,
+        fastest=motion,
+        at=at,
+        limits=limits,
+        period_s=period,
+        longest_period_s=min((loop.longest_period(period) for loop in loops), default=inf),
+        at_period=worst(loop.growth(period) for loop in loops).verdict if loops else Stability.STABLE,
+        period_growth=max((loop.factor(period) for loop in loops), default=1.0),
+        grows_anyway=max((loop.grows_anyway() for loop in loops), default=0.0),
+        growth=max(1.0, *factors, 1.0),
+    )
 
 
 def at_rest(setup: Setup, loop: StateEquation) -> list[State]:

@@ -173,10 +173,19 @@ class Scene(Part):
         paths |= {word: (key,) for word, key in words.items() if key in self.model_fields_set}
         with named_part(paths, [effect.kind for effect in self.effect]):
             return Setup(
-                Plant(robot, acting), q0, v0, self.duration_s, controller, self.integrator(),
-                step_s, self.record_period_s, self.estimate_error, about, self.engine,
+                Plant(robot, acting),
+                q0,
+                v0,
+                duration_s=self.duration_s,
+                controller=controller,
+                integrator=self.integrator(),
+                step_s=step_s,
+                record_period_s=self.record_period_s,
+                estimate_error=self.estimate_error,
+                about=about,
+                engine=self.engine,
                 accuracy=self.accuracy,
-            )  # fmt: skip
+            )
 
     def integrator(self) -> Integrator | Adaptive:
         """Return the integrator with the name `method`."""

@@ -248,9 +248,17 @@ def certify(
     except KeyboardInterrupt:
         left_out.append(INTERRUPTED)
     return Certificate(
-        robot.name, robot.joint_names, tuple(held), digit_count.decimals, digit_count.right_angles,
-        _condition(robot, states, given, rng), digit_count.bits, tuple(left_out), processor_and_versions(), seed,
-    )  # fmt: skip
+        robot=robot.name,
+        joints=robot.joint_names,
+        digits=tuple(held),
+        decimals=digit_count.decimals,
+        right_angles=digit_count.right_angles,
+        condition=_condition(robot, states, given, rng),
+        bits=digit_count.bits,
+        left_out=tuple(left_out),
+        environment=processor_and_versions(),
+        seed=seed,
+    )
 
 
 def _given(robot: Robot, q: Any, v: Any, a: Any, tau: Any) -> dict[str, np.ndarray] | None:

@@ -273,9 +273,18 @@ def work_precision(
     dynamics: Any = setup.plant.dynamics
     types = getattr(dynamics, "joint_types", (None,))
     return WorkPrecision(
-        getattr(dynamics, "name", type(dynamics).__name__), acting(setup), joint_units("q", types), requested, exact,
-        ladders, tuple(left_out), processor_and_versions(), budget.seconds, budget.spent, later,
-    )  # fmt: skip
+        robot=getattr(dynamics, "name", type(dynamics).__name__),
+        acting=acting(setup),
+        unit=joint_units("q", types),
+        duration_s=requested,
+        reference=exact,
+        ladders=ladders,
+        left_out=tuple(left_out),
+        environment=processor_and_versions(),
+        budget_s=budget.seconds,
+        spent_s=budget.spent,
+        past_horizon=later,
+    )
 
 
 def _engines(setup: Setup) -> tuple[Setup, tuple[str, ...], list[str]]:

@@ -48,4 +48,4 @@ def _of(task: OperationalSpace, t: np.ndarray, q: np.ndarray) -> Iterator[Remark
     at, start, duration = int(smallest.argmin()), float(t[below.argmax()]), float(lasts[below].sum())
     least, when = float(smallest[at]), float(t[at])
     facts: dict[str, float | str] = {"least": max(least, 0.0)}  # rounding may leave it below 0
-    yield Remark(RemarkKind.DAMPED, task.frame, "q", start, duration, when, least, float(task.threshold), facts)
+    yield Remark(RemarkKind.DAMPED, task.frame, "q", start, duration, when, least, float(task.threshold), facts=facts)

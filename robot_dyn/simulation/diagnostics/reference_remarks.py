@@ -44,7 +44,7 @@ def jumps(setup: Setup, q0: np.ndarray, v0: np.ndarray, units: Units) -> Iterato
         for i in np.flatnonzero(gaps.any(axis=0)):
             begins, at_start = float(begin[i]), float(there[gaps[:, i].argmax(), i])
             facts: dict[str, float | str] = {"unit": units[i][row]}
-            yield Remark(RemarkKind.JUMPS, names[i], quantity, t, 0.0, t, begins, at_start, facts), gaps[:, i]
+            yield Remark(RemarkKind.JUMPS, names[i], quantity, t, 0.0, t, begins, at_start, facts=facts), gaps[:, i]
 
 
 def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Iterator[Remark]:
@@ -70,7 +70,8 @@ def held(setup: Setup, extremes: np.ndarray, t: np.ndarray, units: Units) -> Ite
         name, (unit, _, of_u) = setup.plant.dynamics.joint_names[i], units[i]
         most = float(np.nan_to_num(np.abs(extremes[2, :, i])).max())
         facts: dict[str, float | str] = {"unit": unit, "unit_of_u": of_u, "most": most}
-        yield Remark(RemarkKind.HELD, name, "q", 0.0, float(t[-1]), 0.0, float(setup.q0[i]), float(span[i]), facts)
+        start, limit = float(setup.q0[i]), float(span[i])
+        yield Remark(RemarkKind.HELD, name, "q", 0.0, float(t[-1]), 0.0, start, limit, facts=facts)
 
 
 def at_rest(extremes: np.ndarray) -> np.ndarray:

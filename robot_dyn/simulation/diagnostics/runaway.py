@@ -64,7 +64,7 @@ def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
     facts: dict[str, float | str] = {
         "method": setup.integrator.name, "motion": str(motion), "step_s": below(limit)
     }  # fmt: skip
-    return (Remark(RemarkKind.TOO_LONG, motion.joint, "v", 0.0, setup.duration_s, 0.0, step, limit, facts),)
+    return (Remark(RemarkKind.TOO_LONG, motion.joint, "v", 0.0, setup.duration_s, 0.0, step, limit, facts=facts),)
 
 
 def judged(setup: Setup, record: Recording, fast: dict[str, float | str]) -> Outcome:

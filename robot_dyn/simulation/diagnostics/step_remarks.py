@@ -119,7 +119,7 @@ def _creeping(setup: Setup, t: np.ndarray, v: np.ndarray, units: Units) -> Itera
                 "load": float(part[i] * level[i]),
                 "level": float(level[i]),
             }
-            yield Remark(RemarkKind.CREEPS, name, "v", start, lasted, float(t[-1]), float(mean[i]), None, facts)
+            yield Remark(RemarkKind.CREEPS, name, "v", start, lasted, float(t[-1]), float(mean[i]), None, facts=facts)
 
 
 def units_of(dynamics: Any) -> Units:
@@ -144,7 +144,15 @@ def _passed(names: tuple[str, ...], units: Units, visits: dict[Level, Visit], in
         if QUANTITIES[quantity] == "u" and instants:
             facts["instants"] = instants
         yield Remark(
-            level.kind, names[joint], QUANTITIES[quantity], start, duration, most.at, most.value, level.limit, facts
+            level.kind,
+            names[joint],
+            QUANTITIES[quantity],
+            start,
+            duration,
+            most.at,
+            most.value,
+            level.limit,
+            facts=facts,
         )
 
 
@@ -154,7 +162,7 @@ def _chatter(
     for joint, episode in sorted(episodes.items(), key=lambda each: -each[1].amplitude):
         yield Remark(
             RemarkKind.CHATTER, names[joint], "u", episode.start, episode.duration, episode.start, episode.amplitude,
-            None, {**remedy(episode), "unit": units[joint][2]},
+            None, facts={**remedy(episode), "unit": units[joint][2]},
         )  # fmt: skip
 
 

@@ -77,7 +77,7 @@ class GrowingLoop(NamedTuple):
             facts |= self._other_period(period) if remedies else {}
         else:
             facts = _gains(setup, self.joint) | (self._lower_gains() if remedies else {})
-        return Remark(RemarkKind.UNSTABLE, joint, "q", t, 0.0, t, self.rate, 1.0 if period else 0.0, facts)
+        return Remark(RemarkKind.UNSTABLE, joint, "q", t, 0.0, t, self.rate, 1.0 if period else 0.0, facts=facts)
 
     def _other_period(self, period_s: float) -> dict[str, float | str]:
         """Return the longest stable period of a sampled loop, or how it grows with any period."""

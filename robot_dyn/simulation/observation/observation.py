@@ -79,7 +79,7 @@ def observations_of(start: Array, levels: GuardLevels, tiles: int) -> list[Obser
     first, latest = np.searchsorted(of, np.arange(rows + 1)), np.zeros((tiles, 1))
     chatters = chatters_of(rows // 3, W, tiles)
     return [
-        Observation(low[k], high[k], inner[k], first, sides, bounds[k], visits[k], chatters[k], latest[k])
+        Observation(low[k], high[k], inner[k], first, sides, bounds[k], visits[k], chatters[k], latest=latest[k])
         for k in range(tiles)
     ]
 

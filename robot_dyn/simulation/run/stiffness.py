@@ -95,4 +95,4 @@ def _bounds(motion: Fastest, h: float) -> bool:
 def _remark(motion: Fastest, end: float, at: float, methods: dict[str, str]) -> Remark:
     """Return the remark that stability bounds the steps up to `end`, as seen at time `at`."""
     size, facts = abs(motion.eigenvalue), {"motion": str(motion), **methods}
-    return Remark(RemarkKind.STIFF, motion.joint, "v", 0.0, end, at, size, None, dict[str, float | str](facts))
+    return Remark(RemarkKind.STIFF, motion.joint, "v", 0.0, end, at, size, None, facts=dict[str, float | str](facts))
