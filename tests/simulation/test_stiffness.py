@@ -65,7 +65,7 @@ def test_a_run_says_that_stability_bounds_its_steps() -> None:
     assert stiff.statistics.steps > 1000
     assert remark.joint == "joint_2"
     assert "steps bounded by stability: the fastest motion decays with" in stiff.summary
-    assert "by 'viscous_friction'; take integrator='Rosenbrock'" in stiff.summary
+    assert "by 'viscous_friction'; use integrator='Rosenbrock'" in stiff.summary
     short = rd.simulate(
         ARM, **options | {"duration_s": 20.0, "integrator": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)}
     )
