@@ -93,7 +93,7 @@ def test_a_stiff_run_is_made_by_the_stiff_method_unless_another_is_named() -> No
     )  # estimates may be 0.3 of it
     (remark,) = (each for each in chosen.remarks if each.kind is RemarkKind.STIFF)
     assert remark.joint == "joint_2"
-    assert "by 'viscous_friction'; made by Rosenbrock in place of DOP853" in chosen.summary
+    assert "by 'viscous_friction'; made by Rosenbrock instead of DOP853" in chosen.summary
 
 
 @pytest.mark.parametrize(
