@@ -40,7 +40,7 @@ CEILINGS = {
     "beside": 30,
     "anew": 0,
     "likewise": 1,
-    "in place of": 13,
+    "in place of": 12,
     "so many": 13,
     "but for": 4,
     "whatever": 12,

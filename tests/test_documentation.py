@@ -39,6 +39,13 @@ def test_links_between_pages_resolve() -> None:
     assert [f"{target} of {page.name}" for page, target in links if not resolves(page, target)] == []
 
 
+def test_paths_that_contributing_names_exist() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    named = re.findall(r"\b(?:tests|docs|scripts|robot_dyn)/[\w./]*", text)
+    assert len(named) > 5
+    assert [path for path in named if not (ROOT / path.rstrip(".")).exists()] == []
+
+
 def test_records_of_decisions_are_short() -> None:
     assert RECORDS
     texts = {record.name: record.read_text(encoding="utf-8") for record in RECORDS}

@@ -143,7 +143,7 @@ class Advice(Answer):
         if unstable and not limit:
             to = f", as every period is: take {remedy(self.grows_anyway)}"
         elif unstable:
-            to = f"; the loop is stable up to {limit:.3g} s: take period_s={below(limit)}, or lower gains"
+            to = f"; the loop is stable up to {limit:.3g} s: use period_s={below(limit)}, or lower gains"
         elif self.period_s > limit:
             to = f"; but not every shorter one: the loop is stable up to {limit:.3g} s"
         else:

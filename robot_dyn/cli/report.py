@@ -115,8 +115,11 @@ def queries(state: PlantState, names: Sequence[str], frame: str | None) -> Docum
     """Return the answers of the rigid bodies at a state to queries of the table, by name.
 
     Raises:
-        QueryError: If there is no such query or frame, or a query needs a frame.
+        QueryError: If there is no such query or frame, a query needs a frame, or none uses the given one.
     """
+    framed = [name for name, quantity in QUANTITIES.items() if quantity.framed]
+    if frame is not None and not set(names) & set(framed) and set(names) <= set(QUANTITIES):
+        raise QueryError(f"--frame has no effect without --quantity {', '.join(framed[:-1])} or {framed[-1]}")
     answers = {}
     for name in names:
         quantity = QUANTITIES[choice("quantity", name, QUANTITIES)]

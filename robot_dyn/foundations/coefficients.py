@@ -17,7 +17,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.foundations.errors import EffectError, RobotDynError, nearest, shown
+from robot_dyn.foundations.errors import EffectError, RobotDynError, nearest, shorten, shown
 from robot_dyn.foundations.validate import instance, number, numbers, truth
 
 URDF = "urdf"  # as the value of a coefficient: the value in the robot's file
@@ -83,6 +83,8 @@ class Coefficient:
             return values
         if resolved and self.stated and isinstance(values, str) and values == URDF:
             return URDF
+        if resolved and self.stated and isinstance(values, str):
+            raise error(f'{name} must be real numbers or "{URDF}", got {shorten(values)!r}')
         array = numbers(
             name, values, *self.shapes, error=error, least=self.least, above=self.above, infinite=self.infinite
         )

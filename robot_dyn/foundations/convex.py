@@ -26,8 +26,8 @@ ROUNDING = 16 * float(np.finfo(float).eps)
 
 
 def not_found(M: np.ndarray, p: np.ndarray) -> RobotDynError:
-    """Return the error for a problem without a minimum."""
-    return RobotDynError(f"no minimum exists for M = {M.tolist()} and p = {p.tolist()}: give finite numbers")
+    """Return the error for a problem whose minimum was not found."""
+    return RobotDynError(f"no minimum was found for M = {M.tolist()} and p = {p.tolist()}: give finite numbers")
 
 
 def residual(M: np.ndarray, p: np.ndarray, f: np.ndarray, lower: np.ndarray, upper: np.ndarray, x: np.ndarray) -> float:

@@ -170,7 +170,8 @@ def _solve(body: MassProperties, torque: np.ndarray) -> np.ndarray:
         return cholesky_solve(np.broadcast_to(body.inertia, (*torque.shape[:-1], 3, 3)), torque)
     except NotPositiveDefiniteError:
         raise QueryError(
-            "no angular acceleration: the inertia is singular, like that of points on a line; give it three extents"
+            "no angular acceleration: the inertia is singular, like that of points on a line; give it"
+            " points off one line"
         ) from None
 
 

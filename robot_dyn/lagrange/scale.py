@@ -24,10 +24,10 @@ def scaled(error: np.ndarray, scale: np.ndarray) -> np.ndarray:
 
 
 def floored(scale: np.ndarray) -> np.ndarray:
-    """Return the scale of each entry, (n,), (m, n) or a number; an entry without terms uses the largest near it.
+    """Return the scale of each entry, (n,), (m, n) or a number.
 
-    Of a matrix, that is the largest in its row and column: such an entry contains only rounding errors of its
-    neighbours.
+    An entry without terms uses the largest in its row and column, because it contains only rounding
+    errors of its neighbours.
     """
     if scale.ndim != 2:
         return np.where(scale == 0, np.max(scale, initial=0.0), scale)

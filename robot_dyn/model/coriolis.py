@@ -1,7 +1,10 @@
 """The Coriolis matrix in the axes of each body: C = Σ J_bᵀ (𝓜_b J̇_b + 𝓖_b J_b), 𝓖 linear in the angular velocity ω_b.
 
-A point r of a body moves by ∂ṙ/∂v_j along joint j, and the Christoffel symbols of points are C_ij = ∫ ∂ṙ/∂v_i ·
-d/dt(∂ṙ/∂v_j) dm. In the body's axes ∂ṙ/∂v = (1, −r̂) J and d/dt adds ω̂, so that
+A point r of a body moves by ∂ṙ/∂v_j along joint j, and the Christoffel symbols of points are
+
+    C_ij = ∫ ∂ṙ/∂v_i · d/dt(∂ṙ/∂v_j) dm.
+
+In the body's axes ∂ṙ/∂v = (1, −r̂) J and d/dt adds ω̂, so that
 
     𝓖 = ∫ (1, −r̂)ᵀ ω̂ (1, −r̂) dm = [[m ω̂, −m ω̂ ĉ], [m ĉ ω̂, (Σ ω)^]],   Σ = ∫ r rᵀ dm = ½ tr(I) 1 − I,
 

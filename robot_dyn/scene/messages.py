@@ -74,6 +74,8 @@ def validation_message(error: ValidationError, table: Mapping[str, Any], text: s
         message = re.sub("greater than 0$", "positive", message)
         if kind != "missing":
             message += f", got {shorten(bounded_repr(first['input']))}"
+        if kind == "string_type" and len(path) == 1 and isinstance(first["input"], dict):
+            message += f'; write {path[0]} = "…" before the first table'
     key = path[-1] if kind == "missing" else context.get("key")
     place = ".".join([*_place(table, path), *([] if key is None else [shorten(key)])])
     more = f" (and {len(others)} more)" if others else ""

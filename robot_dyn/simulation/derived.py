@@ -148,7 +148,7 @@ class Results:
         runs_away = self.record.outcome.ending is Ending.DIVERGED or bool(runaway(self.setup, self.observer.fastest))
         doubtful = runs_away or (self.error is not None and self.error.note)
         step = step_too_long(self.setup, self.record.outcome.t) if doubtful else ()
-        loop = unstable(self.setup, self.record.t, self.record.y, runs_away)
+        loop = unstable(self.setup, self.record.t, self.record.y, runs_away, end=self.record.outcome.t)
         return (*step, *loop, *damped(self.setup, self.record))
 
     @property

@@ -121,9 +121,7 @@ def test_the_panda_under_sampled_control() -> None:
     assert advice.fastest.joint == "panda_joint7"
     assert advice.fastest.source == "control"
     assert not advice.stable
-    assert (
-        "control period 0.00025 s: unstable; the loop is stable up to 0.000211 s: take period_s=0.0001" in advice.text
-    )
+    assert "control period 0.00025 s: unstable; the loop is stable up to 0.000211 s: use period_s=0.0001" in advice.text
     assert advice.run is None
 
 

@@ -79,7 +79,7 @@ def test_a_run_that_diverges_says_when_and_what_to_do(scene) -> None:
     )
     done = run("simulate", scene)
     assert done.returncode == 1
-    assert re.search(r"diverged at t = .*step.*joint_\d.*take step_s=", done.stdout)
+    assert re.search(r"diverged at t = .*step.*joint_\d.*use step_s=", done.stdout)
 
 
 WATCHED = """

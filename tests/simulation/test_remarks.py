@@ -298,7 +298,7 @@ def test_a_sampled_loop_that_grows_says_so_though_nothing_chatters(
         (said,) = (each for each in run.remarks if each.kind is RemarkKind.UNSTABLE)
         assert said.value == pytest.approx(radius(period), rel=1e-6)
         assert "control loop unstable, deviations grow: pivot by 1." in run.summary
-        assert float(said.remedy.split("take period_s=")[1].split(",")[0]) < low
+        assert float(said.remedy.split("use period_s=")[1].split(",")[0]) < low
 
 
 @pytest.mark.parametrize("steps", [*long([{"integrator": "DOP853"}]), {"integrator": "rk4", "step_s": 2e-3}])

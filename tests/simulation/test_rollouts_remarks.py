@@ -13,6 +13,7 @@ import robot_dyn as rd
 from robot_dyn import export
 from robot_dyn.foundations import QueryError
 from robot_dyn.simulation import RemarkKind, remark_lines
+from robot_dyn.simulation.dynamics.stability import after, shown
 from tests.long import long
 
 COUNTED = (
@@ -243,13 +244,17 @@ def test_a_limit_of_no_effort_is_reached_all_the_time_once() -> None:
 
 
 def test_growth_over_a_run_counts_its_periods() -> None:
-    """0.3 s are three periods of 0.1 s, though floats divide to less; beyond 1e299 only a bound is told."""
+    """0.3 s are three periods of 0.1 s, though floats divide to less. A run that diverges counts to its end."""
     arm, goal = rd.load("pendulum"), rd.control.hold([0.0])
-    told = {}
+    told, end = {}, {}
     for duration in (0.3, 60.0):
         setup = rd.Setup(
             rd.Plant(arm), [1e-3], None, duration, rd.control.PD(goal, 40.0, 100.0, period_s=0.1), estimate_error=False
         )
-        (told[duration],) = (each for each in rd.simulate(setup).remarks if each.kind is RemarkKind.UNSTABLE)
+        run = rd.simulate(setup)
+        (told[duration],) = (remark for remark in run.remarks if remark.kind is RemarkKind.UNSTABLE)
+        end[duration] = run.outcome.t
     assert f"by {told[0.3].value ** 3:.4g} over the run" in told[0.3].text
-    assert 600 * np.log10(told[60.0].value) > 300 and "by more than 1e+299 over the run" in told[60.0].text
+    assert 0.3 < end[60.0] < 5.0
+    assert f"by {told[60.0].value ** int(end[60.0] / 0.1):.4g} over the run" in told[60.0].text
+    assert shown(after(told[60.0].value, 600)) == "more than 1e+299"

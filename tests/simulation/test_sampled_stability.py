@@ -36,7 +36,7 @@ def test_a_short_run_makes_no_loop_stable(period: float, duration: float) -> Non
     assert not advice.stable
     assert advice.period_growth == pytest.approx(radius, rel=1e-6)
     assert advice.growth == pytest.approx(radius ** (duration // period), rel=1e-6)
-    assert "unstable; the loop is stable up to 0.05 s: take period_s=0.02, or lower gains" in advice.text
+    assert "unstable; the loop is stable up to 0.05 s: use period_s=0.02, or lower gains" in advice.text
     assert f"over this run deviations grow by {advice.growth:.4g}, by {radius:.4g} in each period" in advice.text
     assert (advice.run is None) == (advice.growth > 1e3)  # what the run bears is run
 
@@ -154,7 +154,7 @@ def test_sampling_is_told_apart_from_an_arm_that_falls_anyway() -> None:
         return [each.remedy for each in run.remarks if each.kind is RemarkKind.UNSTABLE]
 
     (remedy,) = remarks(1.5 * limit)
-    told = re.search(r"at ([\d.]+) per second; sampling adds to that beyond ([\d.]+) s: take period_s=([\d.]+)", remedy)
+    told = re.search(r"at ([\d.]+) per second; sampling adds to that beyond ([\d.]+) s: use period_s=([\d.]+)", remedy)
     assert told is not None
     rate, beyond, period = map(float, told.groups())
     falls = float(arm.N([np.pi - 1e-6])[0] - arm.N([np.pi])[0]) / 1e-6  # −∂N/∂q upright

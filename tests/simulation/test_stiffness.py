@@ -65,7 +65,7 @@ def test_a_run_says_that_stability_bounds_its_steps() -> None:
     assert stiff.statistics.steps > 1000
     assert remark.joint == "joint_2"
     assert "steps bounded by stability: the fastest motion decays with" in stiff.summary
-    assert "by 'viscous_friction'; take integrator='Rosenbrock'" in stiff.summary
+    assert "by 'viscous_friction'; use integrator='Rosenbrock'" in stiff.summary
     short = rd.simulate(
         ARM, **options | {"duration_s": 20.0, "integrator": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)}
     )
@@ -93,7 +93,7 @@ def test_a_stiff_run_is_made_by_the_stiff_method_unless_another_is_named() -> No
     )  # estimates may be 0.3 of it
     (remark,) = (each for each in chosen.remarks if each.kind is RemarkKind.STIFF)
     assert remark.joint == "joint_2"
-    assert "by 'viscous_friction'; made by Rosenbrock in place of DOP853" in chosen.summary
+    assert "by 'viscous_friction'; made by Rosenbrock instead of DOP853" in chosen.summary
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ Handler = Callable[..., Value]  # (f, node, arguments) → value
 def called(f: Function, node: ast.Call) -> Value:
     """Return the result of a call."""
     if node.keywords or any(isinstance(argument, ast.Starred) for argument in node.args):
-        raise f.refused(node, "an argument by name, or with a star", "pass arguments by position")
+        raise f.refused(node, "an argument by name, or unpacked with *", "pass arguments by position")
     if isinstance(node.func, ast.Attribute) and node.func.attr == "reshape":
         return _reshape(f, node, node.func.value)
     function, arguments = f.expression(node.func), [f.expression(argument) for argument in node.args]

@@ -30,7 +30,9 @@ _GAINS = ("kp", "ki", "kd")
 _HALVINGS = 20  # of the gains, tried for a stable loop
 
 
-def unstable(setup: Setup, t: np.ndarray, y: np.ndarray, runs_away: bool, remedies: bool = True) -> Iterator[Remark]:
+def unstable(
+    setup: Setup, t: np.ndarray, y: np.ndarray, runs_away: bool, remedies: bool = True, end: float | None = None
+) -> Iterator[Remark]:
     """Yield a remark if the loop is unstable about the start, the middle or the end of a run, where states are finite.
 
     Args:
@@ -40,14 +42,17 @@ def unstable(setup: Setup, t: np.ndarray, y: np.ndarray, runs_away: bool, remedi
         runs_away: True if the run diverged or reached an implausible speed. A continuous loop is examined only then:
             deviations may grow for a while along a motion that is as it should be.
         remedies: True to search for the period or the gains that are stable, which takes most of the time.
+        end: Time reached, in [s]; None for the last finite sample, or for the whole run if there is one sample only.
     """
     if setup.controller is None or not (setup.equation.sampled or runs_away):
         return
     finite = np.flatnonzero(np.isfinite(y).all(axis=1))
     rows = sorted({int(k) for k in finite[[0, len(finite) // 2, -1]]}) if len(finite) else []
+    if end is None:
+        end = float(t[finite[-1]]) if len(t) > 1 and len(finite) else setup.duration_s
     for k in rows:  # the first of them: later ones may be far out
         if growing := growing_loop(setup, float(t[k]), y[k]):
-            yield growing.remark(setup, remedies)
+            yield growing.remark(setup, remedies, end)
             return
 
 
@@ -66,13 +71,13 @@ class GrowingLoop(NamedTuple):
     rate: float
     loop: SampledLoop
 
-    def remark(self, setup: Setup, remedies: bool) -> Remark:
-        """Return the remark about it, with what its remedy depends on if `remedies`."""
+    def remark(self, setup: Setup, remedies: bool, end: float) -> Remark:
+        """Return the remark about it up to the end reached, in [s], with facts for its remedy if `remedies`."""
         assert setup.controller is not None
         period, joint, t = setup.controller.period_s, setup.plant.dynamics.joint_names[self.joint], self.t
         facts: dict[str, float | str]
         if period:
-            over_the_run = shown(after(self.rate, periods(setup.duration_s, period)))
+            over_the_run = shown(after(self.rate, periods(end, period)))
             facts = {"growth": shown(self.rate), "period_s": period, "over_run": over_the_run}
             facts |= self._other_period(period) if remedies else {}
         else:

@@ -70,12 +70,12 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
         (
             (
                 "kd period_s / M is {ratio:.2g}, and reverses nothing: {blocks} of the measurement does; filter it, as "
-                "rd.control.LowPass does, or take less damping: a shorter period is no remedy",
-                "kd period_s / M is {ratio:.3g}, and above 1 it reverses, above 2 it grows: take period_s below "
+                "rd.control.LowPass does, or use less damping: a shorter period is no remedy",
+                "kd period_s / M is {ratio:.3g}, and above 1 it reverses, above 2 it grows: use period_s below "
                 "{longest_s:.2g} s, or less damping",
-                "take a shorter period_s than {period_s:g} or less damping: it reverses where an eigenvalue of "
+                "use a shorter period_s than {period_s:g} or less damping: it reverses where an eigenvalue of "
                 "M⁻¹ kd period_s is above 1",
-                "the step of {step_s:g} s is too long for the gains: take a smaller one",
+                "the step of {step_s:g} s is too long for the gains: use a smaller one",
             ),
         ),
     ),
@@ -87,7 +87,7 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     RemarkKind.COARSE: Sentence(
         "record too coarse",
         ("{quantity} of {joint} {value:.4g} {unit} near {at:.4g} s (sampled: {limit:.4g})",),
-        ("take a shorter record_period_s",),
+        ("use a shorter record_period_s",),
     ),
     RemarkKind.GAINS: Sentence(
         "a dissipative effect does positive work",
@@ -107,12 +107,12 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     RemarkKind.STIFF: Sentence(
         "steps bounded by stability",
         ("{motion}",),
-        (("made by {method} in place of {before}", "take integrator={method!r}"),),
+        (("made by {method} instead of {before}", "use integrator={method!r}"),),
     ),
     RemarkKind.TOO_LONG: Sentence(
         "step too long to be stable",
         ("{value:.4g} s", ", {method} is stable up to {limit:.4g} s", "; {motion}"),
-        ("take step_s={step_s}, or an implicit method",),
+        ("use step_s={step_s}, or an implicit method",),
     ),
     RemarkKind.UNSTABLE: Sentence(
         "control loop unstable, deviations grow",
@@ -127,11 +127,11 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
         (
             (
                 "under control at all times they grow, too, at {anyway:.3g} per second; sampling adds to that beyond "
-                "{limit_s:.3g} s: take period_s={shorter_s}, or lower gains",
-                "the loop is stable up to {limit_s:.3g} s: take period_s={shorter_s}, or lower gains",
-                "so it is with every period: take {otherwise}",
+                "{limit_s:.3g} s: use period_s={shorter_s}, or lower gains",
+                "the loop is stable up to {limit_s:.3g} s: use period_s={shorter_s}, or lower gains",
+                "so it is with every period: use {otherwise}",
                 "lower the gains: about this state the loop is stable with {stable_with:.3g} times these",
-                "take a shorter period than {period_s:g} s, or lower gains",
+                "use a shorter period than {period_s:g} s, or lower gains",
                 "lower the gains",
             ),
         ),
@@ -143,7 +143,7 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
             " (smallest eigenvalue of J M⁻¹ Jᵀ {least:.2g} of threshold {limit:.2g} at {at:.4g} s)",
         ),
         (
-            "it does not follow along that direction: keep the reference within reach, or take a larger threshold for "
+            "it does not follow along that direction: keep the reference within reach, or use a larger threshold for "
             "smaller torques",
         ),
     ),
@@ -158,7 +158,7 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
             "{joint} at {value:.4g} {unit}, its reference moves by {limit:.3g}, |u| up to {most:.3g} {unit_of_u}",
             _ELSEWHERE,
         ),
-        ("the control demands less than friction holds: take larger gains, or less friction",),
+        ("the control demands less than friction holds: use larger gains, or less friction",),
     ),
 }
 

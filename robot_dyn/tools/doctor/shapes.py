@@ -205,7 +205,8 @@ def _inertia(name: str, link: StatedLink, shape: Shape, inertial: Any) -> Findin
     return Finding(
         Severity.ERROR if half >= _GRAVE * most else Severity.WARNING, "inertia_shape", f"link {name!r}",
         f"for {link.mass:g} kg, its inertia needs mass at least {np.sqrt(half / link.mass):.3g} m from the centre, but"
-        f" its shape ends at {far:.3g} m: {half / most:.3g} times the maximum at any density{suspected}",
+        f" its shape ends at {far:.3g} m: {half / most:.3g} times the largest inertia of this"
+        f" shape at any density{suspected}",
         "correct the inertia, or its unit", inertial.sourceline, changes, True,
     )  # fmt: skip
 

@@ -132,7 +132,7 @@ class Expression:
                 return self._compared(operator, self._operands[a], self._operands[b], columns)
         column = str(self._operands[tree.id])
         if (x := columns[column]).dtype != bool:
-            raise SweepError(f"{column!r} is a number: compare it, such as {column} > 0.1")
+            raise SweepError(f"{column!r} is a number: compare it, for example {column} > 0.1")
         return Truth(x, x)
 
     def _compared(

@@ -223,7 +223,9 @@ def from_scene(path: str | Path, **changes: Any) -> Sweep:
     for name, example in (("vary", "kp"), ("figures", "settling")):
         stated[name] = {**table.get(name, {}), **by_name(name, changes.get(name, {}), example)}
     if "runs" not in stated:
-        raise SweepError(f"{path}: the number of runs is missing; give runs=, or a table [sweep] with it")
+        raise SweepError(
+            f"{path}: the number of runs is missing; give --runs N (runs=N in Python), or runs = N in the table [sweep]"
+        )
     return Sweep(str(path), **stated)
 
 

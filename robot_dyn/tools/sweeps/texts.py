@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping, Sequence
-from inspect import signature
+from inspect import Parameter, signature
 from typing import Any
 
 from robot_dyn.foundations import SweepError, nearest, shorten, shown
@@ -57,6 +57,15 @@ def call_of(
         bound = signature(function).bind(*arguments, **by_name)
     except TypeError as error:
         given = ", ".join([*map(shown, arguments), *(f"{key}={shown(x)}" for key, x in by_name.items())])
-        takes = f"{name}{signature(function)}".replace(": Any", "")
-        raise SweepError(f"{shorten(f'{name}({given})')}: {error}; it is {takes}") from None
+        form = ", ".join(map(_written, signature(function).parameters.values()))
+        raise SweepError(f"{shorten(f'{name}({given})')}: {error}; write {name}({form})") from None
     return function(*bound.args, **bound.kwargs)
+
+
+def _written(parameter: Parameter) -> str:
+    """Return a parameter as it is written in a call: a name, `name=default`, or `name=…` if it has no default."""
+    if parameter.default is not Parameter.empty:
+        return f"{parameter.name}={parameter.default!r}"
+    if parameter.kind is Parameter.KEYWORD_ONLY:
+        return f"{parameter.name}=…"
+    return str(parameter.replace(annotation=Parameter.empty))

@@ -105,6 +105,7 @@ WRONG: dict[str, Callable[[], Any]] = {
     "no distribution 'unifrm'; nearest: uniform": lambda: ds.from_dict({"distribution": "unifrm"}),
     "missing a required .*argument: .high": lambda: ds.from_dict({"distribution": "uniform", "low": 1}),
     r"^uniform\(lo=1, high=2\): missing a required": lambda: ds.distribution("uniform(lo=1, high=2)"),
+    r"write uniform\(low=…, high=…\)$": lambda: ds.distribution("uniform(1)"),
     "has no distribution 'os' of one": lambda: ds.from_dict({"distribution": "scipy.stats.os"}),
     "does not accept scipy.stats.gamma.foo=1": lambda: ds.from_dict({"distribution": "scipy.stats.gamma", "foo": 1}),
 }

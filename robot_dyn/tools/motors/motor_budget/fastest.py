@@ -127,7 +127,7 @@ def _no_pace(pace: Pace, motor_budget: MotorBudget) -> str:
     limit = joint.continuous_limit
     return (
         f"no pace fits: {joint.joint} needs {pace.share * limit:.4g} of {limit:.4g} {of_joint('N m', joint.type)} rms"
-        f" at the best pace, {pace.factor:.4g} times slower"
+        f" at the best pace, with {pace.factor:.4g} times the duration"
     )
 
 
