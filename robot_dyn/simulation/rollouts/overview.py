@@ -147,7 +147,9 @@ def _in_runs(remark: Remark, worst: int, some: np.ndarray) -> Remark:
 def _linearised(runs: RolloutsData, run: int) -> Iterator[Remark]:
     """The remark on the sampled loop of one run."""
     setup = runs.setup_of(run)
-    for remark in unstable(setup, *states(setup, *samples_of(runs, run)), bool(runs.diverged[run])):
+    for remark in unstable(
+        setup, *states(setup, *samples_of(runs, run)), bool(runs.diverged[run]), end=runs.ends[run].t
+    ):
         yield replace(remark, runs=(run,), looked=1)
 
 

@@ -18,7 +18,7 @@ def reason_of(setup: Setup, end: Outcome, samples: Samples) -> Outcome:
 
     The search for a stable period or stable gains is left to `simulate`, since it takes most of the time.
     """
-    loop = unstable(setup, *states(setup, *samples), runs_away=True, remedies=False)
+    loop = unstable(setup, *states(setup, *samples), runs_away=True, remedies=False, end=end.t)
     return explained(end, setup, (*step_too_long(setup, end.t), *loop))
 
 

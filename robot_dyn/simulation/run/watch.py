@@ -85,7 +85,7 @@ class Watch:
             return ask()
         except IntegrationError as error:  # the message already suggests a remedy
             facts: dict[str, float | str] = {"error": str(error), **self._steepest()}
-            raise DivergedError(Outcome(Reason.STAGES_NOT_FOUND, t, facts=facts)) from None
+            raise DivergedError(Outcome(Reason.STAGES_NOT_FOUND, t, self.equation.fastest_joint(y), facts)) from None
         except RobotDynError as error:
             if is_mistake(error):
                 raise
