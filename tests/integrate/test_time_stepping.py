@@ -241,7 +241,7 @@ def test_it_takes_over_where_events_accumulate(monkeypatch: pytest.MonkeyPatch) 
     """A ball that bounces, with a limit of 12 changes in a hundredth of the run: made by time stepping, and said."""
     from robot_dyn.simulation.run import event_handler
 
-    monkeypatch.setattr(event_handler, "_ACCUMULATED", 12)
+    monkeypatch.setattr(event_handler, "_MOST_CHANGES", 12)
     monkeypatch.setattr(event_handler, "_BRIEF", 1e-2)
     plant = rd.Plant(RAIL, [rd.effects.RigidStops(0.0, 2.0, 0.5)])
     run = rd.simulate(plant, [0.4], duration_s=2.0)
