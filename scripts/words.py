@@ -32,7 +32,7 @@ CEILINGS = {
     "says that": 14,
     "tells that": 2,
     "goes on": 2,
-    "looks": 33,
+    "looks": 32,
     "believes": 7,
     "is no": 18,
     "of its own": 23,

@@ -88,7 +88,7 @@ PROTOCOL = ("MachineCode.", "Interpreted.", "choose", "interpreted.<locals>.", "
 @pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 @pytest.mark.parametrize("method", ["auto", "rk4"])
 def test_no_room_of_a_run_calls_back_into_one_above_it(engine: str, method: str) -> None:
-    """But for an engine, a plug-in that is called by its protocol, and the monitor to which its functions report."""
+    """Except an engine, which is called by its protocol, and the monitor to which its functions report."""
     options: dict[str, Any] = {"duration_s": 0.02, "controller": CONTROLLER, "engine": engine, "integrator": method}
     climbing = [each for each in entries(lambda: rd.simulate(plant(), Q, **options)) if each.climbs]
     assert [each for each in climbing if not each.function.startswith(PROTOCOL)] == []

@@ -40,7 +40,7 @@ def choose(setup: Setup, seen: float) -> Engine:
 
 
 def engine_of(setup: Setup, seen: float) -> Engine:
-    """Return the engine of a setup, without a look at those of earlier calls."""
+    """Return the engine of a setup, for `choose`, which caches it."""
     required = setup.engine == "compiled"
     try:
         identified = identify(setup.equation, setup.integrator)

@@ -211,7 +211,8 @@ def _check(ticket: Ticket) -> None:
     here, host, digest = versions(), socket.gethostname(), ""
     for name, version in ticket.versions:
         if here.get(name) != version:
-            raise SweepError(f"{name} is {here.get(name)} on {host}, but {version} at the driver; install it there")
+            difference = f"{name} is {here.get(name)} on {host}, but {version} at the driver"
+            raise SweepError(f"{difference}; install the same version of {name} on both")
     with suppress(SweepError):
         digest = stated_in(Path(ticket.folder)).digest
     if digest != ticket.digest:
