@@ -295,7 +295,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.tools.sweeps.normal, mean=1.0, sd=0.1),
         call(rd.tools.sweeps.peak, of_what="v", joint="slide"),
         call(rd.tools.sweeps.read, folder=folder / "sweep", scene=of_sweep, figures={}),
-        call(rd.tools.sweeps.rms_error, joint="slide"),
+        call(rd.tools.sweeps.rms_tracking_error, joint="slide"),
         call(rd.tools.sweeps.run, sweep=swept.sweep, folder=folder / "sweep", threads=1, chunk=16,
             on_progress=print_nothing),
         call(rd.tools.sweeps.triangular, low=0.0, mode=0.5, high=1.0),
