@@ -287,7 +287,7 @@ class UserFigure(Value):
 def rms_tracking_error(joint: str | None = None) -> Figure:
     """Return the figure: root mean square of q_d − q over the samples, and over the joints or for one.
 
-    Samples are `record_period_s` apart. The unit is [rad] or [m]; for a frame that follows a path, [m].
+    Samples are `record_every_s` apart. The unit is [rad] or [m]; for a frame that follows a path, [m].
     """
     return Figure("rms_tracking_error", "tracking_error", joint)
 
