@@ -295,7 +295,7 @@ def rms_tracking_error(joint: str | None = None) -> Figure:
 def peak(of_what: str, joint: str | None = None) -> Figure:
     """Return the figure: largest |q|, |v| or |u| over all steps, or largest tracking error over the samples.
 
-    It covers one joint, or all joints if none is named.
+    It is of one joint, or of all joints by default.
     """
     return Figure("peak", of_what, joint)
 
