@@ -27,7 +27,7 @@ def fall(q0):
         duration_s=10.0,
         integrator="order_8",
         step_s=0.005,  # with shorter ones the error is that of rounding, which the motion magnifies
-        record_period_s=0.01,
+        record_every_s=0.01,
     )
 
 

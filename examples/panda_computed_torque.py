@@ -51,7 +51,7 @@ for name, controller in controllers.items():
         integrator=rd.integrate.Adaptive(
             rtol=1e-8, atol=1e-10
         ),  # the gains make the arm stiff: the method finds its steps
-        record_period_s=0.01,
+        record_every_s=0.01,
     )
     print(f"--- {name}\n{trajectory.summary}\n")
     error = np.abs(trajectory.q - trajectory.desired).max(axis=1)

@@ -43,7 +43,7 @@ for carried, arm in arms.items():
             duration_s=duration_s,
             controller=controller,
             integrator=rd.integrate.Adaptive(rtol=1e-8, atol=1e-10),
-            record_period_s=0.01,
+            record_every_s=0.01,
         )
         print(f"--- {name}, {carried}\n{trajectory.summary}\n")
         error = np.abs(trajectory.q - trajectory.desired).max(axis=1)

@@ -32,7 +32,7 @@ def move(arm):
         controller=rd.control.PD(rd.control.hold(target), kp, kd),
         integrator="order_8",
         step_s=0.002,
-        record_period_s=0.01,
+        record_every_s=0.01,
     )
 
 

@@ -127,7 +127,7 @@ def test_equal_runs_and_setups_do_not_raise() -> None:
         ),
         lambda robot, run: rd.plot(run, run),
         lambda robot, run: rd.Robot(robot.model),
-        lambda robot, run: rd.Setup(rd.Plant(robot), [0.1, 0.2], record_period_s=1e-320),
+        lambda robot, run: rd.Setup(rd.Plant(robot), [0.1, 0.2], record_every_s=1e-320),
         lambda robot, run: rd.compare(robot, seed=-1),
         lambda robot, run: rd.accuracy.Ball(0),
         lambda robot, run: rd.effects.JointStopSpring([0.0, 0.0], [1.0, 1.0, 1.0], 1.0),

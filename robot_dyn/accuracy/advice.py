@@ -233,7 +233,7 @@ def _along(setup: Setup, loop: StateEquation) -> list[State]:
     run = simulate(
         Setup(
             setup.plant, setup.q0, setup.v0, setup.duration_s, loop.controller, engine=setup.engine,
-            record_period_s=setup.duration_s / (_LOOKS - 1), estimate_error=False,
+            record_every_s=setup.duration_s / (_LOOKS - 1), estimate_error=False,
         )
     )  # fmt: skip
     z = [] if run.controller_states is None else [run.controller_states]

@@ -116,7 +116,7 @@ def _method(scene: Scene, setup: Setup) -> Iterator[str]:
     if scene.accuracy is not None:
         method, used = f"chosen for an error of q of at most {scene.accuracy:g}", ("accuracy",)
     yield f"method: {method}, {scene.duration_s:g} s"
-    for key in (*used, "record_period_s", "estimate_error", "engine"):
+    for key in (*used, "record_every_s", "estimate_error", "engine"):
         note = shortened(setup) if key == "step_s" else ""
         yield f"  {key} = {getattr(scene, key)}  ({_source(scene, key)}){note}"
     yield "start:"

@@ -93,7 +93,7 @@ class Scene(Part):
     """Absolute tolerance of an adaptive method, in rad and rad/s (m and m/s for a prismatic joint)."""
     accuracy: Positive | None = None
     """Largest error of q, in rad and m; pilot runs choose method and tolerance for it."""
-    record_period_s: NotNegative = 0.01
+    record_every_s: NotNegative = 0.01
     """Time between samples; 0 for every step."""
     estimate_error: Truth = Setup.estimate_error
     """True to repeat the run with longer steps, which estimates its error."""
@@ -180,7 +180,7 @@ class Scene(Part):
                 controller=controller,
                 integrator=self.integrator(),
                 step_s=step_s,
-                record_period_s=self.record_period_s,
+                record_every_s=self.record_every_s,
                 estimate_error=self.estimate_error,
                 about=about,
                 engine=self.engine,

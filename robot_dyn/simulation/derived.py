@@ -61,7 +61,7 @@ class Results:
 
     @cached_property
     def _columns(self) -> Columns:
-        return columns(self.setup.equation, self.record.t, self.record.y, self.record.made)
+        return columns(self.setup.equation, self.record.t, self.record.y, self.record.sampled)
 
     @cached_property
     def a(self) -> np.ndarray:

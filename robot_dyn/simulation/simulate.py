@@ -55,7 +55,7 @@ def simulate(
         on_progress: Called with the time reached, in [s], at each step, and with that of the end at the steps of
             companion runs; in machine code some ten times a second. An exception from it ends the call.
         **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, integrator, step_s,
-            record_period_s, estimate_error, about, engine, events and accuracy.
+            record_every_s, estimate_error, about, engine, events and accuracy.
 
     Raises:
         QueryError: If the setup is not allowed, or its record would not fit into memory. Whatever happens later is

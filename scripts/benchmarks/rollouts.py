@@ -35,7 +35,7 @@ def one_step(effort: Effort) -> None:
     model: Any = mujoco_model(mujoco, panda, bare=True)
     duration = steps * STEP_S
     setup = rd.Setup(
-        rd.Plant(panda), READY, duration_s=duration, record_period_s=duration, estimate_error=False,
+        rd.Plant(panda), READY, duration_s=duration, record_every_s=duration, estimate_error=False,
         engine="compiled", integrator="rk4",
     )  # fmt: skip
     theirs, ours = [], []

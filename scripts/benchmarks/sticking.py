@@ -37,7 +37,7 @@ def sticking(effort: Effort) -> None:
     for what, stops in (("dry friction", []), ("dry friction and stops, e = 0", [rd.effects.RigidStops(LOWER, UPPER)])):
         plant = rd.Plant(panda, [rd.effects.ViscousFriction(DAMPING), rd.effects.DryFriction(LEVELS), *stops])
         options: dict[str, Any] = {
-            "q0": START, "duration_s": DURATION_S, "controller": drive, "record_period_s": SAMPLE_S,
+            "q0": START, "duration_s": DURATION_S, "controller": drive, "record_every_s": SAMPLE_S,
             "estimate_error": False,
         }  # fmt: skip
         limit = rd.simulate(

@@ -22,7 +22,7 @@ def stiff(effort: Effort) -> None:
     """Errors, steps and times of a run of 1 s, by tolerance."""
     plant = rd.Plant(arms()["Panda-7"], [rd.effects.ViscousFriction(1e5), rd.effects.Spring(1e8, READY)])
     options: dict[str, Any] = {
-        "q0": READY + 0.1, "duration_s": 0.001 if effort.quick else 1.0, "record_period_s": 1e-4,
+        "q0": READY + 0.1, "duration_s": 0.001 if effort.quick else 1.0, "record_every_s": 1e-4,
         "estimate_error": False, "engine": "compiled",
     }  # fmt: skip
     reference = rd.simulate(plant, **options, integrator=rd.integrate.Adaptive("DOP853", 1e-12, 1e-12))

@@ -54,7 +54,7 @@ robot = "planar_2r"
 duration_s = {duration_s}
 method = "rk4"
 step_s = 0.001
-record_period_s = 0.001
+record_every_s = 0.001
 
 [start]
 q = [0.4, 0.9]

@@ -191,7 +191,7 @@ def setup(
     """Return the setup of a run; `engine` is "compiled", "interpreted" or "auto"."""
     options = {"integrator": by} if by is not None else {}
     return rd.Setup(
-        plant, q0, v0, duration, controller=controller, step_s=step, record_period_s=record, estimate_error=estimate,
+        plant, q0, v0, duration, controller=controller, step_s=step, record_every_s=record, estimate_error=estimate,
         engine=engine, events=events, accuracy=accuracy, **options,
     )  # fmt: skip
 

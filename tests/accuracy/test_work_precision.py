@@ -107,7 +107,7 @@ def test_chaotic_motion_is_cut_where_references_part() -> None:
     assert truth.parted_s is not None and truth.lost_s is not None
     assert truth.horizon_s == cut.duration_s <= truth.parted_s < truth.lost_s < 40.0
     runs = [
-        rd.simulate(setup, integrator="order_8", step_s=step, record_period_s=1.0, estimate_error=False)
+        rd.simulate(setup, integrator="order_8", step_s=step, record_every_s=1.0, estimate_error=False)
         for step in (1e-3, 5e-4)
     ]
     apart = np.abs(runs[0].q - runs[1].q).max(axis=1)

@@ -34,7 +34,7 @@ def run(
 ) -> rd.Trajectory:
     """A run with a sample at each quarter of a period, which is no tick."""
     setup = rd.Setup(
-        PLANT, Q0, V0, periods * T, controller, rd.integrate.Adaptive("DOP853", 1e-12, 1e-14), record_period_s=T / 4,
+        PLANT, Q0, V0, periods * T, controller, rd.integrate.Adaptive("DOP853", 1e-12, 1e-14), record_every_s=T / 4,
         engine=engine, estimate_error=False,
     )  # fmt: skip
     return rd.simulate(setup, **options)  # type: ignore[arg-type]
@@ -265,7 +265,7 @@ def test_chatter_is_seen_where_a_torque_acts_late(late: float) -> None:
     for integrator in ("rk4", "DOP853"):
         for engine in ("interpreted", "compiled"):
             options = {"integrator": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
-            made = rd.simulate(PLANT, Q0, V0, controller=loop, record_period_s=T, **options)  # type: ignore[arg-type]
+            made = rd.simulate(PLANT, Q0, V0, controller=loop, record_every_s=T, **options)  # type: ignore[arg-type]
             assert RemarkKind.CHATTER in {remark.kind for remark in made.remarks}
 
 

@@ -88,7 +88,7 @@ def test_a_declared_effect_is_not_looked_at_between_steps_and_an_undeclared_one_
     for kind in (Declared, Silent):
         kind.calls = 0
         plant = rd.Plant(ARM, [kind(1.5)])
-        made = rd.simulate(plant, Q, V, duration_s=0.3, engine="interpreted", record_period_s=0.1)
+        made = rd.simulate(plant, Q, V, duration_s=0.3, engine="interpreted", record_every_s=0.1)
         counts.append(kind.calls - made.statistics.evaluations - made.statistics.companion_evaluations)
     assert made.error is not None and made.error.verdict is Verdict.BOUND
     assert "Silent declares no thresholds" in made.error.reason
@@ -361,7 +361,7 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_auto_takes_the_machine_code_that_is_there_and_both_engines_agree_within_the_estimate(name, tmp_path) -> None:
     effects, controller, integrator = SCENES[name]
-    setup = rd.Setup(rd.Plant(ARM, effects), Q, V, 0.5, controller, integrator, record_period_s=0.05)
+    setup = rd.Setup(rd.Plant(ARM, effects), Q, V, 0.5, controller, integrator, record_every_s=0.05)
     interpreted = rd.simulate(setup, engine="interpreted")
     compiled, auto = rd.simulate(setup, engine="compiled"), rd.simulate(setup)
     assert auto.statistics.engine == compiled.statistics.engine
@@ -403,7 +403,7 @@ def test_a_smooth_function_that_declares_nothing_is_not_said_to_act_between_step
         return _Stiff.kp * (_Stiff.plan.at(t)[0] - q) - _Stiff.kd * v + _Stiff.arm.N(q)
 
     for law in (follows, without_velocity):
-        run = rd.simulate(_Stiff.arm, _Stiff.start, duration_s=0.6, controller=law, record_period_s=0.01)
+        run = rd.simulate(_Stiff.arm, _Stiff.start, duration_s=0.6, controller=law, record_every_s=0.01)
         assert "acts between steps" not in str(run.error) and run.error.largest < 1e-9
 
 
@@ -420,7 +420,7 @@ def test_models_of_ones_own_controller_have_the_right_angles_of_the_machine_code
             q_d, v_d, _ = self.plan.at(t)
             return _Stiff.kp * (q_d - q) + _Stiff.kd * (v_d - v) + self.model.N(q)
 
-    options = {"duration_s": 0.5, "record_period_s": 0.01, "engine": "compiled", "estimate_error": False}
+    options = {"duration_s": 0.5, "record_every_s": 0.01, "engine": "compiled", "estimate_error": False}
     run = rd.simulate(_Stiff.arm, _Stiff.start, controller=Law(_Stiff.plan, _Stiff.arm), **options)
     built_in = rd.control.PDGravity(_Stiff.arm, _Stiff.plan, _Stiff.kp, _Stiff.kd)
     same = rd.simulate(_Stiff.arm, _Stiff.start, controller=built_in, **options)
@@ -712,7 +712,7 @@ def test_a_scene_names_effects_that_its_reader_names(keys: str, c: Any, tmp_path
     path.write_text(f'{SCENE}[[effect]]\nkind = "gravity"\n[[effect]]\nkind = "drag"\n{keys}\n', encoding="utf-8")
     own = rd.read_scene(path, effects={"drag": Drag})
     setup = rd.Setup(rd.Plant(ARM, [Drag(c)]), Q, V, 0.1, integrator=rd.integrate.Adaptive(rtol=1e-10, atol=1e-12))
-    expected = rd.simulate(setup, record_period_s=0.01, engine="interpreted")
+    expected = rd.simulate(setup, record_every_s=0.01, engine="interpreted")
     assert np.array_equal(rd.simulate(own).q, expected.q)
     with pytest.raises(SceneError, match=r"line 8: effect 2 \(drag\).kind: no kind 'drag'"):
         rd.read_scene(path)

@@ -84,7 +84,7 @@ def test_two_masses_move_as_the_damped_oscillator() -> None:
     for engine in ("interpreted", "compiled"):
         run = rd.simulate(
             rd.Plant(MASSES, [strut]), q0=q0, v0=v0, duration_s=t_end, integrator="order_8", step_s=0.01, engine=engine,
-            estimate_error=False, record_period_s=0.1,
+            estimate_error=False, record_every_s=0.1,
         )  # fmt: skip
         np.testing.assert_allclose(run.q[-1], expected, atol=1e-12)
         spent = m @ v0**2 / 2 + k * x0**2 / 2 - m @ run.v[-1] ** 2 / 2 - k * x**2 / 2

@@ -44,7 +44,7 @@ def test_without_loss_energy_stays_over_a_thousand_impacts() -> None:
     h = 0.3
     T = 1000 * 2 * np.sqrt(2 * h / G)
     plant = rd.Plant(RAIL, [rd.effects.RigidStops(0.0, np.inf, 1.0)])
-    run = rd.simulate(plant, [h], duration_s=T, record_period_s=T / 200, engine="compiled", **OPTIONS)
+    run = rd.simulate(plant, [h], duration_s=T, record_every_s=T / 200, engine="compiled", **OPTIONS)
     energy = run.ledger.kinetic + run.ledger.potential
     assert len(run.events) in (999, 1000, 1001)
     assert np.abs(energy / energy[0] - 1).max() <= 1e-12
@@ -107,7 +107,7 @@ def test_without_loss_the_energy_of_an_arm_drifts_by_its_tolerance(case) -> None
     drifts = {}
     for tolerance in (1e-6, 1e-9, 1e-12):
         run = rd.simulate(
-            plant, q0, v0, duration_s=T, engine="compiled", estimate_error=False, record_period_s=T / 100,
+            plant, q0, v0, duration_s=T, engine="compiled", estimate_error=False, record_every_s=T / 100,
             integrator=rd.integrate.Adaptive(rtol=tolerance, atol=tolerance),
         )  # fmt: skip
         energy = run.ledger.kinetic + run.ledger.potential
@@ -125,7 +125,7 @@ def test_an_impact_obeys_newtons_law_and_the_momentum_of_the_others_stays() -> N
     q0, v0 = np.array([0.2, 0.5]), np.array([1.3, -0.8])
     run = rd.simulate(plant, q0, v0, duration_s=0.6, **OPTIONS)
     struck = run.events[0]
-    free = rd.simulate(plant.dynamics, q0, v0, duration_s=struck.t, record_period_s=struck.t, **OPTIONS)
+    free = rd.simulate(plant.dynamics, q0, v0, duration_s=struck.t, record_every_s=struck.t, **OPTIONS)
     before, after, M = free.v[-1], np.array(struck.v), ARM.M(np.array(struck.q))
     assert struck.q[0] == 0.7
     assert after[0] == pytest.approx(-e * before[0], rel=1e-10)
@@ -225,7 +225,7 @@ def test_a_start_of_a_batch_beyond_a_stop_is_refused_by_number(method: str) -> N
 def test_rollouts_are_the_runs_of_simulate(method: str) -> None:
     """To the last bit, friction swept."""
     plant = rd.Plant(ARM, [rd.effects.DryFriction([3.0, 1.0]), rd.effects.RigidStops([-1.5, -2.0], [1.0, 2.0], 0.5)])
-    setup = rd.Setup(plant, [0.3, 0.4], duration_s=1.0, record_period_s=0.1, engine="compiled", integrator=method,
+    setup = rd.Setup(plant, [0.3, 0.4], duration_s=1.0, record_every_s=0.1, engine="compiled", integrator=method,
                      estimate_error=False)  # fmt: skip
     levels = np.array([[3.0, 1.0], [0.5, 2.0]])
     runs = rd.rollouts(setup, params={"dry_friction.level": levels})

@@ -21,7 +21,7 @@ TIGHT = rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)
 
 
 def slide(effects, control, duration_s: float, **options) -> rd.Trajectory:
-    options = {"estimate_error": False, "record_period_s": duration_s} | options
+    options = {"estimate_error": False, "record_every_s": duration_s} | options
     return rd.simulate(rd.Plant(SLIDER, effects), [0.0], duration_s=duration_s, controller=control, **options)
 
 
@@ -80,7 +80,7 @@ def control(kind: str) -> tuple[rd.control.Controller, list[rd.Effect]]:
 
 def saturated(kind: str, **options) -> rd.Trajectory:
     controller, effects = control(kind)
-    options = {"estimate_error": False, "record_period_s": 1.0, "engine": "compiled"} | options
+    options = {"estimate_error": False, "record_every_s": 1.0, "engine": "compiled"} | options
     return rd.simulate(rd.Plant(ARM, effects), START, duration_s=1.0, controller=controller, **options)
 
 
@@ -159,7 +159,7 @@ def test_what_is_held_stays_held_when_a_limit_is_no_longer_looked_for() -> None:
 def test_sweeps_of_the_limit_are_cut_as_single_runs_are() -> None:
     """A limit of none for the first, and two that are reached."""
     controller, _ = control("computed_torque")
-    plant, options = rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), {"record_period_s": 0.25, "estimate_error": False}
+    plant, options = rd.Plant(ARM, [rd.effects.EffortLimit(LIMIT)]), {"record_every_s": 0.25, "estimate_error": False}
     setup = rd.Setup(plant, START, None, 1.0, controller, **options)
     limits = np.array([[np.inf, np.inf], [18.0, 5.0], [25.0, 8.0]])
     runs = rd.rollouts(setup, params={"effort_limit.limit": limits})

@@ -27,7 +27,7 @@ ALPHA, WEIGHTS = NUMBERS.a @ GAMMA, NUMBERS.m @ GAMMA
 BETA = ALPHA + GAMMA
 ARM = rd.load("planar_2r")
 START: dict[str, Any] = {"q0": [0.4, -0.7], "v0": [0.3, 0.5]}
-OPTIONS = START | {"duration_s": 0.5, "record_period_s": 0.1, "estimate_error": False, "integrator": "rosenbrock_5"}
+OPTIONS = START | {"duration_s": 0.5, "record_every_s": 0.1, "estimate_error": False, "integrator": "rosenbrock_5"}
 
 Tree = tuple[Any, ...]  # a rooted tree: the trees that hang on its root
 
@@ -254,7 +254,7 @@ def test_both_engines_make_the_same_steps() -> None:
 def test_the_error_follows_the_tolerance() -> None:
     """Samples between the ends of steps included; a hundredth of the tolerance takes 100^(1/5) = 2.5 times as many."""
     plant = rd.Plant(ARM, [rd.effects.RegularisedCoulombFriction([1.0, 0.6], 0.3), rd.effects.Spring([40.0, 20.0])])
-    options = OPTIONS | {"duration_s": 2.0, "record_period_s": 0.003, "engine": "compiled"}
+    options = OPTIONS | {"duration_s": 2.0, "record_every_s": 0.003, "engine": "compiled"}
     exact = rd.simulate(plant, **options | {"integrator": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)})
     steps = []
     for tolerance in (1e-5, 1e-7, 1e-9):
@@ -270,7 +270,7 @@ def test_the_error_follows_the_tolerance() -> None:
 def test_both_engines_choose_the_same_steps(segments: dict[str, Any]) -> None:
     """Though one has differences for its Jacobian: right to 1e-10, which the error of a step does not see."""
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction([100.0, 300.0])])
-    options = OPTIONS | segments | {"duration_s": 0.1, "record_period_s": 0.003}
+    options = OPTIONS | segments | {"duration_s": 0.1, "record_every_s": 0.003}
     method = {"integrator": rd.integrate.Adaptive("Rosenbrock", 1e-7, 1e-9)}
     ours, theirs = (rd.simulate(plant, **options | method, engine=engine) for engine in ("compiled", "interpreted"))
     assert ours.statistics.steps == theirs.statistics.steps
@@ -287,7 +287,7 @@ def test_stiffness_does_not_bound_its_steps() -> None:
     """
     rest = np.array([0.4, -0.7])
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction(1e5), rd.effects.Spring(1e8, rest)])
-    options: dict[str, Any] = {"record_period_s": 1e-4, "estimate_error": False, "engine": "compiled"}
+    options: dict[str, Any] = {"record_every_s": 1e-4, "estimate_error": False, "engine": "compiled"}
     run = rd.simulate(
         plant, rest + 0.1, **options, duration_s=1.0, integrator=rd.integrate.Adaptive("Rosenbrock", 1e-6, 1e-6)
     )

@@ -30,7 +30,7 @@ def panda() -> rd.Robot:
 @pytest.mark.parametrize("load", [1.0, *long([0.3])])
 def test_what_friction_holds_stays_for_any_number_of_steps(load: float) -> None:
     """A block on a rail for an hour, with the load at its limit to the last bit too: 0.0."""
-    plant, options = rd.Plant(RAIL, [rd.effects.DryFriction(G / load)]), {"record_period_s": 900.0} | FIXED
+    plant, options = rd.Plant(RAIL, [rd.effects.DryFriction(G / load)]), {"record_every_s": 900.0} | FIXED
     run = rd.simulate(plant, [0.25], duration_s=3600.0, step_s=1e-3, engine="compiled", **options)
     assert run.statistics.steps == 3_600_000
     assert (run.q == 0.25).all()
@@ -61,7 +61,7 @@ def test_the_actuation_of_every_step_is_seen_by_both_engines(period_s: float) ->
     control = rd.control.PD(rd.control.hold([0.4, -0.2]), [30.0, 20.0], [3.0, 2.0], period_s=period_s)
     runs = [
         rd.simulate(
-            plant, [0.9, 0.3], [0.4, -0.7], duration_s=0.4, step_s=1e-3, record_period_s=0.0, controller=control,
+            plant, [0.9, 0.3], [0.4, -0.7], duration_s=0.4, step_s=1e-3, record_every_s=0.0, controller=control,
             engine=engine, **FIXED,
         )
         for engine in ENGINES
@@ -141,11 +141,11 @@ def test_its_limit_is_that_of_the_events() -> None:
 
     plant = rd.Plant(arm, [rd.effects.ViscousFriction(0.1), rd.effects.DryFriction(levels)])
     given = {"duration_s": 2.0, "controller": drive, "estimate_error": False, "engine": "compiled"}
-    exact = rd.simulate(plant, q0, integrator=rd.integrate.Adaptive(rtol=1e-8, atol=1e-8), record_period_s=0.1, **given)
+    exact = rd.simulate(plant, q0, integrator=rd.integrate.Adaptive(rtol=1e-8, atol=1e-8), record_every_s=0.1, **given)
     steps = 4e-3 / 2.0 ** np.arange(6)
     errors = [
         np.abs(
-            rd.simulate(plant, q0, integrator="time_stepping", step_s=h, record_period_s=0.1, **given).q - exact.q
+            rd.simulate(plant, q0, integrator="time_stepping", step_s=h, record_every_s=0.1, **given).q - exact.q
         ).max()
         for h in steps
     ]

@@ -123,8 +123,8 @@ def test_six_joints_under_all_at_once(method: str) -> None:
 
 
 @pytest.mark.parametrize("period", [0.0, 0.0025, 0.01, 0.07])
-def test_samples_lie_at_the_record_period(period: float) -> None:
-    check_equal(*both(record_period_s=period), 1e-12)
+def test_samples_lie_at_the_recording_times(period: float) -> None:
+    check_equal(*both(record_every_s=period), 1e-12)
 
 
 def test_a_method_in_python_takes_the_rate_in_machine_code() -> None:
@@ -170,7 +170,7 @@ def test_progress_is_told_and_an_interrupt_keeps_the_samples() -> None:
         if len(seen) == 2:
             raise KeyboardInterrupt
 
-    setup = rd.Setup(rd.Plant(ARM), Q, duration_s=400.0, record_period_s=0.1, engine="compiled", integrator="rk4")
+    setup = rd.Setup(rd.Plant(ARM), Q, duration_s=400.0, record_every_s=0.1, engine="compiled", integrator="rk4")
     run = rd.simulate(setup, on_progress=progress)
     assert run.outcome.ending == "stopped" and run.error is None
     assert 0 < run.t[-1] <= run.outcome.t == seen[-1] < 400.0

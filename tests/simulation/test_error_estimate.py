@@ -61,7 +61,7 @@ def test_estimate_is_within_a_factor_of_ten_of_the_true_error(scene) -> None:
     """At its end and at most times on the way; order 8 at half the step is exact to 1e-4 of that, and says so."""
     run = rd.simulate(setup(*scene))
     reference = rd.simulate(setup(*scene), integrator=rd.integrate.method("order_8"), step_s=scene[-1] / 2,
-                            record_period_s=scene[-1], estimate_error=False)  # fmt: skip
+                            record_every_s=scene[-1], estimate_error=False)  # fmt: skip
     tight = rd.simulate(setup(*scene), integrator=rd.integrate.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False)
     error, estimate = true_error(run, reference), run.error
     assert estimate is not None
@@ -114,7 +114,7 @@ def test_chaos_at_a_coarse_step_is_not_resolved(step: float) -> None:
     """The double pendulum from 2.5 rad tumbles: errors grow e-fold in less than 1 s, up to the size of the motion."""
     chaos = setup(rd.Plant(DOUBLE), None, [2.5, 0.7], [0.3, 0.5], 20.0, step)
     run = rd.simulate(chaos)
-    reference = rd.simulate(chaos, integrator="order_8", step_s=step / 10, record_period_s=step, estimate_error=False)
+    reference = rd.simulate(chaos, integrator="order_8", step_s=step / 10, record_every_s=step, estimate_error=False)
     error, estimate = true_error(run, reference), run.error
     assert error[-1] > 1.0  # the end of the run is fiction
     assert estimate is not None

@@ -242,7 +242,7 @@ def test_an_impulse_in_a_long_run_is_not_merged_away() -> None:
     push = rd.effects.ExternalWrench("block", [0, 0, 1 / length, 0, 0, 0], start_s=start, end_s=start + length)
     real = (start + length) - start  # as floats have it
     run = rd.simulate(
-        rd.Plant(RAIL, [push]), q0=[0.0], duration_s=1000.0, integrator="rk4", step_s=0.1, record_period_s=1.0
+        rd.Plant(RAIL, [push]), q0=[0.0], duration_s=1000.0, integrator="rk4", step_s=0.1, record_every_s=1.0
     )
     v = real / length
     exact = v * (1000.0 - start - length) + v * real / 2
@@ -297,11 +297,11 @@ def test_a_usable_run_with_stiff_friction_is_bounded_not_refused() -> None:
         PANDA, rd.control.quintic(READY, READY + 0.2, 0.2), *rd.control.gains_from(np.diag(PANDA.M(READY)), 10.0)
     )
     run = rd.simulate(
-        plant, q0=READY, duration_s=0.2, controller=law, integrator="rk4", step_s=2.5e-4, record_period_s=1e-3
+        plant, q0=READY, duration_s=0.2, controller=law, integrator="rk4", step_s=2.5e-4, record_every_s=1e-3
     )
     tight = rd.simulate(
         plant, q0=READY, duration_s=0.2, controller=law, integrator=rd.integrate.Adaptive(rtol=1e-12, atol=1e-13),
-        record_period_s=1e-3, estimate_error=False,
+        record_every_s=1e-3, estimate_error=False,
     )  # fmt: skip
     error = np.abs(run.q - tight.q).max()
     assert error < 1e-6
@@ -370,7 +370,7 @@ def test_a_record_that_meets_every_turning_point_accuses_no_run() -> None:
     plant = rd.Plant(RAIL, [rd.effects.Spring(1.0)])
     period = 2 * np.pi  # of 1 kg on 1 N/m
     for method in (rd.integrate.method("rk4"), rd.integrate.Adaptive(rtol=1e-6, atol=1e-8)):
-        run = rd.simulate(plant, q0=[1.0], duration_s=period, record_period_s=period, integrator=method)
+        run = rd.simulate(plant, q0=[1.0], duration_s=period, record_every_s=period, integrator=method)
         assert run.leak == ""
         assert run.error.note == ""
         assert run.error.largest >= LEAST * abs(run.q[-1, 0] - 1.0)

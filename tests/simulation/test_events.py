@@ -45,7 +45,7 @@ def test_grazed_and_struck_stops_are_met_as_in_closed_form(seed: int) -> None:
     rng = np.random.default_rng(seed)
     for _ in range(30):
         excess, k = 10 ** rng.uniform(-6, -2), 10 ** rng.uniform(4, 9)
-        run, exact = tossed(rng.uniform(0.2, 0.6), excess, k, rng.uniform(0.1, 0.3), record_period_s=1.0)
+        run, exact = tossed(rng.uniform(0.2, 0.6), excess, k, rng.uniform(0.1, 0.3), record_every_s=1.0)
         assert [each.direction for each in run.events] == [1, -1], (excess, k)
         assert abs(run.q[-1, 0] - exact) < 1e-11, (excess, k)
 
@@ -63,7 +63,7 @@ def test_near_misses_are_no_events() -> None:
     """1e-12 … 1e-4 m below a stop of 1e8 N/m."""
     rng = np.random.default_rng(3)
     for _ in range(20):
-        run, exact = tossed(rng.uniform(0.2, 0.6), -(10 ** rng.uniform(-12, -4)), 1e8, 0.2, record_period_s=1.0)
+        run, exact = tossed(rng.uniform(0.2, 0.6), -(10 ** rng.uniform(-12, -4)), 1e8, 0.2, record_every_s=1.0)
         assert run.events == ()
         assert abs(run.q[-1, 0] - exact) < 1e-12
 
@@ -98,7 +98,7 @@ def test_a_terminal_event_ends_the_run_there(engine: str) -> None:
     """Run until the arm hangs at rest to 1 mrad/s: the run is finished, its last sample is the event."""
     slow = rd.Event(lambda t, q, v: v[0] ** 2 + v[1] ** 2 - 1e-6, direction=-1, terminal=True, name="at rest")
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction(8.0)])
-    run = rd.simulate(plant, [0.3, 0.4], duration_s=60.0, engine=engine, events=[slow], record_period_s=0.1)
+    run = rd.simulate(plant, [0.3, 0.4], duration_s=60.0, engine=engine, events=[slow], record_every_s=0.1)
     assert run.outcome.ending == "finished"
     assert run.outcome.t == run.t[-1] == run.events[-1].t < 60
     assert "at rest" in run.outcome.text
@@ -134,7 +134,7 @@ def above(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 def test_events_that_never_occur_do_not_change_the_steps() -> None:
     """Stops out of reach: the same steps, the same bits, and no evaluation more."""
-    options = {"q0": [0.3, 0.4], "v0": [0.2, 0.1], "duration_s": 1.0, "estimate_error": False, "record_period_s": 1.0}
+    options = {"q0": [0.3, 0.4], "v0": [0.2, 0.1], "duration_s": 1.0, "estimate_error": False, "record_every_s": 1.0}
     bare = rd.simulate(ARM, **options, engine="interpreted")
     far = rd.simulate(rd.Plant(ARM, rd.effects.joint_stops([-9.0, -9.0], [9.0, 9.0])), **options, engine="interpreted")
     assert far.statistics.evaluations == bare.statistics.evaluations

@@ -33,7 +33,7 @@ def joint():
 def damped(joint, ratio: float, **options) -> rd.Setup:
     """Sampled damping with kd T/M = ratio, disturbed by a little stiffness; a sample every 10 ticks."""
     control = rd.control.PD(rd.control.hold([0.3]), kp=0.05, kd=ratio * INERTIA / PERIOD, period_s=PERIOD)
-    given = {"duration_s": 0.5, "record_period_s": 10 * PERIOD, "engine": "interpreted"}
+    given = {"duration_s": 0.5, "record_every_s": 10 * PERIOD, "engine": "interpreted"}
     if options.get("integrator") != "DOP853":
         given |= {"integrator": "rk4", "step_s": PERIOD / 4}
     plant = rd.Plant(joint, [rd.effects.EffortLimit(LIMIT)])
@@ -82,7 +82,7 @@ def test_extremes_are_those_of_all_steps(method: str) -> None:
     q0, v0 = np.array([0.3, -1.1, 0.9, -0.6, 1.2, 0.4]), np.array([0.5, 0.4, -0.3, 0.2, 0.6, -0.5])
     plant, law = rd.Plant(arm, [rd.effects.ViscousFriction(2.0)]), rd.control.PD(rd.control.hold(q0), 50.0, 5.0)
     setup = rd.Setup(plant, q0, v0, 0.05, law, method, estimate_error=False)
-    every, few = rd.simulate(setup), rd.simulate(setup, record_period_s=0.05)
+    every, few = rd.simulate(setup), rd.simulate(setup, record_every_s=0.05)
     np.testing.assert_array_equal(every.extremes, few.extremes)
     # a step in (q, p) has its velocity at its stages only
     slack = 0.02 if method.startswith("gauss") else 0.0
@@ -117,7 +117,7 @@ def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
     setup = rd.Setup(
         rd.Plant(joint, [rd.effects.EffortLimit(LIMIT)]), [0.0], duration_s=1.0, controller=control, integrator="rk4"
     )
-    run = rd.simulate(setup, record_period_s=0.5, estimate_error=False)
+    run = rd.simulate(setup, record_every_s=0.5, estimate_error=False)
     root = np.roots([kp * a / 2, kd * a, LIMIT - kp * e]).max()
     (said,) = (remark for remark in run.remarks if remark.kind is RemarkKind.EFFORT_REACHED)
     assert (said.start, said.value) == (0.0, LIMIT)
@@ -129,12 +129,12 @@ def cart():
     """A cart pushed beyond 2 m, 5 m/s and 100 N, the limits of its file, with a sample at both ends only."""
     plan = rd.control.quintic(np.zeros(2), np.array([2.5, 0.0]), 0.8)
     plant, law = rd.Plant(rd.load("cart_pole")), rd.control.PD(plan, 4e3, 400.0)
-    return rd.Setup(plant, np.zeros(2), None, 1.0, law, "rk4", record_period_s=1.0, estimate_error=False)
+    return rd.Setup(plant, np.zeros(2), None, 1.0, law, "rk4", record_every_s=1.0, estimate_error=False)
 
 
 def test_what_passes_the_limits_of_the_file_is_said(cart) -> None:
     """Farthest values, times and durations are those of a run that keeps every step."""
-    run, every = rd.simulate(cart), rd.simulate(cart, record_period_s=0.0)
+    run, every = rd.simulate(cart), rd.simulate(cart, record_every_s=0.0)
     said = {remark.quantity: remark for remark in run.remarks if remark.kind is RemarkKind.BEYOND}
     assert set(said) == {"q", "v", "u"}
     for (quantity, x), limit in zip((("q", every.q), ("v", every.v), ("u", every.u)), (2.0, 5.0, 100.0), strict=True):
@@ -170,7 +170,7 @@ def test_an_adaptive_run_is_watched_at_its_steps() -> None:
         rd.Plant(rd.load("cart_pole")), np.array([0.0, 0.4]), duration_s=2.0, estimate_error=False, integrator="rk4"
     )
     fine = rd.simulate(setup, integrator=rd.integrate.method("order_8"), step_s=1e-3)
-    run = rd.simulate(setup, integrator=rd.integrate.Adaptive(), record_period_s=1.0)
+    run = rd.simulate(setup, integrator=rd.integrate.Adaptive(), record_every_s=1.0)
     span = np.ptp(fine.extremes[:2], axis=1)
     assert np.abs(run.extremes[:2] - fine.extremes[:2]).max() < 0.05 * span.max()
 

@@ -35,7 +35,7 @@ SETUP = rd.Setup(
     rd.control.PD(REFERENCE, 40.0, [4.0, 3.0]),
     integrator="rk4",
     step_s=2e-3,
-    record_period_s=0.01,
+    record_every_s=0.01,
 )
 
 PID = replace(SETUP, controller=rd.control.PID(REFERENCE, 40.0, 30.0, 4.0, effort_limit=3.0, period_s=0.004))
@@ -71,12 +71,12 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
     levels = {"joint_stops.stiffness": [0.0, 1e4, 1e4], "joint_stops.upper": [[0.5, 1.0], [0.5, 1.0], [0.45, 0.6]]}
     walls = {"joint_stops.upper": [[0.4, 1.0], [0.3, 0.8], [0.35, 0.9]], "kp": [20.0, 30.0, 40.0]}
     hard = rd.Plant(ARM, [rd.effects.ViscousFriction(0.5), *rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 1e4)])
-    chosen = {"integrator": rd.integrate.Adaptive(), "step_s": None, "record_period_s": 0.05, "engine": "compiled"}
+    chosen = {"integrator": rd.integrate.Adaptive(), "step_s": None, "record_every_s": 0.05, "engine": "compiled"}
     body = rd.effects.CarriedPayload(rd.Payload(ARM_TIP, 0.7), 0.05, 0.12)
     resting = rd.effects.LuGreFriction(1.0, 1.0, 0.1, 0.2, 0.3, 0.1)  # pushed away from v = 0: no reversal
     push = rd.control.PD(rd.control.hold(Q + 3.0), [20.0, 0.8], 0.0)
     bristles = rd.effects.LuGreFriction(100.0, 1.0, 0.05, 0.2, 0.3, 0.05)  # steps in (q, p) end nowhere for them
-    odd = {"duration_s": 0.123, "record_period_s": 0.0101}  # the run does not hold it a whole number of times
+    odd = {"duration_s": 0.123, "record_every_s": 0.0101}  # the run does not hold it a whole number of times
     gauss = rd.integrate.method("gauss_4")
     return {
         "one": (SETUP, {"q0": starts(1)}),
@@ -89,7 +89,7 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
             replace(SETUP, plant=rd.Plant(loaded(), PLANT.effects), controller=known), {"params": masses},
         ),
         "levels": (
-            rd.Setup(rd.Plant(weightless, stops), Q, V, 0.5, integrator="rk4", record_period_s=0.1), {"params": levels},
+            rd.Setup(rd.Plant(weightless, stops), Q, V, 0.5, integrator="rk4", record_every_s=0.1), {"params": levels},
         ),
         "chosen steps": (replace(SETUP, plant=hard, **chosen), {"q0": starts(3), "params": walls}),
         "payloads come and go": (
@@ -100,7 +100,7 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
             rd.Setup(rd.Plant(weightless, [resting]), Q, None, 0.2, push, integrator="rk4"), {"q0": starts(3, 0.01)},
         ),
         "tons": (rd.Setup(rd.Plant(ARM.with_(mass_scale=2000.0)), [1.5, 0.2], duration_s=0.2, integrator="rk4"), {}),
-        **{f"every {x} s": (replace(SETUP, record_period_s=x), {"q0": starts(2)}) for x in (0.0, 0.005, 0.03, 0.5)},
+        **{f"every {x} s": (replace(SETUP, record_every_s=x), {"q0": starts(2)}) for x in (0.0, 0.005, 0.03, 0.5)},
         "between cut steps": (replace(SETUP, **odd), {"q0": starts(2)}),
         "between steps": (replace(SETUP, plant=rd.Plant(ARM, PLANT.effects[:2]), **odd), {"q0": starts(2)}),
         "between steps in (q, p)": (
@@ -175,7 +175,7 @@ def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str, effects:
     It names its time and reason as simulate does; before its step is judged, the joint that moved fastest.
     """
     plant = rd.Plant(ARM, effects)
-    setup = replace(SETUP, plant=plant, integrator=rd.integrate.method(method), record_period_s=0.0)
+    setup = replace(SETUP, plant=plant, integrator=rd.integrate.method(method), record_every_s=0.0)
     q0, v0 = starts(40), np.broadcast_to(V, (40, 2)).copy()
     wild = [3, 17]
     quiet = rd.rollouts(setup, q0, v0, record=EVERYTHING)
@@ -382,7 +382,7 @@ def test_what_has_no_meaning_is_refused() -> None:
         "params must give values by name, .*3": {"params": {3: ones}},
         "no record 'torque'": {"record": ("torque",)},
         "threads .* must be a whole number, from 1": {"threads": 0},
-        r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_period_s": {
+        r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_every_s": {
             "q0": starts(4), "most_bytes": 100,
         },
     }.items():  # fmt: skip
@@ -462,7 +462,7 @@ def interrupt_once(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatch) -> None:
     """Also of runs that were to be made again: theirs are kept up to the step in which they may pass a threshold."""
     short = replace(SETUP, plant=rd.Plant(ARM, effects))
-    setup = replace(short, duration_s=100.0, record_period_s=10.0)
+    setup = replace(short, duration_s=100.0, record_every_s=10.0)
     rd.rollouts(short, starts(1))  # compiled before
     interrupt_once(monkeypatch)
     runs = rd.rollouts(setup, starts(200), threads=2)

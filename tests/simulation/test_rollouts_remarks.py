@@ -39,7 +39,7 @@ SWEEP = np.linspace(0.2, 1.6, B)
 
 def setup(plant: rd.Plant, controller: object, method: str = "rk4", **options) -> rd.Setup:
     own = {} if method == "DOP853" else {"step_s": 4e-3 if getattr(controller, "period_s", 0.0) else 5e-4}
-    return rd.Setup(plant, Q, V, 0.8, controller, integrator=method, record_period_s=0.1, **own | options)
+    return rd.Setup(plant, Q, V, 0.8, controller, integrator=method, record_every_s=0.1, **own | options)
 
 
 SCENES = {
@@ -137,10 +137,10 @@ def test_a_batch_tells_of_each_run_what_simulate_does(batch) -> None:
 def test_actuation_that_changes_between_ticks_is_seen_at_instants(sampled: bool) -> None:
     """Its extremes are those of a record of all steps, at each eighth and at samples; behind a lag at all of them."""
     of = setup(LAGGING, rd.control.PD(GOAL, 300.0, 20.0, period_s=0.02 if sampled else 0.0))
-    of = replace(of, step_s=5e-4, record_period_s=0.0145)
+    of = replace(of, step_s=5e-4, record_every_s=0.0145)
     starts, record = Q + 0.3 * np.random.default_rng(5).normal(size=(B, 2)), ("u",)
     runs = rd.rollouts(of, starts, record=record)
-    u = rd.rollouts(replace(of, record_period_s=0.0), starts, record=record).u
+    u = rd.rollouts(replace(of, record_every_s=0.0), starts, record=record).u
     every = np.arange(u.shape[1]) % (1 if sampled else 8) == 0
     every[np.rint(runs.t / 5e-4).astype(int)] = True
     expected = np.stack([u[:, every].min(axis=1), u[:, every].max(axis=1)], axis=1)

@@ -92,7 +92,7 @@ def test_whole_runs_converge_with_the_order_of_the_method(name: str, step: float
 def test_canonical_and_velocity_coordinates_give_one_trajectory(effects) -> None:
     """Equations p = M v with ṗ = Cᵀ v − N + τ, and v' = M⁻¹ (…): both within 1e-11 of the flow, on general axes."""
     q0, v0 = np.linspace(0.2, -0.5, SKEW.n), np.linspace(-0.8, 0.9, SKEW.n)
-    common = {"q0": q0, "v0": v0, "duration_s": 0.32, "record_period_s": 0.02, "estimate_error": False}
+    common = {"q0": q0, "v0": v0, "duration_s": 0.32, "record_every_s": 0.02, "estimate_error": False}
     canonical, velocity = (
         rd.simulate(rd.Plant(SKEW, effects), **common, integrator=rd.integrate.method(name), step_s=h)
         for name, h in (("gauss_6", 2e-3), ("order_8", 4e-3))
@@ -147,11 +147,11 @@ def test_samples_lie_at_multiples_of_the_record_period_whatever_the_step() -> No
     every = rd.simulate(SMOOTH, **options, integrator="rk4", step_s=1e-3)
     np.testing.assert_allclose(every.t, np.arange(101) * 1e-3, atol=1e-15)
     for steps in ({"integrator": "rk4", "step_s": 1e-3}, {"integrator": "DOP853"}):
-        some = rd.simulate(SMOOTH, **options, record_period_s=0.03, **steps)
+        some = rd.simulate(SMOOTH, **options, record_every_s=0.03, **steps)
         np.testing.assert_allclose(some.t, [0.0, 0.03, 0.06, 0.09, 0.1], atol=1e-15)
         np.testing.assert_allclose(some.q, every.q[[0, 30, 60, 90, 100]], atol=1e-9)
         assert some.t[-1] == 0.1
-    uneven = rd.simulate(SMOOTH, **options, integrator="rk4", step_s=3e-3, record_period_s=0.01)
+    uneven = rd.simulate(SMOOTH, **options, integrator="rk4", step_s=3e-3, record_every_s=0.01)
     np.testing.assert_allclose(uneven.t, np.arange(11) * 0.01, atol=1e-12)
 
 

@@ -43,7 +43,7 @@ def test_torque_of_a_sampled_controller_is_held_between_its_ticks(method) -> Non
     """At a tick it is the law's, of the state there; up to the next one, the same to the last bit."""
     period, count = 0.012, 20
     law = rd.control.PDGravity(DOUBLE, GOAL, [80.0, 20.0], [9.0, 2.0], period_s=period)
-    common = {**START, "duration_s": period * count, "controller": law, "record_period_s": 1e-4}
+    common = {**START, "duration_s": period * count, "controller": law, "record_every_s": 1e-4}
     run = rd.simulate(PLANT, **common, **stepped(method, 2e-3))
     ticks = np.searchsorted(run.t, period * np.arange(count + 1) - 1e-12)
     np.testing.assert_allclose(run.t[ticks], period * np.arange(count + 1), atol=1e-14)  # steps end there
@@ -137,7 +137,7 @@ def test_a_run_evaluates_what_its_method_declares_and_nothing_it_does_not_name(m
     on, seen = counted()
     integrator = rd.integrate.method(method)
     run = rd.simulate(
-        rd.Plant(DOUBLE, [on]), **START, duration_s=0.048, integrator=integrator, record_period_s=0.048,
+        rd.Plant(DOUBLE, [on]), **START, duration_s=0.048, integrator=integrator, record_every_s=0.048,
         estimate_error=False,
     )  # fmt: skip
     assert integrator.evaluations_per_step is not None

@@ -151,7 +151,7 @@ GOOD = {**START, "duration_s": 0.1}
         ({"duration_s": np.inf}, "duration_s must be finite, got inf"),
         ({"step_s": 0}, "step_s must be a positive number of seconds, at least 1e-12; got 0"),
         ({"step_s": "fine"}, "step_s must be a real number, got 'fine'"),
-        ({"record_period_s": -0.1}, "record_period_s must"),
+        ({"record_every_s": -0.1}, "record_every_s must"),
         ({"controller": rd.control.PD(rd.control.hold([0.0, 0.0, 0.0]), 1.0, 1.0)}, "drives 3 joints, the plant has 2"),
         ({"controller": 3}, "controller"),
         ({"integrator": "rk44"}, "no integration method 'rk44'; nearest: rk4"),

@@ -30,7 +30,7 @@ LIMITED = {"limits reached and left": 7, "limits, with back-calculation": 3}  # 
 
 def run(scene: str, **options) -> rd.Trajectory:
     effects, controller = SCENES[scene]
-    options = {"estimate_error": False, "record_period_s": 0.9, "engine": "compiled"} | options
+    options = {"estimate_error": False, "record_every_s": 0.9, "engine": "compiled"} | options
     return rd.simulate(rd.Plant(ARM, effects), START, duration_s=0.9, controller=controller, **options)
 
 
@@ -59,7 +59,7 @@ def test_bristles_at_rest_reverse_no_more() -> None:
     """Where a joint comes to rest its velocity is rounding, to and fro: below a millionth of v_s nothing is cut."""
     effects, controller = SCENES["bristles that reverse"]
     still = rd.simulate(
-        rd.Plant(ARM, effects), START, duration_s=20.0, controller=controller, engine="compiled", record_period_s=20.0,
+        rd.Plant(ARM, effects), START, duration_s=20.0, controller=controller, engine="compiled", record_every_s=20.0,
         integrator=rd.integrate.Adaptive("DOP853", 1e-10, 1e-10), estimate_error=False,
     )  # fmt: skip
     assert 2 < len(still.events) < 100
@@ -69,7 +69,7 @@ def test_bristles_at_rest_reverse_no_more() -> None:
 
 def test_companions_of_a_run_that_an_event_ends_go_on_past_it() -> None:
     """The event falls on times at which runs are compared, ± 3e-8 s: a companion may meet it before, the run behind."""
-    options = {"duration_s": 2.0, "integrator": rd.integrate.Adaptive("DOP853", 1e-6, 1e-6), "record_period_s": 0.1}
+    options = {"duration_s": 2.0, "integrator": rd.integrate.Adaptive("DOP853", 1e-6, 1e-6), "record_every_s": 0.1}
     free = rd.simulate(ARM, START, estimate_error=False, **options)
     for k in range(2, 10):
         way = np.sign(free.v[k, 0])

@@ -24,7 +24,7 @@ def run() -> rd.Trajectory:
 @pytest.fixture(scope="module")
 def batch() -> rd.Rollouts:
     """Three runs, one of which diverges."""
-    setup = replace(SETUP, integrator="rk4", step_s=5e-3, record_period_s=5e-3)
+    setup = replace(SETUP, integrator="rk4", step_s=5e-3, record_every_s=5e-3)
     runs = rd.rollouts(setup, params={"kp": [90.0, 45.0, 1e8]}, record=("q", "v", "u", "energy", "work"))
     assert runs.diverged.tolist() == [False, False, True]
     return runs

@@ -78,7 +78,7 @@ def both(setup: Setup) -> tuple[Any, Any]:
 
 def setup(what: list[Any], name: Any, **options: Any) -> Setup:
     """A run that keeps no estimate."""
-    options = {"duration_s": 0.6, "record_period_s": 0.02, **options}
+    options = {"duration_s": 0.6, "record_every_s": 0.02, **options}
     return Setup(rd.Plant(ARM, what), Q0, V0, integrator=name, engine="compiled", estimate_error=False, **options)
 
 

@@ -51,7 +51,7 @@ def setups() -> dict[str, rd.Setup]:
         "engine": "interpreted",
         "duration_s": 0.2,
         "integrator": "DOP853",
-        "record_period_s": 0.02,
+        "record_every_s": 0.02,
     }
     return {
         "free swing": rd.Setup(rd.Plant(ARM), Q, V, integrator="DOP853", **compiled),

@@ -162,5 +162,5 @@ def _short(setup: Setup, steps: int) -> Setup:
     duration = steps * _STEP_S
     return replace(
         setup, controller=controller, integrator=method("rk4"), step_s=_STEP_S, duration_s=duration,
-        record_period_s=duration, estimate_error=False, accuracy=None, events=(), engine="compiled",
+        record_every_s=duration, estimate_error=False, accuracy=None, events=(), engine="compiled",
     )  # fmt: skip

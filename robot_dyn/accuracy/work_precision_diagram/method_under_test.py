@@ -225,7 +225,7 @@ def recorded(setup: Setup, duration_s: float) -> Setup:
     """The setup up to `duration_s`, with about RECORDS records and no error estimate."""
     return replace(
         setup, integrator=Adaptive(), step_s=None, estimate_error=False, accuracy=None, events=(),
-        duration_s=duration_s, record_period_s=_record_period(setup, duration_s),
+        duration_s=duration_s, record_every_s=_record_period(setup, duration_s),
     )  # fmt: skip
 
 
@@ -286,7 +286,7 @@ def at_setting(setup: Setup, setting: float) -> Setup:
 def _steps(setup: Setup, events: bool) -> Iterator[float]:
     """Steps from the record period on, up to the number that a run may take."""
     before, most = 0, MOST_CUT if events and switches(setup) else _MOST_STEPS  # of more steps none ends at an event
-    for step in step_ladder(setup.record_period_s, setup.integrator.order):
+    for step in step_ladder(setup.record_every_s, setup.integrator.order):
         count = at_setting(setup, step).steps
         if count > most:
             return
@@ -312,9 +312,9 @@ def step_ladder(period_s: float, order: int) -> Iterator[float]:
 
 def warmed(setup: Setup) -> None:
     """Run one or a few steps to load the machine code that the setup needs."""
-    step = setup.record_period_s / _WARM
+    step = setup.record_every_s / _WARM
     setup = setup if setup.integrator.controls_error else replace(setup, step_s=step)
-    timed(replace(setup, duration_s=2 * step, record_period_s=step), Budget().check)
+    timed(replace(setup, duration_s=2 * step, record_every_s=step), Budget().check)
 
 
 def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:

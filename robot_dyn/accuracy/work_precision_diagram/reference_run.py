@@ -116,7 +116,7 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
         if parted is None:
             parted, lost = _rough_ends(setup, run, q, size, budget)
             if parted is not None:
-                setup = replace(setup, duration_s=parted, record_period_s=0.0)
+                setup = replace(setup, duration_s=parted, record_every_s=0.0)
                 continue
         other = _second(setup, run, q, budget)
         end = _passes(other.t, other.distance, size * (_PARTED if other.refined else _COARSE))
@@ -129,7 +129,7 @@ def reference(setup: Setup, budget: Budget) -> tuple[Setup, Reference]:
                 f"{first} and {other.words} part within {_LEAST:g} of the duration, at t = {end:.2g} s: no error can be"
                 " measured; take a shorter run, or a start that is less sensitive"
             )
-        setup = replace(setup, duration_s=end, record_period_s=0.0)
+        setup = replace(setup, duration_s=end, record_every_s=0.0)
 
 
 def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
@@ -199,7 +199,7 @@ def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> _Othe
 def _refined(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> Iterator[_Other]:
     """Runs with ever shorter steps, until these win nothing or take too long."""
     before, limit, late = np.inf, _longest(budget), 0
-    for step in step_ladder(setup.record_period_s, 1):
+    for step in step_ladder(setup.record_every_s, 1):
         words = f"{setup.integrator.name}, step {step:.3g} s"
         budget.report(f"reference: {words}")
         run = _in_time(replace(setup, step_s=step), budget)

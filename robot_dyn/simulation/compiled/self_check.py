@@ -229,7 +229,7 @@ def _first_second(setup: Setup) -> Path:
         span = min(span, _MOST / (setup.integrator.evaluations_per_step or 1) * setup.taken_step_s)
     for _ in range(_TRIES):
         short = replace(
-            setup, duration_s=span, record_period_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
+            setup, duration_s=span, record_every_s=0.0, estimate_error=False, accuracy=None, engine="interpreted"
         )
         record = Run(short, Interpreted(short.equation), samples=False, max_evaluations=_MOST).run()
         if not isinstance(record, Recording):

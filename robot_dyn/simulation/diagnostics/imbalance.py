@@ -56,7 +56,7 @@ def _unbooked(equation: StateEquation, run: Recording) -> str:
         return ""
     rows = np.unique(np.linspace(0, len(run.t) - 1, _LOOKS).astype(int))
     t, y = run.t[rows], run.y[rows]
-    q, v, a, _, _, P, _ = columns(equation, t, y, run.made[rows])
+    q, v, a, _, _, P, _ = columns(equation, t, y, run.sampled[rows])
     worst = largest(np.abs(ledger(equation, run).residual)) / float(run.t[-1]) / 2  # on average, to leave the residual
     advice = ""
     for k in range(len(t)):

@@ -53,7 +53,7 @@ def columns(equation: StateEquation, t: np.ndarray, y: np.ndarray, derived: np.n
 def ledger(equation: StateEquation, record: Recording) -> Ledger:
     """The energy ledger at the samples of a run."""
     m, works = equation.size, equation.size - len(equation.sources)
-    E, work = record.made[:, -2:], dict(zip(equation.sources, record.y[:, works:m].T, strict=True))
+    E, work = record.sampled[:, -2:], dict(zip(equation.sources, record.y[:, works:m].T, strict=True))
     return Ledger(E[:, 0], E[:, 1], work, record.kinetic_peak, equation.stored(record.t, record.y))
 
 

@@ -163,7 +163,7 @@ class Tiles:
             largest=LARGEST,
             base=lanes.start,
             apart=self.apart,
-            sample_period=float(self.setup.record_period_s or 0.0),
+            sample_period=float(self.setup.record_every_s or 0.0),
             sample_slack=ON_STEP * self.setup.nominal_step_s,
         )
         work = stepper.work

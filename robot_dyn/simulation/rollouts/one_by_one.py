@@ -71,7 +71,7 @@ def _single(batch: Batch, setup: Setup, record: Recording, observation: Observat
     outcome = record.outcome
     early = outcome.ending is Ending.FINISHED and outcome.t < setup.duration_s
     rows = int(np.searchsorted(record.t, outcome.t)) if early else len(record.t)
-    values = columns(setup.equation, record.t, record.y, record.made)
+    values = columns(setup.equation, record.t, record.y, record.sampled)
     recorded = {name: getattr(values, name)[:rows].copy() for name in batch.recorded}
     return Single(record.t[:rows], recorded, outcome, record.steps, record.evaluations, observation)
 

@@ -224,8 +224,8 @@ def _method(setup: Setup, equation: StateEquation, mesh: np.ndarray | None) -> t
 
 def event_config(setup: Setup, samples: bool = True) -> LoopConfig:
     """Return the settings of the loop, with the times of samples and of shared states."""
-    controls_error, every = setup.integrator.controls_error, not setup.record_period_s
-    period = setup.record_period_s or (setup.duration_s / _SAMPLES if controls_error else inf)
+    controls_error, every = setup.integrator.controls_error, not setup.record_every_s
+    period = setup.record_every_s or (setup.duration_s / _SAMPLES if controls_error else inf)
     share_period = setup.duration_s / _COMPARED if controls_error and setup.estimate_error else inf
     return loop_config(
         setup.equation,

@@ -34,7 +34,7 @@ class Options(TypedDict, total=False):
     controller: Any
     integrator: Any
     step_s: float | None
-    record_period_s: float
+    record_every_s: float
     estimate_error: bool
     about: dict[str, str]
     engine: str

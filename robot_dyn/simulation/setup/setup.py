@@ -69,7 +69,7 @@ class Setup(Value, Caching):
             `rd.integrate.method` have a fixed one.
         step_s: Fixed step, 1 ms unless given; shortened where samples, ticks, switches and the end require it. It is
             not to be given for a method that chooses its steps.
-        record_period_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
+        record_every_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
         estimate_error: Whether companion runs estimate the error, which cost one to two times as much as the run; five
             times where only shorter steps can show it.
         about: Texts stored with the run.
@@ -88,7 +88,7 @@ class Setup(Value, Caching):
     controller: Any = None
     integrator: Any = "auto"
     step_s: float | None = None
-    record_period_s: float = 0.0
+    record_every_s: float = 0.0
     estimate_error: bool = True
     about: dict[str, str] = field(default_factory=dict, repr=False)
     engine: str = "auto"
@@ -107,9 +107,9 @@ class Setup(Value, Caching):
         object.__setattr__(self, "integrator", as_method(self.integrator))
         for name in ("q0", "v0"):
             object.__setattr__(self, name, one_state(name, getattr(self, name), names))
-        for name in ("duration_s", "step_s", "record_period_s"):
+        for name in ("duration_s", "step_s", "record_every_s"):
             if (seconds := getattr(self, name)) is not None or name != "step_s":
-                object.__setattr__(self, name, duration(name, seconds, zero=name == "record_period_s"))
+                object.__setattr__(self, name, duration(name, seconds, zero=name == "record_every_s"))
         truth("estimate_error", self.estimate_error)
         if self.accuracy is not None:
             self._check_accuracy()
@@ -173,7 +173,7 @@ class Setup(Value, Caching):
         starts, step = self._cuts[:-1], self.nominal_step_s
         ends = [t for t, _ in self._cuts[1:]]
         counts = [
-            steps_on(end - start, step, self.record_period_s) for (start, _), end in zip(starts, ends, strict=True)
+            steps_on(end - start, step, self.record_every_s) for (start, _), end in zip(starts, ends, strict=True)
         ]
         few = sum(count < LEAST_STEPS for count in counts)
         if LEAST_STEPS * few <= sum(counts) / 10:  # so that companion runs can take longer steps there
@@ -206,9 +206,9 @@ class Setup(Value, Caching):
     @property
     def samples_on_steps(self) -> bool:
         """Whether each sample of a method of fixed step is at the end of a step that is not cut."""
-        if not self.record_period_s:
+        if not self.record_every_s:
             return True
-        ends, due = nodes(self.segments), np.arange(0.0, self.duration_s, self.record_period_s)
+        ends, due = nodes(self.segments), np.arange(0.0, self.duration_s, self.record_every_s)
         return bool((np.abs(near(ends, due) - due) <= ON_STEP * self.nominal_step_s).all())
 
     @property
@@ -309,7 +309,7 @@ def steps(setup: Setup) -> float:
     """About so many steps of a fixed-step method; 0 for an adaptive one, which chooses them."""
     if setup.integrator.controls_error:
         return 0.0
-    step = min(setup.nominal_step_s, setup.record_period_s or inf)  # samples lie on steps
+    step = min(setup.nominal_step_s, setup.record_every_s or inf)  # samples lie on steps
     return setup.duration_s / step + 4 * segments(setup)
 
 
@@ -347,13 +347,13 @@ def check_batch(setup: Setup, runs: int, numbers: int, most: float) -> None:
 
 def too_large(what: str, size: float, most: float, or_else: str = "") -> QueryError:
     """The refusal of a record."""
-    remedy = f"take a longer record_period_s or a shorter duration_s{or_else}"
+    remedy = f"take a longer record_every_s or a shorter duration_s{or_else}"
     return QueryError(f"recording {what} takes {gibibytes(size)}, more than {gibibytes(most)}: {remedy}")
 
 
 def samples(setup: Setup) -> float:
     """At most so many samples."""
-    periods = setup.duration_s / setup.record_period_s + 2 if setup.record_period_s else inf
+    periods = setup.duration_s / setup.record_every_s + 2 if setup.record_every_s else inf
     adaptive = setup.integrator.controls_error
     return min(periods, 1000 + segments(setup) if adaptive and periods == inf else inf, steps(setup) or inf)
 
@@ -388,7 +388,7 @@ def _method(setup: Setup) -> Iterator[str]:
     else:
         used = {"step_s": f"{setup.nominal_step_s}{shortened(setup)}"}
     yield f"method: {name}, {setup.duration_s:g} s"
-    used |= {key: getattr(setup, key) for key in ("record_period_s", "estimate_error", "engine")}
+    used |= {key: getattr(setup, key) for key in ("record_every_s", "estimate_error", "engine")}
     yield from (f"  {key} = {value}" for key, value in used.items())
     yield "start:"
     types = getattr(setup.plant.dynamics, "joint_types", (None,) * len(setup.q0))

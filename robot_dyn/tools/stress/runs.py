@@ -58,7 +58,7 @@ def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generato
     for _ in range(_DRAWS):
         drawn, step = _method(rng)
         try:
-            setup = Setup(plant, q, v, duration, control, drawn, record_period_s=record, **step)
+            setup = Setup(plant, q, v, duration, control, drawn, record_every_s=record, **step)
         except RobotDynError:  # not every method supports every effect
             continue
         steps = f", step {setup.nominal_step_s:g} s" if step else f", rtol {setup.integrator.rtol:.0e}"

@@ -283,7 +283,7 @@ class UserFigure(Value):
 def rms_error(joint: str | None = None) -> Figure:
     """Return the figure: root mean square of q − q_d over the samples, and over the joints or for one.
 
-    Samples are `record_period_s` apart. The unit is [rad] or [m]; for a frame that follows a path, [m].
+    Samples are `record_every_s` apart. The unit is [rad] or [m]; for a frame that follows a path, [m].
     """
     return Figure("rms_error", "error", joint)
 

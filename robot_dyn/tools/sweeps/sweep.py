@@ -231,8 +231,8 @@ def from_scene(path: str | Path, **changes: Any) -> Sweep:
 
 def samples_of_run(setup: Setup) -> int:
     """Return the largest number of samples of a run."""
-    if setup.record_period_s:
-        return int(setup.duration_s / setup.record_period_s) + 2
+    if setup.record_every_s:
+        return int(setup.duration_s / setup.record_every_s) + 2
     return 1000 if setup.integrator.controls_error else setup.steps + 1
 
 

@@ -39,7 +39,7 @@ def true_error(run: rd.Trajectory, motion: Motion) -> float:
 
 def rows(case: str, make: Callable[[], Motion], engine: str, seed: int) -> Iterator[Row]:
     motion = make()
-    setup = replace(motion.setup, record_period_s=motion.setup.duration_s / SAMPLES, engine=engine)
+    setup = replace(motion.setup, record_every_s=motion.setup.duration_s / SAMPLES, engine=engine)
     yield _asked(case, motion, setup)
     yield _controlled(case, motion, setup)
     for name in IMPLICIT:

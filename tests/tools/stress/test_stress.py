@@ -129,7 +129,7 @@ def test_an_estimate_that_is_too_small_misleads_and_shrinks_to_a_start_of_few_di
     robot = rd.load("planar_2r")
     setup = rd.Setup(
         rd.Plant(robot), [0.7312, -0.4321], [0.5111, 0.7222], 0.2, integrator="midpoint", step_s=2e-3,
-        record_period_s=0.02,
+        record_every_s=0.02,
     )  # fmt: skip
     found = runs.judged(setup, "swing", Budget())
     assert found.misleads and found.estimated < 0.3 * found.true

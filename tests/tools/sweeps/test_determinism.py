@@ -53,7 +53,7 @@ SCENES = {
     "stops": SCENE.replace("[control]", STOPS),
     "steps that are chosen": SCENE.replace('method = "rk4"\nstep_s = 0.001\n', ""),
     "samples between steps": SCENE.replace("[control]", STOPS).replace(
-        "record_period_s = 0.001", "record_period_s = 0.0017"
+        "record_every_s = 0.001", "record_every_s = 0.0017"
     ),
 }
 
@@ -83,7 +83,7 @@ def test_figures_are_those_of_simulate(tmp_path: Path) -> None:
         q0 = [rows["q0[0]"][i], rows["q0[1]"][i]]
         run = rd.simulate(
             setup.plant, q0, controller=gains, duration_s=setup.duration_s, integrator="rk4", step_s=0.001,
-            record_period_s=0.001, estimate_error=False,
+            record_every_s=0.001, estimate_error=False,
         )  # fmt: skip
         assert run.tracking_error == pytest.approx(rows["error"][i], rel=1e-9)
         assert run.q[-1, 1] == pytest.approx(rows["end"][i], rel=1e-9)
