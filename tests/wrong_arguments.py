@@ -157,7 +157,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(adaptive.steps, system=system, t0=0.0, y0=q, t1=1.0, stop=lambda t, y: 1.0),
         call(adaptive.with_tolerances, factor=10.0, longest_s=0.5),
         call(rd.accuracy.Ball, bits=53),
-        call(rd.Compiled, robot_or_plant=robot, dtype="float64", threads=1, cache=False),
+        call(rd.compiled, robot_or_plant=robot, dtype="float64", threads=1, cache=False),
         call(rd.control.ComputedTorque, **pair),
         call(rd.control.Differences),
         call(rd.Event, function=lambda t, q, v: 1.0, direction=1, terminal=True, name="high"),

@@ -67,7 +67,7 @@ def own_lagrangian(robot: Any) -> Any:
 
 def compiled(robot: Any) -> Any:
     """Return the machine code of a robot or plant, on one thread."""
-    return rd.Compiled(robot, threads=1)
+    return rd.compiled(robot, threads=1)
 
 
 def pinocchio_model(robot: Any) -> Any:
