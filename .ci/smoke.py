@@ -11,7 +11,7 @@ import robot_dyn as rd
 
 arm = rd.load("planar_2r")
 q, v = np.array([0.3, -0.8]), np.array([0.5, 0.4])
-for dynamics in (rd.Lagrangian(arm), rd.Compiled(arm)):
+for dynamics in (rd.Lagrangian(arm), rd.compiled(arm)):
     for ours, theirs in ((dynamics.M(q), arm.M(q)), (dynamics.C(q, v) @ v, arm.C(q, v) @ v), (dynamics.N(q), arm.N(q))):
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12)
 assert rd.compare(rd.load("panda")).ok

@@ -53,7 +53,7 @@ for name, controller in controllers.items():
     )
     print(f"--- {name}\n{trajectory.summary}\n")
     error = np.abs(trajectory.q - trajectory.desired).max(axis=1)
-    rows.append((name, trajectory.tracking_error, error.max(), error[-1]))
+    rows.append((name, trajectory.rms_tracking_error, error.max(), error[-1]))
 
 print(f"{'':<16} {'rms [rad]':>12} {'largest [rad]':>14} {'at the end [rad]':>17}")
 for name, rms, largest, final in rows:

@@ -47,7 +47,7 @@ for carried, arm in arms.items():
         )
         print(f"--- {name}, {carried}\n{trajectory.summary}\n")
         error = np.abs(trajectory.q - trajectory.desired).max(axis=1)
-        rows.append((f"{name}, {carried}", trajectory.tracking_error, error[-1]))
+        rows.append((f"{name}, {carried}", trajectory.rms_tracking_error, error[-1]))
 
 print(f"what the payload costs at rest: {(arms['2 kg in the hand'].N(q_end) - model.N(q_end)).round(2)} N m")
 print(f"{'':<34} {'rms [rad]':>12} {'at the end [rad]':>17}")

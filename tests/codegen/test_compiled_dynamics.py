@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn import Compiled
 from robot_dyn.codegen import CompiledDynamics, CompiledPlant, Kernel, SelfCheckError, SizeWarning, Trace
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.foundations import QueryError, SingularError
@@ -255,7 +254,7 @@ EFFECTS["all"] = [effect for effects in EFFECTS.values() for effect in effects]
 
 
 def plant(effects: list[Any]) -> CompiledPlant:
-    compiled = Compiled(rd.Plant(ROBOT, effects), cache=False)
+    compiled = rd.compiled(rd.Plant(ROBOT, effects), cache=False)
     assert isinstance(compiled, CompiledPlant)
     return compiled
 
@@ -299,7 +298,7 @@ def test_plants_that_differ_in_numbers_share_their_machine_code(monkeypatch: pyt
             rd.effects.EffortLimit(limit),
             rd.effects.RegularisedCoulombFriction(mass, 0.1),
         ]
-        compiled = Compiled(rd.Plant(robot, effects), cache=False)
+        compiled = rd.compiled(rd.Plant(robot, effects), cache=False)
         expected = np.array([compiled.interpreted.forward_dynamics(*row) for row in zip(t, q, v, u, strict=True)])
         batch = compiled.forward_dynamics(t, q, v, u)
         single = [compiled.forward_dynamics(*row) for row in zip(t, q, v, u, strict=True)]

@@ -129,7 +129,7 @@ def test_machine_code_of_a_robot_and_of_a_batch_is_logged(
 ) -> None:
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
     robot = rd.load("planar_2r").with_(mass_scale=1.017)
-    rd.Compiled(robot).M([0.4, -0.7])
+    rd.compiled(robot).M([0.4, -0.7])
     assert ring(clocks, caplog) == [
         "tracing M of planar_2r",
         "compiling M of planar_2r, once for these equations",

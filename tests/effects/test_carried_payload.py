@@ -173,4 +173,4 @@ def test_a_plant_is_asked_at_a_time() -> None:
         ):
             ask()
     with pytest.raises(TraceError, match=r"carried_payload is temporary: use plant.at\(t\)"):
-        rd.Compiled(plant).forward_dynamics(0.0, Q, V, V)
+        rd.compiled(plant).forward_dynamics(0.0, Q, V, V)

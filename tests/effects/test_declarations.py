@@ -342,7 +342,7 @@ def test_equations_of_bodies_of_another_class_are_not_those_of_the_robot_in_it()
 
 
 def test_a_compiled_plant_is_not_what_is_simulated() -> None:
-    compiled: Any = rd.Compiled(rd.Plant(ARM))
+    compiled: Any = rd.compiled(rd.Plant(ARM))
     for asked in (rd.simulate, rd.rollouts):
         with pytest.raises(EffectError, match="got a CompiledPlant; pass the Plant itself, with engine='compiled'"):
             asked(compiled, Q)
@@ -615,7 +615,7 @@ def test_what_cannot_be_traced_says_which_line_stopped_it(effects, controller, p
     assert caught.value.__cause__ is not None  # with its traceback
     if effects:
         with pytest.raises(TraceError, match=rf"cannot be compiled \(line {line} of test_declarations.py"):
-            rd.Compiled(setup.plant, cache=False).torque(0.0, Q, V)
+            rd.compiled(setup.plant, cache=False).torque(0.0, Q, V)
 
 
 def test_a_function_is_the_controller_of_the_same_law() -> None:

@@ -183,7 +183,7 @@ def test_a_plant_that_is_asked_takes_relaxed_states() -> None:
     expected = -(np.array([1.0, 0.8]) + 0.8) * v
     np.testing.assert_allclose(plant.torque(0.0, v, v), expected, rtol=1e-14)
     np.testing.assert_array_equal(plant.actuation(v), v)
-    np.testing.assert_allclose(rd.Compiled(plant).torque(0.0, v, v), expected, rtol=1e-14)
+    np.testing.assert_allclose(rd.compiled(plant).torque(0.0, v, v), expected, rtol=1e-14)
     with pytest.raises(rd.RobotDynError, match="no actuation within the limits of the plant holds this state"):
         rd.linearise(rd.Plant(ARM, [rd.effects.EffortLimit(0.01)]), Q)
 

@@ -187,4 +187,4 @@ def test_a_plant_that_is_asked_takes_relaxed_springs() -> None:
     np.testing.assert_array_equal(plant.torque(0.0, Q, v), [0.0, 0.0])
     expected = ARM.forward_dynamics(Q, v, [3.0, 0.0])
     np.testing.assert_allclose(plant.forward_dynamics(0.0, Q, v, [3.0, 5.0]), expected, rtol=1e-13)
-    np.testing.assert_allclose(rd.Compiled(plant).forward_dynamics(0.0, Q, v, [3.0, 5.0]), expected, rtol=1e-12)
+    np.testing.assert_allclose(rd.compiled(plant).forward_dynamics(0.0, Q, v, [3.0, 5.0]), expected, rtol=1e-12)

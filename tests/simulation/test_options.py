@@ -121,7 +121,7 @@ def test_a_step_that_was_not_given_is_one_millisecond_and_stands_in_the_way_of_n
 def test_types_of_numpy_are_taken_where_their_names_are(dtype) -> None:
     name = np.dtype(dtype).name
     for what in (ARM, PLANT):
-        given, named = (rd.Compiled(what, dtype=each) for each in (dtype, name))
+        given, named = (rd.compiled(what, dtype=each) for each in (dtype, name))
         assert given == named or what is PLANT
         x = Q.astype(dtype)
         answer = given.M(x)
@@ -132,4 +132,4 @@ def test_types_of_numpy_are_taken_where_their_names_are(dtype) -> None:
 @pytest.mark.parametrize("dtype", [np.float16, np.int32, np.dtype(">f8"), None, Q, "f4", [("x", "f4")]], ids=str)
 def test_other_types_are_refused(dtype) -> None:
     with pytest.raises(QueryError, match="no dtype"):
-        rd.Compiled(ARM, dtype=dtype)
+        rd.compiled(ARM, dtype=dtype)

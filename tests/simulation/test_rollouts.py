@@ -236,7 +236,7 @@ def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record:
     effects = [rd.effects.ViscousFriction(params["viscous_friction.damping"][-1]), *PLANT.effects[1:]]
     alone = rd.simulate(setup, q0=starts(3)[-1], plant=rd.Plant(ARM, effects), estimate_error=False)
     run = runs[-1]
-    for name in ("t", "q", "v", "desired", "deviation"):
+    for name in ("t", "q", "v", "desired", "tracking_error"):
         assert_alike(getattr(run, name), getattr(alone, name))
     everything, follows = record == EVERYTHING, not setup.controller.state_size
     for ours, theirs, known in (

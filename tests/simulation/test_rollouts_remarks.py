@@ -151,7 +151,7 @@ def test_actuation_that_changes_between_ticks_is_seen_at_instants(sampled: bool)
 
 def test_tracking_errors_are_those_of_simulate(batch) -> None:
     runs, alone = batch
-    np.testing.assert_allclose(runs.tracking_error, [each.tracking_error for each in alone], rtol=1e-6)
+    np.testing.assert_allclose(runs.rms_tracking_error, [each.rms_tracking_error for each in alone], rtol=1e-6)
 
 
 def test_remarks_survive_files_and_slices(batch, tmp_path: Path) -> None:
@@ -159,12 +159,12 @@ def test_remarks_survive_files_and_slices(batch, tmp_path: Path) -> None:
     runs, _ = batch
     back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / "runs"))
     assert back.remarks == runs.remarks and back.worst == runs.worst
-    np.testing.assert_array_equal(back.tracking_error, runs.tracking_error)
+    np.testing.assert_array_equal(back.rms_tracking_error, runs.rms_tracking_error)
     for some in (runs[1:4], back[1:4]):
         for i in range(3):
             about = {key for key, remark in told(runs).items() if i + 1 in remark.runs}
             assert {key for key, remark in told(some).items() if i in remark.runs} == about == told(some[i]).keys()
-        np.testing.assert_array_equal(some.tracking_error, runs.tracking_error[1:4])
+        np.testing.assert_array_equal(some.rms_tracking_error, runs.rms_tracking_error[1:4])
         assert all(each.looked in (1, 3) for each in some.remarks)
     for x, y in zip(told(back[1:4]).values(), told(runs[1:4]).values(), strict=True):
         assert x.text == y.text or x.text.endswith(", in another run")  # the reference is not in the file
@@ -180,7 +180,9 @@ def test_a_table_of_runs_has_a_row_for_each(batch, tmp_path: Path) -> None:
     assert [row["run"] for row in rows] == [str(i) for i in range(B)]
     of_slide = [float(row["largest u slide [N]"]) for row in rows]
     np.testing.assert_array_equal(of_slide, runs.observed.extremes[:, 2, 1, 0])
-    np.testing.assert_array_equal([float(row["tracking error [m or rad]"]) for row in rows], runs.tracking_error)
+    np.testing.assert_array_equal(
+        [float(row["rms tracking error [m or rad]"]) for row in rows], runs.rms_tracking_error
+    )
     for i, row in enumerate(rows):
         assert float(row["start q slide [m]"]) == runs.q0[i, 0]
         assert float(row["start v hinge [rad/s]"]) == runs.v0[i, 1]
@@ -216,8 +218,8 @@ def test_tracking_errors_of_a_frame() -> None:
     runs = rd.rollouts(given, np.add(q, [[0.0, 0.1], [0.2, -0.1], [0.1, 0.3]]), [[0.1, 0.2], [0.3, 0.1], [1e5, 3e7]])
     assert list(runs.diverged) == [False, False, True]
     assert runs.worst == 2
-    alone = [rd.simulate(runs.setup_of(i), estimate_error=False).tracking_error for i in range(3)]
-    np.testing.assert_allclose(runs.tracking_error[:2], alone[:2], rtol=1e-9)
+    alone = [rd.simulate(runs.setup_of(i), estimate_error=False).rms_tracking_error for i in range(3)]
+    np.testing.assert_allclose(runs.rms_tracking_error[:2], alone[:2], rtol=1e-9)
     assert {run.about["frame"] for run in runs} == {"tip"} and "tracking error of the frame [m]: " in runs.summary
 
 

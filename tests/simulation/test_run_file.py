@@ -139,7 +139,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("about", lambda text: said(text, joint_names=[1, 2]), "'joint_names/0': .*1"),
         ("about", lambda text: said(text, joint_names=["a"]), "'q' is of 2 joints, 'joint_names' of 1"),
         ("about", lambda text: said(text, v="q"), "'v': its array is missing"),
-        ("about", lambda text: said(text, deviation="u", u=None), "'u': its array is missing"),
+        ("about", lambda text: said(text, tracking_error="u", u=None), "'u': its array is missing"),
         ("about", lambda text: said(text, power={}), "member 'power/.*' is unknown to this version"),
         ("about", lambda text: said(text, outcome__reason="done"), "'outcome/reason': .*interrupted.*'done'"),
         ("about", lambda text: said(text, outcome__t=float("nan")), "'outcome/t' holds nan, not a time"),

@@ -165,7 +165,7 @@ def test_progress_is_told_at_each_step_and_in_the_companion_runs() -> None:
     assert [array.shape for array in (run.q, run.v, run.a, run.u)] == [(len(run.t), 2)] * 4
 
 
-def test_a_frame_that_follows_a_circle_has_a_deviation_in_metres() -> None:
+def test_a_frame_that_follows_a_circle_has_a_tracking_error_in_metres() -> None:
     """With the exact model the tool stays on its circle; what is told is the distance of the frame from it."""
     arm = rd.load("ur5")
     q0 = np.array([0.3, -1.3, 1.6, -1.9, -1.5, 0.2])
@@ -175,11 +175,13 @@ def test_a_frame_that_follows_a_circle_has_a_deviation_in_metres() -> None:
     run = rd.simulate(arm, q0=q0, duration_s=0.2, controller=law, method="rk4", step_s=4e-3, estimate_error=False)
     desired, p = path.at(run.t)[0], arm.placement(run.q, "tool0")[:, :3, 3]
     assert run.desired is None
-    np.testing.assert_allclose(run.deviation, p - desired, atol=1e-15)
-    assert run.tracking_error == pytest.approx(np.sqrt(np.mean((p - desired) ** 2)))
+    np.testing.assert_allclose(run.tracking_error, desired - p, atol=1e-15)
+    assert run.rms_tracking_error == pytest.approx(np.sqrt(np.mean((p - desired) ** 2)))
     assert "tracking error of the frame [m]: " in run.summary
-    far = replace(run, deviation=np.full_like(run.deviation, 3e200))  # of a run that diverged: its square overflows
-    assert far.tracking_error == 3e200
+    far = replace(
+        run, tracking_error=np.full_like(run.tracking_error, 3e200)
+    )  # of a run that diverged: its square overflows
+    assert far.rms_tracking_error == 3e200
 
 
 def test_a_run_from_python_carries_its_origin() -> None:

@@ -99,7 +99,7 @@ def test_exact_computed_torque_makes_each_joint_a_linear_oscillator() -> None:
     assert run.desired is not None
     np.testing.assert_array_equal(run.desired, np.tile([0.9, 0.2], (len(run.t), 1)))
     rms = np.sqrt(np.mean((np.exp(-decay * t) * wave) ** 2))
-    assert run.tracking_error == pytest.approx(rms, rel=1e-8)
+    assert run.rms_tracking_error == pytest.approx(rms, rel=1e-8)
 
 
 @pytest.mark.parametrize("period", [0.0, 0.01])

@@ -55,7 +55,7 @@ def stretched(run, m: int, **changes):
     t = np.linspace(0.0, 5.0, m)
     q = np.sin(t[:, None] * np.arange(1, len(run.joint_names) + 1))
     zero = np.zeros(m)
-    made = {"t": t, "q": q, "v": q, "a": q, "u": q, "desired": None, "deviation": None, "error": None}
+    made = {"t": t, "q": q, "v": q, "a": q, "u": q, "desired": None, "tracking_error": None, "error": None}
     return replace(run, **(made | {"ledger": Ledger(zero, zero, {"control": zero})} | changes))
 
 

@@ -34,8 +34,8 @@ class Sweep(Answer, Value):
         runs: Number of runs, N.
         vary: Distributions by name: a parameter of `rollouts(params=…)`, "q0" or "v0". Frozen distributions of
             scipy.stats and texts such as "uniform(low=0, high=3)" are allowed, too.
-        figures: Figures of each run, by name: `rms_error()`, `peak("u")`, `final("q", joint)`, or a function of a `Run`
-            by import path. Texts such as "peak('u')" are allowed, too.
+        figures: Figures of each run, by name: `rms_tracking_error()`, `peak("u")`, `final("q", joint)`, or a function
+            of a `Run` by import path. Texts such as "peak('u')" are allowed, too.
         design: "random", "sobol", "halton", "latin", "saltelli", "grid"; or rows in [0, 1), (N, d), with a column for
             each varying number.
         seed: Seed of the design.

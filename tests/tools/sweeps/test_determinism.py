@@ -69,7 +69,7 @@ def test_a_run_by_itself_has_the_bits_of_its_row(tmp_path: Path, name: str) -> N
         assert run.q[-1, 1] == rows["end"][i]
         assert np.abs(run.extremes[1]).max() == rows["peak"][i]
         assert run.q[0].tolist() == [rows["q0[0]"][i], rows["q0[1]"][i]]
-        assert run.tracking_error == pytest.approx(rows["error"][i], rel=1e-12)  # another order of the sum
+        assert run.rms_tracking_error == pytest.approx(rows["error"][i], rel=1e-12)  # another order of the sum
 
 
 def test_figures_are_those_of_simulate(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_figures_are_those_of_simulate(tmp_path: Path) -> None:
             setup.plant, q0, controller=gains, duration_s=setup.duration_s, method="rk4", step_s=0.001,
             record_every_s=0.001, estimate_error=False,
         )  # fmt: skip
-        assert run.tracking_error == pytest.approx(rows["error"][i], rel=1e-9)
+        assert run.rms_tracking_error == pytest.approx(rows["error"][i], rel=1e-9)
         assert run.q[-1, 1] == pytest.approx(rows["end"][i], rel=1e-9)
         assert np.abs(run.v).max() == pytest.approx(rows["peak"][i], rel=1e-9)
 
