@@ -64,8 +64,8 @@ class Setup(Value, Caching):
         v0: Velocity at the start, (n,); 0 if not given.
         duration_s: In [s].
         controller: What drives it: a `Controller`; a function (t, q, v) → torque (n,), which becomes one; or None.
-        method: The integration method, or its name, see `rd.integrate.method`. "auto", "DOP853" and "Rosenbrock" choose
-            their steps, as does an `Adaptive` with other tolerances; others, such as "rk4", have a fixed step.
+        method: The integration method, or its name, see `rd.integrate.method`. "auto", "DOP853" and "Rodas5P" choose
+            their steps, as does an `Adaptive` with other tolerances; others, such as "RK4", have a fixed step.
         step_s: Fixed step, 1 ms unless given; shortened where samples, ticks, switches and the end require it. It is
             not to be given for a method that chooses its steps.
         record_every_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
@@ -240,7 +240,7 @@ def no_step(name: str) -> str:
     """What is wrong with a step for a method that chooses its own."""
     return (
         f"step_s has no effect on {name}, which chooses its steps: leave it out, name a method of fixed step, such as"
-        " method='rk4', or give rd.integrate.Adaptive(max_step_s=…)"
+        " method='RK4', or give rd.integrate.Adaptive(max_step_s=…)"
     )
 
 
