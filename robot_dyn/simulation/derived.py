@@ -14,6 +14,7 @@ from robot_dyn.simulation.diagnostics.damped_task import damped
 from robot_dyn.simulation.diagnostics.imbalance import cause
 from robot_dyn.simulation.diagnostics.runaway import runaway, step_too_long
 from robot_dyn.simulation.diagnostics.step_remarks import remarks
+from robot_dyn.simulation.diagnostics.stiff_motion import limited_by_stability
 from robot_dyn.simulation.diagnostics.unstable_loop import explained, unstable
 from robot_dyn.simulation.observation.observation import Observed
 from robot_dyn.simulation.observation.observer import Observer
@@ -26,7 +27,6 @@ from robot_dyn.simulation.results.provenance import edits_of_machine_code, origi
 from robot_dyn.simulation.results.samples import Columns, Tracking, columns, ledger, tracking_of
 from robot_dyn.simulation.run.outcome import Ending, Outcome
 from robot_dyn.simulation.run.recording import Recording
-from robot_dyn.simulation.run.stiffness import bounded_by_stability
 from robot_dyn.simulation.setup.setup import Setup
 
 
@@ -91,7 +91,7 @@ class Results:
         energy = ledger(self.setup.equation, self.record)
         explains = self.setup.estimate_error or not self.setup.undeclared  # the search calls these 4000 times
         if explains and self.record.outcome.ending is not Ending.STOPPED and leak(energy, self.error, self.q):
-            return replace(energy, cause=cause(self.setup, self.record, energy.closes))
+            return replace(energy, cause=cause(self.setup, self.record))
         return energy
 
     @cached_property
@@ -137,7 +137,7 @@ class Results:
         observed, samples = self._observed, np.hstack([self.q, self.v, self.u])
         return (
             *remarks(self.setup, self.observer, observed, self.record.t, samples, self.power), *self.before,
-            *bounded_by_stability(self.setup, self.record), *self._of_control,
+            *limited_by_stability(self.setup, self.record), *self._of_control,
         )  # fmt: skip
 
     @cached_property
@@ -146,7 +146,7 @@ class Results:
         if self.record.outcome.ending is Ending.STOPPED:
             return ()
         runs_away = self.record.outcome.ending is Ending.DIVERGED or bool(runaway(self.setup, self.observer.fastest))
-        doubtful = runs_away or (self.error is not None and self.error.note)
+        doubtful = runs_away or (self.error is not None and self.error.ends_early)
         step = step_too_long(self.setup, self.record.outcome.t) if doubtful else ()
         loop = unstable(self.setup, self.record.t, self.record.y, runs_away, end=self.record.outcome.t)
         return (*step, *loop, *damped(self.setup, self.record))

@@ -8,28 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from string import Formatter
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
-Facts = Mapping[str, float | str]
-"""Numbers and names by name: the fields of a sentence."""
-
-Parts = tuple[str | tuple[str, ...], ...]
-"""The parts of a sentence, each a format string; of several in brackets, the first whose facts are all known."""
+from robot_dyn.foundations.sentences import Facts, Parts, prefixed, sentence
+from robot_dyn.simulation.dynamics.fastest_motion import MOTION
 
 _NAMED = 3  # joints in a line
-
-
-def sentence(parts: Parts, facts: Facts) -> str:
-    """Return the parts of a sentence with their facts filled in, without the parts whose facts are missing."""
-    chosen = ((part,) if isinstance(part, str) else part for part in parts)
-    complete = (next((text for text in texts if _fields(text) <= facts.keys()), "") for texts in chosen)
-    return "".join(text.format_map(facts) for text in complete)
-
-
-def _fields(text: str) -> set[str]:
-    """Return the names of the facts in a format string."""
-    return {name for _, name, _, _ in Formatter().parse(text) if name}
 
 
 class RemarkKind(StrEnum):
@@ -106,12 +90,12 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     ),
     RemarkKind.STIFF: Sentence(
         "steps bounded by stability",
-        ("{motion}",),
+        (MOTION,),
         (("made by {method} instead of {before}", "use integrator={method!r}"),),
     ),
     RemarkKind.TOO_LONG: Sentence(
         "step too long to be stable",
-        ("{value:.4g} s", ", {method} is stable up to {limit:.4g} s", "; {motion}"),
+        ("{value:.4g} s", ", {method} is stable up to {limit:.4g} s", prefixed("; ", MOTION)),
         ("use step_s={step_s}, or an implicit method",),
     ),
     RemarkKind.UNSTABLE: Sentence(
@@ -198,7 +182,7 @@ class Remark:
     @property
     def fields(self) -> Facts:
         """The numbers and names of its sentence."""
-        own: dict[str, Any] = {
+        own: dict[str, float | str] = {
             "joint": self.joint, "quantity": self.quantity, "start": self.start, "duration": self.duration,
             "at": self.at, "value": self.value,
         }  # fmt: skip
@@ -219,11 +203,7 @@ class Remark:
 def line_parts(kind: RemarkKind) -> Parts:
     """Return the parts of the line about one remark of a kind."""
     heading, text, remedy = _SENTENCES[kind]
-    return (f"{heading}: ", *text, *(_after_semicolon(part) for part in remedy))
-
-
-def _after_semicolon(part: str | tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(f"; {text}" for text in ((part,) if isinstance(part, str) else part))
+    return (f"{heading}: ", *text, *(prefixed("; ", part) for part in remedy))
 
 
 def remark_lines(remarks: Iterable[Remark]) -> list[str]:
