@@ -52,7 +52,7 @@ def run(trajectory: Trajectory) -> Document:
         "error_until_s": None if error is None else error.until_s,
         "error_verdict": None if error is None else error.verdict,
         "error_doubts": [] if error is None else [_doubt(x) for x in (error.ends_early, error.no_order) if x],
-        "tracking_error": trajectory.tracking_error,
+        "rms_tracking_error": trajectory.rms_tracking_error,
         "accuracy": trajectory.accuracy,
         "remarks": [_remark(remark) for remark in trajectory.remarks],
         "extremes": _extremes(trajectory),

@@ -37,7 +37,7 @@ def cause(setup: Setup, run: Recording) -> Doubt:
         return Doubt(DoubtKind.DIVERGED)
     if (unbooked := _unbooked(setup.equation, run)) is not None:
         return unbooked
-    if setup.integrator.controls_error:
+    if setup.method.controls_error:
         return finer(setup, Doubt(DoubtKind.LOOSE_TOLERANCE))
     missed = stepped_over(setup, run.step_log, 0.0) or cut_alike(setup, run)
     if missed is None:
@@ -47,7 +47,7 @@ def cause(setup: Setup, run: Recording) -> Doubt:
 
 def finer(setup: Setup, doubt: Doubt) -> Doubt:
     """Return a doubt with a smaller step or tolerance as its remedy."""
-    method = setup.integrator
+    method = setup.method
     if isinstance(method, Adaptive):
         return Doubt(doubt.kind, doubt.facts | {"smaller_rtol": method.rtol / _TIGHTER})
     return Doubt(doubt.kind, doubt.facts | {"smaller_step_s": setup.taken_step_s / _FINER})
@@ -63,7 +63,7 @@ def _unbooked(equation: StateEquation, run: Recording) -> Doubt | None:
         return None
     rows = np.unique(np.linspace(0, len(run.t) - 1, _CHECKED).astype(int))
     t, y = run.t[rows], run.y[rows]
-    q, v, a, _, _, P, _ = columns(equation, t, y, run.made[rows])
+    q, v, a, _, _, P, _ = columns(equation, t, y, run.sampled[rows])
     worst = largest(np.abs(ledger(equation, run).residual)) / float(run.t[-1]) / 2  # mean power of half the residual
     doubt = None
     for k in range(len(t)):

@@ -59,7 +59,7 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> Kink:
         return Kink()
     q, v = path.y[:, : equation.plant.dynamics.n], equation.velocities(path.y)
     kinks = [Kink()]
-    if not setup.integrator.controls_error:
+    if not setup.method.controls_error:
         kinks += _passed(setup, equation, path, q, v)
         kinks.append(first_crossing(equation, path, parts=_THIRDS))
     if not setup.finds_events:
@@ -74,7 +74,7 @@ def _passed(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v:
     for k, effect in enumerate(setup.plant.effects):
         for threshold in effect.thresholds(n):
             joint, level, of_velocity = threshold.joint, threshold.level, threshold.of_velocity
-            if threshold.of_actuation or (setup.finds_events and not (of_velocity and setup.integrator.canonical)):
+            if threshold.of_actuation or (setup.finds_events and not (of_velocity and setup.method.canonical)):
                 continue
             if of_velocity or threshold.state is not None:
                 z = path.y[:, 2 * n + equation.state_size :]

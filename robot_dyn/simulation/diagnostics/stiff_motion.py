@@ -39,7 +39,7 @@ def limited_by_stability(setup: Setup, record: Recording) -> tuple[Remark, ...]:
     The criterion: in most of the steps checked, h |λ| is near the end of the stability domain, where λ is the fastest
     decay.
     """
-    method, t = setup.integrator, record.step_log.t
+    method, t = setup.method, record.step_log.t
     explicit = method.controls_error and method.plain and not method.needs_jacobian
     if not explicit or record.steps < _LEAST_STEPS or len(t) < _LEAST_STEPS:
         return ()

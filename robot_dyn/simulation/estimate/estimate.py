@@ -56,12 +56,12 @@ def estimate(setup: Setup, run: Recording, runner: Runner) -> ErrorEstimate:
     equation = setup.equation
     if len(run.shared.t) < 2:
         return no_estimate(Doubt(DoubtKind.ENDED_AT_ONCE))
-    if equation.impulses and setup.integrator.nonsmooth:
+    if equation.impulses and setup.method.nonsmooth:
         return no_estimate(Doubt(DoubtKind.NO_ORDER_OF_IMPACTS))
     n = equation.plant.dynamics.n
     kink = first_kink(setup, equation, run.step_log)
     estimated = Estimated(run.shared, n, kink.t, rounding(run.shared, n), meaningless(run.step_log, n))
-    method = setup.integrator
+    method = setup.method
     if isinstance(method, Adaptive):
         result = _by_refinement(setup, method, run, estimated, runner)
     else:
@@ -158,7 +158,7 @@ def _with_rounding(estimated: Estimated, pushed: Path, of: Path, units: float = 
 def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:
     """Return the setup with the tolerances of its method multiplied by a factor."""
     method = replace(method, rtol=method.rtol * factor, atol=method.atol * factor)
-    return with_values(setup, {"integrator": method})  # the other values were checked
+    return with_values(setup, {"method": method})  # the other values were checked
 
 
 def _pushed(setup: Setup, units: float = PUSH) -> Setup:

@@ -64,7 +64,7 @@ _SENTENCES: Mapping[DoubtKind, _Sentence] = {
     DoubtKind.IMPLAUSIBLE_SPEED: _Sentence(TOO_FAST),
     DoubtKind.NO_ORDER_OF_IMPACTS: _Sentence(
         ("the error of time stepping falls with the step, but from step to step by no order",),
-        ("compare it with step_s / 4, or with integrator='DOP853'",),
+        ("compare it with step_s / 4, or with method='DOP853'",),
     ),
     DoubtKind.OSCILLATION_DAMPED: _Sentence(
         (
