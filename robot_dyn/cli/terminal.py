@@ -118,7 +118,7 @@ def put(text: str) -> None:
     _guarded(lambda: (sys.stdout.write(text), sys.stdout.flush()))
 
 
-def say_json(value: Any, **more: Any) -> None:
+def say_json(value: Answer | Mapping[str, object], **more: object) -> None:
     """Print a document or a result as JSON, with more keys; errors as of `say`."""
     from robot_dyn.foundations.result import json_text, plain
 
