@@ -1,7 +1,7 @@
 """Dynamics of robot arms from a URDF: M(q) a + C(q, v) v + N(t, q, v) = τ, by Pinocchio and a Lagrangian.
 
 An arm              load, list_robots, Robot, Payload; `arm.M(q)`, `arm.C(q, v)`, `arm.N(q)`, …
-Other formulations  Lagrangian, Compiled, euler_lagrange
+Other formulations  Lagrangian, compiled, euler_lagrange
 What it answers     info (an arm), why (a torque by cause), explain (what is integrated), sweepable (by rollouts)
 Trust               compare
 A simulation        Plant, Setup, Event, read_scene, simulate, rollouts, linearise, advise

@@ -25,9 +25,9 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 203,
-    "as of": 44,
-    "what without noun": 181,
+    "opening": 201,
+    "as of": 43,
+    "what without noun": 180,
     "is told": 5,
     "says that": 14,
     "tells that": 2,

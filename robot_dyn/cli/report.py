@@ -50,7 +50,7 @@ def run(trajectory: Trajectory) -> Document:
         "error_until_s": None if error is None else error.until_s,
         "error_verdict": None if error is None else error.verdict,
         "error_note": None if error is None else error.note or error.reason,
-        "tracking_error": trajectory.tracking_error,
+        "rms_tracking_error": trajectory.rms_tracking_error,
         "accuracy": trajectory.accuracy,
         "remarks": [_remark(remark) for remark in trajectory.remarks],
         "extremes": _extremes(trajectory),

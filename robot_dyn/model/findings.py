@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from robot_dyn.description.coordinate_limits import position_limits, speed_limits
 from robot_dyn.description.couplings import resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
@@ -31,6 +32,7 @@ def findings_of(description: Description, edits: Edits, regularity: Regularity) 
     kinds = (
         massless_bodies, moments_without_mass, impossible_inertias, tiny_masses, inertias_beyond_reach,
         centres_beyond_reach, long_lengths, large_ratios, welded_base, zero_limits, equal_limits,
+        followers_beyond_limits,
         impossible_inertias_of_the_base,
     )  # fmt: skip
     robot = structure_of(description, edits)
@@ -175,6 +177,17 @@ def equal_limits(robot: Structure) -> Iterator[str]:
     """Report joints whose lower and upper limits are equal."""
     if names := [name for name in robot.free if robot.joints[name].lower == robot.joints[name].upper]:
         yield f"{_joints(names)}: the lower and upper limits are equal; correct them, or make the joint fixed"
+
+
+def followers_beyond_limits(robot: Structure) -> Iterator[str]:
+    """Report followers that leave their own limits while the joint they follow is within its limits."""
+    for of_joints, kind in ((position_limits(robot), "position"), (speed_limits(robot), "velocity")):
+        for source, limit in of_joints.items():
+            for name, (low, high) in limit.exceeded.items():
+                yield (
+                    f"joint {name!r}: follows {source!r} beyond its own {kind} limits, [{low:g}, {high:g}], which are"
+                    f" not enforced, because {source!r} would keep hardly any range; correct its <limit> or <mimic>"
+                )
 
 
 def welded_base(robot: Structure) -> Iterator[str]:

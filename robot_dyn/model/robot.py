@@ -22,10 +22,12 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy import ndarray
 from numpy.typing import ArrayLike
 
+from robot_dyn.description.coordinate_limits import CoordinateLimit, position_limits, speed_limits
 from robot_dyn.description.couplings import Couplings
 from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Changes, Edits, takes_changes
 from robot_dyn.description.inertial_parameters import Parametrised
+from robot_dyn.description.structure import Structure, structure_of
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.errors import (
     DescriptionError,
@@ -42,7 +44,7 @@ from robot_dyn.model.coriolis import Coriolis
 from robot_dyn.model.evaluation import Evaluation
 from robot_dyn.model.findings import findings_of
 from robot_dyn.model.from_pinocchio import described
-from robot_dyn.model.info import Info, Joint, couplings_of, no_torque, robot_line
+from robot_dyn.model.info import Info, Joint, couplings_of, narrowed, no_torque, robot_line
 from robot_dyn.model.pinocchio_model import Built, build, joint_ids, link_frames
 from robot_dyn.model.to_urdf import write_urdf
 from robot_dyn.queries.batch import into
@@ -153,13 +155,13 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def lower(self) -> ndarray:
-        """Lower position limits, (n,) in [rad] or [m]; −inf if unstated."""
-        return self._per_joint(self.model.lowerPositionLimit)
+        """Lower position limits, (n,) in [rad] or [m]; −inf if unstated; those of followers count, see `info`."""
+        return self._limits(position_limits, "lower")
 
     @cached_property
     def upper(self) -> ndarray:
-        """Upper position limits, (n,) in [rad] or [m]; inf if unstated."""
-        return self._per_joint(self.model.upperPositionLimit)
+        """Upper position limits, (n,) in [rad] or [m]; inf if unstated; those of followers count, see `info`."""
+        return self._limits(position_limits, "upper")
 
     @cached_property
     def effort_limit(self) -> ndarray:
@@ -168,8 +170,8 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
     @cached_property
     def velocity_limit(self) -> ndarray:
-        """Velocity limits, (n,) in [rad/s] or [m/s]; inf if unstated."""
-        return self._per_joint(self.model.velocityLimit)
+        """Velocity limits, (n,) in [rad/s] or [m/s]; inf if unstated; those of followers count, see `info`."""
+        return self._limits(speed_limits, "upper")
 
     @cached_property
     def gravity(self) -> ndarray:
@@ -406,6 +408,11 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         ids = joint_ids(self.model)
         return _frozen(np.concatenate([self.model.inertias[ids[x]].toDynamicParameters() for x in self.body_names]))
 
+    def _limits(self, limits: Callable[[Structure], dict[str, CoordinateLimit]], side: str) -> ndarray:
+        """Return one side of the limits of the coordinates, in the order of q."""
+        of_joints = limits(structure_of(self.description, self.edits))
+        return _frozen(np.array([getattr(of_joints[name], side) for name in self.joint_names]))
+
     def _per_joint(self, full: ndarray) -> ndarray:
         """Return values of the joints of `model` in the order of q; infinite where the file states no limit."""
         ids = joint_ids(self.model)
@@ -437,6 +444,7 @@ def info(robot: Robot) -> Info:
         gravity_acts=robot.gravity_acts,
         joints=tuple(Joint(*row) for row in rows),
         couplings=tuple(couplings_of(robot.description, set(robot.model.names[1:]))),
+        narrowed=dict(narrowed(structure_of(robot.description, robot.edits))),
         locked=dict(robot.edits.lock),
         payloads=robot.edits.payloads,
         estimated=dict(robot.estimated),

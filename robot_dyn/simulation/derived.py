@@ -1,4 +1,4 @@
-"""What follows from the record of a run: samples, energy ledger, deviation, loads, remarks; each when it is read."""
+"""Values derived from the record of a run on first access: samples, energy ledger, tracking error, loads, remarks."""
 
 from __future__ import annotations
 
@@ -57,11 +57,11 @@ class Results:
     u = property(attrgetter("_columns.u"))
     desired = property(attrgetter("_tracking.desired"))
     desired_velocity = property(attrgetter("_tracking.desired_velocity"))
-    deviation = property(attrgetter("_tracking.deviation"))
+    tracking_error = property(attrgetter("_tracking.tracking_error"))
 
     @cached_property
     def _columns(self) -> Columns:
-        return columns(self.setup.equation, self.record.t, self.record.y, self.record.made)
+        return columns(self.setup.equation, self.record.t, self.record.y, self.record.sampled)
 
     @cached_property
     def a(self) -> np.ndarray:

@@ -121,7 +121,7 @@ def iftomm(effort: Effort) -> None:
     duration = 0.05 if effort.quick else 10.0
     table("what", "method", "step or tolerance", "error, m", "steps", "time, ms")
     for name, problem in PROBLEMS.items():
-        known = problem.setup(duration_s=duration, record_period_s=0.01, estimate_error=False)
+        known = problem.setup(duration_s=duration, record_every_s=0.01, estimate_error=False)
         t = rd.simulate(known).t
         reference = problem.reference(t)
         for method in problem.methods:
@@ -140,5 +140,5 @@ def iftomm(effort: Effort) -> None:
 
 def _options(method: str, number: float) -> dict[str, Any]:
     if method in ADAPTIVE:
-        return {"integrator": rd.integrate.Adaptive(method, number, number), "step_s": None, "engine": "compiled"}
-    return {"integrator": rd.integrate.method(method), "step_s": number, "engine": "compiled"}
+        return {"method": rd.integrate.Adaptive(method, number, number), "step_s": None, "engine": "compiled"}
+    return {"method": rd.integrate.method(method), "step_s": number, "engine": "compiled"}

@@ -54,7 +54,7 @@ robot = "planar_2r"
 duration_s = {duration_s}
 method = "rk4"
 step_s = 0.001
-record_period_s = 0.001
+record_every_s = 0.001
 
 [start]
 q = [0.4, 0.9]
@@ -90,7 +90,7 @@ def panda(folder: str, runs: int) -> sw.Sweep:
         "viscous_friction.damping": sw.lognormal(median=0.5, sigma_of_log=0.2),
         "mass_scale": sw.normal(mean=1, sd=0.1),
     }
-    return sw.Sweep(f"{folder}/scene.toml", runs, vary, {"error": sw.rms_error(), "peak": sw.peak("u")})
+    return sw.Sweep(f"{folder}/scene.toml", runs, vary, {"error": sw.rms_tracking_error(), "peak": sw.peak("u")})
 
 
 def peak_rss() -> float:

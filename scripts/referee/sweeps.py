@@ -109,7 +109,11 @@ def speed(run: Any) -> float:
 
 START = {"q0": OF.normal([0.4, 0.9], 0.05), "v0": OF.uniform([1.0, -1.0], [1.5, 0.5])}
 MOTION = {"end": FIGURES.final("q", "joint_2"), "fastest": FIGURES.peak("v"), "speed": "referee.sweeps:speed"}
-EFFORT = {"error": FIGURES.rms_error(), "torque": FIGURES.peak("u", "joint_1"), "end": FIGURES.final("v", "joint_1")}
+EFFORT = {
+    "error": FIGURES.rms_tracking_error(),
+    "torque": FIGURES.peak("u", "joint_1"),
+    "end": FIGURES.final("v", "joint_1"),
+}
 
 
 @dataclass(frozen=True)
@@ -138,7 +142,7 @@ PLANS = (
     Plan(springs, {"spring": OF.triangular([10.0, 2.0], [20.0, 5.0], [30.0, 9.0])}, START, MOTION),
     Plan(pushed, {"bar_2.mass": OF.normal(1.0, 0.1)}, START, MOTION),
     Plan(ur5, {"kp": OF.uniform(100.0, 300.0)}, {"mass_scale": OF.normal(1.0, 0.05)},
-         {"error": FIGURES.rms_error(), "torque": FIGURES.peak("u", "elbow_joint")}),
+         {"error": FIGURES.rms_tracking_error(), "torque": FIGURES.peak("u", "elbow_joint")}),
     Plan(picks_up, START, {"viscous": OF.uniform(0.1, 1.0), "mass_scale": OF.triangular(0.9, 1.0, 1.2)}, MOTION),
 )  # fmt: skip
 

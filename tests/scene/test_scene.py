@@ -156,7 +156,7 @@ def test_every_joint_controller_follows_its_plan(write, kind: str) -> None:
     text = SCENE.replace("0.1", "1.0", 1) + PD.replace('"pd"', f'"{kind}"')
     run = rd.simulate(rd.read_scene(write(text)))
     np.testing.assert_allclose(run.q[-1], [1.0, 0.5], atol=0.05)
-    assert run.tracking_error is not None
+    assert run.rms_tracking_error is not None
 
 
 def test_explanation_names_each_term_and_its_source(write) -> None:

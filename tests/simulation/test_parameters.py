@@ -72,7 +72,7 @@ def test_another_structure_is_compiled() -> None:
     ends = []
     for frame in ARM.frame_names[1:3]:
         setup = rd.Setup(rd.Plant(ARM, [rd.effects.ExternalWrench(frame, [1.0, 0.2, 0.7, 0.1, 0.4, 0.2])]), Q)
-        options = {"duration_s": 0.1, "integrator": "rk4"}
+        options = {"duration_s": 0.1, "method": "rk4"}
         ours, theirs = (rd.simulate(setup, engine=x, **options).q[-1] for x in ("compiled", "interpreted"))
         assert np.abs(ours - theirs).max() < 1e-13
         ends.append(ours)
@@ -100,7 +100,7 @@ def test_another_structure_is_compiled() -> None:
 )
 def test_every_number_is_a_sweep_parameter(name: str, values: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each run is that of the setup with this value; other values of what is swept compile nothing."""
-    base = replace(setup(0.0), record_period_s=0.02)
+    base = replace(setup(0.0), record_every_s=0.02)
     rd.rollouts(base, params={name: values[::-1] + 0.01})
     compiles_nothing(monkeypatch)
     runs = rd.rollouts(base, params={name: values})
@@ -179,7 +179,7 @@ def test_parts_of_a_users_own_have_all_of_it() -> None:
     by_name = rd.Plant(ARM, [Drag({ARM.joint_names[1]: 0.5})])
     np.testing.assert_array_equal(by_name.effects[0].strength, [0.0, 0.5])
     path = rd.control.quintic(Q, Q + 0.2, 0.1)
-    options = {"record_period_s": 0.01, "estimate_error": False}
+    options = {"record_every_s": 0.01, "estimate_error": False}
     base = rd.Setup(by_name, Q, V, 0.2, Follower(path, ARM, 50.0), "rk4", **options)
     theirs = rd.simulate(base, engine="interpreted")
     assert np.abs(rd.simulate(base, engine="compiled").q - theirs.q).max() < 1e-12

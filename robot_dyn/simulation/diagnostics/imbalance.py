@@ -38,7 +38,7 @@ def cause(setup: Setup, run: Recording, contradicts: bool) -> str:
         return "the run diverged"
     if unbooked := _unbooked(setup.equation, run):
         return unbooked
-    method: Any = setup.integrator
+    method: Any = setup.method
     doubt = "do not trust the estimate, " if contradicts else ""
     if method.controls_error:
         return f"{doubt}the tolerance is too loose; take rtol = {method.rtol / _TIGHTER:.0e}"
@@ -56,7 +56,7 @@ def _unbooked(equation: StateEquation, run: Recording) -> str:
         return ""
     rows = np.unique(np.linspace(0, len(run.t) - 1, _LOOKS).astype(int))
     t, y = run.t[rows], run.y[rows]
-    q, v, a, _, _, P, _ = columns(equation, t, y, run.made[rows])
+    q, v, a, _, _, P, _ = columns(equation, t, y, run.sampled[rows])
     worst = largest(np.abs(ledger(equation, run).residual)) / float(run.t[-1]) / 2  # on average, to leave the residual
     advice = ""
     for k in range(len(t)):

@@ -5,7 +5,7 @@
 | /joint_states | sensor_msgs/msg/JointState | q, v and u as position, velocity and effort |
 | /desired/joint_states | sensor_msgs/msg/JointState | desired positions |
 | /causes/NAME | sensor_msgs/msg/JointState | effort: the part of u that inertia, gravity, an effect … asks for |
-| /deviation/x, y, z | std_msgs/msg/Float64 | of a frame from its reference, in [m] |
+| /tracking_error/x, y, z | std_msgs/msg/Float64 | p_d − p of a frame, in [m] |
 | /power/NAME, /energy, /residual | std_msgs/msg/Float64 | of the control and each effect, in [W]; in [J] |
 
 Time 0 of the run is time 0 of the log, to 1 ns. A message is of all joints or of one number, and is written in the
@@ -44,7 +44,7 @@ uint32 nanosec
 """
 _NS = 10**9
 _LONGEST_S = 2.0**31  # seconds of a stamp are an int32
-_NUMBERS = ("deviation", "power", "energy", "residual")
+_NUMBERS = ("tracking error", "power", "energy", "residual")
 _STATE, _NUMBER = "sensor_msgs/msg/JointState", "std_msgs/msg/Float64"
 _DEFINITIONS = {_STATE: _JOINT_STATE, _NUMBER: "float64 data\n"}
 
@@ -102,7 +102,7 @@ def _states(run: TrajectoryData, stamps: Sequence[int], *values: np.ndarray) -> 
 
 def _of_numbers(columns: Sequence[Column]) -> Iterator[Topic]:
     """A topic for each column."""
-    names = _names([f"/{each.quantity}" + f"/{_word(each.of)}" * bool(each.of) for each in columns])
+    names = _names([f"/{_word(each.quantity)}" + f"/{_word(each.of)}" * bool(each.of) for each in columns])
     for name, each in zip(names, columns, strict=True):
         yield name, _NUMBER, ({"data": x} for x in each.values.tolist())
 

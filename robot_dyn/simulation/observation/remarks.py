@@ -87,7 +87,7 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     RemarkKind.COARSE: Sentence(
         "record too coarse",
         ("{quantity} of {joint} {value:.4g} {unit} near {at:.4g} s (sampled: {limit:.4g})",),
-        ("use a shorter record_period_s",),
+        ("use a shorter record_every_s",),
     ),
     RemarkKind.GAINS: Sentence(
         "a dissipative effect does positive work",
@@ -107,7 +107,7 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     RemarkKind.STIFF: Sentence(
         "steps bounded by stability",
         ("{motion}",),
-        (("made by {method} instead of {before}", "use integrator={method!r}"),),
+        (("made by {method} instead of {before}", "use method={method!r}"),),
     ),
     RemarkKind.TOO_LONG: Sentence(
         "step too long to be stable",

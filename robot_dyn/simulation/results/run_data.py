@@ -63,8 +63,8 @@ SAMPLED: Mapping[str, SampledQuantity] = MappingProxyType(
         "u": SampledQuantity(_MN, absent=True, unit="u", title="actuation within its bounds", heading="u"),
         "desired": SampledQuantity(_MN, unit="q", title="desired position", heading="desired"),
         "desired_velocity": SampledQuantity(_MN, unit="v", title="desired velocity"),
-        "deviation": SampledQuantity(
-            ("m", ("n", 3)), unit="m", title="deviation from the desired motion", heading="deviation", over="axis"
+        "tracking_error": SampledQuantity(
+            ("m", ("n", 3)), unit="m", title="tracking error", heading="tracking error", over="axis"
         ),
         "at_stop": SampledQuantity(_MN, "bool", title="whether it is at or beyond a stop"),
         "effect_torques": SampledQuantity(_MN, absent=True, unit="u", title="torque of an effect"),
@@ -169,7 +169,7 @@ class TrajectoryData(RunData):
     power: dict[str, Annotated[np.ndarray, SAMPLED["power"]]]
     ledger: Ledger
     desired: Annotated[np.ndarray, SAMPLED["desired"]] | None
-    deviation: Annotated[np.ndarray, SAMPLED["deviation"]] | None
+    tracking_error: Annotated[np.ndarray, SAMPLED["tracking_error"]] | None
     outcome: Outcome
     error: ErrorEstimate | None = field(default_factory=NoneType)
     wrenches: dict[str, Annotated[np.ndarray, Layout((None, 7))]] = field(default_factory=dict)
@@ -185,9 +185,9 @@ class TrajectoryData(RunData):
     desired_velocity: Annotated[np.ndarray, SAMPLED["desired_velocity"]] | None = field(default_factory=NoneType)
 
     @property
-    def tracking_error(self) -> float | None:
-        """Root mean square of the deviation over samples and joints or axes; None without a reference."""
-        return None if self.deviation is None else root_mean_square(self.deviation)
+    def rms_tracking_error(self) -> float | None:
+        """Root mean square of the tracking error over samples and joints or axes; None without a reference."""
+        return None if self.tracking_error is None else root_mean_square(self.tracking_error)
 
     @property
     def leak(self) -> str:

@@ -2,7 +2,7 @@
 
     a = M⁻¹ (τ − C v − N),   P_k = τ_kᵀ v,   E = K + Σ potentials
 
-The tracking error is √(mean over samples and joints of (q − q_d)²).
+The tracking error is √(mean over samples and joints of (q_d − q)²).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def columns(equation: StateEquation, t: np.ndarray, y: np.ndarray, derived: np.n
 def ledger(equation: StateEquation, record: Recording) -> Ledger:
     """The energy ledger at the samples of a run."""
     m, works = equation.size, equation.size - len(equation.sources)
-    E, work = record.made[:, -2:], dict(zip(equation.sources, record.y[:, works:m].T, strict=True))
+    E, work = record.sampled[:, -2:], dict(zip(equation.sources, record.y[:, works:m].T, strict=True))
     return Ledger(E[:, 0], E[:, 1], work, record.kinetic_peak, equation.stored(record.t, record.y))
 
 
@@ -67,14 +67,14 @@ def _acceleration(
 
 
 class Tracking(NamedTuple):
-    """Desired positions and velocities of the joints, (m, n); how far the joints, or the frame, are from the reference.
+    """Desired positions and velocities of the joints, (m, n); the tracking error of joints or frame.
 
-    None where there is no such reference; `deviation` is (…, m, n) or (…, m, 3).
+    None where there is no such reference; `tracking_error` is (…, m, n) or (…, m, 3).
     """
 
     desired: np.ndarray | None = None
     desired_velocity: np.ndarray | None = None
-    deviation: np.ndarray | None = None
+    tracking_error: np.ndarray | None = None
 
 
 def tracking_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> Tracking:
@@ -91,17 +91,17 @@ def tracking_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> Tracking:
     reference = controller.desired
     if isinstance(reference, PiecewisePolynomial):
         desired, velocity, _ = reference.at(t)
-        return Tracking(desired, velocity, q - desired)
+        return Tracking(desired, velocity, desired - q)
     if isinstance(reference, CartesianReference) and controller.task_frame is not None:
         p = setup.plant.dynamics.placement(q, controller.task_frame)[..., :3, 3]
-        return Tracking(deviation=p - reference.at(t)[0])
+        return Tracking(tracking_error=reference.at(t)[0] - p)
     return Tracking()
 
 
-def root_mean_square(deviation: np.ndarray) -> float:
-    """Of all entries."""
-    scale = np.ldexp(1.0, np.frexp(np.abs(deviation).max(initial=0.0))[1] - 1)  # that squares do not overflow
-    return float(scale * np.sqrt(np.mean((deviation / scale) ** 2)))
+def root_mean_square(x: np.ndarray) -> float:
+    """Return the root mean square of all entries."""
+    scale = np.ldexp(1.0, np.frexp(np.abs(x).max(initial=0.0))[1] - 1)  # so that squares do not overflow
+    return float(scale * np.sqrt(np.mean((x / scale) ** 2)))
 
 
 def root_mean_squares(x: np.ndarray) -> np.ndarray:

@@ -35,8 +35,8 @@ def summary(run: TrajectoryData) -> str:
     lines += ["between samples: not observed"] if run.extremes is None else []
     lines += [f"events: {_events_text(run.events)}"] if run.events else []
     lines += [line for line in lines_of(run.remarks) if line != run.outcome.text]
-    if run.tracking_error is not None:
-        lines.append(f"{of_tracking(run, run.desired is None)}: {run.tracking_error:.3e} rms")
+    if run.rms_tracking_error is not None:
+        lines.append(f"{of_tracking(run, run.desired is None)}: {run.rms_tracking_error:.3e} rms")
     step = f"step {s.step_s:.4g} s, " if s.step_s else ""
     lines.append(f"{s.method}: {step}{s.steps} steps, {s.evaluations} evaluations, {s.engine}")
     if s.user_code and s.companion_runs:

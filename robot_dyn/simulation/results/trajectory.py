@@ -49,7 +49,7 @@ class Trajectory(TrajectoryData):
         power: Of the control and of each effect without a potential, by name, in [W].
         ledger: Energy and work.
         desired: Positions of a joint reference, or None.
-        deviation: q − q_d, (m, n); or p − p_d of a frame that follows a Cartesian reference, (m, 3) in [m];
+        tracking_error: q_d − q, (m, n); or p_d − p of a frame that follows a Cartesian reference, (m, 3) in [m];
             None without a reference.
         outcome: How it ended.
         statistics: What it took.

@@ -31,7 +31,7 @@ def overview(runs: RolloutsData) -> Overview:
         setup = runs.setup_of(run)
         return against(setup, runs.t, np.tile(setup.q0, (len(runs.t), 1)) if runs.q is None else runs.q[run])
 
-    errors, remarks = tracking_errors(runs), tuple(_remarks(runs, remedy))
+    errors, remarks = rms_tracking_errors(runs), tuple(_remarks(runs, remedy))
     worst = worst_of(runs, remarks, errors)
     return Overview(worst, (*remarks, *_linearised(runs, worst)), errors)
 
@@ -59,7 +59,7 @@ def texts_by_run(remarks: Iterable[Remark], count: int) -> list[str]:
 
 def of_some(runs: RolloutsData, numbers: range, whole: Overview) -> Overview:
     """Of runs without their setup that were these of a larger batch."""
-    errors = None if whole.tracking_error is None else whole.tracking_error[numbers]
+    errors = None if whole.rms_tracking_error is None else whole.rms_tracking_error[numbers]
     facts = {remark.kind: remark.facts for remark in whole.remarks}
     remarks = *_counted(runs, lambda _: lambda _: facts[RemarkKind.CHATTER]), *_of_whole(whole, numbers)
     alone = (remark for remark in whole.remarks if remark.looked == 1 != len(numbers) and remark.runs[0] in numbers)
@@ -166,13 +166,13 @@ def worst_of(runs: RolloutsData, remarks: tuple[Remark, ...], errors: np.ndarray
     return 0 if errors is None or np.isnan(errors).all() else int(np.nanargmax(errors))
 
 
-def tracking_errors(runs: RolloutsData) -> np.ndarray | None:
-    """As of `Rollouts.tracking_error`; nan for a run that was not begun."""
+def rms_tracking_errors(runs: RolloutsData) -> np.ndarray | None:
+    """As of `Rollouts.rms_tracking_error`; nan for a run that was not begun."""
     if runs.q is None or runs.setup is None or runs.setup.controller is None:
         return None
     known = np.isfinite(runs.q.sum(axis=2))
     q = np.where(known[..., None], runs.q, 0.0)
-    deviation = tracking_of(runs.setup, runs.t, q).deviation
-    if deviation is None:
+    errors = tracking_of(runs.setup, runs.t, q).tracking_error
+    if errors is None:
         return None
-    return np.array([root_mean_square(x[of]) if of.any() else np.nan for x, of in zip(deviation, known, strict=True)])
+    return np.array([root_mean_square(x[of]) if of.any() else np.nan for x, of in zip(errors, known, strict=True)])

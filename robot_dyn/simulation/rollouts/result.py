@@ -125,9 +125,9 @@ class Rollouts(RolloutsData):
         return self.overview.remarks
 
     @property
-    def tracking_error(self) -> np.ndarray | None:
+    def rms_tracking_error(self) -> np.ndarray | None:
         """Tracking error of each run, as in `Trajectory`, (B,); None without a reference, or if q was not recorded."""
-        return self.overview.tracking_error
+        return self.overview.rms_tracking_error
 
     @property
     def worst(self) -> int:
@@ -173,7 +173,7 @@ class Rollouts(RolloutsData):
         counted = len(self) > 1
         remarks = [each if counted else replace(each, runs=()) for each in self.remarks]
         lines += lines_of(remarks)
-        errors = self.tracking_error
+        errors = self.rms_tracking_error
         if errors is not None and np.isfinite(errors).any():
             most = int(np.nanargmax(errors))
             largest = f" in the median, {errors[most]:.3e} in run {most}" if counted else ""

@@ -29,12 +29,12 @@ class Overview(Value):
     """The overview of a batch.
 
     Attributes:
-        worst, remarks, tracking_error: As of `Rollouts`.
+        worst, remarks, rms_tracking_error: As of `Rollouts`.
     """
 
     worst: int
     remarks: tuple[Remark, ...]
-    tracking_error: Annotated[np.ndarray, Layout(("B",))] | None
+    rms_tracking_error: Annotated[np.ndarray, Layout(("B",))] | None
 
     def __post_init__(self) -> None:
         read_only(self)

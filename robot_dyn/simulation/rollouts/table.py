@@ -29,9 +29,11 @@ def columns(runs: RolloutsData, of: Overview) -> Iterator[Column]:
     yield Column("outcome", np.array([end.ending.value for end in runs.ends]))
     yield Column("reason", np.array([outcome.reason.value for outcome in runs.outcomes]))
     yield Column("steps", runs.steps)
-    if of.tracking_error is not None:
+    if of.rms_tracking_error is not None:
         yield Column(
-            "tracking error", of.tracking_error, "m" if "frame" in runs.about else joint_units("q", types.values())
+            "rms tracking error",
+            of.rms_tracking_error,
+            "m" if "frame" in runs.about else joint_units("q", types.values()),
         )
     texts = texts_by_run(of.remarks, len(runs))
     yield Column("number of remarks", np.array([text.count(";") + 1 if text else 0 for text in texts]))

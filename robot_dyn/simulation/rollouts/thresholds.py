@@ -66,7 +66,7 @@ def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thr
         sweep: Values that differ from run to run, (B, size) by name.
         count: B.
     """
-    if setup.steps > MOST_CUT or setup.integrator.nonsmooth:
+    if setup.steps > MOST_CUT or setup.method.nonsmooth:
         return None
     equation, names = setup.equation, dict[str, None]()
     levels, others = dict[tuple[bool, int, int], np.ndarray](), np.zeros(count, bool)

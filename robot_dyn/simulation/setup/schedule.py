@@ -87,11 +87,11 @@ def near(fixed: np.ndarray, t: np.ndarray) -> np.ndarray:
     return np.where(t - fixed[right - 1] < fixed[right] - t, fixed[right - 1], fixed[right])
 
 
-def steps_on(length: float, step_s: float, record_period_s: float) -> int:
+def steps_on(length: float, step_s: float, record_every_s: float) -> int:
     """Number of steps on a segment; where it holds whole record periods, each of them has the same number."""
-    periods = round(length / record_period_s) if record_period_s else 0
-    if periods and abs(length / record_period_s - periods) < _ROUNDED:
-        return periods * max(1, ceil(record_period_s / step_s - _ROUNDED))
+    periods = round(length / record_every_s) if record_every_s else 0
+    if periods and abs(length / record_every_s - periods) < _ROUNDED:
+        return periods * max(1, ceil(record_every_s / step_s - _ROUNDED))
     return max(1, ceil(length / step_s - _ROUNDED))
 
 

@@ -64,12 +64,11 @@ class Setup(Value, Caching):
         v0: Velocity at the start, (n,); 0 if not given.
         duration_s: In [s].
         controller: What drives it: a `Controller`; a function (t, q, v) → torque (n,), which becomes one; or None.
-        integrator: The method, by its name as in a scene or itself: "auto", "DOP853" and "Rosenbrock", or an `Adaptive`
-            with other tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of
-            `rd.integrate.method` have a fixed one.
+        method: The integration method, or its name, see `rd.integrate.method`. "auto", "DOP853" and "Rosenbrock" choose
+            their steps, as does an `Adaptive` with other tolerances; others, such as "rk4", have a fixed step.
         step_s: Fixed step, 1 ms unless given; shortened where samples, ticks, switches and the end require it. It is
             not to be given for a method that chooses its steps.
-        record_period_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
+        record_every_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
         estimate_error: Whether companion runs estimate the error, which cost one to two times as much as the run; five
             times where only shorter steps can show it.
         about: Texts stored with the run.
@@ -86,9 +85,9 @@ class Setup(Value, Caching):
     v0: Any = None
     duration_s: float = 1.0
     controller: Any = None
-    integrator: Any = "auto"
+    method: Any = "auto"
     step_s: float | None = None
-    record_period_s: float = 0.0
+    record_every_s: float = 0.0
     estimate_error: bool = True
     about: dict[str, str] = field(default_factory=dict, repr=False)
     engine: str = "auto"
@@ -104,12 +103,12 @@ class Setup(Value, Caching):
         names = self.plant.dynamics.joint_names
         if self.v0 is None:
             object.__setattr__(self, "v0", np.zeros(len(names)))
-        object.__setattr__(self, "integrator", as_method(self.integrator))
+        object.__setattr__(self, "method", as_method(self.method))
         for name in ("q0", "v0"):
             object.__setattr__(self, name, one_state(name, getattr(self, name), names))
-        for name in ("duration_s", "step_s", "record_period_s"):
+        for name in ("duration_s", "step_s", "record_every_s"):
             if (seconds := getattr(self, name)) is not None or name != "step_s":
-                object.__setattr__(self, name, duration(name, seconds, zero=name == "record_period_s"))
+                object.__setattr__(self, name, duration(name, seconds, zero=name == "record_every_s"))
         truth("estimate_error", self.estimate_error)
         if self.accuracy is not None:
             self._check_accuracy()
@@ -118,23 +117,23 @@ class Setup(Value, Caching):
         ):
             instance("about", text, str, "give texts by name")
         object.__setattr__(self, "about", dict(self.about))
-        if self.integrator.controls_error and self.step_s is not None:
-            raise QueryError(no_step(self.integrator.name))
+        if self.method.controls_error and self.step_s is not None:
+            raise QueryError(no_step(self.method.name))
         choice("engine", self.engine, ENGINES)
         object.__setattr__(self, "events", _events(self.events))
         object.__setattr__(self, "controller", _controller(self.controller, len(names)))
         if self.controller is not None:
             check_model(self.plant.dynamics, self.controller, self.q0)
         _check_segments(self)
-        check_method(self.plant, self.integrator, self.events, self.finds_events)
+        check_method(self.plant, self.method, self.events, self.finds_events)
         check_start(self.plant, self.controller, self.events, self.q0, self.v0)  # pyright: ignore[reportArgumentType]
 
     def _check_accuracy(self) -> None:
         """That an accuracy is one, and that nothing else chooses method or tolerance."""
         object.__setattr__(self, "accuracy", least_accuracy(self.accuracy, self.plant.dynamics))
-        if self.integrator != Adaptive(AUTO):
-            name = self.integrator.name
-            raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {name!r}")
+        if self.method != Adaptive(AUTO):
+            name = self.method.name
+            raise QueryError(f"accuracy: chooses method and tolerance; leave out method, got {name!r}")
         if not self.estimate_error:
             raise QueryError("accuracy: is held to the error estimate; leave out estimate_error=False")
 
@@ -151,12 +150,12 @@ class Setup(Value, Caching):
     @cached_property
     def is_value(self) -> bool:
         """Whether no part but its events is user-defined code, or may change: what follows from it stays as it is."""
-        return all(map(is_value, (self.plant, self.controller, self.integrator)))
+        return all(map(is_value, (self.plant, self.controller, self.method)))
 
     @cached_property
     def equation(self) -> StateEquation:
         """Its state equation."""
-        return StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
+        return StateEquation(self.plant, self.controller, self.method.canonical, self.events)
 
     @cached_property
     def undeclared(self) -> tuple[tuple[Any, str], ...]:
@@ -173,7 +172,7 @@ class Setup(Value, Caching):
         starts, step = self._cuts[:-1], self.nominal_step_s
         ends = [t for t, _ in self._cuts[1:]]
         counts = [
-            steps_on(end - start, step, self.record_period_s) for (start, _), end in zip(starts, ends, strict=True)
+            steps_on(end - start, step, self.record_every_s) for (start, _), end in zip(starts, ends, strict=True)
         ]
         few = sum(count < LEAST_STEPS for count in counts)
         if LEAST_STEPS * few <= sum(counts) / 10:  # so that companion runs can take longer steps there
@@ -199,16 +198,16 @@ class Setup(Value, Caching):
     @property
     def finds_events(self) -> bool:
         """Whether steps end where effects and the controller switch, and at requested events."""
-        if self.integrator.controls_error or self.integrator.nonsmooth:
-            return not self.integrator.nonsmooth
+        if self.method.controls_error or self.method.nonsmooth:
+            return not self.method.nonsmooth
         return self.equation.switches and self.steps <= MOST_CUT
 
     @property
     def samples_on_steps(self) -> bool:
         """Whether each sample of a method of fixed step is at the end of a step that is not cut."""
-        if not self.record_period_s:
+        if not self.record_every_s:
             return True
-        ends, due = nodes(self.segments), np.arange(0.0, self.duration_s, self.record_period_s)
+        ends, due = nodes(self.segments), np.arange(0.0, self.duration_s, self.record_every_s)
         return bool((np.abs(near(ends, due) - due) <= ON_STEP * self.nominal_step_s).all())
 
     @property
@@ -241,7 +240,7 @@ def no_step(name: str) -> str:
     """What is wrong with a step for a method that chooses its own."""
     return (
         f"step_s has no effect on {name}, which chooses its steps: leave it out, name a method of fixed step, such as"
-        " integrator='rk4', or give rd.integrate.Adaptive(max_step_s=…)"
+        " method='rk4', or give rd.integrate.Adaptive(max_step_s=…)"
     )
 
 
@@ -307,9 +306,9 @@ def segments(setup: Setup) -> float:
 
 def steps(setup: Setup) -> float:
     """About so many steps of a fixed-step method; 0 for an adaptive one, which chooses them."""
-    if setup.integrator.controls_error:
+    if setup.method.controls_error:
         return 0.0
-    step = min(setup.nominal_step_s, setup.record_period_s or inf)  # samples lie on steps
+    step = min(setup.nominal_step_s, setup.record_every_s or inf)  # samples lie on steps
     return setup.duration_s / step + 4 * segments(setup)
 
 
@@ -347,14 +346,14 @@ def check_batch(setup: Setup, runs: int, numbers: int, most: float) -> None:
 
 def too_large(what: str, size: float, most: float, or_else: str = "") -> QueryError:
     """The refusal of a record."""
-    remedy = f"take a longer record_period_s or a shorter duration_s{or_else}"
+    remedy = f"take a longer record_every_s or a shorter duration_s{or_else}"
     return QueryError(f"recording {what} takes {gibibytes(size)}, more than {gibibytes(most)}: {remedy}")
 
 
 def samples(setup: Setup) -> float:
     """At most so many samples."""
-    periods = setup.duration_s / setup.record_period_s + 2 if setup.record_period_s else inf
-    adaptive = setup.integrator.controls_error
+    periods = setup.duration_s / setup.record_every_s + 2 if setup.record_every_s else inf
+    adaptive = setup.method.controls_error
     return min(periods, 1000 + segments(setup) if adaptive and periods == inf else inf, steps(setup) or inf)
 
 
@@ -378,7 +377,7 @@ def shortened(setup: Setup) -> str:
 
 
 def _method(setup: Setup) -> Iterator[str]:
-    method: Any = setup.integrator
+    method: Any = setup.method
     name: str = method.name
     used: dict[str, Any] = {}
     if setup.accuracy is not None:
@@ -388,7 +387,7 @@ def _method(setup: Setup) -> Iterator[str]:
     else:
         used = {"step_s": f"{setup.nominal_step_s}{shortened(setup)}"}
     yield f"method: {name}, {setup.duration_s:g} s"
-    used |= {key: getattr(setup, key) for key in ("record_period_s", "estimate_error", "engine")}
+    used |= {key: getattr(setup, key) for key in ("record_every_s", "estimate_error", "engine")}
     yield from (f"  {key} = {value}" for key, value in used.items())
     yield "start:"
     types = getattr(setup.plant.dynamics, "joint_types", (None,) * len(setup.q0))

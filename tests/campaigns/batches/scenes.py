@@ -40,7 +40,7 @@ def batch(seed: int, index: int) -> Batch:
         rd.Plant(arm, [rd.effects.ViscousFriction(scale * rng.uniform(0.1, 1.0, arm.n)), *effects]), q0[0], v0[0],
         duration,
         _controller(rng, family, arm, q0[0], scale, duration), method,
-        record_period_s=float(rng.choice([0.0, 0.02])), estimate_error=False, engine="compiled", **options,
+        record_every_s=float(rng.choice([0.0, 0.02])), estimate_error=False, engine="compiled", **options,
     )  # fmt: skip
     swept |= {"viscous_friction.damping": scale * rng.uniform(0.1, 1.0, (B, arm.n))}
     params = {key: np.broadcast_to(x, (B, arm.n)) for key, x in swept.items() if rng.random() < 0.5}

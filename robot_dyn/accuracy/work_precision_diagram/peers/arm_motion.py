@@ -83,7 +83,7 @@ class ArmMotion:
     @cached_property
     def times(self) -> np.ndarray:
         """Times of the records, including the start, (k,), in [s]."""
-        period, end = self.setup.record_period_s, self.setup.duration_s
+        period, end = self.setup.record_every_s, self.setup.duration_s
         return np.append(period * np.arange(round(end / period)), end)
 
     @property
