@@ -14,8 +14,6 @@ import numpy as np
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-    from robot_dyn.foundations.answer import Answer
-
 UNREPORTED: Mapping[str, bool] = {"reported": False}
 """Metadata of a field that plain data omit."""
 
@@ -25,7 +23,7 @@ class reported(property):  # noqa: N801 - used like `property`
 
 
 @overload
-def plain(value: Answer | DataclassInstance | Mapping[str, object]) -> dict[str, object]: ...
+def plain(value: DataclassInstance | Mapping[str, object]) -> dict[str, object]: ...
 @overload
 def plain(value: object) -> object: ...
 def plain(value: object) -> object:

@@ -11,7 +11,7 @@ from math import hypot, inf, isfinite
 from numbers import Real
 from operator import index
 from types import UnionType
-from typing import TYPE_CHECKING, SupportsIndex, TypeGuard, TypeVar, overload
+from typing import Protocol, SupportsIndex, TypeGuard, TypeVar, overload
 
 import numpy as np
 
@@ -25,9 +25,6 @@ from robot_dyn.foundations.errors import (
     shown,
 )
 
-if TYPE_CHECKING:
-    from robot_dyn.foundations.arithmetic import Arithmetic
-
 Shape = tuple[int | str, ...]  # a named length, such as "n", is any length except 0
 Kind = type[RobotDynError]
 Instance = TypeVar("Instance")
@@ -35,6 +32,20 @@ Function = TypeVar("Function")
 LEAST_EXACT = 1e-3  # [rad], [m] or [s]: largest rounding error of positions and times
 _F8 = np.dtype(np.float64)
 _PLAIN = {float, int, np.float64}  # usual types of entries in lists; bool is excluded
+
+
+class ArithmeticLike(Protocol):
+    """A kind of number to which arguments are converted, such as an `Arithmetic`."""
+
+    dtype: np.dtype
+
+    def asarray(self, values: object) -> np.ndarray:
+        """Return an array of this kind of number; raise TypeError or ValueError if the values are not numbers."""
+        ...
+
+    def finite(self, x: np.ndarray) -> np.ndarray:
+        """Return True for entries that are finite numbers."""
+        ...
 
 
 def real(values: object) -> np.ndarray:
@@ -191,13 +202,15 @@ def is_plain(x: object, shape: tuple[int] | None) -> TypeGuard[np.ndarray]:
 
 
 def joint_values(
-    what: str, values: object, joint_names: Sequence[str], arithmetic: Arithmetic | None = None
+    what: str, values: object, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
 ) -> np.ndarray:
     """Return finite numbers of each joint, shape (..., n), not copied; for errors, see `shaped` and `converted`."""
     return converted(what, shaped(what, values, joint_names, arithmetic), joint_names, arithmetic)
 
 
-def shaped(what: str, values: object, joint_names: Sequence[str], arithmetic: Arithmetic | None = None) -> np.ndarray:
+def shaped(
+    what: str, values: object, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
+) -> np.ndarray:
     """Return numbers of each joint, finite or not, shape (..., n), not copied; floats and integers keep their type.
 
     Args:
@@ -220,7 +233,7 @@ def shaped(what: str, values: object, joint_names: Sequence[str], arithmetic: Ar
 
 
 def converted(
-    what: str, array: np.ndarray, joint_names: Sequence[str], arithmetic: Arithmetic | None = None
+    what: str, array: np.ndarray, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
 ) -> np.ndarray:
     """Convert an array of real numbers to an arithmetic, by default float64; not copied if it has that type.
 
@@ -251,7 +264,7 @@ def _check_rounding(what: str, exact: np.ndarray, rounded: np.ndarray, joint_nam
 
 
 def check_finite(
-    what: str, array: np.ndarray, joint_names: Sequence[str], arithmetic: Arithmetic | None = None
+    what: str, array: np.ndarray, joint_names: Sequence[str], arithmetic: ArithmeticLike | None = None
 ) -> None:
     """Raise a NotFiniteError that names the joint unless all numbers of an argument, (..., n), are finite."""
     finite = np.isfinite(array) if arithmetic is None else arithmetic.finite(array)
