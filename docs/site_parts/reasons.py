@@ -34,7 +34,7 @@ EXAMPLES = {
         "step, or a method for stiff systems"
     },
     Reason.EVENTS_ACCUMULATE: {
-        "changes": 1000, "span_s": 2.1e-10, "remedy": "integrator='time_stepping' and a step_s"
+        "changes": 1000, "span_s": 2.1e-10, "remedy": "method='time_stepping' and a step_s"
     },
     Reason.TORQUE_NOT_FINITE: _STEP,
     Reason.CANNOT_EVALUATE: {

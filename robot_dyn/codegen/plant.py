@@ -6,7 +6,6 @@ plants that differ only in these share compiled code.
 
 from __future__ import annotations
 
-from abc import ABC
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -188,7 +187,15 @@ class CompiledPlant:
         return Traced(function, formulation, {formulation: instructions(function)})
 
 
-class Compiled(ABC):  # noqa: B024  its instances belong to the two classes registered below
+@overload
+def compiled(
+    robot_or_plant: Robot, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
+) -> CompiledDynamics: ...
+@overload
+def compiled(
+    robot_or_plant: Plant, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
+) -> CompiledPlant: ...
+def compiled(robot_or_plant: Any, *, dtype: Any = "float64", threads: int | None = 1, cache: bool = True) -> Any:
     """Compile a robot or a plant to machine code, for one state (n,) and batches (..., n).
 
     Args:
@@ -198,28 +205,12 @@ class Compiled(ABC):  # noqa: B024  its instances belong to the two classes regi
         cache: Store compiled code on disk.
 
     Returns:
-        A `CompiledDynamics` or a `CompiledPlant`; both are instances of `Compiled`.
+        An object with the same queries: a `CompiledDynamics` for a robot, a `CompiledPlant` for a plant.
 
     Raises:
         QueryError: If `robot_or_plant` is neither, or an option is not allowed.
     """
-
-    @overload
-    def __new__(
-        cls, robot_or_plant: Robot, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
-    ) -> CompiledDynamics: ...
-    @overload
-    def __new__(
-        cls, robot_or_plant: Plant, *, dtype: Any = ..., threads: int | None = ..., cache: bool = ...
-    ) -> CompiledPlant: ...
-    def __new__(
-        cls, robot_or_plant: Any, *, dtype: Any = "float64", threads: int | None = 1, cache: bool = True
-    ) -> Any:
-        if not isinstance(robot_or_plant, Plant):
-            return CompiledDynamics(robot_or_plant, dtype, threads, cache)
-        robot: Any = getattr(robot_or_plant.dynamics, "robot", robot_or_plant.dynamics)
-        return CompiledPlant(robot_or_plant, CompiledDynamics(robot, dtype, threads, cache))
-
-
-Compiled.register(CompiledDynamics)
-Compiled.register(CompiledPlant)
+    if not isinstance(robot_or_plant, Plant):
+        return CompiledDynamics(robot_or_plant, dtype, threads, cache)
+    robot: Any = getattr(robot_or_plant.dynamics, "robot", robot_or_plant.dynamics)
+    return CompiledPlant(robot_or_plant, CompiledDynamics(robot, dtype, threads, cache))

@@ -54,7 +54,7 @@ def simulate(
         v0: Velocity at the start, (n,), in [rad/s] or [m/s]; 0, or that of the setup, unless given.
         on_progress: Called with the time reached, in [s], at each step, and with that of the end at the steps of
             companion runs; in machine code some ten times a second. An exception from it ends the call.
-        **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, integrator, step_s,
+        **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, method, step_s,
             record_every_s, estimate_error, about, engine, events and accuracy.
 
     Raises:
@@ -97,7 +97,7 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
     if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # nothing may be read later
         later = [field.name for field in fields(Trajectory) if field.name not in (*known, "statistics")]
         known |= {name: getattr(results, name) for name in later}
-    method = ran.setup.integrator
+    method = ran.setup.method
     statistics = Statistics(
         method=EXPLICIT if method.name == AUTO else method.name,
         step_s=0.0 if method.controls_error else recording.outcome.t / max(recording.steps, 1),
@@ -139,7 +139,7 @@ class _Ran(NamedTuple):
 
 def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _Ran:
     """Run a setup; restart with another engine or method if it turns out to be better suited."""
-    seen, remarks, may_replace = 0, (), setup.integrator.name == AUTO
+    seen, remarks, may_replace = 0, (), setup.method.name == AUTO
     while True:
         engine, observer = choose(setup, seen), observer_of(setup)
         run = Run(
@@ -166,12 +166,12 @@ def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _R
 
 def with_stiff_method(setup: Setup) -> Setup:
     """Return the setup by the stiff method with the same tolerances."""
-    return replace(setup, integrator=replace(setup.integrator, method=STIFF))
+    return replace(setup, method=replace(setup.method, method=STIFF))
 
 
 def with_time_stepping(setup: Setup) -> Setup:
     """Return the setup by time stepping."""
-    return replace(setup, integrator=TimeStepping())
+    return replace(setup, method=TimeStepping())
 
 
 def _estimated(ran: _Ran, runner: Runner) -> tuple[Recording, ErrorEstimate | None]:

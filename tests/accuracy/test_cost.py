@@ -100,7 +100,7 @@ def test_algorithms_are_counted_from_the_kernels_of_compiled() -> None:
     """The least of each formulation is that of the kernel of the same query."""
     arm = rd.load("ur5")
     pairs = {name: make() for name, make in QueryCost(arm).pairs()}
-    own: Any = rd.Compiled(arm)
+    own: Any = rd.compiled(arm)
     count = {name: len(own.engine.kernels[name].program) for name in ("C", "coriolis_torque", "forward_dynamics")}
     derivatives = len(own.engine.kernels["forward_dynamics_derivatives"].program)
     matrix = pairs["Coriolis matrix"]

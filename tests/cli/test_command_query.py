@@ -277,7 +277,7 @@ def test_info_names_the_formulation_of_the_fewest_instructions() -> None:
 
 def test_the_cache_is_listed_and_cleared(folder: Path) -> None:
     assert "0 kernels" in said("cache")
-    rd.Compiled(rd.load("pendulum")).M(np.array([0.3]))
+    rd.compiled(rd.load("pendulum")).M(np.array([0.3]))
     listed = document("cache")
     assert (listed["folder"], len(listed["kernels"])) == (str(folder), 1)
     assert listed["bytes"] == listed["kernels"][0]["size"] > 1000

@@ -15,10 +15,10 @@ from robot_dyn.foundations import QueryError, TraceError
 from tests.user_parts import Push
 
 ARM = rd.load("planar_2r")
-FAST = rd.Compiled(ARM)
+FAST = rd.compiled(ARM)
 WINDOW = rd.effects.ExternalWrench("tip", [1.0, 0, 2, 0, -0.5, 0], start_s=0.2, end_s=0.6)
 PUSHED = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3), WINDOW])
-PLANT = rd.Compiled(PUSHED)
+PLANT = rd.compiled(PUSHED)
 FAR = 2 * np.pi * 40_000
 
 
@@ -153,11 +153,11 @@ def test_what_was_used_can_be_pickled(engine: Any, time: tuple[float, ...]) -> N
 )
 def test_an_effect_that_cannot_be_traced_is_named(does) -> None:
     with pytest.raises(TraceError, match="effect push cannot be compiled"):
-        rd.Compiled(rd.Plant(ARM, [Push(does)])).torque(0.0, *state(False)[:2])
+        rd.compiled(rd.Plant(ARM, [Push(does)])).torque(0.0, *state(False)[:2])
 
 
 def test_one_sided_stops_are_compiled_exactly() -> None:
     """No digit of the stop that is not there, 1e9 away, is in the torque of the one that is."""
     plant = rd.Plant(ARM, [*rd.effects.joint_stops(-3.0, np.inf)])
     q, v = np.array([-3.05, -2.9]), np.array([0.2, -0.1])
-    np.testing.assert_allclose(rd.Compiled(plant).torque(0.0, q, v), plant.torque(0.0, q, v), rtol=1e-13)
+    np.testing.assert_allclose(rd.compiled(plant).torque(0.0, q, v), plant.torque(0.0, q, v), rtol=1e-13)

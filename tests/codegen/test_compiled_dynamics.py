@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import robot_dyn as rd
-from robot_dyn import Compiled
 from robot_dyn.codegen import CompiledDynamics, CompiledPlant, Kernel, SelfCheckError, SizeWarning, Trace
 from robot_dyn.codegen.llvm import machine_code
 from robot_dyn.foundations import QueryError, SingularError
@@ -255,7 +254,7 @@ EFFECTS["all"] = [effect for effects in EFFECTS.values() for effect in effects]
 
 
 def plant(effects: list[Any]) -> CompiledPlant:
-    compiled = Compiled(rd.Plant(ROBOT, effects), cache=False)
+    compiled = rd.compiled(rd.Plant(ROBOT, effects), cache=False)
     assert isinstance(compiled, CompiledPlant)
     return compiled
 
@@ -299,7 +298,7 @@ def test_plants_that_differ_in_numbers_share_their_machine_code(monkeypatch: pyt
             rd.effects.EffortLimit(limit),
             rd.effects.RegularisedCoulombFriction(mass, 0.1),
         ]
-        compiled = Compiled(rd.Plant(robot, effects), cache=False)
+        compiled = rd.compiled(rd.Plant(robot, effects), cache=False)
         expected = np.array([compiled.interpreted.forward_dynamics(*row) for row in zip(t, q, v, u, strict=True)])
         batch = compiled.forward_dynamics(t, q, v, u)
         single = [compiled.forward_dynamics(*row) for row in zip(t, q, v, u, strict=True)]
@@ -339,7 +338,7 @@ def test_numpy_clip_is_the_minimum_of_a_maximum() -> None:
     """Of six joints with two bounds each: as branches these would be 3⁶."""
     most = np.array([6.0] * 3 + [1.2] * 3)
     law = rd.control.ControlLaw(lambda t, q, v: np.clip(-40.0 * (q - 0.3) - 10.0 * v, -2.0, most), 6)
-    setup = rd.Setup(rd.Plant(rd.load("ur5")), [0.1] * 6, duration_s=0.05, integrator="rk4", controller=law)
+    setup = rd.Setup(rd.Plant(rd.load("ur5")), [0.1] * 6, duration_s=0.05, method="rk4", controller=law)
     interpreted, compiled = (rd.simulate(setup, engine=each) for each in ("interpreted", "compiled"))
     assert compiled.statistics.engine == "compiled"
     np.testing.assert_allclose(compiled.q, interpreted.q, rtol=0, atol=1e-12)

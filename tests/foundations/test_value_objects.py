@@ -34,7 +34,8 @@ NO_VALUES = FOR_AUTHORS | {
     "SweepError",
 }  # for types, warned of or raised
 HELD = {  # of values that are made by functions, or held by others
-    "CartesianReference", "Compiled", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate", "ExplicitRungeKutta",
+    "CartesianReference", "CompiledDynamics", "CompiledPlant", "Couplings", "Edits", "ErrorEstimate",
+    "ExplicitRungeKutta",
     "Gauss", "Ledger", "Outcome", "Rosenbrock", "Statistics", "TaskDynamics", "WorstCase",
 }  # fmt: skip
 NAMES = sorted(CLASSES - NO_VALUES | HELD)
@@ -59,7 +60,7 @@ def values() -> dict[str, Any]:
     options: Any = {
         "duration_s": 0.05,
         "controller": rd.control.PD(PLAN, 10.0, 1.0),
-        "integrator": "rk4",
+        "method": "rk4",
         "step_s": 0.01,
     }
     setup = rd.Setup(plant, Q, **options)
@@ -99,7 +100,7 @@ def values() -> dict[str, Any]:
         rd.tools.sweeps.Run(Q, Q, Q, None, None, None, None, None, np.ones((3, 2, 2)), 0.05, {"q0": Q}),
     ]  # fmt: skip
     named: dict[str, Any] = {type(each).__name__: each for each in made}
-    return named | {"Compiled": rd.Compiled(ARM), "CompiledPlant": rd.Compiled(plant)}
+    return named | {"CompiledDynamics": rd.compiled(ARM), "CompiledPlant": rd.compiled(plant)}
 
 
 def test_every_public_class_is_looked_at() -> None:

@@ -181,7 +181,7 @@ def test_a_wrong_way_with_errors_is_refused_at_one_state_as_well(name: str) -> N
 
 ARM = rd.load("ur5")
 NEAR = np.array([0.3, -0.2, 0.5, 0.7, -0.4, 0.9])
-NARROW = {"Lagrangian": rd.Lagrangian(ARM, np.float32), "machine code": rd.Compiled(ARM, dtype="float32")}
+NARROW = {"Lagrangian": rd.Lagrangian(ARM, np.float32), "machine code": rd.compiled(ARM, dtype="float32")}
 # what cannot be held, by what cannot hold it: the distance to the nearest number is 2⁻¹¹ and more
 HIDDEN: dict[str, tuple[Any, Any]] = {
     "float64 in float32": (NARROW["Lagrangian"], NEAR + 1e12),
@@ -226,7 +226,7 @@ def test_a_float32_is_one_angle_however_large(name: str, far: float) -> None:
 @pytest.mark.parametrize("rows", [0, 1, 20])
 def test_a_time_that_rounding_hides_is_refused_by_machine_code(rows: int) -> None:
     """float32 tells 1e9 s to 64 s; what it holds, 2^30 s, it takes."""
-    plant = rd.Compiled(rd.Plant(ARM, [Push(lambda t, q, v: 0 * v + t)]), dtype="float32")
+    plant = rd.compiled(rd.Plant(ARM, [Push(lambda t, q, v: 0 * v + t)]), dtype="float32")
     q = np.tile(NEAR, (rows, 1) if rows else 1).astype(np.float32)
 
     def torque(t: float) -> Any:

@@ -38,7 +38,7 @@ def cause(setup: Setup, run: Recording, contradicts: bool) -> str:
         return "the run diverged"
     if unbooked := _unbooked(setup.equation, run):
         return unbooked
-    method: Any = setup.integrator
+    method: Any = setup.method
     doubt = "do not trust the estimate, " if contradicts else ""
     if method.controls_error:
         return f"{doubt}the tolerance is too loose; take rtol = {method.rtol / _TIGHTER:.0e}"

@@ -52,7 +52,7 @@ def first_kink(setup: Setup, equation: StateEquation, path: Path) -> Kink:
         return np.inf, ""
     q, v = path.y[:, : equation.plant.dynamics.n], equation.velocities(path.y)
     found = [(np.inf, "")]
-    if not setup.integrator.controls_error:
+    if not setup.method.controls_error:
         found += _passed(setup, equation, path, q, v)
         found.append(first_crossing(equation, path, parts=_THIRDS))
     if not setup.finds_events:
@@ -66,7 +66,7 @@ def _passed(setup: Setup, equation: StateEquation, path: Path, q: np.ndarray, v:
     low, high = extremes(path.t, q, v)
     for k, effect in enumerate(setup.plant.effects):
         for each in effect.thresholds(n):
-            if each.of_actuation or (setup.finds_events and not (each.of_velocity and setup.integrator.canonical)):
+            if each.of_actuation or (setup.finds_events and not (each.of_velocity and setup.method.canonical)):
                 continue
             if each.of_velocity or each.state is not None:
                 z = path.y[:, 2 * n + equation.state_size :]

@@ -56,15 +56,15 @@ def estimate(setup: Setup, run: Recording, runner: Runner) -> ErrorEstimate:
     equation = setup.equation
     if len(run.shared.t) < 2:
         return no_estimate("it ended in its first step")
-    if equation.impulses and setup.integrator.nonsmooth:
+    if equation.impulses and setup.method.nonsmooth:
         return no_estimate(
             "the error of time stepping falls with the step, but from step to step by no order; compare it with"
-            " step_s / 4, or with integrator='DOP853'"
+            " step_s / 4, or with method='DOP853'"
         )
     n = equation.plant.dynamics.n
     kink, why = first_kink(setup, equation, run.step_log)
     estimated = Estimated(run.shared, n, kink, rounding(run.shared, n), meaningless(run.step_log, n))
-    method: Any = setup.integrator
+    method: Any = setup.method
     if method.controls_error:
         result = _by_refinement(setup, method, run, estimated, runner)
     else:
@@ -160,7 +160,7 @@ def _with_rounding(estimated: Estimated, pushed: Path, of: Path, units: float = 
 
 def _tolerant(setup: Setup, method: Adaptive, factor: float) -> Setup:
     method = replace(method, rtol=method.rtol * factor, atol=method.atol * factor)
-    return with_values(setup, {"integrator": method})  # all else was checked
+    return with_values(setup, {"method": method})  # all else was checked
 
 
 def _pushed(setup: Setup, units: float = PUSH) -> Setup:
@@ -196,6 +196,6 @@ def _advised(setup: Setup, result: ErrorEstimate, why: str) -> ErrorEstimate:
         return result
     if result.note.startswith(ROUNDED):
         return replace(result, note=f"{result.note}; take a shorter run")
-    method: Any = setup.integrator
+    method: Any = setup.method
     finer = f"rtol = {method.rtol / 100:.0e}" if method.controls_error else f"step_s = {setup.taken_step_s / 4:.0e}"
     return replace(result, note=f"{result.note}; take {finer}, or a shorter run")

@@ -103,10 +103,10 @@ def _at(
     setup: Setup, method: str, rtol: float, requested: float
 ) -> Generator[Setup, Trajectory, tuple[Trajectory, int]]:
     """Return the run at a tolerance, by the cheaper method if stability limits explicit steps; and the evaluations."""
-    trial = yield replace(setup, integrator=Adaptive(method, rtol, _ATOL * rtol))
+    trial = yield replace(setup, method=Adaptive(method, rtol, _ATOL * rtol))
     if method != AUTO or trial.statistics.method != EXPLICIT or setup.equation.sampled or not _stable_at_most(trial):
         return trial, _in_all(trial)
-    other = yield replace(setup, integrator=Adaptive(STIFF, rtol, _ATOL * rtol))
+    other = yield replace(setup, method=Adaptive(STIFF, rtol, _ATOL * rtol))
     return min((trial, other), key=lambda each: _predicted(each, requested)), _in_all(trial) + _in_all(other)
 
 
@@ -122,7 +122,7 @@ def _in_each_segment(setup: Setup, requested: float) -> Generator[Setup, Traject
     """Return the run of one RK4 step between ticks of sampled control, if accurate enough; and the evaluations."""
     if not setup.equation.sampled or len(setup.segments) < _MANY:
         return None, 0
-    trial = yield replace(setup, integrator=RK4, step_s=setup.duration_s)
+    trial = yield replace(setup, method=RK4, step_s=setup.duration_s)
     error, spent = _resolved(trial), _in_all(trial)
     good = trial.outcome.ending is Ending.FINISHED and error <= _TRUSTED * requested
     return (_achieved(_Try(error, 0.0, trial), requested, spent) if good else None), spent

@@ -107,7 +107,7 @@ _SENTENCES: Mapping[RemarkKind, Sentence] = {
     RemarkKind.STIFF: Sentence(
         "steps bounded by stability",
         ("{motion}",),
-        (("made by {method} instead of {before}", "use integrator={method!r}"),),
+        (("made by {method} instead of {before}", "use method={method!r}"),),
     ),
     RemarkKind.TOO_LONG: Sentence(
         "step too long to be stable",

@@ -13,7 +13,7 @@ class Statistics:
     """Steps, evaluations and times of a run.
 
     Attributes:
-        method: Name of the integrator.
+        method: Name of the integration method.
         step_s: Its step, or 0 if it chose its own.
         steps: Number of steps.
         evaluations: Evaluations of the equation of motion, those of its Jacobian apart.

@@ -88,7 +88,7 @@ class EventHandler:
         index = self.switching.number(index)
         if index < len(thresholds):
             self._add(self.switching.occurrence(index, t, y, side))
-            if self.state.setup.integrator.needs_jacobian:
+            if self.state.setup.method.needs_jacobian:
                 self.control.next_h[0] = 0.0  # an L-stable step damps what is fast: to start with, it must be resolved
             if self._chatters():
                 self._drop(thresholds[index])
@@ -128,7 +128,7 @@ class EventHandler:
         self._forget_regions()
         self.take_log()
         self._renew_table(t)
-        if state.setup.integrator.needs_jacobian:
+        if state.setup.method.needs_jacobian:
             self.control.next_h[0] = 0.0
         self._apply_mode()
 
@@ -214,7 +214,7 @@ class EventHandler:
         motion = self.state.equation.equation_of_motion
         excludes_time_stepping = motion.payloads or motion.drives
         if excludes_time_stepping or not self.may_replace:
-            soft, stepping = "soft stops and regularised friction", "integrator='time_stepping' and a step_s"
+            soft, stepping = "soft stops and regularised friction", "method='time_stepping' and a step_s"
             remedy = soft if excludes_time_stepping else stepping
             facts = {"changes": len(mode.changes), "span_s": span, "remedy": remedy}
             raise DivergedError(Outcome(Reason.EVENTS_ACCUMULATE, t, joint, facts))

@@ -91,7 +91,7 @@ class Reason(StrEnum):
     EVENTS_ACCUMULATE = "events_accumulate"
     """Impacts or changes between sliding and sticking follow each other in ever shorter times.
 
-    Take `integrator="time_stepping"` with a step, or soft stops and regularised friction.
+    Take `method="time_stepping"` with a step, or soft stops and regularised friction.
     """
 
     TORQUE_NOT_FINITE = "torque_not_finite"

@@ -52,7 +52,7 @@ def bounded_by_stability(setup: Setup, record: Recording) -> tuple[Remark, ...]:
     That is where h |λ| is about the end of the stability domain in most of some steps, λ the fastest decay.
     [Hairer, Wanner 1996, IV.2, p. 21]
     """
-    method, equation, t, y = setup.integrator, setup.equation, record.step_log.t, record.step_log.y
+    method, equation, t, y = setup.method, setup.equation, record.step_log.t, record.step_log.y
     explicit = method.controls_error and method.plain and not method.needs_jacobian
     if not explicit or record.steps < _LEAST_STEPS or len(t) < _LEAST_STEPS:
         return ()

@@ -14,7 +14,7 @@ from tests.wrong_arguments import NOT_NUMBERS, NOT_OBJECTS, examples
 
 # These open files, browsers and compilers, or take long by themselves; their arguments are tried one by one elsewhere.
 SLOW = {
-    "Compiled", "compare", "euler_lagrange", "list_robots", "load", "load_run", "load_rollouts", "save_rollouts",
+    "compiled", "compare", "euler_lagrange", "list_robots", "load", "load_run", "load_rollouts", "save_rollouts",
     "plot", "read_scene", "replay", "rollouts", "Adaptive.solve", "save_plot", "save_replay", "save_run",
     "show", "simulate", "linearise",
 }  # fmt: skip

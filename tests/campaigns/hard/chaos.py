@@ -126,7 +126,7 @@ def _run(robot: rd.Robot, of: tuple[Any, float], seed: int, duration: float, eng
     method, step = of
     fixed = {"step_s": step} if step else {}
     return rd.simulate(
-        robot, *start(seed, robot.n), duration_s=duration, integrator=method, record_every_s=PERIOD,
+        robot, *start(seed, robot.n), duration_s=duration, method=method, record_every_s=PERIOD,
         engine=engine, **fixed,
     )  # fmt: skip
 
@@ -164,7 +164,7 @@ def _lyapunov(seed: int) -> Iterator[Row]:
     robot, duration, small, h = arm("planar_2r"), 3.0, 1e-6, PERIOD / 4
     q0, v0 = start(seed, 2)
     method = rd.integrate.Adaptive("DOP853", 1e-11, 1e-13)
-    run = rd.simulate(robot, q0, v0, duration_s=duration, integrator=method, record_every_s=h / 2)
+    run = rd.simulate(robot, q0, v0, duration_s=duration, method=method, record_every_s=h / 2)
     A = [rd.linearise(robot, q, v, np.zeros(2))[0] for q, v in zip(run.q, run.v, strict=True)]
     aside = np.array([1.0, -1.0])
     x = np.array([*aside, 0.0, 0.0])

@@ -43,7 +43,7 @@ def loaded(name: str) -> rd.Robot:
 
 def implementations(robot: rd.Robot) -> Implementations:
     """Of a robot whose right angles are written out in full."""
-    engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.Compiled(robot)}
+    engines = {"Pinocchio": robot, "Lagrangian": rd.Lagrangian(robot), "machine code": rd.compiled(robot)}
     return Implementations(robot, engines, rd.Lagrangian(robot, rd.accuracy.Ball(BITS)))
 
 
