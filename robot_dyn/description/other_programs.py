@@ -1,4 +1,4 @@
-"""What a URDF states for other programs: rotors and gears, springs and dampers, soft limits.
+"""Rotors, gears, springs and soft limits that a URDF states for other programs.
 
 None of it acts unless an effect or edit asks for it. The elements are <transmission> of ROS control and of Drake,
 <gazebo>, <safety_controller>, and more attributes of <dynamics> than URDF defines.
