@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[1]
 # lowered to it.
 CEILINGS = {
     "opening": 201,
-    "as of": 43,
+    "as of": 42,
     "what without noun": 180,
     "is told": 5,
     "says that": 14,
@@ -48,7 +48,7 @@ CEILINGS = {
     "the same holds": 0,
     "each": 223,
     "arguments": 0,
-    "Any": 1100,
+    "Any": 1001,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.
