@@ -18,7 +18,7 @@ EXAMPLES = {
     },
     Reason.STEP_TOO_LONG: {
         "value": 0.01, "limit": 0.004, "method": "RK4", "step_s": "0.002",
-        "motion": "the fastest motion changes with 710 per second, of joint 'elbow_joint', by 'joint_stops'",
+        "motion": "changes", "rate_per_s": 710.0, "moving_joint": "elbow_joint", "source": "joint_stops",
     },
     Reason.IMPLAUSIBLE_SPEED: {"value": 640.0, "limit": 3.15, "unit": "rad/s", "step_s": 0.002},
     Reason.ENERGY_WITHOUT_SOURCE: _STEP,

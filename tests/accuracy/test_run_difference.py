@@ -245,7 +245,7 @@ def test_files_name_their_runs_and_old_files_say_what_is_not_known(tmp_path: Pat
     assert found.names == ("light", "heavy") and [each.name for each in found.settings] == ["payload on rod"]
     old = replace(light, about={name: text for name, text in light.about.items() if name != "settings"})
     assert "edits" in {each.name for each in rd.compare_runs(old, heavy).settings}
-    assert any("carries no settings" in each for each in rd.compare_runs(old, heavy).left_out)
+    assert any("contains no settings" in each for each in rd.compare_runs(old, heavy).left_out)
 
 
 def test_the_command_writes_its_figure_and_its_document(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from robot_dyn.control import Block, Controller
 from robot_dyn.effects import Effect
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SceneError, TraceError, tanh
 from robot_dyn.scene.effects import DeclaredEffect
-from robot_dyn.simulation import MachineError, Verdict
+from robot_dyn.simulation import DoubtKind, MachineError, Verdict
 from robot_dyn.simulation.diagnostics.smoothness import LOOKS
 from robot_dyn.simulation.dynamics.declarations import undeclared
 from robot_dyn.simulation.engine.choice import choose
@@ -91,7 +91,7 @@ def test_a_declared_effect_is_not_looked_at_between_steps_and_an_undeclared_one_
         made = rd.simulate(plant, Q, V, duration_s=0.3, engine="interpreted", record_every_s=0.1)
         counts.append(kind.calls - made.statistics.evaluations - made.statistics.companion_evaluations)
     assert made.error is not None and made.error.verdict is Verdict.BOUND
-    assert "Silent declares no thresholds" in made.error.reason
+    assert made.error.no_order.kind is DoubtKind.UNDECLARED and made.error.no_order.facts["part"] == "Silent"
     assert counts[0] < 100 < LOOKS <= counts[1]  # of the start, the samples and their ledger
 
 

@@ -10,7 +10,7 @@ import pytest
 import robot_dyn as rd
 from robot_dyn.cli import report
 from robot_dyn.foundations import QueryError
-from robot_dyn.simulation import ErrorEstimate, Verdict
+from robot_dyn.simulation import Doubt, DoubtKind, ErrorEstimate, Verdict
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.estimate.estimate import estimate
 from robot_dyn.simulation.results.error_estimate import no_estimate
@@ -119,7 +119,8 @@ def test_chaos_at_a_coarse_step_is_not_resolved(step: float) -> None:
     assert error[-1] > 1.0  # the end of the run is fiction
     assert estimate is not None
     assert estimate.until_s < 20.0
-    assert "differ by more than 0.1 rad or m; take step_s" in estimate.note
+    assert estimate.ends_early and estimate.ends_early.kind is DoubtKind.COMPANIONS_DIFFER
+    assert estimate.ends_early.facts == {"limit": 0.1, "smaller_step_s": step / 4}
     assert f"up to t = {estimate.until_s:g} s" in run.summary
     assert estimate.note in run.summary
     before = error[run.t <= estimate.until_s]
@@ -132,7 +133,7 @@ def test_a_long_adaptive_run_of_chaos_is_not_resolved() -> None:
     run = rd.simulate(chaos, method=rd.integrate.Adaptive(rtol=1e-4, atol=1e-6))
     assert run.error is not None
     assert run.error.until_s < 20.0
-    assert "take rtol = 1e-06" in run.error.note
+    assert run.error.ends_early and run.error.ends_early.facts["smaller_rtol"] == 1e-6
     assert run.error.at(run.error.until_s) <= 0.1 and run.error.largest == np.inf
 
 
@@ -151,12 +152,12 @@ def test_a_run_whose_estimate_ends_early_has_no_finite_error() -> None:
 
 def test_the_estimate_at_a_time_is_the_largest_up_to_it() -> None:
     t, error = np.array([0.0, 0.1, 0.2, 0.3]), np.array([0.0, 1e-9, 1e-9, 4e-9])
-    whole, early = ErrorEstimate(t, error, 0.3), ErrorEstimate(t, error, 0.2, note="companions differ")
+    whole, early = ErrorEstimate(t, error, 0.3), ErrorEstimate(t, error, 0.2, Doubt(DoubtKind.COMPANIONS_DIFFER))
     assert whole.largest == whole.at(0.3) == 4e-9 and early.largest == np.inf
     np.testing.assert_array_equal(early.at([0.0, 0.05, 0.1, 0.15, 0.2, 0.21]), [0, 1e-9, 1e-9, 1e-9, 1e-9, np.inf])
     assert whole.at(3 * 0.1) == 4e-9  # one unit after 0.3
     assert np.isnan(whole.at([-0.1, np.nan])).all() and whole.at(np.zeros((2, 3))).shape == (2, 3)
-    none = no_estimate("it ended in its first step")
+    none = no_estimate(Doubt(DoubtKind.ENDED_AT_ONCE))
     assert none.largest == none.at(0.0) == np.inf
     with pytest.raises(QueryError, match="t must be a time in seconds"):
         whole.at(["soon"])

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 import robot_dyn as rd
 from robot_dyn.effects import Active
 from robot_dyn.foundations import QueryError, tanh
-from robot_dyn.simulation import Verdict
+from robot_dyn.simulation import Doubt, DoubtKind, Verdict
 from robot_dyn.simulation.results import provenance as origin
 from tests.campaigns.estimates.judge import FAR, LEAST, MOST, judge
 from tests.campaigns.estimates.layers import judge_layer, slide, slider_truth
@@ -128,7 +128,7 @@ def test_a_switch_in_the_last_step_ends_the_estimate() -> None:
     plant = rd.Plant(TOSS, rd.effects.joint_stops([-50.0], [apex - 0.5], 1e6, 0.0))
     run = rd.simulate(plant, [0.0], [10.0], duration_s=0.703, method="DP8", step_s=0.01, engine="interpreted")
     exact = rebound(run, 0.5, 1e6)
-    assert run.error.at(run.error.until_s) >= LEAST * exact or "switches in the last step" in run.error.note
+    assert run.error.at(run.error.until_s) >= LEAST * exact or run.error.ends_early.kind is DoubtKind.SWITCHES_LAST
     assert exact > 1e3 * run.error.at(run.error.until_s)
 
 
@@ -137,7 +137,7 @@ def test_an_order_that_is_seen_is_that_of_the_run(seed: int, index: int) -> None
     """A swing, bristles and stops; longer steps show another order, or by chance that one, or magnify rounding."""
     judged = judge(seed, index, scene_of_all)
     assert judged.run.error.verdict is Verdict.ORDER, str(judged)
-    assert "rounding" not in judged.run.error.note
+    assert judged.run.error.ends_early is None or judged.run.error.ends_early.kind is not DoubtKind.ROUNDING
     assert LEAST <= judged.ratio <= FAR, str(judged)
 
 
@@ -199,7 +199,7 @@ def test_an_effect_of_a_user_declares_its_layer(level: float) -> None:
     error = np.abs(found[0].q[:, 0] - exact.y[0]).max()
     assert [run.error.verdict for run in found] == [Verdict.ORDER, Verdict.BOUND]
     assert found[0].error.largest < LEAST * error < found[1].error.largest
-    assert "layer" in found[1].error.reason
+    assert found[1].error.no_order.kind is DoubtKind.LAYER_CROSSED
 
 
 def slid(method: str, step: float, friction, motion) -> tuple[rd.Trajectory, float]:
@@ -312,7 +312,7 @@ def test_rounding_of_a_far_position_is_in_the_estimate(far: float) -> None:
     """Q += h v loses what is below half a unit of q's last place, in every step and every companion run alike."""
     run = rd.simulate(RAIL, [far], [0.7], duration_s=1.0, method="SemiImplicitEuler")
     error = abs(run.q[-1, 0] - (far + 0.7))
-    assert run.error.at(run.error.until_s) >= LEAST * error or "rounding" in run.error.note
+    assert run.error.at(run.error.until_s) >= LEAST * error or run.error.ends_early.kind is DoubtKind.ROUNDING
     assert (far == 1e9) == (run.error.note == "")
 
 
@@ -347,7 +347,8 @@ def test_turns_that_no_step_can_see_have_no_estimate() -> None:
     """A whole turn in each step: gravity is sampled at one angle, in all companions alike."""
     run = rd.simulate(rd.load("pendulum"), [0.0], [400 * np.pi], duration_s=0.5, method="RK4", step_s=5e-3)
     assert run.error.verdict is Verdict.NONE
-    assert "turns by 6.28 rad in a step" in run.error.note
+    assert run.error.ends_early.kind is DoubtKind.TURNS_TOO_FAR
+    assert run.error.ends_early.facts["turn"] == pytest.approx(2 * np.pi, rel=1e-3)
 
 
 @pytest.mark.parametrize("method", [OwnImplicit(), *long(["Rodas5PFixed"])])
@@ -357,7 +358,8 @@ def test_an_oscillation_that_a_method_damps_has_no_estimate(method: Any) -> None
     options = {"duration_s": 0.02, "method": method, "engine": "interpreted"}
     run = rd.simulate(rd.Plant(bar, [rd.effects.Spring(1e8)]), [1e-2], step_s=1e-3, **options)
     assert run.error.verdict is Verdict.NONE
-    assert "joint 'pivot', by 'spring'" in run.error.note
+    assert run.error.ends_early.kind is DoubtKind.OSCILLATION_DAMPED
+    assert [run.error.ends_early.facts[name] for name in ("moving_joint", "source")] == ["pivot", "spring"]
     slow = rd.simulate(rd.Plant(bar, [rd.effects.Spring(1e4)]), [1e-2], step_s=1e-3, **options)  # ω h = 0.17
     exact = 1e-2 * np.cos(np.sqrt(3e4) * slow.t[:, None])
     assert slow.error.at(slow.error.until_s) >= LEAST * np.abs(slow.q - exact).max()
@@ -406,13 +408,13 @@ def test_the_summary_tells_an_estimate_from_a_bound_and_the_time_it_covers() -> 
 
     t, error = np.array([0.0, 0.008]), np.array([0.0, 2e-9])
     assert str(ErrorEstimate(t, error, 0.008)) == "2.0e-09 (order seen)"
-    bounded = ErrorEstimate(t, error, 0.008, verdict=Verdict.BOUND, reason="a joint touches its stop")
-    assert str(bounded) == "about 2.0e-09 (bounded: a joint touches its stop)"
-    early = ErrorEstimate(t, error, 0.008, note="companion runs differ; take step_s = 1e-04")
-    assert (
-        str(early)
-        == "2.0e-09 up to t = 0.008 s (order seen); after that none: companion runs differ; take step_s = 1e-04"
-    )
+    cut = Doubt(DoubtKind.SATURATES)
+    bounded = ErrorEstimate(t, error, 0.008, verdict=Verdict.BOUND, no_order=cut)
+    assert str(bounded) == f"about 2.0e-09 (bounded: {cut.text})"
+    differ = Doubt(DoubtKind.COMPANIONS_DIFFER, {"limit": 0.1, "smaller_step_s": 1e-4})
+    early = ErrorEstimate(t, error, 0.008, differ)
+    assert "take step_s = 1e-04" in early.note
+    assert str(early) == f"2.0e-09 up to t = 0.008 s (order seen); after that none: {early.note}"
 
 
 def test_a_ledger_that_contradicts_the_estimate_is_told() -> None:

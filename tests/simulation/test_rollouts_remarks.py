@@ -203,7 +203,7 @@ def test_a_sampled_loop_is_linearised_in_the_worst_run() -> None:
     )
     assert remark.runs == (runs.worst,) and remark.joint == theirs.joint
     assert remark.value == pytest.approx(theirs.value, rel=1e-6) and remark.remedy == theirs.remedy
-    assert f"{remark.text} (run {runs.worst}; the only run looked at)" in runs.summary
+    assert f"{remark.text} (run {runs.worst}; the only run examined)" in runs.summary
 
 
 def test_tracking_errors_of_a_frame() -> None:

@@ -129,7 +129,7 @@ def said(text: np.ndarray, **changes) -> np.ndarray:
         ("about", lambda _: None, "no text 'about'"),
         ("about", lambda text: np.array("[" * 100_000), "'about' is not JSON"),
         ("about", lambda text: np.array([str(text)]), "no text 'about'"),
-        ("about", lambda text: said(text, format=3), "it has format 3, but this version reads 8; .*robot-dyn"),
+        ("about", lambda text: said(text, format=3), "it has format 3, but this version reads 9; .*robot-dyn"),
         ("about", lambda text: said(text, format="3"), "it has format '3'"),
         ("about", lambda text: said(text, format={"a": 3}), "it has format {'a': 3}"),
         ("about", lambda text: said(text, novelty=3), "'novelty': .*3"),

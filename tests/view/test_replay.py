@@ -267,7 +267,7 @@ def test_runs_that_cannot_be_shown_say_why(swing) -> None:
     arrays = {name: getattr(swing, name)[:0] for name in ("t", "q", "v", "a", "u")}
     for why, changes in (
         ("no samples", arrays),
-        ("carries no URDF", {"about": {}}),
+        ("contains no URDF", {"about": {}}),
         ("not those of its URDF", {"joint_names": ("a", "b")}),
         ("edits that the run carries", {"about": swing.about | {"edits": json.dumps({"gravity": 1})}}),
     ):

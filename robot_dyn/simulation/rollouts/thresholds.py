@@ -100,7 +100,8 @@ def _of_runs(
     """Yield the thresholds of the runs, with the numbers of those that have them, (k,)."""
     plant, controller = equation.plant, equation.controller
     known = parameters(plant.dynamics, plant.effects, controller, sweep)
-    of = {("effect", i): effect for i, effect in enumerate(plant.effects)} | {CONTROLLER: controller}
+    of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(plant.effects)}
+    of[CONTROLLER] = controller
     parts = {x.part for x in known if x.name in sweep and x.part in of and not _always_smooth(of[x.part])}
     known = [x for x in known if x.part in parts]
     values, places = joined(known), {x.name: rows(known, x.name) for x in known if x.name in sweep}

@@ -103,7 +103,7 @@ class Watch:
             facts: dict[str, float | str] = {"steps": since, "advanced_s": made, "remaining": ahead}
             facts["remedy"] = f"{implicit}softer effects or a larger tolerance"
             motion = self._fastest(t, y, made / since)
-            facts |= {"motion": str(motion)} if motion else {}
+            facts |= motion.facts if motion else {}
             joint = motion.joint if motion else ""
             raise DivergedError(Outcome(Reason.STALLED, t, joint, facts | self._steepest()))
 

@@ -16,7 +16,6 @@ is 0.01 of the logarithm.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from functools import cache, partial
 from typing import Any
@@ -103,8 +102,8 @@ def errors(run: rd.Trajectory, q: np.ndarray) -> np.ndarray:
 
 def passed(run: rd.Trajectory, q: np.ndarray) -> float:
     """Time at which the true error passes the limit that the run names; the end if it does not."""
-    named = re.search(r"more than ([\d.e-]+) ", run.error.note)
-    limit = float(named[1]) if named else 0.1
+    facts = run.error.ends_early.facts if run.error.ends_early else {}
+    limit = float(facts.get("limit", facts.get("tenth", 0.1)))
     beyond = np.flatnonzero(errors(run, q) > limit)
     return float(run.t[beyond[0]]) if len(beyond) else float(run.t[-1])
 

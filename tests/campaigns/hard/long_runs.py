@@ -167,7 +167,7 @@ STEPS_OF = {  # of the full form: some 4 minutes on one core at most
 
 
 def _case(name: str, method: str, steps: int, full: bool = True) -> Case:
-    run = _symplectic if method.startswith("Gauss") else _explicit
+    run = _symplectic if method.startswith("GaussLegendre") else _explicit
     return Case(f"{NAMES[name]}, {method}, {steps:g} steps", partial(run, name, method, steps), full)
 
 
