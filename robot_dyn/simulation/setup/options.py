@@ -32,7 +32,7 @@ class Options(TypedDict, total=False):
 
     duration_s: float
     controller: Any
-    integrator: Any
+    method: Any
     step_s: float | None
     record_every_s: float
     estimate_error: bool
@@ -69,11 +69,11 @@ def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, 
     known = {each.name for each in fields(Setup)} if isinstance(what, Setup) else {"q0", "v0", *Options.__annotations__}
     for name in options.keys() - known:
         if name in ("rtol", "atol"):  # a key of scenes, and in texts
-            remedy = f"it is of the method: integrator=rd.integrate.Adaptive({name}=…)"
+            remedy = f"it is of the method: method=rd.integrate.Adaptive({name}=…)"
         else:
             remedy = nearest(name, known)
         raise QueryError(f"{caller}: no option {name!r}; {remedy}")
-    if "integrator" in options and (method := as_method(options["integrator"])).controls_error:
+    if "method" in options and (method := as_method(options["method"])).controls_error:
         if "step_s" in options:
             raise QueryError(no_step(method.name))
         options = {"step_s": None, **options}  # that of the setup was given for another method

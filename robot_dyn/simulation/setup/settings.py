@@ -49,7 +49,7 @@ def _all(setup: Setup) -> Iterator[Setting]:
         yield from _numbers(effect.name, effect, types)
     if setup.controller is not None:
         yield from _of_controller(setup.controller, types)
-    method: Any = setup.integrator
+    method: Any = setup.method
     yield "method", method.name
     if method.controls_error:
         yield from (("rtol", _number(method.rtol)), ("atol", _number(method.atol)))

@@ -64,9 +64,8 @@ class Setup(Value, Caching):
         v0: Velocity at the start, (n,); 0 if not given.
         duration_s: In [s].
         controller: What drives it: a `Controller`; a function (t, q, v) → torque (n,), which becomes one; or None.
-        integrator: The method, by its name as in a scene or itself: "auto", "DOP853" and "Rosenbrock", or an `Adaptive`
-            with other tolerances, choose their steps; "rk4", "order_8", "gauss_4" and others of
-            `rd.integrate.method` have a fixed one.
+        method: The integration method, or its name, see `rd.integrate.method`. "auto", "DOP853" and "Rosenbrock" choose
+            their steps, as does an `Adaptive` with other tolerances; others, such as "rk4", have a fixed step.
         step_s: Fixed step, 1 ms unless given; shortened where samples, ticks, switches and the end require it. It is
             not to be given for a method that chooses its steps.
         record_every_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
@@ -86,7 +85,7 @@ class Setup(Value, Caching):
     v0: Any = None
     duration_s: float = 1.0
     controller: Any = None
-    integrator: Any = "auto"
+    method: Any = "auto"
     step_s: float | None = None
     record_every_s: float = 0.0
     estimate_error: bool = True
@@ -104,7 +103,7 @@ class Setup(Value, Caching):
         names = self.plant.dynamics.joint_names
         if self.v0 is None:
             object.__setattr__(self, "v0", np.zeros(len(names)))
-        object.__setattr__(self, "integrator", as_method(self.integrator))
+        object.__setattr__(self, "method", as_method(self.method))
         for name in ("q0", "v0"):
             object.__setattr__(self, name, one_state(name, getattr(self, name), names))
         for name in ("duration_s", "step_s", "record_every_s"):
@@ -118,23 +117,23 @@ class Setup(Value, Caching):
         ):
             instance("about", text, str, "give texts by name")
         object.__setattr__(self, "about", dict(self.about))
-        if self.integrator.controls_error and self.step_s is not None:
-            raise QueryError(no_step(self.integrator.name))
+        if self.method.controls_error and self.step_s is not None:
+            raise QueryError(no_step(self.method.name))
         choice("engine", self.engine, ENGINES)
         object.__setattr__(self, "events", _events(self.events))
         object.__setattr__(self, "controller", _controller(self.controller, len(names)))
         if self.controller is not None:
             check_model(self.plant.dynamics, self.controller, self.q0)
         _check_segments(self)
-        check_method(self.plant, self.integrator, self.events, self.finds_events)
+        check_method(self.plant, self.method, self.events, self.finds_events)
         check_start(self.plant, self.controller, self.events, self.q0, self.v0)  # pyright: ignore[reportArgumentType]
 
     def _check_accuracy(self) -> None:
         """That an accuracy is one, and that nothing else chooses method or tolerance."""
         object.__setattr__(self, "accuracy", least_accuracy(self.accuracy, self.plant.dynamics))
-        if self.integrator != Adaptive(AUTO):
-            name = self.integrator.name
-            raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {name!r}")
+        if self.method != Adaptive(AUTO):
+            name = self.method.name
+            raise QueryError(f"accuracy: chooses method and tolerance; leave out method, got {name!r}")
         if not self.estimate_error:
             raise QueryError("accuracy: is held to the error estimate; leave out estimate_error=False")
 
@@ -151,12 +150,12 @@ class Setup(Value, Caching):
     @cached_property
     def is_value(self) -> bool:
         """Whether no part but its events is user-defined code, or may change: what follows from it stays as it is."""
-        return all(map(is_value, (self.plant, self.controller, self.integrator)))
+        return all(map(is_value, (self.plant, self.controller, self.method)))
 
     @cached_property
     def equation(self) -> StateEquation:
         """Its state equation."""
-        return StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
+        return StateEquation(self.plant, self.controller, self.method.canonical, self.events)
 
     @cached_property
     def undeclared(self) -> tuple[tuple[Any, str], ...]:
@@ -199,8 +198,8 @@ class Setup(Value, Caching):
     @property
     def finds_events(self) -> bool:
         """Whether steps end where effects and the controller switch, and at requested events."""
-        if self.integrator.controls_error or self.integrator.nonsmooth:
-            return not self.integrator.nonsmooth
+        if self.method.controls_error or self.method.nonsmooth:
+            return not self.method.nonsmooth
         return self.equation.switches and self.steps <= MOST_CUT
 
     @property
@@ -241,7 +240,7 @@ def no_step(name: str) -> str:
     """What is wrong with a step for a method that chooses its own."""
     return (
         f"step_s has no effect on {name}, which chooses its steps: leave it out, name a method of fixed step, such as"
-        " integrator='rk4', or give rd.integrate.Adaptive(max_step_s=…)"
+        " method='rk4', or give rd.integrate.Adaptive(max_step_s=…)"
     )
 
 
@@ -307,7 +306,7 @@ def segments(setup: Setup) -> float:
 
 def steps(setup: Setup) -> float:
     """About so many steps of a fixed-step method; 0 for an adaptive one, which chooses them."""
-    if setup.integrator.controls_error:
+    if setup.method.controls_error:
         return 0.0
     step = min(setup.nominal_step_s, setup.record_every_s or inf)  # samples lie on steps
     return setup.duration_s / step + 4 * segments(setup)
@@ -354,7 +353,7 @@ def too_large(what: str, size: float, most: float, or_else: str = "") -> QueryEr
 def samples(setup: Setup) -> float:
     """At most so many samples."""
     periods = setup.duration_s / setup.record_every_s + 2 if setup.record_every_s else inf
-    adaptive = setup.integrator.controls_error
+    adaptive = setup.method.controls_error
     return min(periods, 1000 + segments(setup) if adaptive and periods == inf else inf, steps(setup) or inf)
 
 
@@ -378,7 +377,7 @@ def shortened(setup: Setup) -> str:
 
 
 def _method(setup: Setup) -> Iterator[str]:
-    method: Any = setup.integrator
+    method: Any = setup.method
     name: str = method.name
     used: dict[str, Any] = {}
     if setup.accuracy is not None:
