@@ -13,6 +13,7 @@ from typing import Any, overload
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.codegen.dynamics import CompiledDynamics
 from robot_dyn.codegen.engine import Engine
@@ -104,15 +105,19 @@ class CompiledPlant:
         """Names of the n joints, in the order of q."""
         return self.dynamics.joint_names
 
-    def M(self, q: Array, *, t: Any = None, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+    def M(self, q: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None, errors: str = "raise") -> Any:
         """Return the mass matrix, (..., n, n); it does not depend on t."""
         return self._rigid.M(q, out=out, errors=errors)
 
-    def C(self, q: Array, v: Array, *, t: Any = None, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+    def C(
+        self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> Any:
         """Return the Coriolis matrix, (..., n, n); it does not depend on t."""
         return self._rigid.C(q, v, out=out, errors=errors)
 
-    def N(self, q: Array, v: Array, *, t: Any = None, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+    def N(
+        self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> Any:
         """Return gravity minus the torques of the effects, N = ∂V/∂q − Σ τ_effect, (..., n), in [N m] or [N].
 
         Args:
@@ -127,18 +132,34 @@ class CompiledPlant:
         """
         return self._ask("N", (self._any_time if t is None else t, q, v), out, errors)
 
-    def torque(self, q: Array, v: Array, *, t: Any = None, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+    def torque(
+        self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None, errors: str = "raise"
+    ) -> Any:
         """Return Σ τ_effect, (..., n); for arguments and errors, see `N`."""
         return self._ask("torque", (self._any_time if t is None else t, q, v), out, errors)
 
     def inverse_dynamics(
-        self, q: Array, v: Array, a: Array, *, t: Any = None, out: np.ndarray | None = None, errors: str = "raise"
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        *,
+        t: ArrayLike | None = None,
+        out: np.ndarray | None = None,
+        errors: str = "raise",
     ) -> Any:
         """Return the actuation τ = M a + C v + N for the acceleration a, (..., n)."""
         return self._ask("inverse_dynamics", (self._any_time if t is None else t, q, v, a), out, errors)
 
     def forward_dynamics(
-        self, q: Array, v: Array, u: Array, *, t: Any = None, out: np.ndarray | None = None, errors: str = "raise"
+        self,
+        q: Array,
+        v: Array,
+        u: Array,
+        *,
+        t: ArrayLike | None = None,
+        out: np.ndarray | None = None,
+        errors: str = "raise",
     ) -> Any:
         """Return the acceleration under the actuation u, (..., n)."""
         return self._ask("forward_dynamics", (self._any_time if t is None else t, q, v, u), out, errors)
