@@ -60,7 +60,7 @@ def check_start(
     nothing = np.zeros(plant.dynamics.n)
     plant.actuation(nothing)
     with suppress(OverflowedError):  # a start so far out is the outcome of a run
-        plant.forward_dynamics(0.0, q0, v0, nothing)  # a singular M is reported here
+        plant.forward_dynamics(q0, v0, nothing, t=0.0)  # a singular M is reported here
 
 
 def check_model(plant: Dynamics, controller: Controller, q0: np.ndarray) -> None:
