@@ -30,8 +30,8 @@ EXAMPLES = {
         "remedy": "Rodas5P, softer effects or a larger tolerance",
     },
     Reason.STAGES_NOT_FOUND: {
-        "error": "GaussLegendre4: the stages of the step 0.01 at t = 0.13 do not converge in 50 iterations: take a smaller "
-        "step, or a method for stiff systems"
+        "error": "GaussLegendre4: the stages of the step 0.01 at t = 0.13 do not converge in 50 iterations: take a "
+        "smaller step, or a method for stiff systems"
     },
     Reason.EVENTS_ACCUMULATE: {
         "changes": 1000, "span_s": 2.1e-10, "remedy": "method='MoreauJean' and a step_s"
