@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import MISSING, fields, replace
-from inspect import signature
+from inspect import Parameter, signature
 from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
@@ -28,11 +28,13 @@ _MAX_SEGMENTS = 1000  # building more takes little of the time of their run, and
 
 
 class Options(TypedDict, total=False):
-    """Attributes of a `Setup`, but for plant and start, for readers and type checkers."""
+    """Attributes of a `Setup` without plant and start, and the tolerances of its method; for type checkers."""
 
     duration_s: float
     controller: Any
     method: Any
+    rtol: float | None
+    atol: float | None
     step_s: float | None
     record_every_s: float
     estimate_error: bool
@@ -43,7 +45,8 @@ class Options(TypedDict, total=False):
 
 
 _BUILT = {each.name: each.default_factory() for each in fields(Setup) if each.default_factory is not MISSING}
-_STATED = {name: signature(Setup).parameters[name] for name in Options.__annotations__}
+_TOLERANCES = {name: Parameter(name, Parameter.KEYWORD_ONLY, default=None) for name in ("rtol", "atol")}
+_STATED = {name: (signature(Setup).parameters | _TOLERANCES)[name] for name in Options.__annotations__}
 takes_options = takes([x.replace(default=_BUILT.get(name, x.default)) for name, x in _STATED.items()])
 """A decorator: the signature shows each option with its default, in place of `**options`."""
 
@@ -62,27 +65,43 @@ def setup_of(caller: str, what: Setup | Plant | Dynamics, options: Mapping[str, 
         options: The options that were given, q0 and v0 among them.
 
     Raises:
-        QueryError: If an option is unknown, or q0 is missing.
+        QueryError: If an option is unknown, q0 is missing, or a method of fixed step is given a tolerance.
     """
     if isinstance(what, Setup) and not options:
         return what if what.is_value else copy(what)  # parts may have changed since: nothing cached is used
-    known = {each.name for each in fields(Setup)} if isinstance(what, Setup) else {"q0", "v0", *Options.__annotations__}
+    attributes = {field.name for field in fields(Setup)} if isinstance(what, Setup) else {"q0", "v0"}
+    known = attributes | Options.__annotations__.keys()
     for name in options.keys() - known:
-        if name in ("rtol", "atol"):  # a key of scenes, and in texts
-            remedy = f"it is of the method: method=rd.integrate.Adaptive({name}=…)"
-        else:
-            remedy = nearest(name, known)
-        raise QueryError(f"{caller}: no option {name!r}; {remedy}")
+        raise QueryError(f"{caller}: no option {name!r}; {nearest(name, known)}")
     if "method" in options and (method := as_method(options["method"])).controls_error:
         if "step_s" in options:
             raise QueryError(no_step(method.name))
         options = {"step_s": None, **options}  # that of the setup was given for another method
     if isinstance(what, Setup):
-        return replace(what, **options)
+        return replace(what, **_with_tolerances(options, what.method))
     plant = what if isinstance(what, Plant) else _plant(what)
     if "q0" not in options:
         raise QueryError(f"{caller}: give q0, the position at the start, ({plant.dynamics.n},)")
     return _latest_or_new(plant, options)
+
+
+def _with_tolerances(options: Mapping[str, Any], default: Any = Setup.method) -> dict[str, Any]:
+    """Return the options with `rtol` and `atol` as tolerances of the method, or of `default` if no method is given.
+
+    Raises:
+        QueryError: If a tolerance is given for a method of fixed step.
+    """
+    attributes = {name: value for name, value in options.items() if name not in _TOLERANCES}
+    tolerances = {name: options[name] for name in _TOLERANCES if options.get(name) is not None}
+    if not tolerances:
+        return attributes
+    method = as_method(attributes.get("method", default))
+    if not isinstance(method, Adaptive):
+        raise QueryError(
+            f"{' and '.join(tolerances)}: no effect on {method.name}, which has a fixed step; use step_s, or an"
+            " adaptive method, for example method='DOP853'"
+        )
+    return attributes | {"method": replace(method, **tolerances)}
 
 
 def _plant(dynamics: Dynamics) -> Plant:
@@ -107,11 +126,11 @@ def _latest_or_new(plant: Plant, options: Mapping[str, Any]) -> Setup:
     try:
         content = _content(dict(sorted(options.items())))
     except _MayChangeError:
-        return Setup(plant, **options)
+        return Setup(plant, **_with_tolerances(options))
     latest = plant.cache.get(Setup)
     if latest is not None and latest.content == content:
         return latest.setup
-    setup = Setup(plant, **options)
+    setup = Setup(plant, **_with_tolerances(options))
     if setup.is_value and not setup.events and segments(setup) <= _MAX_SEGMENTS:
         plant.cache[Setup] = _Latest(options, content, setup)
     return setup

@@ -133,7 +133,7 @@ class Setup(Value, Caching):
         object.__setattr__(self, "accuracy", least_accuracy(self.accuracy, self.plant.dynamics))
         if self.method != Adaptive(AUTO):
             name = self.method.name
-            raise QueryError(f"accuracy: chooses method and tolerance; leave out method, got {name!r}")
+            raise QueryError(f"accuracy: chooses method and tolerances; leave out method, rtol and atol, got {name!r}")
         if not self.estimate_error:
             raise QueryError("accuracy: is held to the error estimate; leave out estimate_error=False")
 
