@@ -14,16 +14,19 @@ from robot_dyn.effects.rigid_stops import RigidStops
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import ControlError, EffectError, OverflowedError, QueryError, call, shown
 from robot_dyn.foundations.validate import Kind, float64, number
+from robot_dyn.integrate.adaptive import Adaptive
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.dynamics.event import Event
 from robot_dyn.simulation.setup.schedule import MOST_CUT
 
 _UNITS = ("rad", "m")
+Method = Integrator | Adaptive
 Accuracy = float | Mapping[str, float]
 """A requested accuracy: one number for rad and m, or a number for each unit."""
 
 
-def check_method(plant: Plant, method: Any, events: tuple[Event, ...], finds_events: bool) -> None:
+def check_method(plant: Plant, method: Method, events: tuple[Event, ...], finds_events: bool) -> None:
     """Check that a method can integrate a plant and can locate the events.
 
     Raises:
@@ -97,12 +100,12 @@ def check_stops(plant: Plant, q0: Array, name: str = "q0") -> None:
             raise QueryError(f"{name}: {joint!r} is {depth[i]:.3g} beyond its {which} stop; start between the stops")
 
 
-def _check_set_valued(plant: Plant, method: Any, finds_events: bool) -> None:
+def _check_set_valued(plant: Plant, method: Method, finds_events: bool) -> None:
     """Check that the steps of a method can end where dry friction, stops or backlash hold or release a joint."""
     effects = plant.equation_of_motion.set_valued
     for is_unsuited, reason in (
         (method.canonical, "integrates momenta"),
-        (not method.controls_error and method.order < 2, "is of order 1, too low to find where"),
+        (isinstance(method, Integrator) and method.order < 2, "is of order 1, too low to find where"),
         (not finds_events, f"takes more than {MOST_CUT} steps"),
     ):
         if effects and is_unsuited and not method.nonsmooth:
@@ -114,7 +117,7 @@ def _check_set_valued(plant: Plant, method: Any, finds_events: bool) -> None:
         raise QueryError(f"{other[0].name}: has no law for {method.name}; take integrator='DOP853'")
 
 
-def _check_payloads(plant: Plant, method: Any) -> None:
+def _check_payloads(plant: Plant, method: Method) -> None:
     """Check that a method can continue after a payload has been picked up or dropped."""
     for is_unsuited, reason in (
         (method.canonical, f"what is picked up or dropped changes momenta, which {method.name} integrates"),

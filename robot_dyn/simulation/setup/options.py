@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import MISSING, fields, replace
 from inspect import signature
-from typing import Any, NamedTuple, TypedDict
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,29 +23,19 @@ from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.queries.dynamics import Dynamics
-from robot_dyn.simulation.setup.setup import Setup, no_step, segments
+from robot_dyn.simulation.setup.setup import Options, Setup, no_step, segments
 
 _MAX_SEGMENTS = 1000  # of a cached setup: more take memory, and building them takes little of the time of the run
 
 
-class Options(TypedDict, total=False):
-    """Attributes of a `Setup` other than plant and start, for readers and type checkers."""
-
-    duration_s: float
-    controller: Any
-    integrator: Any
-    step_s: float | None
-    record_every_s: float
-    estimate_error: bool
-    about: dict[str, str]
-    engine: str
-    events: Any
-    accuracy: Any
-
-
 _BUILT = {field.name: field.default_factory() for field in fields(Setup) if field.default_factory is not MISSING}
 _STATED = {name: signature(Setup).parameters[name] for name in Options.__annotations__}
-takes_options = takes([x.replace(default=_BUILT.get(name, x.default)) for name, x in _STATED.items()])
+takes_options = takes(
+    [
+        x.replace(default=_BUILT.get(name, x.default), annotation=Options.__annotations__[name].__forward_arg__)
+        for name, x in _STATED.items()
+    ]
+)
 """A decorator: the signature then shows each option with its default instead of `**options`."""
 
 

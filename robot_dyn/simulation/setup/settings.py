@@ -12,6 +12,7 @@ import numpy as np
 from robot_dyn.control.reference import PiecewisePolynomial, Reference
 from robot_dyn.description.edits import Edits, Payload
 from robot_dyn.foundations.coefficients import declared
+from robot_dyn.integrate.adaptive import Adaptive
 from robot_dyn.queries.units import coefficient_unit
 from robot_dyn.simulation.setup.explanation import pace
 
@@ -49,9 +50,9 @@ def _all(setup: Setup) -> Iterator[Setting]:
         yield from _numbers(effect.name, effect, types)
     if setup.controller is not None:
         yield from _of_controller(setup.controller, types)
-    method: Any = setup.integrator
+    method = setup.integrator
     yield "method", method.name
-    if method.controls_error:
+    if isinstance(method, Adaptive):
         yield from (("rtol", _number(method.rtol)), ("atol", _number(method.atol)))
     else:
         yield "step", f"{_number(setup.nominal_step_s)} s"

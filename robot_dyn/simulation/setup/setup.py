@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import inf, ulp
 from sys import float_info
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robot_dyn.control.controller import ControlLaw, Controller
 from robot_dyn.effects.explanation import Explanation, explanation
@@ -19,12 +20,13 @@ from robot_dyn.foundations.errors import QueryError, shown
 from robot_dyn.foundations.validate import LEAST_EXACT, choice, duration, instance, integer, one_state, truth
 from robot_dyn.foundations.values import Caching, Value
 from robot_dyn.integrate.adaptive import AUTO, Adaptive
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import as_method
 from robot_dyn.queries.units import joint_units
 from robot_dyn.simulation.dynamics.declarations import is_value, undeclared
 from robot_dyn.simulation.dynamics.event import Event
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
-from robot_dyn.simulation.setup.checks import check_method, check_model, check_start, least_accuracy
+from robot_dyn.simulation.setup.checks import Accuracy, check_method, check_model, check_start, least_accuracy
 from robot_dyn.simulation.setup.explanation import control_lines, law
 from robot_dyn.simulation.setup.schedule import LEAST_STEPS, MOST_CUT, ON_STEP, Segment, cuts, near, nodes, steps_on
 
@@ -51,6 +53,21 @@ CACHED = {
     "with_time_stepping": "the same setup with time stepping",
 }
 """All values cached with a setup, by the function that computes them; see `foundations.values.cached`."""
+
+
+class Options(TypedDict, total=False):
+    """Attributes of a `Setup` other than plant and start, in the forms that it accepts."""
+
+    duration_s: float
+    controller: Controller | Callable[[float, np.ndarray, np.ndarray], ArrayLike] | None
+    integrator: str | Integrator | Adaptive
+    step_s: float | None
+    record_every_s: float
+    estimate_error: bool
+    about: dict[str, str]
+    engine: str
+    events: Event | Sequence[Event]
+    accuracy: Accuracy | None
 
 
 @final
@@ -82,18 +99,24 @@ class Setup(Value, Caching):
     """
 
     plant: Plant
-    q0: Any  # array-like; arrays once built
-    v0: Any = None
+    q0: np.ndarray
+    v0: np.ndarray = None  # pyright: ignore[reportAssignmentType] # zeros once built
     duration_s: float = 1.0
-    controller: Any = None
-    integrator: Any = "auto"
+    controller: Controller | None = None
+    integrator: Integrator | Adaptive = AUTO  # pyright: ignore[reportAssignmentType]
     step_s: float | None = None
     record_every_s: float = 0.0
     estimate_error: bool = True
     about: dict[str, str] = field(default_factory=dict, repr=False)
     engine: str = "auto"
     events: tuple[Event, ...] = ()
-    accuracy: Any = None
+    accuracy: float | None = None
+
+    if TYPE_CHECKING:  # arguments that `__post_init__` converts to the types of the attributes
+
+        def __init__(
+            self, plant: Plant, q0: ArrayLike, v0: ArrayLike | None = None, **options: Unpack[Options]
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         instance("plant", self.plant, Plant, "give one, as rd.Plant(robot)")
@@ -112,7 +135,7 @@ class Setup(Value, Caching):
                 object.__setattr__(self, name, duration(name, seconds, zero=name == "record_every_s"))
         truth("estimate_error", self.estimate_error)
         if self.accuracy is not None:
-            self._check_accuracy()
+            self._check_accuracy(self.accuracy)
         for text in (
             text for pair in instance("about", self.about, dict, "give texts by name").items() for text in pair
         ):
@@ -127,11 +150,11 @@ class Setup(Value, Caching):
             check_model(self.plant.dynamics, self.controller, self.q0)
         _check_segments(self)
         check_method(self.plant, self.integrator, self.events, self.finds_events)
-        check_start(self.plant, self.controller, self.events, self.q0, self.v0)  # pyright: ignore[reportArgumentType]
+        check_start(self.plant, self.controller, self.events, self.q0, self.v0)
 
-    def _check_accuracy(self) -> None:
+    def _check_accuracy(self, accuracy: Accuracy) -> None:
         """Check the requested accuracy, and that no other option chooses the method or the tolerance."""
-        object.__setattr__(self, "accuracy", least_accuracy(self.accuracy, self.plant.dynamics))
+        object.__setattr__(self, "accuracy", least_accuracy(accuracy, self.plant.dynamics))
         if self.integrator != Adaptive(AUTO):
             name = self.integrator.name
             raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {name!r}")
@@ -257,7 +280,7 @@ def _controller(controller: Any, n: int) -> Controller | None:
     """Return a controller of n joints; a function becomes a `ControlLaw`. Raise QueryError if it is neither."""
     if callable(controller) and not isinstance(controller, Controller) and not isinstance(controller, type):
         controller = ControlLaw(controller, n)
-    instance(
+    controller = instance(
         "controller",
         controller,
         Controller | None,
@@ -377,12 +400,11 @@ def shortened(setup: Setup) -> str:
 
 
 def _method(setup: Setup) -> Iterator[str]:
-    method: Any = setup.integrator
-    name: str = method.name
+    method, name = setup.integrator, setup.integrator.name
     used: dict[str, Any] = {}
     if setup.accuracy is not None:
         name = f"chosen for an error of q of at most {setup.accuracy:g}"
-    elif method.controls_error:
+    elif isinstance(method, Adaptive):
         used = {"rtol": method.rtol, "atol": method.atol}
     else:
         used = {"step_s": f"{setup.nominal_step_s}{shortened(setup)}"}
