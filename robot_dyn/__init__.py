@@ -18,14 +18,10 @@ from __future__ import annotations
 
 from robot_dyn.foundations.public import public_names
 
-TYPE_CHECKING = False  # as of typing, whose import takes longer than all of this
-if TYPE_CHECKING:
-    from typing import Any
-
 _public, _, __all__ = public_names(__spec__)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name == "__version__":
         from importlib.metadata import version
 

@@ -112,7 +112,7 @@ def examples(folder: Path) -> dict[str, Example]:
     friction, hold = rd.effects.ViscousFriction(0.1), rd.control.hold(q)
     certified = rd.accuracy.certify(robot, samples=100, repeats=1)
     plant, own = rd.Plant(robot, [friction]), rd.Lagrangian(robot)
-    setup = rd.Setup(plant, q, duration_s=0.01, integrator="rk4")
+    setup = rd.Setup(plant, q, duration_s=0.01, method="rk4")
     run, several = rd.simulate(setup), rd.rollouts(setup, np.tile(q, (2, 1)))
     proven = rd.tools.proof.prove(setup, bits=53)
     measured = rd.accuracy.work_precision(
@@ -215,7 +215,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.control.Samples, t=[0.0, 0.5, 1.0], q=points, v=points, a=points),
         call(rd.control.Samples([0.0, 0.5, 1.0], points).at, t=0.1),
         call(rd.Setup, plant=plant, q0=q, v0=v, duration_s=0.1, controller=rd.control.PD(hold, 1.0, 1.0),
-            integrator=rd.integrate.method("rk4"), step_s=1e-3, record_every_s=0.01, estimate_error=True,
+            method=rd.integrate.method("rk4"), step_s=1e-3, record_every_s=0.01, estimate_error=True,
             about={"note": "text"}, engine="interpreted"),
         call(rd.effects.Layer, joint=1, width=0.01, level=0.5, of_velocity=True),
         call(rd.effects.Threshold, joint=1, level=0.5, name="stop", rising="touched", falling="left",

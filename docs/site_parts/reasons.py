@@ -18,7 +18,7 @@ EXAMPLES = {
     },
     Reason.STEP_TOO_LONG: {
         "value": 0.01, "limit": 0.004, "method": "rk4", "step_s": "0.002",
-        "motion": "the fastest motion changes with 710 per second, of joint 'elbow_joint', by 'joint_stops'",
+        "motion": "changes", "rate_per_s": 710.0, "moving_joint": "elbow_joint", "source": "joint_stops",
     },
     Reason.IMPLAUSIBLE_SPEED: {"value": 640.0, "limit": 3.15, "unit": "rad/s", "step_s": 0.002},
     Reason.ENERGY_WITHOUT_SOURCE: _STEP,
@@ -34,7 +34,7 @@ EXAMPLES = {
         "step, or a method for stiff systems"
     },
     Reason.EVENTS_ACCUMULATE: {
-        "changes": 1000, "span_s": 2.1e-10, "remedy": "integrator='time_stepping' and a step_s"
+        "changes": 1000, "span_s": 2.1e-10, "remedy": "method='time_stepping' and a step_s"
     },
     Reason.TORQUE_NOT_FINITE: _STEP,
     Reason.CANNOT_EVALUATE: {

@@ -1,6 +1,6 @@
 """Methods for y' = f(t, y), one family a file; they know no robot. `method("rk4")` finds one by name.
 
-    by name            method; `integrator="rk4"` of `rd.simulate` takes the same names
+    by name            method; `method="rk4"` of `rd.simulate` takes the same names
     chosen steps       Adaptive: DOP853, Radau and others, within a tolerance
     fixed steps        ExplicitRungeKutta, SemiImplicitEuler, Gauss
     stiff, fixed steps Rosenbrock

@@ -62,6 +62,6 @@ def as_method(value: Any) -> Integrator | Adaptive:
         return method(value)
     if not isinstance(value, Integrator | Adaptive):
         raise QueryError(
-            f"integrator: give a name, such as 'rk4' or 'DOP853', or an rd.integrate.Adaptive(…), got {shown(value)}"
+            f"method: give a name, such as 'rk4' or 'DOP853', or an rd.integrate.Adaptive(…), got {shown(value)}"
         )
     return value

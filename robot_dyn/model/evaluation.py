@@ -46,7 +46,7 @@ class Evaluation:
         return regularity(self._batched("M")(np.linspace(0.3, 0.9, len(names))), names)
 
     @cached_property
-    def one_state(self) -> OnFirstUse:
+    def one_state(self) -> OnFirstUse[str | tuple[str, ...], Call]:
         """Queries at one state as functions (data, q, …), by name or (name, frame, axes), with coupled joints."""
         return OnFirstUse(self._one_state)
 
@@ -67,7 +67,7 @@ class Evaluation:
         return coupled
 
     @cached_property
-    def _calls(self) -> OnFirstUse:
+    def _calls(self) -> OnFirstUse[tuple[str, ...], Call]:
         """Pinocchio's calls by (name, frame, axes)."""
         return OnFirstUse(lambda query: PINOCCHIO[query[0]](self.built, *query[1:]))
 

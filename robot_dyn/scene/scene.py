@@ -31,7 +31,7 @@ from robot_dyn.simulation.setup.setup import STEP_S, Setup
 
 Factories = Mapping[str, Callable[..., Effect]]
 MAX_BYTES = 2**20
-_OF_SETUP = {"integrator": "method", "controller": "control", "period_s": "control", "q0": "start", "v0": "start"}
+_OF_SETUP = {"controller": "control", "period_s": "control", "q0": "start", "v0": "start"}
 SCENE = FileKind("a scene", ".toml")
 
 
@@ -84,7 +84,7 @@ class Scene(Part):
     duration_s: Positive
     """Length of the run."""
     method: Annotated[str, AfterValidator(_known_method)] = AUTO
-    """Integrator."""
+    """Integration method."""
     step_s: Positive = STEP_S
     """Step of a method with a fixed step; shorter where samples, ticks and switches require it."""
     rtol: Positive = Adaptive.rtol
@@ -178,7 +178,7 @@ class Scene(Part):
                 v0,
                 duration_s=self.duration_s,
                 controller=controller,
-                integrator=self.integrator(),
+                method=self.built_method(),
                 step_s=step_s,
                 record_every_s=self.record_every_s,
                 estimate_error=self.estimate_error,
@@ -187,8 +187,8 @@ class Scene(Part):
                 accuracy=self.accuracy,
             )
 
-    def integrator(self) -> Integrator | Adaptive:
-        """Return the integrator with the name `method`."""
+    def built_method(self) -> Integrator | Adaptive:
+        """Return the integration method with the name `method`, with the tolerances of the scene if it is adaptive."""
         if self.method in ADAPTIVE:
             return Adaptive(self.method, self.rtol, self.atol)
         return method(self.method)

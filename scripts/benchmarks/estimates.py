@@ -40,8 +40,8 @@ def estimates(effort: Effort) -> None:
     for name, full in scenes().items():
         setup = replace(full, duration_s=0.4) if effort.quick else full
         run, h = rd.simulate(setup), setup.nominal_step_s
-        exact = rd.simulate(setup, integrator="order_8", step_s=h / 2, record_every_s=h, estimate_error=False)
-        tight = rd.simulate(setup, integrator=TIGHT, estimate_error=False)
+        exact = rd.simulate(setup, method="order_8", step_s=h / 2, record_every_s=h, estimate_error=False)
+        tight = rd.simulate(setup, method=TIGHT, estimate_error=False)
         error, doubt = np.abs(run.q - exact.q).max(), np.abs(tight.q[-1] - exact.q[-1]).max()
         assert run.error is not None
         largest = run.error.largest

@@ -140,5 +140,5 @@ def iftomm(effort: Effort) -> None:
 
 def _options(method: str, number: float) -> dict[str, Any]:
     if method in ADAPTIVE:
-        return {"integrator": rd.integrate.Adaptive(method, number, number), "step_s": None, "engine": "compiled"}
-    return {"integrator": rd.integrate.method(method), "step_s": number, "engine": "compiled"}
+        return {"method": rd.integrate.Adaptive(method, number, number), "step_s": None, "engine": "compiled"}
+    return {"method": rd.integrate.method(method), "step_s": number, "engine": "compiled"}

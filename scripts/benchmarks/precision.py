@@ -43,7 +43,7 @@ def whole(setup: rd.Setup, effort: Effort) -> list[float]:
     found = []
     for target in TARGETS:
         with_method = replace(
-            setup, integrator=rd.integrate.Adaptive(rtol=target / 10, atol=target / 10), record_every_s=1.0
+            setup, method=rd.integrate.Adaptive(rtol=target / 10, atol=target / 10), record_every_s=1.0
         )
         times = [seconds(lambda: rd.simulate(with_method)) for _ in range(effort.repeats + 1)]
         found.append(median(times[1:]))

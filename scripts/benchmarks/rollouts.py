@@ -36,7 +36,7 @@ def one_step(effort: Effort) -> None:
     duration = steps * STEP_S
     setup = rd.Setup(
         rd.Plant(panda), READY, duration_s=duration, record_every_s=duration, estimate_error=False,
-        engine="compiled", integrator="rk4",
+        engine="compiled", method="rk4",
     )  # fmt: skip
     theirs, ours = [], []
     rd.simulate(setup)
@@ -75,7 +75,7 @@ def _side_by_side(effort: Effort, model: Any, held: list[Any], method: str, what
     goal, starts = READY + 0.2, READY + 0.1 * np.random.default_rng(0).uniform(-1, 1, size=(runs, 7))
     control = rd.control.PD(rd.control.hold(goal), *GAINS)
     plant = rd.Plant(panda, [rd.effects.ViscousFriction(DAMPING), *held])
-    setup = rd.Setup(plant, READY, duration_s=steps * STEP_S, controller=control, integrator=method)
+    setup = rd.Setup(plant, READY, duration_s=steps * STEP_S, controller=control, method=method)
     first = np.zeros((runs, 1 + 14))
     first[:, 1:8] = starts
     command, state = np.broadcast_to(goal, (runs, steps, 7)).copy(), np.empty((runs, steps, 15))

@@ -40,14 +40,12 @@ def sticking(effort: Effort) -> None:
             "q0": START, "duration_s": DURATION_S, "controller": drive, "record_every_s": SAMPLE_S,
             "estimate_error": False,
         }  # fmt: skip
-        limit = rd.simulate(
-            plant, **options, engine="compiled", integrator=rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)
-        )
+        limit = rd.simulate(plant, **options, engine="compiled", method=rd.integrate.Adaptive(rtol=1e-12, atol=1e-12))
         print(f"\n{what}: {len(limit.events)} events")
         table("h, s", *(f"{h:g}" for h in steps), "mean order")
 
         def ours(h: float, plant: rd.Plant = plant, options: dict[str, Any] = options) -> np.ndarray:
-            return rd.simulate(plant, **options, integrator="time_stepping", step_s=h).q
+            return rd.simulate(plant, **options, method="time_stepping", step_s=h).q
 
         _distances("time_stepping", ours, steps, limit.q)
         for name, stiff in (("MuJoCo, stiffest", True), ("MuJoCo, default", False)):

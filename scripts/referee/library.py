@@ -189,7 +189,7 @@ def setup(
     accuracy: float | None = None,
 ) -> Any:
     """Return the setup of a run; `engine` is "compiled", "interpreted" or "auto"."""
-    options = {"integrator": by} if by is not None else {}
+    options = {"method": by} if by is not None else {}
     return rd.Setup(
         plant, q0, v0, duration, controller=controller, step_s=step, record_every_s=record, estimate_error=estimate,
         engine=engine, events=events, accuracy=accuracy, **options,

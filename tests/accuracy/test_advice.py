@@ -82,7 +82,7 @@ def test_a_method_of_ones_own_has_a_limit() -> None:
     tableau = rd.integrate.ButcherTableau(a=((), (1,)), b=(Fraction(1, 2), Fraction(1, 2)), c=(0, 1), order=2)
     heun = rd.integrate.ExplicitRungeKutta("heun", tableau)
     plant = rd.Plant(BLOCK, [rd.effects.ViscousFriction(100.0)])
-    fine, coarse = (rd.advise(plant, [0.1], [1.0], duration_s=0.1, integrator=heun, step_s=h) for h in (0.019, 0.021))
+    fine, coarse = (rd.advise(plant, [0.1], [1.0], duration_s=0.1, method=heun, step_s=h) for h in (0.019, 0.021))
     assert fine.limits["heun"] == pytest.approx(0.02, rel=2e-3)
     assert fine.stable
     assert not coarse.stable
@@ -116,7 +116,7 @@ def test_the_panda_under_sampled_control() -> None:
     arm = rd.load("panda").with_(lock={"panda_finger_joint1": 0.0})
     q0 = np.array([0.3, 0.6, -0.4, -1.2, 0.5, 1.1, 0.2])
     law = rd.control.PDGravity(arm, rd.control.hold(q0), 1000.0, 60.0, period_s=2.5e-4)
-    advice = rd.advise(arm, q0, controller=law, integrator="rk4", duration_s=0.2)
+    advice = rd.advise(arm, q0, controller=law, method="rk4", duration_s=0.2)
     assert advice.longest_period_s == pytest.approx(0.211e-3, rel=0.01)  # three digits
     assert advice.fastest.joint == "panda_joint7"
     assert advice.fastest.source == "control"
@@ -203,14 +203,14 @@ def test_a_loop_that_no_period_makes_stable_says_so() -> None:
 
 def test_a_step_that_is_short_enough_is_told_with_its_error() -> None:
     plant = rd.Plant(rd.load("planar_2r"), [rd.effects.ViscousFriction(60.0)])
-    fine = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-4, duration_s=0.05)
+    fine = rd.advise(plant, [0.4, -0.7], method="rk4", step_s=1e-4, duration_s=0.05)
     assert fine.stable
     assert f"error of q [rad] to expect: {fine.run.error}" in fine.text
-    coarse = rd.advise(plant, [0.4, -0.7], integrator="rk4", step_s=1e-2, duration_s=0.05)
+    coarse = rd.advise(plant, [0.4, -0.7], method="rk4", step_s=1e-2, duration_s=0.05)
     assert coarse.limits == fine.limits
     assert not coarse.stable
     assert "step 0.01 s: unstable; rk4 is stable up to" in coarse.text
-    assert rd.simulate(plant, [0.4, -0.7], integrator="rk4", step_s=1e-2, duration_s=0.2).outcome.ending == "diverged"
+    assert rd.simulate(plant, [0.4, -0.7], method="rk4", step_s=1e-2, duration_s=0.2).outcome.ending == "diverged"
     chosen = rd.advise(plant, [0.4, -0.7], duration_s=0.05)
     assert chosen.stable
     assert "auto chooses its steps" in chosen.text
@@ -240,7 +240,7 @@ def test_a_stop_that_samples_miss_bounds_the_step(k: float) -> None:
     """On a stop ω = √(k / I), for half a period only; RK4 is stable up to h ω = √8 there."""
     bar = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
     plant = rd.Plant(bar, [rd.effects.JointStopSpring(-9.0, 0.0, k)])
-    advice = rd.advise(plant, [-0.3], [1.5], duration_s=0.5, integrator="rk4", step_s=1e-3)
+    advice = rd.advise(plant, [-0.3], [1.5], duration_s=0.5, method="rk4", step_s=1e-3)
     omega = np.sqrt(3 * k)
     assert advice.limits["rk4"] == pytest.approx(np.sqrt(8) / omega, rel=2e-3)
     assert advice.fastest.source == "joint_stops"
@@ -250,7 +250,7 @@ def test_a_stop_that_samples_miss_bounds_the_step(k: float) -> None:
 def test_free_flight_bounds_no_step() -> None:
     """J = [[0, 1], [0, 0]]: nothing acts back."""
     bar = rd.load("pendulum").with_(gravity=(0.0, 0.0, 0.0))
-    advice = rd.advise(bar, [0.1], [1.0], duration_s=0.2, step_s=1e-2, integrator="rk4")
+    advice = rd.advise(bar, [0.1], [1.0], duration_s=0.2, step_s=1e-2, method="rk4")
     assert advice.stable
     assert "nothing acts back on the motion" in str(advice.fastest)
     assert all(limit == np.inf for limit in advice.limits.values())

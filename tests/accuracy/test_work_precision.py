@@ -107,7 +107,7 @@ def test_chaotic_motion_is_cut_where_references_part() -> None:
     assert truth.parted_s is not None and truth.lost_s is not None
     assert truth.horizon_s == cut.duration_s <= truth.parted_s < truth.lost_s < 40.0
     runs = [
-        rd.simulate(setup, integrator="order_8", step_s=step, record_every_s=1.0, estimate_error=False)
+        rd.simulate(setup, method="order_8", step_s=step, record_every_s=1.0, estimate_error=False)
         for step in (1e-3, 5e-4)
     ]
     apart = np.abs(runs[0].q - runs[1].q).max(axis=1)
@@ -140,8 +140,8 @@ def test_machine_code_that_is_loaded_takes_no_time_of_a_run_beyond_the_horizon(m
 
     def loading(run):
         def first(setup: rd.Setup, **options):
-            now[0] += 1000.0 * (setup.integrator.name not in loaded)
-            loaded.add(setup.integrator.name)
+            now[0] += 1000.0 * (setup.method.name not in loaded)
+            loaded.add(setup.method.name)
             return run(setup, **options)
 
         return first

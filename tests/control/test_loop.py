@@ -241,7 +241,7 @@ def test_states_that_wait_do_not_loosen_the_tolerance() -> None:
     """They do not change between ticks: the mean of squares of the local error is that of the others."""
     arm, free = rd.load("planar_2r"), rd.control.PD(rd.control.hold(Q0), 0.0, 0.0, 1.0)
     made = [
-        rd.simulate(arm, [0.9, -0.4], duration_s=3.0, controller=x, integrator="DOP853", estimate_error=False)
+        rd.simulate(arm, [0.9, -0.4], duration_s=3.0, controller=x, method="DOP853", estimate_error=False)
         for x in (free, rd.control.Loop(free, actuation_delay=50))
     ]
     assert made[0].statistics.steps == made[1].statistics.steps
@@ -264,7 +264,7 @@ def test_chatter_is_seen_where_a_torque_acts_late(late: float) -> None:
     loop = rd.control.Loop(rd.control.PD(rd.control.hold(TARGET), 0.0, kd, T), actuation_delay=late)
     for integrator in ("rk4", "DOP853"):
         for engine in ("interpreted", "compiled"):
-            options = {"integrator": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
+            options = {"method": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
             made = rd.simulate(PLANT, Q0, V0, controller=loop, record_every_s=T, **options)  # type: ignore[arg-type]
             assert RemarkKind.CHATTER in {remark.kind for remark in made.remarks}
 

@@ -72,11 +72,11 @@ def test_noise_is_the_same_alone_in_batches_and_in_threads() -> None:
         for engine in ("interpreted", "compiled"):
             for run in (0, 77):
                 each = replace(loop, run=run)
-                options = given | {"integrator": integrator, "engine": engine, "estimate_error": False}
+                options = given | {"method": integrator, "engine": engine, "estimate_error": False}
                 made = rd.simulate(ARM, [0.0, 0.0], controller=each, **options)
                 assert made.u.tobytes() == expected[run].tobytes(), (integrator, engine, run)
         for threads in (1, 2):
-            options = given | {"integrator": integrator, "record": ("u",), "threads": threads}
+            options = given | {"method": integrator, "record": ("u",), "threads": threads}
             runs = rd.rollouts(ARM, np.zeros((130, 2)), controller=loop, **options)
             assert runs.u.tobytes() == np.array(expected).tobytes(), (integrator, threads)
 
@@ -89,7 +89,7 @@ def test_each_tick_has_its_noise_whatever_the_steps_and_the_delay() -> None:
         actuation_delay=1.5, seed=4,
     )  # fmt: skip
     run = rd.simulate(
-        ARM, [0.0, 0.0], controller=loop, integrator="rk4", step_s=1e-3, duration_s=0.1, record_every_s=PERIOD
+        ARM, [0.0, 0.0], controller=loop, method="rk4", step_s=1e-3, duration_s=0.1, record_every_s=PERIOD
     )
     np.testing.assert_array_equal(
         run.u[2:], -WEAK * deviates(4, 0, 11, 2)[:9]

@@ -18,7 +18,7 @@ from robot_dyn.control import Block, Controller
 from robot_dyn.effects import Effect
 from robot_dyn.foundations import ControlError, EffectError, QueryError, SceneError, TraceError, tanh
 from robot_dyn.scene.effects import DeclaredEffect
-from robot_dyn.simulation import MachineError, Verdict
+from robot_dyn.simulation import DoubtKind, MachineError, Verdict
 from robot_dyn.simulation.diagnostics.smoothness import LOOKS
 from robot_dyn.simulation.dynamics.declarations import undeclared
 from robot_dyn.simulation.engine.choice import choose
@@ -32,7 +32,7 @@ Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.9])
 def setup_of(part: Any, **options: Any) -> rd.Setup:
     """Of an effect or a controller."""
     effects, controller = ([part], None) if isinstance(part, Effect) else ((), part)
-    steps = {"duration_s": 0.5, "integrator": "rk4", "step_s": 1e-3, "estimate_error": False}
+    steps = {"duration_s": 0.5, "method": "rk4", "step_s": 1e-3, "estimate_error": False}
     return rd.Setup(rd.Plant(ARM, effects), Q, V, controller=controller, **steps | options)
 
 
@@ -91,7 +91,7 @@ def test_a_declared_effect_is_not_looked_at_between_steps_and_an_undeclared_one_
         made = rd.simulate(plant, Q, V, duration_s=0.3, engine="interpreted", record_every_s=0.1)
         counts.append(kind.calls - made.statistics.evaluations - made.statistics.companion_evaluations)
     assert made.error is not None and made.error.verdict is Verdict.BOUND
-    assert "Silent declares no thresholds" in made.error.reason
+    assert made.error.no_order.kind is DoubtKind.UNDECLARED and made.error.no_order.facts["part"] == "Silent"
     assert counts[0] < 100 < LOOKS <= counts[1]  # of the start, the samples and their ledger
 
 
@@ -277,14 +277,14 @@ CHANGED: dict[str, tuple[Any, dict[str, Any]]] = {
 def test_what_has_changed_since_an_earlier_run_is_found(what: str) -> None:
     """What an attribute, a file or a global holds is a constant of the code: it is compared before each run."""
     effects, parts = CHANGED[what]
-    options = {"duration_s": 0.1, "integrator": "rk4", "estimate_error": False} | parts
+    options = {"duration_s": 0.1, "method": "rk4", "estimate_error": False} | parts
     setup = rd.Setup(rd.Plant(ARM, effects), Q, V, **options)
     OWNED.stiffness = STATE["gain"] = 2.0
     rd.simulate(setup, engine="compiled")
     OWNED.stiffness = STATE["gain"] = 3.0
     for method in ("rk4", "DOP853"):
         with pytest.raises(MachineError, match=r"(changing|Law|crosses) differs from the interpreted one"):
-            rd.simulate(setup, engine="compiled", integrator=method)
+            rd.simulate(setup, engine="compiled", method=method)
     assert np.array_equal(rd.simulate(setup).q, rd.simulate(setup, engine="interpreted").q)
 
 
@@ -375,7 +375,7 @@ def test_auto_takes_the_machine_code_that_is_there_and_both_engines_agree_within
 
 def test_auto_has_machine_code_for_other_coefficients_and_none_for_another_structure(monkeypatch) -> None:
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
-    base = rd.Setup(rd.Plant(ARM, [rd.effects.Spring(3.0)]), Q, V, 0.2, integrator="rk4", estimate_error=False)
+    base = rd.Setup(rd.Plant(ARM, [rd.effects.Spring(3.0)]), Q, V, 0.2, method="rk4", estimate_error=False)
     rd.simulate(base, engine="compiled")
     assert rd.simulate(replace(base, plant=rd.Plant(ARM, [rd.effects.Spring(5.0)]))).statistics.engine == "compiled"
     other = rd.Plant(ARM.with_(mass_scale=1.07), [rd.effects.Spring(5.0)])
@@ -553,7 +553,7 @@ def test_an_overflow_in_a_users_code_is_an_outcome_of_the_run() -> None:
     def runaway(t, q, v):
         return ARM.inverse_dynamics(q, v, 1e4 * v)
 
-    run = rd.simulate(ARM, Q, V, duration_s=0.2, controller=runaway, integrator="rk4")
+    run = rd.simulate(ARM, Q, V, duration_s=0.2, controller=runaway, method="rk4")
     assert run.outcome.ending == "diverged" and len(run.t) > 1
 
 
@@ -607,7 +607,7 @@ class Raises(rd.control.Stateless):
 )
 def test_what_cannot_be_traced_says_which_line_stopped_it(effects, controller, part, code, why) -> None:
     line = code.co_firstlineno + (1 if code is opaque.__code__ else 2)
-    setup = rd.Setup(rd.Plant(ARM, effects), Q, V, 0.1, controller, engine="compiled", integrator="rk4")
+    setup = rd.Setup(rd.Plant(ARM, effects), Q, V, 0.1, controller, engine="compiled", method="rk4")
     with pytest.raises(
         TraceError, match=rf"{part} cannot be compiled \(line {line} of test_declarations.py: {why}"
     ) as caught:
@@ -624,7 +624,7 @@ def test_a_function_is_the_controller_of_the_same_law() -> None:
 
     pd = rd.control.PD(rd.control.hold(Q - 0.2), 4.0, 1.5)
     setup = rd.Setup(rd.Plant(ARM), Q, V, 0.1, pd, "rk4", engine="interpreted")
-    run = rd.simulate(ARM, Q, V, duration_s=0.1, controller=law, integrator="rk4")
+    run = rd.simulate(ARM, Q, V, duration_s=0.1, controller=law, method="rk4")
     assert np.array_equal(run.q, rd.simulate(setup).q)
     assert run.statistics.engine.startswith("interpreted (law declares no thresholds: give a class")
     compiled = rd.simulate(setup, controller=law, engine="compiled")
@@ -658,7 +658,7 @@ def test_recorded_controller_states_obey_their_equation(
     ki = 3.0
     pid = rd.control.PID(rd.control.hold(Q - 0.2), 8.0, ki, 2.0, period_s=period_s)
     method = "gauss_4" if canonical else "rk4"
-    run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.2, controller=pid, engine=engine, integrator=method)
+    run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.2, controller=pid, engine=engine, method=method)
     z, e = run.controller_states, Q - 0.2 - run.q
     assert z is not None and z.shape == (len(run.t), 2)
     if period_s:
@@ -711,7 +711,7 @@ def test_a_scene_names_effects_that_its_reader_names(keys: str, c: Any, tmp_path
     path = tmp_path / "scene.toml"
     path.write_text(f'{SCENE}[[effect]]\nkind = "gravity"\n[[effect]]\nkind = "drag"\n{keys}\n', encoding="utf-8")
     own = rd.read_scene(path, effects={"drag": Drag})
-    setup = rd.Setup(rd.Plant(ARM, [Drag(c)]), Q, V, 0.1, integrator=rd.integrate.Adaptive(rtol=1e-10, atol=1e-12))
+    setup = rd.Setup(rd.Plant(ARM, [Drag(c)]), Q, V, 0.1, method=rd.integrate.Adaptive(rtol=1e-10, atol=1e-12))
     expected = rd.simulate(setup, record_every_s=0.01, engine="interpreted")
     assert np.array_equal(rd.simulate(own).q, expected.q)
     with pytest.raises(SceneError, match=r"line 8: effect 2 \(drag\).kind: no kind 'drag'"):

@@ -19,7 +19,7 @@ ENGINES = ["interpreted", "compiled"]
 RAIL = arms()["rail"]  # 1 kg on a vertical rail
 ARM = rd.load("planar_2r")
 TIGHT = rd.integrate.Adaptive(rtol=1e-12, atol=1e-12)
-OPTIONS = {"estimate_error": False, "integrator": TIGHT}
+OPTIONS = {"estimate_error": False, "method": TIGHT}
 
 
 def DRIVE(t, q, v):
@@ -248,7 +248,7 @@ def driven_panda(integrator: rd.Integrator | rd.integrate.Adaptive | str, **opti
     return rd.simulate(
         rd.Plant(panda, [rd.effects.ViscousFriction(0.1), rd.effects.DryFriction(levels)]), q0, duration_s=2.0,
         controller=lambda t, q, v: 0.8 * weight + A * np.sin(omega * t + 0.3), engine="compiled",
-        estimate_error=False, integrator=integrator, **options,
+        estimate_error=False, method=integrator, **options,
     )  # fmt: skip
 
 
@@ -304,11 +304,10 @@ def test_fixed_steps_keep_their_order_across_sticking(method: str, order: int) -
     """Mean slope over three halvings, against DOP853 at 1e-12; within 1 of the order of the method."""
     plant = rd.Plant(ARM, [rd.effects.DryFriction([3.0, 1.0])])
     options = {"duration_s": 2.0, "controller": DRIVE, "estimate_error": False, "record_every_s": 2.0}
-    exact = rd.simulate(plant, [-1.4, 0.2], integrator=TIGHT, **options).q[-1]
+    exact = rd.simulate(plant, [-1.4, 0.2], method=TIGHT, **options).q[-1]
     steps = [0.05 / 2**k for k in range(4)] if method != "order_8" else [0.1 / 2**k for k in range(3)]
     errors = [
-        np.abs(rd.simulate(plant, [-1.4, 0.2], integrator=method, step_s=h, **options).q[-1] - exact).max()
-        for h in steps
+        np.abs(rd.simulate(plant, [-1.4, 0.2], method=method, step_s=h, **options).q[-1] - exact).max() for h in steps
     ]
     slope = np.log2(errors[0] / errors[-1]) / (len(steps) - 1)
     assert slope > order - 1

@@ -36,7 +36,7 @@ class Ramp(rd.control.Stateless):
 
 
 def slide(effects, control, engine: str, **options) -> rd.Trajectory:
-    options = {"integrator": "order_8", "step_s": 1e-3, "record_every_s": 0.01, "estimate_error": False} | options
+    options = {"method": "order_8", "step_s": 1e-3, "record_every_s": 0.01, "estimate_error": False} | options
     return rd.simulate(rd.Plant(SLIDER, effects), q0=[0.0], controller=control, engine=engine, **options)
 
 
@@ -114,7 +114,7 @@ def setup(engine: str, period: float = 0.0, **options) -> rd.Setup:
     control = rd.control.PID(rd.control.quintic(Q, [0.6, -0.3], 0.3), 90.0, 60.0, 20.0, period_s=period)
     return rd.Setup(
         rd.Plant(ARM, effects), Q, controller=control, record_every_s=0.01, estimate_error=False, engine=engine,
-        **({"duration_s": 0.3, "integrator": "rk4", "step_s": 1e-3} | options),
+        **({"duration_s": 0.3, "method": "rk4", "step_s": 1e-3} | options),
     )  # fmt: skip
 
 
@@ -127,7 +127,7 @@ REST = [(name, period) for name in ("semi_implicit_euler", "rosenbrock_5") for p
 )
 def test_both_engines_make_the_same_run_of_effects_with_states(method: str, period: float) -> None:
     """Beside controller states, in (q, v) and in (q, p); 100 steps leave some 1e-10 of rounding in stiff ones."""
-    options = {"integrator": method, "duration_s": 0.1}
+    options = {"method": method, "duration_s": 0.1}
     ours, theirs = (rd.simulate(setup(engine, period, **options)) for engine in ("compiled", "interpreted"))
     assert ours.outcome.ending == "finished"
     np.testing.assert_allclose(ours.q, theirs.q, atol=1e-11)
@@ -158,7 +158,7 @@ def test_passive_bristles_only_take_energy() -> None:
     """With σ₂ ≥ σ₁ (f_s/f_c − 1)."""
     friction = rd.effects.LuGreFriction(200.0, 0.5, 0.4, 1.0, 1.6, 0.1)
     swing = rd.simulate(
-        rd.Plant(rd.load("pendulum"), [friction]), q0=[0.9], duration_s=3.0, integrator="rk4", step_s=5e-4,
+        rd.Plant(rd.load("pendulum"), [friction]), q0=[0.9], duration_s=3.0, method="rk4", step_s=5e-4,
         record_every_s=0.01, estimate_error=False,
     )  # fmt: skip
     only_takes_energy(swing, "lugre_friction", 1e-6)
@@ -241,7 +241,7 @@ def curve(start: float, path: np.ndarray, side: float, exponent: float) -> np.nd
 @BOTH
 def test_the_hysteresis_is_that_of_the_closed_form(exponent: float | None, engine: str) -> None:
     """From reversal to reversal F is a function of the path alone; a tolerance of 1e-12 leaves 1e-9."""
-    swing = dahl_run(exponent, engine, integrator=rd.integrate.Adaptive("DOP853", 1e-12, 1e-14))
+    swing = dahl_run(exponent, engine, method=rd.integrate.Adaptive("DOP853", 1e-12, 1e-14))
     turns = [(each.t, each.q[0]) for each in swing.events]
     assert len(turns) > 4
     at, place = np.array([0.0, *(t for t, _ in turns), np.inf]), np.array([0.0, *(q for _, q in turns)])

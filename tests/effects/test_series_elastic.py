@@ -17,11 +17,11 @@ TIGHT = rd.integrate.Adaptive("DOP853", 1e-12, 1e-14)
 BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 K, J, RATIO, D, B = 80.0, 0.002, 9.0, 0.4, 0.3  # of the slider, in [N/m], [kg], 1, [N s/m], [N s/m]
 REFLECTED = RATIO**2 * J
-OFTEN = {"integrator": TIGHT, "record_every_s": 0.01, "estimate_error": False}
+OFTEN = {"method": TIGHT, "record_every_s": 0.01, "estimate_error": False}
 
 
 def slide(effect: rd.effects.SeriesElastic, engine: str = "interpreted", **options) -> rd.Trajectory:
-    options = {"integrator": TIGHT, "record_every_s": 0.05, "duration_s": 2.0, "estimate_error": False} | options
+    options = {"method": TIGHT, "record_every_s": 0.05, "duration_s": 2.0, "estimate_error": False} | options
     return rd.simulate(rd.Plant(SLIDER, [effect]), [0.2], [0.5], engine=engine, **options)
 
 
@@ -33,7 +33,7 @@ def test_two_masses_and_a_spring_move_by_the_matrix_exponential(method, engine: 
     """q, q̇, δ, θ̇ under a constant force on the motor; dense output of Rosenbrock, of order 4, leaves 1e-10."""
     F = 1.7
     options = {"step_s": 2e-3} if isinstance(method, str) else {}
-    options |= {"controller": Ramp(F), "integrator": method, "duration_s": 1.0}
+    options |= {"controller": Ramp(F), "method": method, "duration_s": 1.0}
     run = slide(rd.effects.SeriesElastic(K, J, RATIO, D, B), engine, **options)
     A = np.array(
         [
@@ -106,7 +106,7 @@ def test_a_2r_with_one_elastic_joint_is_that_of_equations_written_out(engine: st
     run = rd.simulate(
         rd.Plant(ARM, [drive]), Q, [0.4, -0.6], duration_s=1.0,
         controller=rd.control.PD(rd.control.hold(target), kp, kd),
-        integrator=TIGHT, engine=engine, record_every_s=0.1, estimate_error=False,
+        method=TIGHT, engine=engine, record_every_s=0.1, estimate_error=False,
     )  # fmt: skip
     x = np.array([exact.sol(t) for t in run.t])
     np.testing.assert_allclose(run.q, x[:, :2], atol=1e-10)
@@ -121,7 +121,7 @@ def test_stiff_springs_are_the_armature_of_gear_and_rotor() -> None:
     """The distance from M + n² J falls as 1/k: tenfold for a tenfold stiffness, within a tenth."""
     control = rd.control.PD(rd.control.quintic(Q, [0.6, 0.4], 0.5), 100.0, 20.0)
     options = {
-        "duration_s": 0.5, "integrator": rd.integrate.Adaptive("Rosenbrock", 1e-10, 1e-12), "record_every_s": 0.5,
+        "duration_s": 0.5, "method": rd.integrate.Adaptive("Rosenbrock", 1e-10, 1e-12), "record_every_s": 0.5,
         "estimate_error": False, "controller": control,
     }  # fmt: skip
     rigid = rd.simulate(ARM.with_(armature=[0.4 * 2.0**2, 0.05 * 5.0**2]), Q, **options)

@@ -47,7 +47,7 @@ def test_radau_slides_to_rest_whatever_the_width_of_dry_friction() -> None:
     runs = [
         rd.simulate(
             rd.Plant(ARM, [rd.effects.RegularisedCoulombFriction([9.0, 6.0], width)]),
-            **START, duration_s=0.2, integrator=STIFF,
+            **START, duration_s=0.2, method=STIFF,
         )
         for width in (1e-4, 1e-7, 1e-9)
     ]  # fmt: skip
@@ -63,7 +63,7 @@ def test_rosenbrock_bounces_off_a_stop_whatever_its_stiffness(stiffness: float) 
     cart = rd.load("cart_pole").with_(lock={"hinge": 0.3})
     run = rd.simulate(
         rd.Plant(cart, [rd.effects.JointStopSpring(-1.0, 0.1, stiffness)]), q0=[0.0], v0=[1.0], duration_s=0.15,
-        engine="interpreted", estimate_error=False, integrator=STIFF,
+        engine="interpreted", estimate_error=False, method=STIFF,
     )  # fmt: skip
     assert run.outcome.ending == "finished"
     assert run.statistics.steps < 500
@@ -84,7 +84,7 @@ def test_a_run_that_does_not_get_on_ends_with_a_verdict(method, verdict: str) ->
     plant = rd.Plant(
         ARM, [rd.effects.ViscousFriction(0.1), rd.effects.RegularisedCoulombFriction([30.0, 20.0], [1.0, 1e-13])]
     )
-    run = rd.simulate(plant, **START, duration_s=5.0, integrator=method)
+    run = rd.simulate(plant, **START, duration_s=5.0, method=method)
     assert run.outcome.ending == "diverged"
     assert run.outcome.t < 5.0
     assert re.search(verdict, run.outcome.text)

@@ -60,7 +60,7 @@ def values() -> dict[str, Any]:
     options: Any = {
         "duration_s": 0.05,
         "controller": rd.control.PD(PLAN, 10.0, 1.0),
-        "integrator": "rk4",
+        "method": "rk4",
         "step_s": 0.01,
     }
     setup = rd.Setup(plant, Q, **options)

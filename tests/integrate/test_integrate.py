@@ -196,19 +196,19 @@ def test_one_list_of_names_serves_all_that_take_a_method() -> None:
     plant = rd.Plant(rd.load("pendulum"))
     for name in METHODS:
         assert method(name).name == name
-        assert rd.Setup(plant, [0.1], integrator=name).integrator.name == name
+        assert rd.Setup(plant, [0.1], method=name).method.name == name
         text = f'robot = "pendulum"\nduration_s = 1.0\nmethod = "{name}"\n'
-        assert parse_scene(text, "scene.toml").integrator().name == name
+        assert parse_scene(text, "scene.toml").built_method().name == name
     with pytest.raises(QueryError, match="no integration method 'rk44'; nearest: rk4"):
-        rd.Setup(plant, [0.1], integrator="rk44")
-    with pytest.raises(QueryError, match=r"integrator: give a name, such as 'rk4' or 'DOP853', .* got 4"):
-        rd.Setup(plant, [0.1], integrator=4)
+        rd.Setup(plant, [0.1], method="rk44")
+    with pytest.raises(QueryError, match=r"method: give a name, such as 'rk4' or 'DOP853', .* got 4"):
+        rd.Setup(plant, [0.1], method=4)
 
 
 def test_scenes_and_python_have_the_same_defaults() -> None:
     scene = parse_scene('robot = "pendulum"\nduration_s = 1.0\n', "scene.toml")
     setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1])
-    assert scene.integrator() == setup.integrator == rd.integrate.Adaptive("auto")
+    assert scene.built_method() == setup.method == rd.integrate.Adaptive("auto")
     assert scene.step_s == setup.nominal_step_s
     for name in ("estimate_error", "engine"):
         assert getattr(scene, name) == getattr(setup, name), name

@@ -125,11 +125,11 @@ def test_runs_in_lock_step_have_each_their_own() -> None:
 
 
 def test_differences_are_named_in_the_summary() -> None:
-    options = START | {"duration_s": 0.02, "step_s": 0.01, "integrator": "rosenbrock_5", "estimate_error": False}
+    options = START | {"duration_s": 0.02, "step_s": 0.01, "method": "rosenbrock_5", "estimate_error": False}
     labels = [rd.simulate(ARM, **options, engine=engine).statistics.engine for engine in ("interpreted", "compiled")]
     assert labels[0] == "interpreted (Jacobian by differences)"
     assert "differences" not in labels[1]
-    assert "differences" not in rd.simulate(ARM, **options | {"integrator": "rk4"}).statistics.engine
+    assert "differences" not in rd.simulate(ARM, **options | {"method": "rk4"}).statistics.engine
 
 
 @pytest.mark.parametrize("end", [0.3 + 0.1, 0.3 - 0.1, 0.3 + 1e-7])

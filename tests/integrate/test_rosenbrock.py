@@ -27,7 +27,7 @@ ALPHA, WEIGHTS = NUMBERS.a @ GAMMA, NUMBERS.m @ GAMMA
 BETA = ALPHA + GAMMA
 ARM = rd.load("planar_2r")
 START: dict[str, Any] = {"q0": [0.4, -0.7], "v0": [0.3, 0.5]}
-OPTIONS = START | {"duration_s": 0.5, "record_every_s": 0.1, "estimate_error": False, "integrator": "rosenbrock_5"}
+OPTIONS = START | {"duration_s": 0.5, "record_every_s": 0.1, "estimate_error": False, "method": "rosenbrock_5"}
 
 Tree = tuple[Any, ...]  # a rooted tree: the trees that hang on its root
 
@@ -209,7 +209,7 @@ def test_elimination_in_machine_code_gives_equal_bits(runs: int) -> None:
 def test_a_run_converges_to_that_of_rk4_at_small_steps(engine: str) -> None:
     """planar_2r with friction: half the step leaves 1/32 of the difference, within a quarter."""
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction(0.3)])
-    fine = rd.simulate(plant, **OPTIONS | {"integrator": "rk4", "step_s": 1e-4}, engine="compiled")
+    fine = rd.simulate(plant, **OPTIONS | {"method": "rk4", "step_s": 1e-4}, engine="compiled")
     runs = [rd.simulate(plant, **OPTIONS, step_s=step, engine=engine) for step in (0.025, 0.0125)]
     far, near = (np.abs(run.q - fine.q).max() for run in runs)
     assert near < 1e-8
@@ -222,7 +222,7 @@ def test_steps_are_not_bounded_by_stiff_damping(engine: str) -> None:
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction(1e5)])
     run = rd.simulate(plant, **OPTIONS, step_s=0.01, engine=engine)
     np.testing.assert_allclose(run.v[-1], -ARM.N(run.q[-1]) / 1e5, rtol=1e-6)
-    explicit = rd.simulate(plant, **OPTIONS | {"integrator": "rk4"}, step_s=0.01, engine=engine)
+    explicit = rd.simulate(plant, **OPTIONS | {"method": "rk4"}, step_s=0.01, engine=engine)
     assert explicit.outcome.ending == "diverged"
 
 
@@ -230,7 +230,7 @@ def test_both_engines_make_the_same_steps() -> None:
     """To 4 κ u, of κ the condition of 1 − h γ J, where both have one Jacobian: stiff, with a moving reference."""
     law = rd.control.PD(rd.control.quintic([0.0, 0.1], [0.5, 0.9], 1.0, v0=0.3), [2000.0, 900.0], [40.0, 20.0])
     plant, h = rd.Plant(ARM, [rd.effects.ViscousFriction([1e3, 1e4]), rd.effects.Spring(1e4)]), 0.01
-    options: dict[str, Any] = {"controller": law, "integrator": "rosenbrock_5", "step_s": h, "duration_s": h}
+    options: dict[str, Any] = {"controller": law, "method": "rosenbrock_5", "step_s": h, "duration_s": h}
     setup, equation = rd.Setup(plant, **START, **options), StateEquation(plant, law)
     machine, m = machine_code(equation, jacobian=True), equation.size
     p, run_parameters = segment_table(setup).parameters[0], machine.run_parameters({})
@@ -255,10 +255,10 @@ def test_the_error_follows_the_tolerance() -> None:
     """Samples between the ends of steps included; a hundredth of the tolerance takes 100^(1/5) = 2.5 times as many."""
     plant = rd.Plant(ARM, [rd.effects.RegularisedCoulombFriction([1.0, 0.6], 0.3), rd.effects.Spring([40.0, 20.0])])
     options = OPTIONS | {"duration_s": 2.0, "record_every_s": 0.003, "engine": "compiled"}
-    exact = rd.simulate(plant, **options | {"integrator": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)})
+    exact = rd.simulate(plant, **options | {"method": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)})
     steps = []
     for tolerance in (1e-5, 1e-7, 1e-9):
-        run = rd.simulate(plant, **options | {"integrator": rd.integrate.Adaptive("Rosenbrock", tolerance, tolerance)})
+        run = rd.simulate(plant, **options | {"method": rd.integrate.Adaptive("Rosenbrock", tolerance, tolerance)})
         assert np.abs(run.q - exact.q).max() < 30 * tolerance
         steps.append(run.statistics.steps)
     np.testing.assert_allclose(np.divide(steps[1:], steps[:-1]), 2.5, rtol=0.2)
@@ -271,7 +271,7 @@ def test_both_engines_choose_the_same_steps(segments: dict[str, Any]) -> None:
     """Though one has differences for its Jacobian: right to 1e-10, which the error of a step does not see."""
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction([100.0, 300.0])])
     options = OPTIONS | segments | {"duration_s": 0.1, "record_every_s": 0.003}
-    method = {"integrator": rd.integrate.Adaptive("Rosenbrock", 1e-7, 1e-9)}
+    method = {"method": rd.integrate.Adaptive("Rosenbrock", 1e-7, 1e-9)}
     ours, theirs = (rd.simulate(plant, **options | method, engine=engine) for engine in ("compiled", "interpreted"))
     assert ours.statistics.steps == theirs.statistics.steps
     assert ours.statistics.evaluations == theirs.statistics.evaluations
@@ -289,10 +289,10 @@ def test_stiffness_does_not_bound_its_steps() -> None:
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction(1e5), rd.effects.Spring(1e8, rest)])
     options: dict[str, Any] = {"record_every_s": 1e-4, "estimate_error": False, "engine": "compiled"}
     run = rd.simulate(
-        plant, rest + 0.1, **options, duration_s=1.0, integrator=rd.integrate.Adaptive("Rosenbrock", 1e-6, 1e-6)
+        plant, rest + 0.1, **options, duration_s=1.0, method=rd.integrate.Adaptive("Rosenbrock", 1e-6, 1e-6)
     )
     explicit = rd.simulate(
-        plant, rest + 0.1, **options, duration_s=0.01, integrator=rd.integrate.Adaptive("DOP853", 1e-12, 1e-12)
+        plant, rest + 0.1, **options, duration_s=0.01, method=rd.integrate.Adaptive("DOP853", 1e-12, 1e-12)
     )
     np.testing.assert_allclose(run.q[:101], explicit.q, rtol=0, atol=1e-6)
     np.testing.assert_allclose(run.q[-1], rest, rtol=0, atol=1e-6)

@@ -134,8 +134,8 @@ def test_a_run_that_diverges_says_so() -> None:
         ({"accuracy": "fine"}, "accuracy must be a"),
         ({"accuracy": {"deg": 1.0}}, "no unit 'deg'; give 'rad', 'm' or both"),
         ({"accuracy": {"m": 1e-3}}, "no value for joints in rad"),
-        ({"accuracy": 1e-6, "integrator": "rk4"}, "chooses method and tolerance; leave out integrator"),
-        ({"accuracy": 1e-6, "integrator": rd.integrate.Adaptive(rtol=1e-6)}, "leave out integrator"),
+        ({"accuracy": 1e-6, "method": "rk4"}, "chooses method and tolerance; leave out method"),
+        ({"accuracy": 1e-6, "method": rd.integrate.Adaptive(rtol=1e-6)}, "leave out method"),
         ({"accuracy": 1e-6, "estimate_error": False}, "leave out estimate_error=False"),
     ],
 )

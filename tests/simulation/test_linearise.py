@@ -263,7 +263,7 @@ def test_a_small_deviation_with_states_moves_as_the_linearisation_says(effects) 
     start = np.concatenate([away, plant.equation_of_motion.start(q + away[:2], away[2:])])
     run = rd.simulate(
         plant, q + away[:2], v0=away[2:], duration_s=0.3, controller=rd.control.PD(rd.control.hold(q), 20.0, 3.0),
-        integrator=rd.integrate.Adaptive(rtol=1e-10, atol=1e-13), estimate_error=False,
+        method=rd.integrate.Adaptive(rtol=1e-10, atol=1e-13), estimate_error=False,
     )  # fmt: skip
     moved = np.concatenate([run.q[-1] - q, run.v[-1], *(states[-1] for states in (run.effect_states or {}).values())])
     np.testing.assert_allclose(moved, expm(0.3 * (system.A - system.B @ K)) @ start, atol=1e-9)

@@ -72,7 +72,7 @@ def test_another_structure_is_compiled() -> None:
     ends = []
     for frame in ARM.frame_names[1:3]:
         setup = rd.Setup(rd.Plant(ARM, [rd.effects.ExternalWrench(frame, [1.0, 0.2, 0.7, 0.1, 0.4, 0.2])]), Q)
-        options = {"duration_s": 0.1, "integrator": "rk4"}
+        options = {"duration_s": 0.1, "method": "rk4"}
         ours, theirs = (rd.simulate(setup, engine=x, **options).q[-1] for x in ("compiled", "interpreted"))
         assert np.abs(ours - theirs).max() < 1e-13
         ends.append(ours)

@@ -34,8 +34,8 @@ def damped(joint, ratio: float, **options) -> rd.Setup:
     """Sampled damping with kd T/M = ratio, disturbed by a little stiffness; a sample every 10 ticks."""
     control = rd.control.PD(rd.control.hold([0.3]), kp=0.05, kd=ratio * INERTIA / PERIOD, period_s=PERIOD)
     given = {"duration_s": 0.5, "record_every_s": 10 * PERIOD, "engine": "interpreted"}
-    if options.get("integrator") != "DOP853":
-        given |= {"integrator": "rk4", "step_s": PERIOD / 4}
+    if options.get("method") != "DOP853":
+        given |= {"method": "rk4", "step_s": PERIOD / 4}
     plant = rd.Plant(joint, [rd.effects.EffortLimit(LIMIT)])
     return rd.Setup(plant, [0.2], [0.02], controller=control, estimate_error=False, **given | options)
 
@@ -48,7 +48,7 @@ def kinds(run) -> list[RemarkKind]:
 @pytest.mark.parametrize("integrator", ["rk4", "DOP853"])
 def test_sampled_damping_chatters_above_two(joint, ratio: float, integrator, chatters: bool) -> None:
     """v⁺ = (1 − kd T/M) v at a tick: above 2 it grows, up to where the effort limit holds u at ± LIMIT."""
-    run = rd.simulate(damped(joint, ratio, integrator=integrator))
+    run = rd.simulate(damped(joint, ratio, method=integrator))
     assert kinds(run).count(RemarkKind.CHATTER) == chatters
     if chatters:
         (said,) = (remark for remark in run.remarks if remark.kind is RemarkKind.CHATTER)
@@ -115,7 +115,7 @@ def test_time_at_the_effort_limit_is_that_of_the_closed_form(joint) -> None:
     a = LIMIT / INERTIA
     control = rd.control.PD(rd.control.hold([e]), kp, kd)
     setup = rd.Setup(
-        rd.Plant(joint, [rd.effects.EffortLimit(LIMIT)]), [0.0], duration_s=1.0, controller=control, integrator="rk4"
+        rd.Plant(joint, [rd.effects.EffortLimit(LIMIT)]), [0.0], duration_s=1.0, controller=control, method="rk4"
     )
     run = rd.simulate(setup, record_every_s=0.5, estimate_error=False)
     root = np.roots([kp * a / 2, kd * a, LIMIT - kp * e]).max()
@@ -167,10 +167,10 @@ def test_a_start_beyond_a_limit_is_said(cart) -> None:
 def test_an_adaptive_run_is_watched_at_its_steps() -> None:
     """A pole falls: q and v against a fixed step of 1 ms; between two of its own steps little is missed."""
     setup = rd.Setup(
-        rd.Plant(rd.load("cart_pole")), np.array([0.0, 0.4]), duration_s=2.0, estimate_error=False, integrator="rk4"
+        rd.Plant(rd.load("cart_pole")), np.array([0.0, 0.4]), duration_s=2.0, estimate_error=False, method="rk4"
     )
-    fine = rd.simulate(setup, integrator=rd.integrate.method("order_8"), step_s=1e-3)
-    run = rd.simulate(setup, integrator=rd.integrate.Adaptive(), record_every_s=1.0)
+    fine = rd.simulate(setup, method=rd.integrate.method("order_8"), step_s=1e-3)
+    run = rd.simulate(setup, method=rd.integrate.Adaptive(), record_every_s=1.0)
     span = np.ptp(fine.extremes[:2], axis=1)
     assert np.abs(run.extremes[:2] - fine.extremes[:2]).max() < 0.05 * span.max()
 
@@ -289,7 +289,7 @@ def test_a_sampled_loop_that_grows_says_so_though_nothing_chatters(
     period = part * low
     loop = rd.control.Loop(rd.control.PD(rd.control.hold([0.0]), kp, kd, period), actuation_delay=1.0)
     run = rd.simulate(
-        joint, [1e-6], duration_s=1000 * period, controller=loop, integrator="rk4", step_s=period, engine=engine,
+        joint, [1e-6], duration_s=1000 * period, controller=loop, method="rk4", step_s=period, engine=engine,
         estimate_error=False,
     )  # fmt: skip
     assert RemarkKind.CHATTER not in kinds(run)
@@ -301,7 +301,7 @@ def test_a_sampled_loop_that_grows_says_so_though_nothing_chatters(
         assert float(said.remedy.split("use period_s=")[1].split(",")[0]) < low
 
 
-@pytest.mark.parametrize("steps", [*long([{"integrator": "DOP853"}]), {"integrator": "rk4", "step_s": 2e-3}])
+@pytest.mark.parametrize("steps", [*long([{"method": "DOP853"}]), {"method": "rk4", "step_s": 2e-3}])
 def test_a_task_that_is_damped_says_so_between_samples_too(steps) -> None:
     """A planar arm held stretched but for 1e-3: the smallest eigenvalue of J M⁻¹ Jᵀ by inv(M). Bent, it is silent."""
     arm, frame = rd.load("planar_2r").with_(gravity=(0, 0, 0)), "tip"

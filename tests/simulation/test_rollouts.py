@@ -33,7 +33,7 @@ SETUP = rd.Setup(
     V,
     0.2,
     rd.control.PD(REFERENCE, 40.0, [4.0, 3.0]),
-    integrator="rk4",
+    method="rk4",
     step_s=2e-3,
     record_every_s=0.01,
 )
@@ -71,7 +71,7 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
     levels = {"joint_stops.stiffness": [0.0, 1e4, 1e4], "joint_stops.upper": [[0.5, 1.0], [0.5, 1.0], [0.45, 0.6]]}
     walls = {"joint_stops.upper": [[0.4, 1.0], [0.3, 0.8], [0.35, 0.9]], "kp": [20.0, 30.0, 40.0]}
     hard = rd.Plant(ARM, [rd.effects.ViscousFriction(0.5), *rd.effects.joint_stops([-1.0, -1.0], [0.4, 1.0], 1e4)])
-    chosen = {"integrator": rd.integrate.Adaptive(), "step_s": None, "record_every_s": 0.05, "engine": "compiled"}
+    chosen = {"method": rd.integrate.Adaptive(), "step_s": None, "record_every_s": 0.05, "engine": "compiled"}
     body = rd.effects.CarriedPayload(rd.Payload(ARM_TIP, 0.7), 0.05, 0.12)
     resting = rd.effects.LuGreFriction(1.0, 1.0, 0.1, 0.2, 0.3, 0.1)  # pushed away from v = 0: no reversal
     push = rd.control.PD(rd.control.hold(Q + 3.0), [20.0, 0.8], 0.0)
@@ -89,7 +89,7 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
             replace(SETUP, plant=rd.Plant(loaded(), PLANT.effects), controller=known), {"params": masses},
         ),
         "levels": (
-            rd.Setup(rd.Plant(weightless, stops), Q, V, 0.5, integrator="rk4", record_every_s=0.1), {"params": levels},
+            rd.Setup(rd.Plant(weightless, stops), Q, V, 0.5, method="rk4", record_every_s=0.1), {"params": levels},
         ),
         "chosen steps": (replace(SETUP, plant=hard, **chosen), {"q0": starts(3), "params": walls}),
         "payloads come and go": (
@@ -97,16 +97,16 @@ def batches() -> dict[str, tuple[rd.Setup, dict[str, Any]]]:
             {"params": {"gravity": [[0.0, 0.0, -9.8], [1.0, 0.0, -1.6]]}},
         ),
         "bristles": (
-            rd.Setup(rd.Plant(weightless, [resting]), Q, None, 0.2, push, integrator="rk4"), {"q0": starts(3, 0.01)},
+            rd.Setup(rd.Plant(weightless, [resting]), Q, None, 0.2, push, method="rk4"), {"q0": starts(3, 0.01)},
         ),
-        "tons": (rd.Setup(rd.Plant(ARM.with_(mass_scale=2000.0)), [1.5, 0.2], duration_s=0.2, integrator="rk4"), {}),
+        "tons": (rd.Setup(rd.Plant(ARM.with_(mass_scale=2000.0)), [1.5, 0.2], duration_s=0.2, method="rk4"), {}),
         **{f"every {x} s": (replace(SETUP, record_every_s=x), {"q0": starts(2)}) for x in (0.0, 0.005, 0.03, 0.5)},
         "between cut steps": (replace(SETUP, **odd), {"q0": starts(2)}),
         "between steps": (replace(SETUP, plant=rd.Plant(ARM, PLANT.effects[:2]), **odd), {"q0": starts(2)}),
         "between steps in (q, p)": (
-            replace(SETUP, plant=rd.Plant(ARM, [bristles]), integrator=gauss, **odd), {"q0": starts(2)},
+            replace(SETUP, plant=rd.Plant(ARM, [bristles]), method=gauss, **odd), {"q0": starts(2)},
         ),
-        "Gauss": (replace(SETUP, integrator=rd.integrate.method("gauss_2")), {"q0": starts(70)}),
+        "Gauss": (replace(SETUP, method=rd.integrate.method("gauss_2")), {"q0": starts(70)}),
     }  # fmt: skip
 
 
@@ -175,7 +175,7 @@ def test_a_run_that_diverges_leaves_the_others_as_they_are(method: str, effects:
     It names its time and reason as simulate does; before its step is judged, the joint that moved fastest.
     """
     plant = rd.Plant(ARM, effects)
-    setup = replace(SETUP, plant=plant, integrator=rd.integrate.method(method), record_every_s=0.0)
+    setup = replace(SETUP, plant=plant, method=rd.integrate.method(method), record_every_s=0.0)
     q0, v0 = starts(40), np.broadcast_to(V, (40, 2)).copy()
     wild = [3, 17]
     quiet = rd.rollouts(setup, q0, v0, record=EVERYTHING)
@@ -206,7 +206,7 @@ def test_a_run_that_overflows_ends_at_the_step_at_which_simulate_ends_it(engine:
     """Velocities square from step to step: from 1e100 to 1e308 it is one or two of them. Rounding moves no end."""
     rng, h = np.random.default_rng(2), 0.02
     q0, v0 = rng.normal(size=(12, 2)), 30.0 * rng.normal(size=(12, 2))
-    setup = rd.Setup(SETUP.plant, q0[0], v0[0], duration_s=40 * h, integrator="explicit_euler", step_s=h, engine=engine)
+    setup = rd.Setup(SETUP.plant, q0[0], v0[0], duration_s=40 * h, method="explicit_euler", step_s=h, engine=engine)
     runs = rd.rollouts(replace(setup, engine="auto"), q0, v0)
     wild = np.flatnonzero(runs.diverged)
     assert len(set(np.rint(runs.ended[wild] / h))) > 2
@@ -227,7 +227,7 @@ def assert_alike(ours: np.ndarray, theirs: np.ndarray) -> None:
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-10 * (1 + np.abs(theirs).max()))
 
 
-@pytest.mark.parametrize("setup", [SETUP, PID, *long([replace(SETUP, integrator=rd.integrate.method("gauss_2"))])])
+@pytest.mark.parametrize("setup", [SETUP, PID, *long([replace(SETUP, method=rd.integrate.method("gauss_2"))])])
 @pytest.mark.parametrize("record", [EVERYTHING, ("q", "v")])
 def test_a_run_of_a_batch_is_the_trajectory_of_simulate(setup: rd.Setup, record: tuple[str, ...]) -> None:
     """In all that was recorded or follows from it; what neither tells is nan, and nothing is in its place."""
@@ -409,7 +409,7 @@ def test_a_joint_strikes_its_stops_in_a_batch_as_it_does_alone() -> None:
     The runs that stay between the stops are those of lock step, bit for bit.
     """
     plant = rd.Plant(ARM.with_(gravity=(0.0, 0.0, 0.0)), rd.effects.joint_stops(-0.1, 0.5, 1e5, 0.0))
-    setup = rd.Setup(plant, Q, duration_s=1.0, integrator="rk4", step_s=2e-3, estimate_error=False)
+    setup = rd.Setup(plant, Q, duration_s=1.0, method="rk4", step_s=2e-3, estimate_error=False)
     q0, v0 = np.tile([0.2, 0.15], (70, 1)), np.full((70, 2), [0.05, -0.1])
     strikes = [2, 65]
     v0[strikes] = [[2.0, -1.4], [-0.8, 2.4]]
@@ -434,7 +434,7 @@ def test_events_end_the_runs_of_a_batch_as_they_end_single_ones(tmp_path: Path) 
     setup = replace(SETUP, controller=None, events=[down], estimate_error=False, duration_s=0.3)
     q0 = np.array([[0.4, -0.7], [0.5, -0.7], [3.0, 0.2]])
     for method in ("rk4", "DOP853"):
-        runs = rd.rollouts(setup, q0, 0 * q0, integrator=rd.integrate.method(method) if method == "rk4" else method)
+        runs = rd.rollouts(setup, q0, 0 * q0, method=rd.integrate.method(method) if method == "rk4" else method)
         back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / method))
         for i in range(3):
             alone = rd.simulate(runs.setup, q0=q0[i], v0=[0.0, 0.0])
@@ -476,7 +476,7 @@ def test_an_interrupt_ends_the_batch_and_keeps_what_there_is(effects, monkeypatc
 
 def test_a_run_that_was_not_begun_has_its_start(monkeypatch) -> None:
     """An interrupt before the first of runs that are made one after the other: each is a trajectory of one sample."""
-    setup = replace(SETUP, integrator=rd.integrate.method("DOP853"), step_s=None)
+    setup = replace(SETUP, method=rd.integrate.method("DOP853"), step_s=None)
     rd.rollouts(setup, starts(1))  # compiled before
     interrupt_once(monkeypatch)
     runs = rd.rollouts(setup, starts(200), record=EVERYTHING, threads=2)

@@ -39,7 +39,7 @@ SWEEP = np.linspace(0.2, 1.6, B)
 
 def setup(plant: rd.Plant, controller: object, method: str = "rk4", **options) -> rd.Setup:
     own = {} if method == "DOP853" else {"step_s": 4e-3 if getattr(controller, "period_s", 0.0) else 5e-4}
-    return rd.Setup(plant, Q, V, 0.8, controller, integrator=method, record_every_s=0.1, **own | options)
+    return rd.Setup(plant, Q, V, 0.8, controller, method=method, record_every_s=0.1, **own | options)
 
 
 SCENES = {
@@ -109,7 +109,7 @@ def test_each_run_has_the_remarks_of_simulate(batch) -> None:
         size = np.abs(alone[i].extremes).max()
         rows = 2 if runs.observed.instants.any() else 3
         np.testing.assert_allclose(runs[i].extremes[:rows], alone[i].extremes[:rows], rtol=0, atol=1e-7 * size)
-        allowed = 2500.0 * SPACING if runs.setup.integrator.nonsmooth else 5e-3 * size
+        allowed = 2500.0 * SPACING if runs.setup.method.nonsmooth else 5e-3 * size
         np.testing.assert_allclose(runs[i].extremes, alone[i].extremes, rtol=0, atol=allowed)
 
 
@@ -203,7 +203,7 @@ def test_a_sampled_loop_is_linearised_in_the_worst_run() -> None:
     )
     assert remark.runs == (runs.worst,) and remark.joint == theirs.joint
     assert remark.value == pytest.approx(theirs.value, rel=1e-6) and remark.remedy == theirs.remedy
-    assert f"{remark.text} (run {runs.worst}; the only run looked at)" in runs.summary
+    assert f"{remark.text} (run {runs.worst}; the only run examined)" in runs.summary
 
 
 def test_tracking_errors_of_a_frame() -> None:
@@ -214,7 +214,7 @@ def test_tracking_errors_of_a_frame() -> None:
     law = rd.control.OperationalSpace(
         arm, "tip", rd.control.line(at, np.add(at, [0.1, 0, 0.1]), 0.2), 50.0, 10.0, rows=(0, 2)
     )
-    given = rd.Setup(rd.Plant(arm), q, duration_s=0.2, controller=law, integrator="rk4", step_s=4e-3)
+    given = rd.Setup(rd.Plant(arm), q, duration_s=0.2, controller=law, method="rk4", step_s=4e-3)
     runs = rd.rollouts(given, np.add(q, [[0.0, 0.1], [0.2, -0.1], [0.1, 0.3]]), [[0.1, 0.2], [0.3, 0.1], [1e5, 3e7]])
     assert list(runs.diverged) == [False, False, True]
     assert runs.worst == 2
@@ -239,7 +239,7 @@ def test_a_limit_of_no_effort_is_reached_all_the_time_once() -> None:
     given = rd.Setup(
         rd.Plant(CART, [rd.effects.EffortLimit([0.0, 1.0])]), Q, V, 0.2, rd.control.PD(GOAL, 40.0, 4.0, period_s=0.02)
     )
-    runs = rd.rollouts(replace(given, integrator=rd.integrate.method("rk4")))
+    runs = rd.rollouts(replace(given, method=rd.integrate.method("rk4")))
     for remarks in (runs.remarks, rd.simulate(given, estimate_error=False).remarks):
         (at,) = (each for each in remarks if each.kind is RemarkKind.EFFORT_REACHED and each.joint == "slide")
         assert at.duration == pytest.approx(0.2, rel=1e-9)

@@ -31,7 +31,7 @@ def test_a_run_that_fits_no_memory_is_refused_before_it_starts(duration, method,
     if method == "DOP853" and "controller" not in options and duration > 1e13:
         remedy = "floats resolve"  # with no record either
     with pytest.raises(QueryError, match=f"{remedy}.*shorter duration_s"):
-        rd.simulate(ARM, q0=[0.1, 0.2], duration_s=duration, integrator=method, **options)
+        rd.simulate(ARM, q0=[0.1, 0.2], duration_s=duration, method=method, **options)
 
 
 @pytest.mark.parametrize("duration", [1e13, 1e154, 1e300, 1e308])
@@ -45,9 +45,7 @@ def test_a_run_that_ends_at_a_time_that_floats_do_not_tell_is_refused(duration: 
 def test_a_batch_that_fits_no_memory_is_refused_before_it_starts() -> None:
     """1e9 samples of 2 joints take 30 GiB; the steps between samples take no memory."""
     with pytest.raises(QueryError, match=r"1e\+07 samples of 100 runs.*longer record_every_s.*fewer runs"):
-        rd.rollouts(
-            rd.Setup(ARM, duration_s=1e5, q0=[0.1, 0.2], record_every_s=0.01), [[0.1, 0.2]] * 100, integrator="rk4"
-        )
+        rd.rollouts(rd.Setup(ARM, duration_s=1e5, q0=[0.1, 0.2], record_every_s=0.01), [[0.1, 0.2]] * 100, method="rk4")
 
 
 @pytest.mark.parametrize("period", [0.0, 0.0237, *long([0.01])])
@@ -56,7 +54,7 @@ def test_a_batch_that_fits_no_memory_is_refused_before_it_starts() -> None:
 def test_the_size_that_is_told_bounds_the_run(method, law, period: float) -> None:
     """Not below what the run has, and not above it by more than the four steps a segment that rounding may add."""
     setup = rd.Setup(
-        ARM, [0.1, 0.2], duration_s=1.0, controller=law, integrator=method, record_every_s=period, estimate_error=False
+        ARM, [0.1, 0.2], duration_s=1.0, controller=law, method=method, record_every_s=period, estimate_error=False
     )
     run = rd.simulate(setup, engine="interpreted")
     many = segments(setup)

@@ -35,7 +35,7 @@ def controllers(period: float) -> list:
 
 def stepped(method, step: float) -> dict:
     """A method and its step; an adaptive one has none."""
-    return {"integrator": method} | ({} if method == "DOP853" else {"step_s": step})
+    return {"method": method} | ({} if method == "DOP853" else {"step_s": step})
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -79,7 +79,7 @@ def test_continuous_control_is_the_limit_of_a_small_period(kind: int) -> None:
     for period in (0.0, 1e-3, 2e-3, 4e-3):
         law = controllers(period)[kind]
         run = rd.simulate(
-            PLANT, **START, duration_s=0.2, controller=law, integrator="rk4", step_s=1e-3, estimate_error=False
+            PLANT, **START, duration_s=0.2, controller=law, method="rk4", step_s=1e-3, estimate_error=False
         )
         ends[period] = run.q[-1]
     distance = [np.linalg.norm(ends[period] - ends[0.0]) for period in (1e-3, 2e-3, 4e-3)]
@@ -91,7 +91,7 @@ def test_exact_computed_torque_makes_each_joint_a_linear_oscillator() -> None:
     """ë + 2 ζ ω ė + ω² e = 0 from e(0), whatever the arm: the closed form within the 1e-10 of its estimate."""
     omega, zeta = 9.0, 0.6
     law = rd.control.ComputedTorque(DOUBLE, rd.control.hold([0.9, 0.2]), *rd.control.gains_from(1.0, omega, zeta))
-    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.5, controller=law, integrator="rk4", step_s=5e-4)
+    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.5, controller=law, method="rk4", step_s=5e-4)
     e0, de0, decay = np.array([0.5, 0.9]), -np.array(START["v0"]), zeta * omega
     damped, t = omega * np.sqrt(1 - zeta**2), run.t[:, None]
     wave = e0 * np.cos(damped * t) + (de0 + decay * e0) / damped * np.sin(damped * t)
@@ -125,7 +125,7 @@ def test_a_switch_on_a_tick_is_one_cut(edge: float) -> None:
     """3 · 0.1 = 0.30000000000000004 is not 0.3: the two are one end of a step, and companions are not lost to it."""
     push = rd.effects.ExternalWrench("tip", [1.0, 0.0, -2.0, 0.0, -0.5, 0.0], start_s=0.1, end_s=edge)
     law = rd.control.PD(GOAL, [8.0, 2.0], [1.0, 0.2], period_s=0.1)  # slow enough for 10 Hz
-    run = rd.simulate(rd.Plant(DOUBLE, [push]), **START, duration_s=0.9, controller=law, integrator="rk4", step_s=5e-3)
+    run = rd.simulate(rd.Plant(DOUBLE, [push]), **START, duration_s=0.9, controller=law, method="rk4", step_s=5e-3)
     assert np.diff(run.t).min() > 1e-3
     assert run.error is not None
     assert run.error.largest < 1e-6
@@ -137,7 +137,7 @@ def test_a_run_evaluates_what_its_method_declares_and_nothing_it_does_not_name(m
     on, seen = counted()
     integrator = rd.integrate.method(method)
     run = rd.simulate(
-        rd.Plant(DOUBLE, [on]), **START, duration_s=0.048, integrator=integrator, record_every_s=0.048,
+        rd.Plant(DOUBLE, [on]), **START, duration_s=0.048, method=integrator, record_every_s=0.048,
         estimate_error=False,
     )  # fmt: skip
     assert integrator.evaluations_per_step is not None
@@ -155,7 +155,7 @@ def test_companions_that_are_off_cost_nothing(method) -> None:
     for estimate in (False, True):
         effect, seen = counted()
         plant = rd.Plant(DOUBLE, [effect])
-        runs.append(rd.simulate(plant, **START, duration_s=0.04, integrator=method, estimate_error=estimate))
+        runs.append(rd.simulate(plant, **START, duration_s=0.04, method=method, estimate_error=estimate))
         calls.append(len(seen))
     without, with_companions = runs
     assert without.error is None

@@ -79,7 +79,7 @@ def both(setup: Setup) -> tuple[Any, Any]:
 def setup(what: list[Any], name: Any, **options: Any) -> Setup:
     """A run that keeps no estimate."""
     options = {"duration_s": 0.6, "record_every_s": 0.02, **options}
-    return Setup(rd.Plant(ARM, what), Q0, V0, integrator=name, engine="compiled", estimate_error=False, **options)
+    return Setup(rd.Plant(ARM, what), Q0, V0, method=name, engine="compiled", estimate_error=False, **options)
 
 
 @pytest.mark.parametrize("sampled", [*long([False]), True], ids=["continuous", "sampled"])
@@ -269,7 +269,7 @@ class Heun(PlainMethod):
 def test_a_step_of_the_users_own_is_machine_code_or_the_summary_says_why_not() -> None:
     """Both take the compiled equation; a step in arrays runs in Python, and says the line and what to write."""
     options: dict[str, Any] = {"engine": "compiled", "step_s": 2e-3, "duration_s": 0.4, "estimate_error": False}
-    made = [rd.simulate(rd.Plant(ARM, SMOOTH), Q0, V0, integrator=Heun(of), **options) for of in (heun, heun_by_arrays)]
+    made = [rd.simulate(rd.Plant(ARM, SMOOTH), Q0, V0, method=Heun(of), **options) for of in (heun, heun_by_arrays)]
     np.testing.assert_allclose(made[0].q, made[1].q, rtol=0, atol=1e-13)  # rounding of another order
     assert made[0].statistics.engine == "compiled"
     said = made[1].statistics.engine
@@ -281,15 +281,13 @@ def test_a_step_of_the_users_own_is_machine_code_or_the_summary_says_why_not() -
     )
     assert said in made[1].summary
     with pytest.raises(SubsetError, match=f"line {line}, in heun_by_arrays"):
-        rd.rollouts(
-            rd.Plant(ARM, SMOOTH), [Q0] * 3, [V0] * 3, integrator=Heun(heun_by_arrays), step_s=2e-3, duration_s=0.1
-        )
+        rd.rollouts(rd.Plant(ARM, SMOOTH), [Q0] * 3, [V0] * 3, method=Heun(heun_by_arrays), step_s=2e-3, duration_s=0.1)
 
 
 def test_a_step_that_errs_ends_the_run_with_its_line() -> None:
     """Not as a run that diverged."""
     with pytest.raises(MachineCodeError, match=r"heun_that_errs, line \d+: an index is out of range"):
         rd.simulate(
-            rd.Plant(ARM, SMOOTH), Q0, V0, integrator=Heun(heun_that_errs), engine="compiled", step_s=2e-3,
+            rd.Plant(ARM, SMOOTH), Q0, V0, method=Heun(heun_that_errs), engine="compiled", step_s=2e-3,
             duration_s=0.4, estimate_error=False,
         )  # fmt: skip

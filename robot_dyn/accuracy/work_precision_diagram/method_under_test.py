@@ -224,7 +224,7 @@ def whole(setup: Setup) -> Setup:
 def recorded(setup: Setup, duration_s: float) -> Setup:
     """The setup up to `duration_s`, with about RECORDS records and no error estimate."""
     return replace(
-        setup, integrator=Adaptive(), step_s=None, estimate_error=False, accuracy=None, events=(),
+        setup, method=Adaptive(), step_s=None, estimate_error=False, accuracy=None, events=(),
         duration_s=duration_s, record_every_s=_record_period(setup, duration_s),
     )  # fmt: skip
 
@@ -265,7 +265,7 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnde
         engine: "compiled" or "interpreted".
         events: Whether steps end at the thresholds of the effects.
     """
-    setup = replace(setup, integrator=made, engine=engine)
+    setup = replace(setup, method=made, engine=engine)
 
     def run(setting: float, limit: Limit) -> Run:
         return timed(at_setting(setup, setting), limit, events)
@@ -278,8 +278,8 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnde
 
 def at_setting(setup: Setup, setting: float) -> Setup:
     """The setup with its method at a step, in [s], or a relative tolerance."""
-    if isinstance(setup.integrator, Adaptive):
-        return replace(setup, integrator=replace(setup.integrator, rtol=setting, atol=ATOL * setting))
+    if isinstance(setup.method, Adaptive):
+        return replace(setup, method=replace(setup.method, rtol=setting, atol=ATOL * setting))
     return replace(setup, step_s=setting)
 
 
@@ -313,7 +313,7 @@ def step_ladder(period_s: float, order: int) -> Iterator[float]:
 def warmed(setup: Setup) -> None:
     """Run one or a few steps to load the machine code that the setup needs."""
     step = setup.record_every_s / _WARM
-    setup = setup if setup.integrator.controls_error else replace(setup, step_s=step)
+    setup = setup if setup.method.controls_error else replace(setup, step_s=step)
     timed(replace(setup, duration_s=2 * step, record_every_s=step), Budget().check)
 
 
@@ -331,7 +331,7 @@ def timed(setup: Setup, limit: Limit, events: bool = True) -> Run:
         raise KeyboardInterrupt
     finished = record.outcome.ending is Ending.FINISHED
     met = np.ones(len(record.t), bool)
-    if not setup.integrator.controls_error and record.ends is not None:
+    if not setup.method.controls_error and record.ends is not None:
         met = common(record.t, np.append(0.0, record.ends)) >= 0
     return Run(
         record.t[met], record.y[met, : setup.plant.dynamics.n] if finished else None,

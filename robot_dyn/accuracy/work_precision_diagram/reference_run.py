@@ -137,7 +137,7 @@ def _first(setup: Setup, budget: Budget) -> tuple[str, np.ndarray, np.ndarray]:
     for tight in _FIRST:
         description = f"{tight.name}, rtol {tight.rtol:g}"
         budget.report(f"reference: {description}")
-        run = _in_time(replace(setup, integrator=tight), budget)
+        run = _in_time(replace(setup, method=tight), budget)
         if run is not None and run.q is not None:
             return description, run.t, run.q
     raise HorizonError(
@@ -150,7 +150,7 @@ def _rough_ends(
     setup: Setup, t: np.ndarray, q: np.ndarray, size: float, budget: Budget
 ) -> tuple[float | None, float | None]:
     """When a run with a looser tolerance parts from the first one, and when nothing is left; None if it does not."""
-    run = _in_time(replace(setup, integrator=Adaptive("DOP853", _ROUGH, _ROUGH)), budget)
+    run = _in_time(replace(setup, method=Adaptive("DOP853", _ROUGH, _ROUGH)), budget)
     if run is None or run.q is None:
         return None, None
     times, distance = _distance(t, q, run)
@@ -186,7 +186,7 @@ def _second(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> _Othe
     """The finest run by another method."""
     for name in _SECOND:
         try:
-            setup_of_other = replace(setup, integrator=method(name))
+            setup_of_other = replace(setup, method=method(name))
         except QueryError:  # it cannot end its steps where joints are held, say
             continue
         if runs := list(_refined(setup_of_other, t, q, budget)):
@@ -200,7 +200,7 @@ def _refined(setup: Setup, t: np.ndarray, q: np.ndarray, budget: Budget) -> Iter
     """Runs with ever shorter steps, until these win nothing or take too long."""
     before, limit, late = np.inf, _longest(budget), 0
     for step in step_ladder(setup.record_every_s, 1):
-        words = f"{setup.integrator.name}, step {step:.3g} s"
+        words = f"{setup.method.name}, step {step:.3g} s"
         budget.report(f"reference: {words}")
         run = _in_time(replace(setup, step_s=step), budget)
         late += run is None  # steps that are too long may bring forth a motion that takes longer
@@ -273,7 +273,7 @@ def past_horizon(
         budget.report(f"beyond the horizon: {ladder.name}")
         with suppress(OvertimeError, RobotDynError):
             setting = in_time[-1].setting
-            finest = replace(setup, integrator=integrators[ladder.method], engine=ladder.engine)
+            finest = replace(setup, method=integrators[ladder.method], engine=ladder.engine)
             finest = at_setting(finest, setting)
             with budget.apart():
                 warmed(finest)

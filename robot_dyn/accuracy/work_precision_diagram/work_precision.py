@@ -304,7 +304,7 @@ def _able(setup: Setup, integrators: list[Any]) -> tuple[list[Any], list[str]]:
     able, why = [], []
     for each in integrators:
         try:
-            able.append(replace(setup, integrator=each).integrator)
+            able.append(replace(setup, method=each).method)
         except QueryError as error:
             why.append(f"{each.name}: {error}")
     return able, why

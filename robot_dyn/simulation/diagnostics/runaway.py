@@ -50,20 +50,18 @@ def runaway(setup: Setup, speeds: np.ndarray) -> dict[str, float | str]:
 
 def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
     """Return a remark if a fixed step is too long to be stable at the start, and deviations grow by 1e3 until t."""
-    if setup.integrator.controls_error or setup.integrator.nonsmooth or setup.equation.canonical:
+    if setup.method.controls_error or setup.method.nonsmooth or setup.equation.canonical:
         return ()
     equation, step = setup.equation, setup.taken_step_s
     y, held = equation.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if equation.sampled else None
     try:
-        linear = setup.integrator, jacobian(equation, 0.0, y, held), len(setup.q0)
+        linear = setup.method, jacobian(equation, 0.0, y, held), len(setup.q0)
         if not excess_rate(*linear)(step) * t > log(EXPLAINS):
             return ()
         limit, motion = longest_step(*linear), fastest(equation, 0.0, y, held)
     except (RobotDynError, np.linalg.LinAlgError):
         return ()
-    facts: dict[str, float | str] = {
-        "method": setup.integrator.name, "motion": str(motion), "step_s": below(limit)
-    }  # fmt: skip
+    facts = motion.facts | {"method": setup.method.name, "step_s": below(limit)}
     return (Remark(RemarkKind.TOO_LONG, motion.joint, "v", 0.0, setup.duration_s, 0.0, step, limit, facts=facts),)
 
 
@@ -76,7 +74,7 @@ def judged(setup: Setup, record: Recording, fast: dict[str, float | str]) -> Out
         fast: The joint that reached an implausible speed, see `runaway`.
     """
     outcome = record.outcome
-    if outcome.ending is not Ending.FINISHED or setup.integrator.controls_error:
+    if outcome.ending is not Ending.FINISHED or setup.method.controls_error:
         return outcome
     if remarks := step_too_long(setup, outcome.t):
         return Outcome(Reason.STEP_TOO_LONG, outcome.t, remarks[0].joint, dict(remarks[0].fields))

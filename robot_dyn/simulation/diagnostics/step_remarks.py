@@ -209,7 +209,7 @@ def _of_sensors(controller: Any) -> tuple[str, ...]:
 def _coarse(setup: Setup, observer: Observer, t: np.ndarray, samples: np.ndarray, units: Units) -> Iterator[Remark]:
     """Where q, v or u left the hull of the samples around it by a good part of its range; the worst for each joint."""
     edges, low, high = observer.windows
-    every = not setup.record_every_s and not setup.integrator.controls_error
+    every = not setup.record_every_s and not setup.method.controls_error
     if every or not len(low) or not len(t):
         return
     spacing = 1e-9 * (t[-1] - t[0])

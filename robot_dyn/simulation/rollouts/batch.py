@@ -78,7 +78,7 @@ class Batch:
     @property
     def why_one_by_one(self) -> str:
         """Why the runs do not go in lock step; empty if they do."""
-        setup, method = self.setup, self.setup.integrator
+        setup, method = self.setup, self.setup.method
         motion = setup.plant.equation_of_motion
         if method.controls_error:
             return f"{method.name} chooses its steps"

@@ -141,7 +141,7 @@ class Tiles:
         run_parameters = self.code.run_parameters({name: x[numbers] for name, x in self.batch.sweep.items()})
         noise, more = self.batch.number_of(numbers), self.out_extras.shape[1]
         runs = lanes_of(equation, self.y[numbers].T, run_parameters, more, self.table.parameters[0], noise)
-        method = cast(PlainMethod, self.setup.integrator)
+        method = cast(PlainMethod, self.setup.method)
         assert self.code.machine_loop is not None
         advance = self.code.machine_loop.calls()
         rows = equation.size | 1  # odd: stages a power of two apart would share the sets of a cache
@@ -209,7 +209,7 @@ class Tiles:
         instants = self.steps // self.apart if self.apart > 1 else 0
         result = Record(
             _compiled(setup), t, columns, outcomes, self._steps(ended), np.repeat(self.evaluations, LANES)[:B],
-            Statistics(setup.integrator.name, step, self.steps, most, perf_counter() - began, engine=label),
+            Statistics(setup.method.name, step, self.steps, most, perf_counter() - began, engine=label),
             observed(self.observations, self.levels, alone, instants)[:B],
         )  # fmt: skip
         for run, single in repeated.items():

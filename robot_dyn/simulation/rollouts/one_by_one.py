@@ -90,11 +90,11 @@ def one_by_one(batch: Batch, threads: int, on_progress: Callable[[float], object
         if name in ("q", "v"):
             x[:, 0] = batch.q0 if name == "q" else batch.v0
     label = f"{engine.label}, {B} run{'s' * (B > 1)} one after the other on each thread"
-    step = 0.0 if setup.integrator.controls_error else setup.duration_s / setup.steps
+    step = 0.0 if setup.method.controls_error else setup.duration_s / setup.steps
     steps, evaluations = (max((getattr(x, of) for x in made.values()), default=0) for of in ("steps", "evaluations"))
     result = Record(
         setup, t, recorded, [Outcome(Reason.INTERRUPTED, 0.0)] * B, np.zeros(B, np.int64), np.zeros(B, np.int64),
-        Statistics(setup.integrator.name, step, steps, evaluations, perf_counter() - began, engine=label),
+        Statistics(setup.method.name, step, steps, evaluations, perf_counter() - began, engine=label),
         observed([starts], levels, {i: record.observation for i, record in made.items()}),
     )  # fmt: skip
     for i, record in made.items():

@@ -66,7 +66,7 @@ def thresholds(setup: Setup, sweep: Mapping[str, np.ndarray], count: int) -> Thr
         sweep: Values that differ from run to run, (B, size) by name.
         count: B.
     """
-    if setup.steps > MOST_CUT or setup.integrator.nonsmooth:
+    if setup.steps > MOST_CUT or setup.method.nonsmooth:
         return None
     equation, names = setup.equation, dict[str, None]()
     levels, others = dict[tuple[bool, int, int], np.ndarray](), np.zeros(count, bool)
@@ -100,7 +100,8 @@ def _of_runs(
     """Yield the thresholds of the runs, with the numbers of those that have them, (k,)."""
     plant, controller = equation.plant, equation.controller
     known = parameters(plant.dynamics, plant.effects, controller, sweep)
-    of = {("effect", i): effect for i, effect in enumerate(plant.effects)} | {CONTROLLER: controller}
+    of: dict[Part, Any] = {("effect", i): effect for i, effect in enumerate(plant.effects)}
+    of[CONTROLLER] = controller
     parts = {x.part for x in known if x.name in sweep and x.part in of and not _always_smooth(of[x.part])}
     known = [x for x in known if x.part in parts]
     values, places = joined(known), {x.name: rows(known, x.name) for x in known if x.name in sweep}

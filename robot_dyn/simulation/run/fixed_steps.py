@@ -43,7 +43,7 @@ class FixedSteps:
     def __init__(self, state: RunState, pace: Fraction) -> None:
         setup, counts, m, n = state.setup, state.table.counts, state.equation.size, state.config.n
         self.state, self.segments = state, paced(setup.segments, pace)
-        self.method = cast(Integrator, setup.integrator)
+        self.method = cast(Integrator, setup.method)
         self.stepper = self.method.stepper(FLOAT64, m, n, m + n, 1, state.equation.widths)
         self.loop = state.engine.loop() or time_loop(self.stepper.step)
         every, thin = _shared(setup, pace, len(counts))

@@ -76,7 +76,7 @@ class Run:
             self.state = RunState(setup, engine, table, observer)
             self.steps: FixedSteps | EventSteps = FixedSteps(self.state, cast(Fraction, pace))
             return
-        if setup.integrator.controls_error:
+        if setup.method.controls_error:
             ends = pace if isinstance(pace, np.ndarray) else None
         else:
             ends = mesh(setup.segments, cast(Fraction, pace))
@@ -177,7 +177,7 @@ class Run:
             events=tuple(event for event in state.events if event.t <= outcome.t),  # not those of states that overflow
             ends=ends,
         )
-        if state.setup.integrator.nonsmooth:
+        if state.setup.method.nonsmooth:
             _complete_samples(state, recording)
         return recording
 

@@ -34,15 +34,15 @@ def check_method(plant: Plant, method: Method, events: tuple[Event, ...], finds_
     """
     if events and not finds_events:
         raise QueryError(
-            f"events: steps of {method.name} are not cut; take integrator='DOP853'"
+            f"events: steps of {method.name} are not cut; take method='DOP853'"
             if method.nonsmooth
             else f"events: runs of more than {MOST_CUT} steps of {method.name} are not cut; take longer"
-            " steps, or integrator='DOP853'"
+            " steps, or method='DOP853'"
         )
     _check_set_valued(plant, method, finds_events)
     _check_payloads(plant, method)
     if method.nonsmooth and (drives := [*plant.equation_of_motion.drives.values()]):
-        raise QueryError(f"{drives[0].name}: {method.name} takes no motors of a drive; take integrator='DOP853'")
+        raise QueryError(f"{drives[0].name}: {method.name} takes no motors of a drive; take method='DOP853'")
 
 
 def check_start(
@@ -111,10 +111,10 @@ def _check_set_valued(plant: Plant, method: Method, finds_events: bool) -> None:
         if effects and is_unsuited and not method.nonsmooth:
             raise QueryError(
                 f"{effects[0].name}: steps must end where it holds a joint or lets it go, and {method.name} {reason};"
-                " take integrator='DOP853', or 'time_stepping' with a step_s"
+                " take method='DOP853', or 'time_stepping' with a step_s"
             )
     if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
-        raise QueryError(f"{other[0].name}: has no law for {method.name}; take integrator='DOP853'")
+        raise QueryError(f"{other[0].name}: has no law for {method.name}; take method='DOP853'")
 
 
 def _check_payloads(plant: Plant, method: Method) -> None:
@@ -124,7 +124,7 @@ def _check_payloads(plant: Plant, method: Method) -> None:
         (method.nonsmooth, f"steps of {method.name} do not end where it comes and goes"),
     ):
         if plant.equation_of_motion.payloads and is_unsuited:
-            raise QueryError(f"carried_payload: {reason}; take integrator='DOP853'")
+            raise QueryError(f"carried_payload: {reason}; take method='DOP853'")
 
 
 def _check_torques(plant: Plant, q0: Array, v0: Array) -> None:

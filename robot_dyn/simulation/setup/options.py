@@ -61,11 +61,11 @@ def setup_of(caller: str, source: Setup | Plant | Dynamics, options: Mapping[str
     names = of_setup if isinstance(source, Setup) else {"q0", "v0", *Options.__annotations__}
     for name in options.keys() - names:
         if name in ("rtol", "atol"):  # which are keys of scenes
-            remedy = f"it is of the method: integrator=rd.integrate.Adaptive({name}=…)"
+            remedy = f"it is of the method: method=rd.integrate.Adaptive({name}=…)"
         else:
             remedy = nearest(name, names)
         raise QueryError(f"{caller}: no option {name!r}; {remedy}")
-    if "integrator" in options and (method := as_method(options["integrator"])).controls_error:
+    if "method" in options and (method := as_method(options["method"])).controls_error:
         if "step_s" in options:
             raise QueryError(no_step(method.name))
         options = {"step_s": None, **options}  # the step of the setup belongs to its own method

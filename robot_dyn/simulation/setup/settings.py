@@ -50,7 +50,7 @@ def _all(setup: Setup) -> Iterator[Setting]:
         yield from _numbers(effect.name, effect, types)
     if setup.controller is not None:
         yield from _of_controller(setup.controller, types)
-    method = setup.integrator
+    method = setup.method
     yield "method", method.name
     if isinstance(method, Adaptive):
         yield from (("rtol", _number(method.rtol)), ("atol", _number(method.atol)))

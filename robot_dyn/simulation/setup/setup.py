@@ -60,7 +60,7 @@ class Options(TypedDict, total=False):
 
     duration_s: float
     controller: Controller | Callable[[float, np.ndarray, np.ndarray], ArrayLike] | None
-    integrator: str | Integrator | Adaptive
+    method: str | Integrator | Adaptive
     step_s: float | None
     record_every_s: float
     estimate_error: bool
@@ -81,9 +81,8 @@ class Setup(Value, Caching):
         v0: Velocity at the start, (n,); 0 by default.
         duration_s: Length of the run, in [s].
         controller: A `Controller`; a function (t, q, v) → torque (n,), which becomes one; or None.
-        integrator: The method, or its name as in a scene. "auto", "DOP853" and "Rosenbrock", or an `Adaptive` with
-            other tolerances, choose their steps. "rk4", "order_8", "gauss_4" and others of `rd.integrate.method` have
-            a fixed step.
+        method: The integration method, or its name, see `rd.integrate.method`. "auto", "DOP853" and "Rosenbrock" choose
+            their steps, as does an `Adaptive` with other tolerances; others, such as "rk4", have a fixed step.
         step_s: Step of a method of fixed step, in [s], 1 ms by default. Steps are shorter where samples, ticks,
             switches or the end of the run require it. A method that chooses its steps takes no step_s.
         record_every_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
@@ -103,7 +102,7 @@ class Setup(Value, Caching):
     v0: np.ndarray = None  # pyright: ignore[reportAssignmentType] # zeros once built
     duration_s: float = 1.0
     controller: Controller | None = None
-    integrator: Integrator | Adaptive = AUTO  # pyright: ignore[reportAssignmentType]
+    method: Integrator | Adaptive = AUTO  # pyright: ignore[reportAssignmentType]
     step_s: float | None = None
     record_every_s: float = 0.0
     estimate_error: bool = True
@@ -127,7 +126,7 @@ class Setup(Value, Caching):
         names = self.plant.dynamics.joint_names
         if self.v0 is None:
             object.__setattr__(self, "v0", np.zeros(len(names)))
-        object.__setattr__(self, "integrator", as_method(self.integrator))
+        object.__setattr__(self, "method", as_method(self.method))
         for name in ("q0", "v0"):
             object.__setattr__(self, name, one_state(name, getattr(self, name), names))
         for name in ("duration_s", "step_s", "record_every_s"):
@@ -141,23 +140,23 @@ class Setup(Value, Caching):
         ):
             instance("about", text, str, "give texts by name")
         object.__setattr__(self, "about", dict(self.about))
-        if self.integrator.controls_error and self.step_s is not None:
-            raise QueryError(no_step(self.integrator.name))
+        if self.method.controls_error and self.step_s is not None:
+            raise QueryError(no_step(self.method.name))
         choice("engine", self.engine, ENGINES)
         object.__setattr__(self, "events", _events(self.events))
         object.__setattr__(self, "controller", _controller(self.controller, len(names)))
         if self.controller is not None:
             check_model(self.plant.dynamics, self.controller, self.q0)
         _check_segments(self)
-        check_method(self.plant, self.integrator, self.events, self.finds_events)
+        check_method(self.plant, self.method, self.events, self.finds_events)
         check_start(self.plant, self.controller, self.events, self.q0, self.v0)
 
     def _check_accuracy(self, accuracy: Accuracy) -> None:
         """Check the requested accuracy, and that no other option chooses the method or the tolerance."""
         object.__setattr__(self, "accuracy", least_accuracy(accuracy, self.plant.dynamics))
-        if self.integrator != Adaptive(AUTO):
-            name = self.integrator.name
-            raise QueryError(f"accuracy: chooses method and tolerance; leave out integrator, got {name!r}")
+        if self.method != Adaptive(AUTO):
+            name = self.method.name
+            raise QueryError(f"accuracy: chooses method and tolerance; leave out method, got {name!r}")
         if not self.estimate_error:
             raise QueryError("accuracy: is checked by the error estimate; leave out estimate_error=False")
 
@@ -174,12 +173,12 @@ class Setup(Value, Caching):
     @cached_property
     def is_value(self) -> bool:
         """True if no part, events excepted, is user-defined code or may change; derived values then remain valid."""
-        return all(map(is_value, (self.plant, self.controller, self.integrator)))
+        return all(map(is_value, (self.plant, self.controller, self.method)))
 
     @cached_property
     def equation(self) -> StateEquation:
         """The state equation of the run."""
-        return StateEquation(self.plant, self.controller, self.integrator.canonical, self.events)
+        return StateEquation(self.plant, self.controller, self.method.canonical, self.events)
 
     @cached_property
     def undeclared(self) -> tuple[tuple[object, str], ...]:
@@ -222,8 +221,8 @@ class Setup(Value, Caching):
     @property
     def finds_events(self) -> bool:
         """True if steps end at thresholds of effects and of the controller, and at requested events."""
-        if self.integrator.controls_error or self.integrator.nonsmooth:
-            return not self.integrator.nonsmooth
+        if self.method.controls_error or self.method.nonsmooth:
+            return not self.method.nonsmooth
         return self.equation.switches and self.steps <= MOST_CUT
 
     @property
@@ -264,7 +263,7 @@ def no_step(name: str) -> str:
     """Return the error message for step_s with a method that chooses its steps."""
     return (
         f"step_s has no effect on {name}, which chooses its steps: leave it out, name a method of fixed step like"
-        " integrator='rk4', or give rd.integrate.Adaptive(max_step_s=…)"
+        " method='rk4', or give rd.integrate.Adaptive(max_step_s=…)"
     )
 
 
@@ -329,7 +328,7 @@ def segments(setup: Setup) -> float:
 
 def steps(setup: Setup) -> float:
     """Return the approximate number of steps of a method of fixed step; 0 for an adaptive method."""
-    if setup.integrator.controls_error:
+    if setup.method.controls_error:
         return 0.0
     step = min(setup.nominal_step_s, setup.record_every_s or inf)  # samples lie on steps
     return setup.duration_s / step + 4 * segments(setup)
@@ -376,7 +375,7 @@ def too_large(record: str, size: float, most: float, or_else: str = "") -> Query
 def samples(setup: Setup) -> float:
     """Return an upper bound of the number of samples."""
     periods = setup.duration_s / setup.record_every_s + 2 if setup.record_every_s else inf
-    adaptive = setup.integrator.controls_error
+    adaptive = setup.method.controls_error
     return min(periods, 1000 + segments(setup) if adaptive and periods == inf else inf, steps(setup) or inf)
 
 
@@ -400,7 +399,7 @@ def shortened(setup: Setup) -> str:
 
 
 def _method(setup: Setup) -> Iterator[str]:
-    method, name = setup.integrator, setup.integrator.name
+    method, name = setup.method, setup.method.name
     used: dict[str, Any] = {}
     if setup.accuracy is not None:
         name = f"chosen for an error of q of at most {setup.accuracy:g}"

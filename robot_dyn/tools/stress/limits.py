@@ -201,7 +201,7 @@ def _judged_step(setup: Setup, name: str, advice: Advice, J: np.ndarray, seed: i
     try:
         unstable = isfinite(limit.value) and not iterates
         matrix = step_map(method(name), J, len(at))(_BEYOND * limit.value) if unstable else J
-        setup = _pushed(replace(setup, integrator=name), matrix, seed)
+        setup = _pushed(replace(setup, method=name), matrix, seed)
         if not isfinite(limit.value):
             setup = replace(setup, step_s=setup.duration_s / _PARTS)
             run = run_from_near(setup, at, budget, True)

@@ -61,8 +61,8 @@ def _scene(robot: Robot, family: str, scale: np.ndarray, rng: np.random.Generato
             setup = Setup(plant, q, v, duration, control, drawn, record_every_s=record, **step)
         except RobotDynError:  # not every method supports every effect
             continue
-        steps = f", step {setup.nominal_step_s:g} s" if step else f", rtol {setup.integrator.rtol:.0e}"
-        return setup, f"{family}: {setup.integrator.name}{steps}"
+        steps = f", step {setup.nominal_step_s:g} s" if step else f", rtol {setup.method.rtol:.0e}"
+        return setup, f"{family}: {setup.method.name}{steps}"
     return Setup(plant, q, v, duration, control), f"{family}: auto"
 
 
@@ -127,8 +127,8 @@ def judged(setup: Setup, what: str, budget: Budget) -> JudgedRun:
     report = says(run) if finished else f"{run.outcome.ending} at {run.outcome.t:.3g} s"
     if error is None or not finished or not error.until_s:
         return JudgedRun(what, setup.duration_s, np.nan, np.nan, np.nan, report, False, setup)
-    sure = replace(setup, step_s=None, estimate_error=False, integrator=_BETTER[0])
-    better = [simulate(replace(sure, integrator=integrator), on_progress=budget.check) for integrator in _BETTER]
+    sure = replace(setup, step_s=None, estimate_error=False, method=_BETTER[0])
+    better = [simulate(replace(sure, method=integrator), on_progress=budget.check) for integrator in _BETTER]
     if any(x.outcome.ending is not Ending.FINISHED for x in better):
         raise RobotDynError("a better run did not finish")
     if any(x.t.shape != run.t.shape or np.abs(x.t - run.t).max() > _ONE_TIME for x in better):

@@ -233,7 +233,7 @@ def samples_of_run(setup: Setup) -> int:
     """Return the largest number of samples of a run."""
     if setup.record_every_s:
         return int(setup.duration_s / setup.record_every_s) + 2
-    return 1000 if setup.integrator.controls_error else setup.steps + 1
+    return 1000 if setup.method.controls_error else setup.steps + 1
 
 
 def parameter_of(column: str) -> str:

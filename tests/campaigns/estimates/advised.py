@@ -55,7 +55,7 @@ def limited(seed: int, index: int) -> Limited:
 
 def blow_up(scene: Limited, near: float) -> float:
     """The length at which runs begin to blow up, bisected between a third and three times a length."""
-    exact = rd.simulate(scene.of(near / 20), integrator="rk4" if scene.sampled else "rosenbrock_5")
+    exact = rd.simulate(scene.of(near / 20), method="rk4" if scene.sampled else "rosenbrock_5")
     usual = _off(rd.simulate(scene.of(near / 2)), exact)
     return _bisected(
         lambda length: _off(rd.simulate(scene.of(length)), exact) > _FAR * usual + _LEAST, near / 3, near * 3

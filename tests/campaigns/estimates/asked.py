@@ -26,7 +26,7 @@ def asked_scene(seed: int, index: int) -> tuple[Scene, float]:
         plant = rd.Plant(
             plant.dynamics, [*plant.effects, rd.effects.ViscousFriction(scale * 10 ** rng.uniform(2, 4.3, n))]
         )
-    setup = replace(made.setup, plant=plant, integrator="auto", step_s=None)
+    setup = replace(made.setup, plant=plant, method="auto", step_s=None)
     return Scene(family, setup, made.label), float(10 ** rng.uniform(-10, -3))
 
 

@@ -57,7 +57,7 @@ def slide(
     robot = rd.Robot.from_text(SLIDER).with_(gravity=(0.0, 0.0, 0.0))
     plant = rd.Plant(robot, [rd.effects.Spring(stiffness, 0.0), friction])
     return rd.Setup(
-        plant, [q], [v], duration, integrator=method, step_s=step, record_every_s=duration / 20, engine="compiled"
+        plant, [q], [v], duration, method=method, step_s=step, record_every_s=duration / 20, engine="compiled"
     )
 
 

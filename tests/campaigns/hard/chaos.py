@@ -16,7 +16,6 @@ is 0.01 of the logarithm.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from functools import cache, partial
 from typing import Any
@@ -103,8 +102,8 @@ def errors(run: rd.Trajectory, q: np.ndarray) -> np.ndarray:
 
 def passed(run: rd.Trajectory, q: np.ndarray) -> float:
     """Time at which the true error passes the limit that the run names; the end if it does not."""
-    named = re.search(r"more than ([\d.e-]+) ", run.error.note)
-    limit = float(named[1]) if named else 0.1
+    facts = run.error.ends_early.facts if run.error.ends_early else {}
+    limit = float(facts.get("limit", facts.get("tenth", 0.1)))
     beyond = np.flatnonzero(errors(run, q) > limit)
     return float(run.t[beyond[0]]) if len(beyond) else float(run.t[-1])
 
@@ -126,7 +125,7 @@ def _run(robot: rd.Robot, of: tuple[Any, float], seed: int, duration: float, eng
     method, step = of
     fixed = {"step_s": step} if step else {}
     return rd.simulate(
-        robot, *start(seed, robot.n), duration_s=duration, integrator=method, record_every_s=PERIOD,
+        robot, *start(seed, robot.n), duration_s=duration, method=method, record_every_s=PERIOD,
         engine=engine, **fixed,
     )  # fmt: skip
 
@@ -164,7 +163,7 @@ def _lyapunov(seed: int) -> Iterator[Row]:
     robot, duration, small, h = arm("planar_2r"), 3.0, 1e-6, PERIOD / 4
     q0, v0 = start(seed, 2)
     method = rd.integrate.Adaptive("DOP853", 1e-11, 1e-13)
-    run = rd.simulate(robot, q0, v0, duration_s=duration, integrator=method, record_every_s=h / 2)
+    run = rd.simulate(robot, q0, v0, duration_s=duration, method=method, record_every_s=h / 2)
     A = [rd.linearise(robot, q, v, np.zeros(2))[0] for q, v in zip(run.q, run.v, strict=True)]
     aside = np.array([1.0, -1.0])
     x = np.array([*aside, 0.0, 0.0])

@@ -78,7 +78,7 @@ def energies(name: str, method: str, step: float, steps: int, seed: int) -> tupl
     """E − E₀ at the samples, (16, m), and the largest |K| + |V| of each run."""
     q0, v0 = starts(name, seed)
     runs = rd.rollouts(
-        arm(name), q0, v0, duration_s=steps * step, integrator=method, step_s=step, record=("energy",),
+        arm(name), q0, v0, duration_s=steps * step, method=method, step_s=step, record=("energy",),
         record_every_s=steps * step / SAMPLES, threads=1,
     )  # fmt: skip
     assert runs.kinetic is not None and runs.potential is not None
@@ -130,7 +130,7 @@ def _rounded(name: str, method: str, step: float, steps: int, seed: int) -> Iter
 
 def _back(name: str, method: str, step: float, steps: int, seed: int) -> Iterator[Row]:
     robot, (q0, v0) = arm(name), starts(name, seed)
-    options = {"duration_s": steps * step, "integrator": method, "step_s": step, "record_every_s": steps * step}
+    options = {"duration_s": steps * step, "method": method, "step_s": step, "record_every_s": steps * step}
     there = rd.rollouts(robot, q0, v0, threads=1, **options)
     back = rd.rollouts(robot, there.q[:, -1], -there.v[:, -1], threads=1, **options)
     off = float(np.abs(back.q[:, -1] - q0).max())
@@ -143,7 +143,7 @@ def _momentum(method: str, steps: int, seed: int) -> Iterator[Row]:
     """The vertical angular momentum M₁ v of the body, by Pinocchio."""
     step, robot, (q0, v0) = step_of("body", method), arm("body"), starts("body", seed)
     runs = rd.rollouts(
-        robot, q0, v0, duration_s=steps * step, integrator=method, step_s=step, threads=1,
+        robot, q0, v0, duration_s=steps * step, method=method, step_s=step, threads=1,
         record_every_s=steps * step / SAMPLES,
     )  # fmt: skip
     vertical = np.einsum("...ij,...j->...i", robot.M(runs.q), runs.v)[..., 0]

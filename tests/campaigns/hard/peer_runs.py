@@ -135,8 +135,8 @@ def energy(seed: int) -> Iterator[Row]:
         "planar_2r, free, 10 s", "energy, relative", 1e-9, drift,
         {
             f"{OURS}, default": lambda: ours(robot, q0, 10.0, []),
-            f"{OURS}, gauss_4, 1 ms": lambda: ours(robot, q0, 10.0, [], integrator="gauss_4", step_s=STEP_S),
-            f"{OURS}, rk4, 1 ms": lambda: ours(robot, q0, 10.0, [], integrator="rk4", step_s=STEP_S),
+            f"{OURS}, gauss_4, 1 ms": lambda: ours(robot, q0, 10.0, [], method="gauss_4", step_s=STEP_S),
+            f"{OURS}, rk4, 1 ms": lambda: ours(robot, q0, 10.0, [], method="rk4", step_s=STEP_S),
             "MuJoCo, RK4, 1 ms": lambda: mujoco(robot, q0, 10.0, rk4),
             "Drake, runge_kutta5, accuracy 1e-10": lambda: drake(robot, q0, 10.0, "runge_kutta5"),
             "PyBullet, 1 ms": lambda: bullet(robot, q0, 10.0, 0.0, 0.0),
@@ -159,7 +159,7 @@ def oil(seed: int) -> Iterator[Row]:
         {
             f"{OURS}, default": lambda: ours(robot, [start], duration, effects),
             f"{OURS}, gauss_4, 1 ms": lambda: ours(
-                robot, [start], duration, effects, integrator="gauss_4", step_s=STEP_S
+                robot, [start], duration, effects, method="gauss_4", step_s=STEP_S
             ),
             "MuJoCo, implicitfast, 1 ms": lambda: mujoco(robot, start, duration, implicit),
             "Drake, radau3, accuracy 1e-10": lambda: drake(robot, start, duration, "radau3", c),
@@ -186,7 +186,7 @@ def rest(seed: int) -> Iterator[Row]:
         {
             f"{OURS}, default": lambda: ours(robot, [0.0], 10.0, [rd.effects.DryFriction(force)]),
             f"{OURS}, time_stepping, 1 ms": lambda: ours(
-                robot, [0.0], 10.0, [rd.effects.DryFriction(force)], integrator="time_stepping", step_s=STEP_S
+                robot, [0.0], 10.0, [rd.effects.DryFriction(force)], method="time_stepping", step_s=STEP_S
             ),
             "MuJoCo, frictionloss, solref 2 h, solimp 0.9999, 1 ms": lambda: mujoco(robot, 0.0, 10.0, stiffest),
             "Drake, runge_kutta5, accuracy 1e-10": no_friction,
@@ -210,7 +210,7 @@ def stopped(seed: int) -> Iterator[Row]:
         {
             f"{OURS}, default": lambda: ours(robot, [0.0], 2.0, stops),
             f"{OURS}, time_stepping, 1 ms": lambda: ours(
-                robot, [0.0], 2.0, stops, integrator="time_stepping", step_s=STEP_S
+                robot, [0.0], 2.0, stops, method="time_stepping", step_s=STEP_S
             ),
             "MuJoCo, solref 2 h, solimp 0.9999, 1 ms": lambda: mujoco(robot, 0.0, 2.0, limited),
             "PyBullet, 1 ms": lambda: bullet(robot, 0.0, 2.0, 0.0, 0.0, -FALL),

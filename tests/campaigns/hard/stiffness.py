@@ -43,8 +43,8 @@ def rows(case: str, make: Callable[[], Motion], engine: str, seed: int) -> Itera
     yield _asked(case, motion, setup)
     yield _controlled(case, motion, setup)
     for name in IMPLICIT:
-        yield _fixed(case, name, motion, replace(setup, integrator=name, step_s=STEP))
-    yield from _explicit(case, motion, replace(setup, integrator="rk4", step_s=STEP))
+        yield _fixed(case, name, motion, replace(setup, method=name, step_s=STEP))
+    yield from _explicit(case, motion, replace(setup, method="rk4", step_s=STEP))
 
 
 def _asked(case: str, motion: Motion, setup: rd.Setup) -> Row:
@@ -57,7 +57,7 @@ def _asked(case: str, motion: Motion, setup: rd.Setup) -> Row:
 
 
 def _controlled(case: str, motion: Motion, setup: rd.Setup) -> Row:
-    run = rd.simulate(setup, integrator=rd.integrate.Adaptive("Rosenbrock", ASKED, ASKED / 100))
+    run = rd.simulate(setup, method=rd.integrate.Adaptive("Rosenbrock", ASKED, ASKED / 100))
     error = true_error(run, motion)
     scale = ASKED * float(np.abs(run.q).max()) + ASKED / 100
     said = str(run.error) if run.error.at(run.error.until_s) >= LEAST * error else ""
@@ -88,7 +88,7 @@ def _explicit(case: str, motion: Motion, setup: rd.Setup) -> Iterator[Row]:
     limit = advice.limits["rk4"]
     others = [name for name, h in advice.limits.items() if h >= STEP]
     if others:
-        yield _fixed(case, f"{others[0]}, as advised for rk4,", motion, replace(setup, integrator=others[0]))
+        yield _fixed(case, f"{others[0]}, as advised for rk4,", motion, replace(setup, method=others[0]))
     if setup.duration_s / limit < 20_000:
         yield _fixed(case, "rk4 at half the limit", motion, replace(setup, step_s=limit / 2))
 

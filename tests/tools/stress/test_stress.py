@@ -128,12 +128,12 @@ def test_an_estimate_that_is_too_small_misleads_and_shrinks_to_a_start_of_few_di
     monkeypatch.setattr(runs, "simulate", boastful)
     robot = rd.load("planar_2r")
     setup = rd.Setup(
-        rd.Plant(robot), [0.7312, -0.4321], [0.5111, 0.7222], 0.2, integrator="midpoint", step_s=2e-3,
+        rd.Plant(robot), [0.7312, -0.4321], [0.5111, 0.7222], 0.2, method="midpoint", step_s=2e-3,
         record_every_s=0.02,
     )  # fmt: skip
     found = runs.judged(setup, "swing", Budget())
     assert found.misleads and found.estimated < 0.3 * found.true
-    assert runs.judged(replace(setup, integrator="order_8"), "swing", Budget()).misleads is False  # rounding
+    assert runs.judged(replace(setup, method="order_8"), "swing", Budget()).misleads is False  # rounding
     small = runs.shrunk_run(found, "shrinking", Work())
     start = [*small.setup.q0.tolist(), *small.setup.v0.tolist()]
     assert small.misleads and sum(map(len, map(repr, start))) < len("0.7312-0.43210.51110.7222")
@@ -281,7 +281,7 @@ def test_with_time_enough_what_is_found_depends_on_no_clock() -> None:
 
 def test_a_run_ends_at_its_deadline_and_so_do_the_companions_of_its_error_estimate() -> None:
     """They take more steps than the run: the clock stops them beyond its 100 steps, and before their end."""
-    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.4], duration_s=0.1, integrator="rk4", engine="interpreted")
+    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.4], duration_s=0.1, method="rk4", engine="interpreted")
     for most, done in ((50, False), (150, False), (1e6, True)):
         work = Work(Budget(most, clock=ticking()))
         run = work.do("run", lambda until: rd.simulate(setup, on_progress=until.check))
@@ -324,7 +324,7 @@ def test_a_run_that_leaves_an_equilibrium_is_seen_to_say_so() -> None:
     """Steps beyond their limit: the run leaves the equilibrium, and admits that."""
     robot = rd.load("pendulum")
     law = rd.control.PDGravity(robot, rd.control.hold([0.4]), 133.0, 13.3)
-    setup = rd.Setup(rd.Plant(robot), [0.4 + 1e-6], duration_s=2.0, controller=law, integrator="midpoint", step_s=0.11)
+    setup = rd.Setup(rd.Plant(robot), [0.4 + 1e-6], duration_s=2.0, controller=law, method="midpoint", step_s=0.11)
     pushed = limits.run_from_near(setup, np.array([0.4]), Budget(), True)
     assert pushed.growth > 30 and not pushed.misleads  # it says so
 
