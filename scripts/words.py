@@ -48,7 +48,7 @@ CEILINGS = {
     "the same holds": 0,
     "each": 190,
     "arguments": 0,
-    "Any": 994,
+    "Any": 990,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.

@@ -137,7 +137,7 @@ def test_machine_code_of_constants_has_no_inputs_and_the_numbers_of_its_robot() 
         assert made.parameters.size == 0 < sum(each.size for each in parameters(ARM, plant.effects, None))
         y, out = np.array([*Q, *V, 0.0, 0.0]), np.empty((8, 1))
         made.in_python.rate(0.0, y, np.array([0.0, 1.0]), np.zeros((1, 1)), out)
-        theirs = plant.forward_dynamics(0.0, Q, V, np.zeros(2))
+        theirs = plant.forward_dynamics(Q, V, np.zeros(2), t=0.0)
         np.testing.assert_allclose(out[2:4, 0], theirs, rtol=1e-12)
 
 

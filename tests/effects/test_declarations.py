@@ -526,7 +526,7 @@ def test_an_exception_of_a_users_code_reaches_the_user_with_its_line_and_the_par
 @pytest.mark.parametrize("error", [TypeError, ValueError, LateError])
 def test_an_exception_at_the_start_and_in_a_query_is_the_users(error: type[Exception]) -> None:
     plant = rd.Plant(ARM, [FailingForce(error, -1.0)])
-    for ask in (lambda: rd.Setup(plant, Q), lambda: plant.torque(0.0, Q, V), lambda: plant.N(0.0, Q, V)):
+    for ask in (lambda: rd.Setup(plant, Q), lambda: plant.torque(Q, V, t=0.0), lambda: plant.N(Q, V, t=0.0)):
         with pytest.raises(error, match="own"):
             ask()
 
@@ -567,12 +567,12 @@ def test_a_torque_of_a_wrong_shape_is_an_error_of_the_library() -> None:
             return np.ones(2)
 
     with pytest.raises(EffectError, match="wide does not fit 2 joints"):
-        rd.Plant(ARM, [Wide()]).torque(0.0, Q, V)
+        rd.Plant(ARM, [Wide()]).torque(Q, V, t=0.0)
     broken, plant = rd.effects.ViscousFriction(0.1), rd.Plant(ARM)
     object.__setattr__(broken, "damping", np.ones(3))
     object.__setattr__(plant, "effects", (broken,))
     with pytest.raises(EffectError, match="viscous_friction does not fit"):
-        plant.torque(0.0, Q, V)
+        plant.torque(Q, V, t=0.0)
     with pytest.raises(ControlError, match=r"States.state_rate returned shape \(2,\) for 1 state"):
         rd.Setup(rd.Plant(ARM), Q, controller=States(LateError))
 
@@ -615,7 +615,7 @@ def test_what_cannot_be_traced_says_which_line_stopped_it(effects, controller, p
     assert caught.value.__cause__ is not None  # with its traceback
     if effects:
         with pytest.raises(TraceError, match=rf"cannot be compiled \(line {line} of test_declarations.py"):
-            rd.compiled(setup.plant, cache=False).torque(0.0, Q, V)
+            rd.compiled(setup.plant, cache=False).torque(Q, V, t=0.0)
 
 
 def test_a_function_is_the_controller_of_the_same_law() -> None:

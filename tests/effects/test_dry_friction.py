@@ -131,11 +131,11 @@ def test_what_cannot_be_decided_is_refused() -> None:
     with pytest.warns(rd.ModelWarning):
         tip = rd.load("massless_tip")
     with pytest.raises(SingularError, match="'pointer_joint' carries no inertia"):
-        rd.Plant(tip, [rd.effects.DryFriction(1.0)]).forward_dynamics(0.0, [0.3, 0.4], [0.0, 0.0], [0.0, 0.0])
+        rd.Plant(tip, [rd.effects.DryFriction(1.0)]).forward_dynamics([0.3, 0.4], [0.0, 0.0], [0.0, 0.0], t=0.0)
     for arithmetic in (rd.accuracy.Ball(80), np.longdouble):
         plant = rd.Plant(rd.Lagrangian(ARM, arithmetic), [rd.effects.DryFriction(1.0)])
         with pytest.raises(EffectError, match="dry_friction: held joints can be determined in float64 only"):
-            plant.forward_dynamics(0.0, [0.3, 0.4], [0.0, 0.0], [0.0, 0.0])
+            plant.forward_dynamics([0.3, 0.4], [0.0, 0.0], [0.0, 0.0], t=0.0)
 
 
 def test_stribecks_curve_is_followed_while_sliding() -> None:

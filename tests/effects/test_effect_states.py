@@ -181,9 +181,9 @@ def test_a_plant_that_is_asked_takes_relaxed_states() -> None:
     """At z = 0 LuGre friction is −(σ₁ + σ₂) v, one state or a batch; a lag passes the actuation; also compiled."""
     plant, v = rd.Plant(ARM, [rd.effects.ActuatorLag(0.1), FRICTION]), np.array([[0.3, -0.7], [1.0, 2.0]])
     expected = -(np.array([1.0, 0.8]) + 0.8) * v
-    np.testing.assert_allclose(plant.torque(0.0, v, v), expected, rtol=1e-14)
+    np.testing.assert_allclose(plant.torque(v, v, t=0.0), expected, rtol=1e-14)
     np.testing.assert_array_equal(plant.actuation(v), v)
-    np.testing.assert_allclose(rd.compiled(plant).torque(0.0, v, v), expected, rtol=1e-14)
+    np.testing.assert_allclose(rd.compiled(plant).torque(v, v, t=0.0), expected, rtol=1e-14)
     with pytest.raises(rd.RobotDynError, match="no actuation within the limits of the plant holds this state"):
         rd.linearise(rd.Plant(ARM, [rd.effects.EffortLimit(0.01)]), Q)
 

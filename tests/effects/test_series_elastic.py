@@ -184,7 +184,7 @@ def test_dry_friction_of_a_joint_holds_it_until_its_spring_has_the_load() -> Non
 def test_a_plant_that_is_asked_takes_relaxed_springs() -> None:
     """No torque on the joint of a drive, which the actuation does not reach; also compiled."""
     plant, v = rd.Plant(ARM, [rd.effects.SeriesElastic([0.0, 90.0], 0.02, damping=2.0)]), np.array([0.3, -0.7])
-    np.testing.assert_array_equal(plant.torque(0.0, Q, v), [0.0, 0.0])
+    np.testing.assert_array_equal(plant.torque(Q, v, t=0.0), [0.0, 0.0])
     expected = ARM.forward_dynamics(Q, v, [3.0, 0.0])
-    np.testing.assert_allclose(plant.forward_dynamics(0.0, Q, v, [3.0, 5.0]), expected, rtol=1e-13)
-    np.testing.assert_allclose(rd.compiled(plant).forward_dynamics(0.0, Q, v, [3.0, 5.0]), expected, rtol=1e-12)
+    np.testing.assert_allclose(plant.forward_dynamics(Q, v, [3.0, 5.0], t=0.0), expected, rtol=1e-13)
+    np.testing.assert_allclose(rd.compiled(plant).forward_dynamics(Q, v, [3.0, 5.0], t=0.0), expected, rtol=1e-12)

@@ -117,7 +117,7 @@ def test_a_sample_keeps_the_equation_of_motion() -> None:
         SMOOTH, **START, duration_s=0.5, controller=rd.control.PD(rd.control.hold([0.1, 0.2]), [20.0, 9.0], 2.0)
     )
     for t, q, v, a, u in zip(run.t, run.q, run.v, run.a, run.u, strict=True):
-        np.testing.assert_allclose(SMOOTH.inverse_dynamics(t, q, v, a), u, atol=1e-11)
+        np.testing.assert_allclose(SMOOTH.inverse_dynamics(q, v, a, t=t), u, atol=1e-11)
     h = run.t[1] - run.t[0]  # central differences err by h²/6 of the third derivative, below 1e4 here
     np.testing.assert_allclose((run.q[2:] - run.q[:-2]) / (2 * h), run.v[1:-1], atol=2e3 * h**2)
     np.testing.assert_allclose((run.v[2:] - run.v[:-2]) / (2 * h), run.a[1:-1], atol=2e4 * h**2)

@@ -65,7 +65,7 @@ def check_start(
     no_torque = np.zeros(plant.dynamics.n)
     plant.actuation(no_torque)
     with suppress(OverflowedError):  # an overflow at the start is an outcome of the run, not a mistake
-        plant.forward_dynamics(0.0, q0, v0, no_torque)  # a singular M is reported here
+        plant.forward_dynamics(q0, v0, no_torque, t=0.0)  # a singular M is reported here
 
 
 def check_model(plant: Dynamics, controller: Controller, q0: np.ndarray) -> None:
