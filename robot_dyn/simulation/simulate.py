@@ -15,7 +15,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.validate import function
 from robot_dyn.foundations.values import cached, derived
 from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF, Adaptive
-from robot_dyn.integrate.time_stepping import TimeStepping
+from robot_dyn.integrate.time_stepping import MoreauJean
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.derived import Results
 from robot_dyn.simulation.diagnostics.runaway import judged, runaway
@@ -172,7 +172,7 @@ def with_stiff_method(setup: Setup) -> Setup:
 
 def with_time_stepping(setup: Setup) -> Setup:
     """Return the setup by time stepping."""
-    return replace(setup, method=TimeStepping())
+    return replace(setup, method=MoreauJean())
 
 
 def _estimated(ran: _Ran, runner: Runner) -> tuple[Recording, ErrorEstimate | None]:

@@ -62,7 +62,7 @@ def rollouts(
     """Run a plant or a robot from many starts, or a setup with the options that are given in place of its own.
 
     Each run is that of `simulate`, to rounding. By an explicit, Gauss or Rosenbrock method of fixed step, such as
-    `method="rk4"`, and by time stepping, the runs go side by side in machine code. Those that may pass a threshold
+    `method="RK4"`, and by time stepping, the runs go side by side in machine code. Those that may pass a threshold
     (a stop, an effort limit, a reversal of friction with states) are repeated one after the other on each thread,
     with steps that end there, in a few milliseconds a run. So are all runs by a method
     that chooses its steps, such as the default, and by one of fixed step where dry friction, rigid stops, payloads
@@ -113,7 +113,7 @@ def rollouts(
     if not setup.method.plain:
         raise QueryError(
             f"rollouts run by an explicit, Gauss or Rosenbrock method, or by one that chooses its steps, not by"
-            f" {setup.method.name}: give method='rk4' and its step_s; simulate takes any method"
+            f" {setup.method.name}: give method='RK4' and its step_s; simulate takes any method"
         )
     if params is not None and not (isinstance(params, Mapping) and all(isinstance(name, str) for name in params)):
         raise QueryError(f"params must give values by name, such as {{'kp': …}}, got {shown(params)}")

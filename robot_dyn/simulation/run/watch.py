@@ -99,7 +99,7 @@ class Watch:
         made, self.paced, self.looked = t - self.paced, t, steps
         ahead = (self.setup.duration_s - t) / max(made, 1e-300) * since
         if ahead > _MOST_AHEAD:
-            implicit = "" if self.setup.method.name == "Rosenbrock" else "Rosenbrock, "
+            implicit = "" if self.setup.method.name == "Rodas5P" else "Rodas5P, "
             facts: dict[str, float | str] = {"steps": since, "advanced_s": made, "remaining": ahead}
             facts["remedy"] = f"{implicit}softer effects or a larger tolerance"
             motion = self._fastest(t, y, made / since)

@@ -111,7 +111,7 @@ def _check_set_valued(plant: Plant, method: Method, finds_events: bool) -> None:
         if effects and is_unsuited and not method.nonsmooth:
             raise QueryError(
                 f"{effects[0].name}: steps must end where it holds a joint or lets it go, and {method.name} {reason};"
-                " take method='DOP853', or 'time_stepping' with a step_s"
+                " take method='DOP853', or 'MoreauJean with a step_s"
             )
     if method.nonsmooth and (other := [x for x in effects if not (x.rubs or x.stops)]):
         raise QueryError(f"{other[0].name}: has no law for {method.name}; take method='DOP853'")

@@ -81,8 +81,8 @@ class Setup(Value, Caching):
         v0: Velocity at the start, (n,); 0 by default.
         duration_s: Length of the run, in [s].
         controller: A `Controller`; a function (t, q, v) → torque (n,), which becomes one; or None.
-        method: The integration method, or its name, see `rd.integrate.method`. "auto", "DOP853" and "Rosenbrock" choose
-            their steps, as does an `Adaptive` with other tolerances; others, such as "rk4", have a fixed step.
+        method: The integration method, or its name, see `rd.integrate.method`. "auto", "DOP853" and "Rodas5P" choose
+            their steps, as does an `Adaptive` with other tolerances; others, such as "RK4", have a fixed step.
         step_s: Step of a method of fixed step, in [s], 1 ms by default. Steps are shorter where samples, ticks,
             switches or the end of the run require it. A method that chooses its steps takes no step_s.
         record_every_s: Time between samples; 0 for every step, or 1000 samples where the method chooses its steps.
@@ -263,7 +263,7 @@ def no_step(name: str) -> str:
     """Return the error message for step_s with a method that chooses its steps."""
     return (
         f"step_s has no effect on {name}, which chooses its steps: leave it out, name a method of fixed step like"
-        " method='rk4', or give rd.integrate.Adaptive(max_step_s=…)"
+        " method='RK4', or give rd.integrate.Adaptive(max_step_s=…)"
     )
 
 
