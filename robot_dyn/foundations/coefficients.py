@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 URDF = "urdf"  # as the value of a coefficient: the value in the robot's file
+URDF_SOFT = "urdf_soft"  # as the position of a stop: the soft limit in the robot's file
 _KEY = "robot_dyn.foundations.coefficients"
 JOINTS = ((), ("n",))  # one number for all joints, or one number for each joint
 
@@ -102,6 +103,8 @@ class Coefficient:
             return values
         if resolved and self.stated and isinstance(values, str) and values == URDF:
             return URDF
+        if resolved and self.stated in ("lower", "upper") and isinstance(values, str) and values == URDF_SOFT:
+            return URDF_SOFT
         if resolved and self.stated and isinstance(values, str):
             raise error(f'{name} must be real numbers or "{URDF}", got {shorten(values)!r}')
         array = numbers(
@@ -120,8 +123,8 @@ class Coefficient:
             for joint in values.keys() - set(names):
                 raise EffectError(f"{name}: no joint {joint!r}; {nearest(str(joint), names)}")
             return [values.get(joint, self.elsewhere) for joint in names]
-        if values is URDF:
-            return self._stated(name, dynamics)
+        if values is URDF or values is URDF_SOFT:
+            return self._stated(name, values, dynamics)
         if self.of_joints and np.ndim(values) and np.shape(values) != (len(names),):
             length = np.shape(values)[0]
             count = f"{length} joint{'s' if length > 1 else ''}"
@@ -131,14 +134,14 @@ class Coefficient:
             )
         return values
 
-    def _stated(self, name: str, dynamics: Jointed) -> np.ndarray:
+    def _stated(self, name: str, values: str, dynamics: Jointed) -> np.ndarray:
         try:
-            stated = getattr(dynamics, self.stated)
+            stated = getattr(dynamics, f"soft_{self.stated}" if values is URDF_SOFT else self.stated)
         except AttributeError:
-            raise EffectError(f"{name}='urdf' needs a Robot, got {type(dynamics).__name__}") from None
+            raise EffectError(f"{name}={values!r} needs a Robot, got {type(dynamics).__name__}") from None
         if np.all(stated == self.elsewhere):
             raise EffectError(
-                f"{name}='urdf' has no effect: the file of {dynamics.name} states no value for any joint; give"
+                f"{name}={values!r} has no effect: the file of {dynamics.name} states no value for any joint; give"
                 " numbers, or remove the effect"
             )
         return stated

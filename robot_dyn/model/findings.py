@@ -17,6 +17,8 @@ from robot_dyn.description.couplings import resolve
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits
 from robot_dyn.description.inertia import implausibility
+from robot_dyn.description.markup import parse
+from robot_dyn.description.other_programs import ARMATURE, STIFFNESS, of_coordinates, statements
 from robot_dyn.description.structure import StatedLink, Structure, stands_on, structure_of
 from robot_dyn.foundations.arithmetic import FLOAT64
 from robot_dyn.foundations.errors import shorten
@@ -24,6 +26,7 @@ from robot_dyn.model.conditioning import LEAST_DIGITS, NearlySingular, Regularit
 
 LONGEST = 1e4  # [m], also for a mimic's multiplier: sums with such a length have rounding errors of 1e-12 m
 LIGHTEST = 1e-12  # [kg]
+_OTHER_PROGRAMS = b"otorInertia", b"rotor_inertia", b"tiffness"  # parts of all elements that `for_other_programs` reads
 _LISTED = 6  # maximum number of names in a finding
 
 
@@ -39,7 +42,7 @@ def findings_of(description: Description, edits: Edits, regularity: Regularity) 
     of_kinds = (finding for kind in kinds for finding in kind(robot))
     joint = None if regularity.near else regularity.joint
     singular, near = no_inertia_about_axis(robot, joint), hardly_any_inertia(regularity.near)
-    return (*reservations(description), *singular, *of_kinds, *near)
+    return (*reservations(description), *singular, *of_kinds, *near, *for_other_programs(robot, description))
 
 
 def reservations(description: Description) -> tuple[str, ...]:
@@ -188,6 +191,32 @@ def followers_beyond_limits(robot: Structure) -> Iterator[str]:
                     f"joint {name!r}: follows {source!r} beyond its own {kind} limits, [{low:g}, {high:g}], which are"
                     f" not enforced, because {source!r} would keep hardly any range; correct its <limit> or <mimic>"
                 )
+
+
+def for_other_programs(robot: Structure, description: Description) -> Iterator[str]:
+    """Report rotors and springs that the file states for other programs and that no edit has added."""
+    if not any(word in description.text for word in _OTHER_PROGRAMS):
+        return
+    stated = of_coordinates(robot, statements(parse(description.text, description.source)[0]))
+    armature = {
+        name: x[ARMATURE] for name, x in stated.items() if x.get(ARMATURE) and name not in dict(robot.edits.armature)
+    }
+    stiffness = {name: x[STIFFNESS] for name, x in stated.items() if x.get(STIFFNESS)}
+    for numbers, what, remedy in (
+        (
+            armature,
+            "a rotor inertia at the joint of {} kg m² or kg, which is not in M",
+            'with_(armature="urdf") adds it',
+        ),
+        (
+            stiffness,
+            "a spring of {} N m/rad or N/m, which does not act",
+            'the effect Spring("urdf", rest="urdf") adds it',
+        ),
+    ):
+        if numbers:
+            largest = f"{'up to ' if len(numbers) > 1 else ''}{max(numbers.values()):.3g}"
+            yield f"{_joints(numbers)}: the file states for other programs {what.format(largest)}; {remedy}"
 
 
 def welded_base(robot: Structure) -> Iterator[str]:

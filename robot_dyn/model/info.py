@@ -10,6 +10,7 @@ from robot_dyn.description.catalog import abbreviated
 from robot_dyn.description.coordinate_limits import position_limits, speed_limits
 from robot_dyn.description.description import Description
 from robot_dyn.description.edits import Edits, Payload
+from robot_dyn.description.other_programs import Statement, in_words
 from robot_dyn.description.structure import Structure
 from robot_dyn.foundations.answer import Answer, Block, Table
 
@@ -63,6 +64,8 @@ class Info(Answer):
         payloads: Payloads that were added.
         estimated: Basis of each inertia that is estimated, not measured, by link.
         links: Names of the frames.
+        other_programs: Rotors, springs and soft limits that the file states for other programs, see
+            `Robot.statements`.
         findings: Doubtful values in the description, each with its remedy.
     """
 
@@ -79,6 +82,7 @@ class Info(Answer):
     payloads: tuple[Payload, ...]
     estimated: dict[str, str]
     links: tuple[str, ...]
+    other_programs: tuple[Statement, ...]
     findings: tuple[str, ...]
 
     def blocks(self) -> Iterator[Block]:
@@ -95,6 +99,7 @@ class Info(Answer):
             yield f"limits of {joint}: narrowed by those of {', '.join(followers)}"
         yield from _edits(self.locked, self.payloads)
         yield from (f"estimated: {link}: {basis}" for link, basis in self.estimated.items())
+        yield from (f"for other programs: {line}" for line in in_words(self.other_programs))
         yield from (f"finding: {finding}" for finding in self.findings)
 
 

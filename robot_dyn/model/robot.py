@@ -27,6 +27,17 @@ from robot_dyn.description.couplings import Couplings
 from robot_dyn.description.description import Description, check
 from robot_dyn.description.edits import Changes, Edits, takes_changes
 from robot_dyn.description.inertial_parameters import Parametrised
+from robot_dyn.description.markup import parse
+from robot_dyn.description.other_programs import (
+    ARMATURE,
+    LOWER,
+    REST,
+    STIFFNESS,
+    UPPER,
+    Statement,
+    of_coordinates,
+    statements,
+)
 from robot_dyn.description.structure import Structure, structure_of
 from robot_dyn.description.urdf import UNBOUNDED
 from robot_dyn.foundations.errors import (
@@ -184,6 +195,39 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         return self._per_joint(self.model.armature)
 
     @cached_property
+    def statements(self) -> tuple[Statement, ...]:
+        """Rotors, springs and soft limits that the file states for other programs; none acts unless you ask for it."""
+        return statements(parse(self.description.text, self.description.source)[0])
+
+    @cached_property
+    def stated_armature(self) -> ndarray:
+        """Reflected rotor inertia n² J that the file states for other programs, (n,) in [kg m²] or [kg]; 0 if none.
+
+        `with_(armature="urdf")` adds it to M.
+        """
+        return self._stated(ARMATURE, 0.0)
+
+    @cached_property
+    def stated_stiffness(self) -> ndarray:
+        """Stiffness of joint springs that the file states for other programs, (n,) in [N m/rad] or [N/m]; 0 if none."""
+        return self._stated(STIFFNESS, 0.0)
+
+    @cached_property
+    def stated_rest(self) -> ndarray:
+        """Rest positions of these springs, (n,) in [rad] or [m]."""
+        return self._stated(REST, 0.0)
+
+    @cached_property
+    def soft_lower(self) -> ndarray:
+        """Lower soft limits of <safety_controller>, (n,) in [rad] or [m]; −inf if unstated."""
+        return self._stated(LOWER, -np.inf)
+
+    @cached_property
+    def soft_upper(self) -> ndarray:
+        """Upper soft limits of <safety_controller>, (n,) in [rad] or [m]; inf if unstated."""
+        return self._stated(UPPER, np.inf)
+
+    @cached_property
     def damping(self) -> ndarray:
         """Viscous friction stated by the file, Σ s² b for coupled joints, (n,) in [N m s/rad] or [N s/m]."""
         return _frozen(self.model.damping @ self.couplings.S**2)
@@ -315,15 +359,18 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
 
         Args:
             **changes: gravity (3,) in base axes, in [m/s²]; lock: values by joint, in [rad] or [m]; payload: one or
-                several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg]; mass_scale;
-                masses and inertias: values by link that replace the file's, in [kg], and (3, 3) in [kg m²].
+                several; armature: inertia of the drives, a scalar, (n,) or by joint, in [kg m²] or [kg], or
+                "urdf" for `stated_armature`; mass_scale; masses and inertias: values by link that replace the
+                file's, in [kg], and (3, 3) in [kg m²].
 
         Raises:
-            EditError: If a name is unknown or a value is not allowed.
+            EditError: If a name is unknown or a value is not allowed, or "urdf" is given and the file states none.
 
         Warns:
             ModelWarning: If the new gravity is not zero and exerts no torque on any joint.
         """
+        if isinstance(armature := changes.get("armature"), str) and armature == "urdf":
+            changes["armature"] = self._armature_of_file()
         robot = Robot(self.description, self.edits.with_(self.joint_names, **changes))
         gravity = robot.edits.gravity
         if gravity != self.edits.gravity and any(gravity) and not robot.gravity_acts:
@@ -413,6 +460,16 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         of_joints = limits(structure_of(self.description, self.edits))
         return _frozen(np.array([getattr(of_joints[name], side) for name in self.joint_names]))
 
+    def _stated(self, quantity: str, unstated: float) -> ndarray:
+        """Return a quantity that the file states for other programs, in the order of q."""
+        numbers = of_coordinates(structure_of(self.description, self.edits), self.statements)
+        return _frozen(np.array([numbers[name].get(quantity, unstated) for name in self.joint_names]))
+
+    def _armature_of_file(self) -> ndarray:
+        if not self.stated_armature.any():
+            raise EditError(f"armature='urdf': the file of {self.name} states no rotor inertia; give it by joint")
+        return self.stated_armature
+
     def _per_joint(self, full: ndarray) -> ndarray:
         """Return values of the joints of `model` in the order of q; infinite where the file states no limit."""
         ids = joint_ids(self.model)
@@ -449,6 +506,7 @@ def info(robot: Robot) -> Info:
         payloads=robot.edits.payloads,
         estimated=dict(robot.estimated),
         links=robot.frame_names,
+        other_programs=robot.statements,
         findings=robot.findings,
     )
 

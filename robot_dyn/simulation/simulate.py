@@ -9,27 +9,29 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import fields, replace
 from time import perf_counter
-from typing import Any, NamedTuple, Unpack
+from typing import Any, NamedTuple, Unpack, cast
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.validate import function
 from robot_dyn.foundations.values import cached, derived
-from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
-from robot_dyn.integrate.time_stepping import TimeStepping
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF, Adaptive
+from robot_dyn.integrate.time_stepping import MoreauJean
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.derived import Results
 from robot_dyn.simulation.diagnostics.runaway import judged, runaway
+from robot_dyn.simulation.diagnostics.stiff_motion import replacement
 from robot_dyn.simulation.dynamics.declarations import named
 from robot_dyn.simulation.engine.choice import choose
 from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.estimate.estimate import estimate
 from robot_dyn.simulation.estimate.requested_accuracy import trials
 from robot_dyn.simulation.observation.observer import Observer, observer_of
-from robot_dyn.simulation.observation.remarks import Remark, sentence
+from robot_dyn.simulation.observation.remarks import Remark
+from robot_dyn.simulation.results.doubts import Doubt, DoubtKind
 from robot_dyn.simulation.results.error_estimate import ErrorEstimate, no_estimate
 from robot_dyn.simulation.results.statistics import Statistics
 from robot_dyn.simulation.results.trajectory import Trajectory
-from robot_dyn.simulation.run.outcome import TOO_FAST, Accumulation, Ending, Outcome, Reason, Stiff, TooLong
+from robot_dyn.simulation.run.outcome import Accumulation, Ending, Outcome, Reason, Stiff, TooLong
 from robot_dyn.simulation.run.recording import Recording
 from robot_dyn.simulation.run.run import Run
 from robot_dyn.simulation.run.runner import Runner
@@ -153,10 +155,9 @@ def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _R
         match run.run():
             case TooLong(evaluations):
                 seen = evaluations
-            case Stiff(remark):
-                setup, may_replace, remarks = cached(setup, with_stiff_method), False, (remark,)
-            case Accumulation(remark):
-                setup, may_replace, remarks = cached(setup, with_time_stepping), False, (*remarks, remark)
+            case Stiff() | Accumulation() as given_up:
+                other = with_stiff_method if isinstance(given_up, Stiff) else with_time_stepping
+                setup, may_replace, remarks = cached(setup, other), False, (*remarks, replacement(given_up))
             case recording:
                 observer.end()
                 if too_fast := runaway(setup, observer.fastest):
@@ -166,12 +167,12 @@ def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _R
 
 def with_stiff_method(setup: Setup) -> Setup:
     """Return the setup by the stiff method with the same tolerances."""
-    return replace(setup, method=replace(setup.method, method=STIFF))
+    return replace(setup, method=replace(cast(Adaptive, setup.method), method=STIFF))
 
 
 def with_time_stepping(setup: Setup) -> Setup:
     """Return the setup by time stepping."""
-    return replace(setup, method=TimeStepping())
+    return replace(setup, method=MoreauJean())
 
 
 def _estimated(ran: _Ran, runner: Runner) -> tuple[Recording, ErrorEstimate | None]:
@@ -180,10 +181,10 @@ def _estimated(ran: _Ran, runner: Runner) -> tuple[Recording, ErrorEstimate | No
     if not setup.estimate_error or recording.outcome.ending is Ending.STOPPED:
         return recording, None
     if ran.runaway:
-        return recording, no_estimate(sentence(TOO_FAST, ran.runaway))
+        return recording, no_estimate(Doubt(DoubtKind.IMPLAUSIBLE_SPEED, ran.runaway))
     try:
         return recording, estimate(setup, recording, runner)
     except KeyboardInterrupt:
         if recording.outcome.ending is Ending.FINISHED:
             recording = replace(recording, outcome=Outcome(Reason.INTERRUPTED_IN_ESTIMATE, recording.outcome.t))
-        return recording, no_estimate("it was interrupted")
+        return recording, no_estimate(Doubt(DoubtKind.INTERRUPTED))

@@ -82,9 +82,9 @@ def test_a_known_shift_is_found_with_its_time() -> None:
 
 
 def test_one_motion_by_two_methods_does_not_part_within_their_errors() -> None:
-    """rk4 with a long step differs from DOP853 by more than the tolerance, and by no more than it says."""
+    """RK4 with a long step differs from DOP853 by more than the tolerance, and by no more than it says."""
     a = coasting(loaded(1.0))
-    b = coasting(loaded(1.0), method="rk4", step_s=0.05, record_every_s=0.05)
+    b = coasting(loaded(1.0), method="RK4", step_s=0.05, record_every_s=0.05)
     found = rd.compare_runs(a, b)
     assert b.error is not None and found.parted is None and 0 < found.joints[0].largest < 4 * b.error.largest
     assert {each.name for each in found.settings} == {"method", "rtol", "atol", "step"}
@@ -245,7 +245,7 @@ def test_files_name_their_runs_and_old_files_say_what_is_not_known(tmp_path: Pat
     assert found.names == ("light", "heavy") and [each.name for each in found.settings] == ["payload on rod"]
     old = replace(light, about={name: text for name, text in light.about.items() if name != "settings"})
     assert "edits" in {each.name for each in rd.compare_runs(old, heavy).settings}
-    assert any("carries no settings" in each for each in rd.compare_runs(old, heavy).left_out)
+    assert any("contains no settings" in each for each in rd.compare_runs(old, heavy).left_out)
 
 
 def test_the_command_writes_its_figure_and_its_document(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from matplotlib.text import Text
 import robot_dyn as rd
 from robot_dyn import plot, save_plot
 from robot_dyn.foundations import QueryError
-from robot_dyn.simulation import Ledger, Outcome, Reason
+from robot_dyn.simulation import Doubt, DoubtKind, Ledger, Outcome, Reason
 from robot_dyn.view import PLOTS, PlotError
 from robot_dyn.view.plots.plots import MOST_JOINTS
 from tests.long import long
@@ -226,7 +226,7 @@ def test_small_numbers_at_logarithmic_axes_are_powers_with_few_digits(run) -> No
 
 
 def test_error_growth_is_veiled_where_it_is_not_resolved(run) -> None:
-    error = replace(run.error, until_s=0.1, note="not resolved")
+    error = replace(run.error, until_s=0.1, ends_early=Doubt(DoubtKind.COMPANIONS_DIFFER))
     (axes,) = plot(replace(run, error=error), "error_growth").axes
     (veil,) = axes.patches
     assert veil.get_x() == pytest.approx(0.1) and axes.get_yscale() == "log"

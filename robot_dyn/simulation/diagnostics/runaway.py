@@ -61,9 +61,7 @@ def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
         limit, motion = longest_step(*linear), fastest(equation, 0.0, y, held)
     except (RobotDynError, np.linalg.LinAlgError):
         return ()
-    facts: dict[str, float | str] = {
-        "method": setup.method.name, "motion": str(motion), "step_s": below(limit)
-    }  # fmt: skip
+    facts = motion.facts | {"method": setup.method.name, "step_s": below(limit)}
     return (Remark(RemarkKind.TOO_LONG, motion.joint, "v", 0.0, setup.duration_s, 0.0, step, limit, facts=facts),)
 
 

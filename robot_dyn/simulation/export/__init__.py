@@ -1,1 +1,1 @@
-"""Runs as files of other programs: tables (CSV, Parquet, netCDF) and MCAP logs."""
+"""Files of runs for other programs: tables (CSV, Parquet, netCDF) and MCAP logs."""

@@ -17,7 +17,7 @@ from robot_dyn.simulation.results.trajectory import Trajectory
 from robot_dyn.simulation.run.outcome import Ending
 from robot_dyn.simulation.setup.setup import LONGEST_S
 
-FORMAT = 8
+FORMAT = 9
 ROLLOUTS_FORMAT = "rollouts 6"
 RUN = FileKind("a run file", ".npz", b"PK\x03\x04")
 

@@ -1,4 +1,4 @@
-"""What follows from the states of a run: acceleration, actuation, power, energy and tracking error of each sample.
+"""Quantities derived from the states of a run: acceleration, actuation, power, energy and tracking error.
 
     a = M⁻¹ (τ − C v − N),   P_k = τ_kᵀ v,   E = K + Σ potentials
 
@@ -46,12 +46,12 @@ def columns(equation: StateEquation, t: np.ndarray, y: np.ndarray, derived: np.n
     if equation.canonical:  # y holds the momentum, and y' its rate
         v = derived[:, :n]
         z = y[:, 2 * n : works]
-        a = np.array([_acceleration(equation, *each) for each in zip(t, q, v, z, u, strict=True)]).reshape(q.shape)
+        a = np.array([_acceleration(equation, *state) for state in zip(t, q, v, z, u, strict=True)]).reshape(q.shape)
     return Columns(q, v, a, u, y[:, works:], derived[:, works:m], derived[:, m + n :])
 
 
 def ledger(equation: StateEquation, record: Recording) -> Ledger:
-    """The energy ledger at the samples of a run."""
+    """Return the energy ledger at the samples of a run."""
     m, works = equation.size, equation.size - len(equation.sources)
     E, work = record.sampled[:, -2:], dict(zip(equation.sources, record.y[:, works:m].T, strict=True))
     return Ledger(E[:, 0], E[:, 1], work, record.kinetic_peak, equation.stored(record.t, record.y))
@@ -67,9 +67,9 @@ def _acceleration(
 
 
 class Tracking(NamedTuple):
-    """Desired positions and velocities of the joints, (m, n); the tracking error of joints or frame.
+    """Desired positions and velocities of the joints, (m, n), and the tracking error of joints or frame.
 
-    None where there is no such reference; `tracking_error` is (…, m, n) or (…, m, 3).
+    A quantity without a reference is None; `tracking_error` is (…, m, n) or (…, m, 3).
     """
 
     desired: np.ndarray | None = None
@@ -78,10 +78,10 @@ class Tracking(NamedTuple):
 
 
 def tracking_of(setup: Setup, t: np.ndarray, q: np.ndarray) -> Tracking:
-    """What a controller is to follow, and how far from it the motion is.
+    """Return the reference of a controller, and the deviation of the motion from it.
 
     Args:
-        setup: Of the controller.
+        setup: The setup with the controller.
         t: Times, (m,), in [s].
         q: Positions there, (…, m, n).
     """
@@ -105,10 +105,10 @@ def root_mean_square(x: np.ndarray) -> float:
 
 
 def root_mean_squares(x: np.ndarray) -> np.ndarray:
-    """Over the samples of runs (B, m, n) that are not nan, (B, n); nan where a run has none."""
-    known = ~np.isnan(x)
-    sizes = np.abs(x).max(axis=1, where=known, initial=0.0, keepdims=True)
+    """Return the root mean squares over the samples of runs (B, m, n) that are not nan, (B, n); nan without any."""
+    is_number = ~np.isnan(x)
+    sizes = np.abs(x).max(axis=1, where=is_number, initial=0.0, keepdims=True)
     scale = np.ldexp(1.0, np.frexp(sizes)[1] - 1)
-    with np.errstate(invalid="ignore"):  # 0 / 0 where nothing is known
-        mean = np.square(x / scale).sum(axis=1, where=known) / known.sum(axis=1)
+    with np.errstate(invalid="ignore"):  # 0 / 0 if all are nan
+        mean = np.square(x / scale).sum(axis=1, where=is_number) / is_number.sum(axis=1)
     return scale[:, 0] * np.sqrt(mean)

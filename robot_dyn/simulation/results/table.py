@@ -15,7 +15,7 @@ Types = Mapping[str, str | None]  # of joints, by name
 
 
 def columns(run: TrajectoryData) -> Iterator[Column]:
-    """The quantities with a heading: of joints by name, of sources by name, states by number.
+    """Yield the quantities with a heading: those of joints and sources by name, states by number.
 
     The tracking error of joints is left out: it is desired − q.
     """
@@ -36,6 +36,6 @@ def columns(run: TrajectoryData) -> Iterator[Column]:
 
 
 def of_joints(heading: str, values: np.ndarray, like: str, types: Types, title: str = "") -> Iterator[Column]:
-    """Columns of values (k, n) with the unit of another quantity."""
+    """Yield columns of values (k, n), in the unit of the quantity `like`."""
     for (name, kind), x in zip(types.items(), values.T, strict=True):
         yield Column(heading, x, unit(like, kind), name, title)
