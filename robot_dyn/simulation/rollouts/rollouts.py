@@ -25,7 +25,7 @@ from robot_dyn.foundations.coefficients import rebuilt
 from robot_dyn.foundations.errors import QueryError, nearest, shown
 from robot_dyn.foundations.validate import choice, integer, joint_values, numbers, truth
 from robot_dyn.foundations.values import several
-from robot_dyn.integrate.adaptive import AUTO, EXPLICIT
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, Adaptive
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.compiled.cache import machine_code
 from robot_dyn.simulation.compiled.choice import checked
@@ -107,7 +107,7 @@ def rollouts(
         TraceError: If a part of the setup cannot be compiled; names it.
     """
     setup = replace(_setup(what, q0, options), estimate_error=False)
-    if setup.method.name == AUTO:
+    if isinstance(setup.method, Adaptive) and setup.method.name == AUTO:
         setup = replace(setup, method=replace(setup.method, method=EXPLICIT))
     most_bytes = integer("most_bytes", most_bytes, most=2**63 - 1)
     if not setup.method.plain:

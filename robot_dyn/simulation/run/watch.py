@@ -143,4 +143,5 @@ class Watch:
 def step_and_period(setup: Setup) -> dict[str, float | str]:
     """Return the step and, of a sampled loop, the control period: the facts about a run that diverged."""
     period_s = 0.0 if setup.controller is None else setup.controller.period_s
-    return {"step_s": setup.taken_step_s} | ({"period_s": period_s} if period_s else {})
+    facts: dict[str, float | str] = {"step_s": setup.taken_step_s}
+    return facts | {"period_s": period_s} if period_s else facts
