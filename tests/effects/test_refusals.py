@@ -114,9 +114,9 @@ IN_A_RUN = [
     *(
         (lambda effect=effect: rd.rollouts(plant(effect), Q, method="rk4", cuts=False), f"cuts=False: {why}")
         for effect, why in (
-            (DRY, "dry_friction holds joints and lets them go, where steps must"),
+            (DRY, "dry_friction stops and releases joints, where steps must"),
             (PLAY, "rigid_backlash holds joints"),
-            (BODY, "carried_payload comes and goes, where steps must end"),
+            (BODY, "carried_payload is attached and detached, where steps must end"),
         )
     ),
 ]

@@ -1,6 +1,6 @@
 """Runs that reach an implausible speed, over 100 times a velocity limit, and steps that are too long as the cause.
 
-No arm moves like that: the error means nothing, and companion runs would take most of the time.
+No arm moves like that: an error estimate would be meaningless, and companion runs would take most of the time.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def runaway(setup: Setup, speeds: np.ndarray) -> dict[str, float | str]:
     """Return the joint that has passed its speed limit most, its speed and the limit; empty if none has.
 
     Args:
-        setup: What ran.
+        setup: The setup of the run.
         speeds: Largest speed of each joint, (n,).
     """
     limits = cached(setup, speed_limits)
@@ -69,7 +69,7 @@ def judged(setup: Setup, record: Recording, fast: dict[str, float | str]) -> Out
     """Return the outcome of an implausibly fast run by fixed steps: diverged if its ledger does not close.
 
     Args:
-        setup: What ran.
+        setup: The setup of the run.
         record: Its recording.
         fast: The joint that reached an implausible speed, see `runaway`.
     """
