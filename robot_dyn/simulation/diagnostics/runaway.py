@@ -48,11 +48,17 @@ def runaway(setup: Setup, speeds: np.ndarray) -> dict[str, float | str]:
     return {"joint": dynamics.joint_names[joint], "value": float(speeds[joint]), "limit": limit, "unit": unit_of_v}
 
 
-def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
-    """Return a remark if a fixed step is too long to be stable at the start, and deviations grow by 1e3 until t."""
+def step_too_long(setup: Setup, t: float, step_s: float | None = None) -> tuple[Remark, ...]:
+    """Return a remark if a fixed step is too long to be stable at the start, and deviations grow by 1e3 until t.
+
+    Args:
+        setup: The setup of the run.
+        t: Time reached, in [s].
+        step_s: Longest step of the run, in [s]; None to find it from the setup.
+    """
     if setup.method.controls_error or setup.method.nonsmooth or setup.equation.canonical:
         return ()
-    equation, step = setup.equation, setup.taken_step_s
+    equation, step = setup.equation, setup.taken_step_s if step_s is None else step_s
     y, held = equation.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if equation.sampled else None
     try:
         linear = setup.method, jacobian(equation, 0.0, y, held), len(setup.q0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 
 from robot_dyn.simulation.diagnostics.runaway import step_too_long
@@ -18,8 +20,10 @@ def reason_of(setup: Setup, end: Outcome, samples: Samples) -> Outcome:
 
     Only `simulate` searches for a stable period or stable gains, because that takes most of the time.
     """
+    step_s = end.facts.get("step_s")  # to find it from the setup takes long if there are many ticks
+    step = step_too_long(setup, end.t, None if step_s is None else float(step_s))
     loop = unstable(setup, *states(setup, *samples), runs_away=True, remedies=False, end=end.t)
-    return explained(end, setup, (*step_too_long(setup, end.t), *loop))
+    return explained(end, setup, chain(step, loop))  # the loop is linearised only if the step explains nothing
 
 
 def states(setup: Setup, t: np.ndarray, q: np.ndarray | None, v: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:

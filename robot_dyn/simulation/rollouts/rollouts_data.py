@@ -10,6 +10,7 @@ import numpy as np
 
 from robot_dyn.control.controller import Controller
 from robot_dyn.effects.plant import Plant
+from robot_dyn.foundations.coefficients import with_values
 from robot_dyn.foundations.errors import QueryError
 from robot_dyn.foundations.store import NOT_STORED, Layout
 from robot_dyn.foundations.validate import integer
@@ -97,7 +98,12 @@ class RolloutsData(RunData):
         if self.setup is None or self.ends[run].ending is not Ending.DIVERGED:
             return self.ends[run]
         if run not in self._judged:
-            self._judged[run] = reason_of(self.setup_of(run), self.ends[run], samples_of(self, run))
+            plant, controller = self._parts(self.setup, run)
+            start = {"q0": self.q0[run], "v0": self.v0[run]}
+            setup = with_values(
+                self.setup, {"plant": plant, "controller": controller, **start}
+            )  # checked before the run
+            self._judged[run] = reason_of(setup, self.ends[run], samples_of(self, run))
         return self._judged[run]
 
     @cached_property

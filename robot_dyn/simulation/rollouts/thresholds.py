@@ -128,6 +128,6 @@ def _of_runs(
         yield Switching(state), np.array(runs if parts else range(count))
 
 
-def _always_smooth(part: Effect | Controller | None) -> bool:
+def _always_smooth(part: Any) -> bool:
     """Return True if a part has no threshold for any coefficients."""
     return type(part).thresholds in (smooth, Effect.thresholds, Controller.thresholds)
