@@ -25,30 +25,30 @@ ROOT = Path(__file__).parents[1]
 # Each count of the tree. A count above its ceiling is an error; a count below it is one too, until the ceiling is
 # lowered to it.
 CEILINGS = {
-    "opening": 141,
+    "opening": 128,
     "as of": 36,
-    "what without noun": 130,
+    "what without noun": 124,
     "is told": 4,
     "says that": 12,
     "tells that": 1,
     "goes on": 1,
     "looks": 23,
     "believes": 7,
-    "is no": 11,
+    "is no": 9,
     "of its own": 21,
     "behind": 9,
     "beside": 24,
     "anew": 0,
     "likewise": 1,
-    "in place of": 11,
-    "so many": 12,
-    "but for": 3,
+    "in place of": 10,
+    "so many": 8,
+    "but for": 2,
     "whatever": 9,
     "of which": 15,
     "the same holds": 0,
-    "each": 190,
+    "each": 160,
     "arguments": 0,
-    "Any": 994,
+    "Any": 971,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.

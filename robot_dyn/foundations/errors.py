@@ -98,6 +98,10 @@ class NotFiniteError(QueryError):
     """An argument of a query with a value that is NaN or infinite."""
 
 
+class MissingTimeError(QueryError):
+    """A query without t of a plant with an effect that depends on the time."""
+
+
 class OverflowedError(QueryError):
     """Arguments so large that the result is not a finite number."""
 
@@ -202,6 +206,10 @@ def call(method: Callable[..., Result], *arguments: object) -> Result:
     """
     try:
         return method(*arguments)
+    except MissingTimeError as error:
+        if (name := getattr(getattr(method, "__self__", None), "name", None)) is not None:
+            error.args = (f"{name} depends on the time: pass t=, in [s]",)
+        raise
     except RobotDynError:
         raise
     except Exception as error:

@@ -16,6 +16,7 @@ from typing import Protocol, SupportsIndex, TypeGuard, TypeVar, overload
 import numpy as np
 
 from robot_dyn.foundations.errors import (
+    MissingTimeError,
     NotFiniteError,
     OverflowedError,
     QueryError,
@@ -66,7 +67,7 @@ def real(values: object) -> np.ndarray:
             array = _of_objects(array)
     except OverflowError:
         raise ValueError("a number too large for a float") from None
-    except (MemoryError, KeyboardInterrupt):
+    except (MemoryError, KeyboardInterrupt, MissingTimeError):
         raise
     except Exception:  # a ragged list, or any error in the conversion of an object
         raise ValueError(shown(values)) from None

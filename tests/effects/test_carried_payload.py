@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robot_dyn as rd
-from robot_dyn.foundations import EffectError, TraceError
+from robot_dyn.foundations import TraceError
 from tests.effects.test_effect_states import MASS, SLIDER, Ramp
 
 ARM = rd.load("planar_2r")
@@ -19,12 +19,12 @@ BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 G = 9.80665
 
 
-@pytest.mark.parametrize("method", [TIGHT, "rk4"], ids=["DOP853", "rk4"])
+@pytest.mark.parametrize("method", [TIGHT, "RK4"], ids=["DOP853", "RK4"])
 @BOTH
 def test_a_slider_keeps_its_momentum_and_the_ledger_has_what_was_lost(method, engine: str) -> None:
     """F on m, M at rest from 0.3 s, μ at the slider's speed from 0.5 s, both dropped by turns: parabolas, 1e-12.
 
-    rk4 is exact on them but for rounding. Work of a body: M g z and ½ M v² that come and go with it.
+    RK4 is exact on them but for rounding. Work of a body: M g z and ½ M v² that come and go with it.
     """
     F, M, mu, z = 2.0, 0.9, 0.4, 0.3
     bodies = [
@@ -155,22 +155,20 @@ def test_rollouts_of_chosen_steps_and_run_files_keep_them(tmp_path) -> None:
 
 
 def test_a_plant_is_asked_at_a_time() -> None:
-    """N and accelerations know the time; M and C are those of `at` a time, and refuse without."""
+    """All queries and `linearise` take the time; machine code is refused."""
     body = rd.effects.CarriedPayload(BODY, 0.1, 0.2)
     plant, carrying = (
         rd.Plant(ARM, [rd.effects.ViscousFriction(0.1), body]),
         rd.Plant(ARM.with_(payload=BODY), [rd.effects.ViscousFriction(0.1)]),
     )
     for t, other in ((0.05, rd.Plant(ARM, [rd.effects.ViscousFriction(0.1)])), (0.15, carrying)):
-        np.testing.assert_array_equal(plant.N(t, Q, V), other.N(t, Q, V))
-        np.testing.assert_array_equal(plant.forward_dynamics(t, Q, V, V), other.forward_dynamics(t, Q, V, V))
-        np.testing.assert_array_equal(plant.inverse_dynamics(t, Q, V, V), other.inverse_dynamics(t, Q, V, V))
-        np.testing.assert_array_equal(plant.at(t).M(Q), other.M(Q))
+        np.testing.assert_array_equal(plant.N(Q, V, t=t), other.N(Q, V, t=t))
+        np.testing.assert_array_equal(plant.forward_dynamics(Q, V, V, t=t), other.forward_dynamics(Q, V, V, t=t))
+        np.testing.assert_array_equal(plant.inverse_dynamics(Q, V, V, t=t), other.inverse_dynamics(Q, V, V, t=t))
+        np.testing.assert_array_equal(plant.M(Q, t=t), other.M(Q))
+        np.testing.assert_array_equal(plant.C(Q, V, t=t), other.C(Q, V))
         np.testing.assert_array_equal(rd.linearise(plant, Q, V, t=t)[0], rd.linearise(other, Q, V)[0])
-    for ask in (lambda: plant.M(Q), lambda: plant.C(Q, V)):
-        with pytest.raises(
-            EffectError, match=r"depends on the carried payloads, and so on the time: use plant.at\(t\)"
-        ):
-            ask()
-    with pytest.raises(TraceError, match=r"carried_payload is temporary: use plant.at\(t\)"):
-        rd.compiled(plant).forward_dynamics(0.0, Q, V, V)
+    compiled = rd.compiled(plant)
+    for query in (lambda: compiled.forward_dynamics(Q, V, V, t=0.0), lambda: compiled.M(Q), lambda: compiled.C(Q, V)):
+        with pytest.raises(TraceError, match=r"carried_payload is temporary: use plant.at\(t\)"):
+            query()

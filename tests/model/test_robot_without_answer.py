@@ -230,7 +230,7 @@ def test_a_time_that_rounding_hides_is_refused_by_machine_code(rows: int) -> Non
     q = np.tile(NEAR, (rows, 1) if rows else 1).astype(np.float32)
 
     def torque(t: float) -> Any:
-        return plant.torque(np.full(rows, t) if rows else t, q, 0 * q)
+        return plant.torque(q, 0 * q, t=np.full(rows, t) if rows else t)
 
     with pytest.raises(OverflowedError, match="t is so large that float32 does not resolve"):
         torque(1e9 + 0.5)

@@ -38,7 +38,7 @@ def test_defaults_are_rest_and_the_actuation_without_acceleration() -> None:
     q, v = np.random.default_rng(8).normal(size=(2, 2))
     plant = rd.Plant(DOUBLE, [rd.effects.ViscousFriction(0.3), rd.effects.Spring(2.0)])
     for given, held in (((q,), (q, 0 * q)), ((q, v), (q, v))):
-        u = plant.inverse_dynamics(0.0, *held, np.zeros(2))
+        u = plant.inverse_dynamics(*held, np.zeros(2), t=0.0)
         for one, two in zip(rd.linearise(plant, *given), rd.linearise(plant, *held, u), strict=True):
             np.testing.assert_array_equal(one, two)
 

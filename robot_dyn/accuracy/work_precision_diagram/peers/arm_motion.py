@@ -144,7 +144,7 @@ class ArmMotion:
             pairs = {
                 "M": (self.robot.M(q), mass_matrix(q)),
                 "N": (self.robot.inverse_dynamics(q, v, zero), bias(q, v)),
-                "the torques of control and effects": (plant.torque(t, q, v) + control, torque(t, q, v)),
+                "the torques of control and effects": (plant.torque(q, v, t=t) + control, torque(t, q, v)),
             }
             for what, (ours, theirs) in pairs.items():
                 differ = float(np.abs(ours - theirs).max() / (np.abs(ours).max() or 1.0))
