@@ -48,7 +48,7 @@ CEILINGS = {
     "the same holds": 0,
     "each": 160,
     "arguments": 0,
-    "Any": 971,
+    "Any": 808,
 }
 
 # Rules that are counted by syntax; the others are regular expressions.
