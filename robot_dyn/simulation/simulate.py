@@ -97,7 +97,7 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
         "error": error,
         "accuracy": None,
     }
-    if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # nothing may be read later
+    if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # later reads are not allowed
         later = [field.name for field in fields(Trajectory) if field.name not in (*known, "statistics")]
         known |= {name: getattr(results, name) for name in later}
     method = ran.setup.method
