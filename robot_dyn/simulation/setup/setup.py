@@ -56,7 +56,7 @@ CACHED = {
 
 
 class Options(TypedDict, total=False):
-    """Attributes of a `Setup` other than plant and start, in the forms that it accepts; and tolerances of its method."""
+    """Attributes of a `Setup` other than plant and start, in the forms it accepts; tolerances of its method."""
 
     duration_s: float
     controller: Controller | Callable[[float, np.ndarray, np.ndarray], ArrayLike] | None
