@@ -20,7 +20,7 @@ plant, controller = (
     rd.Plant(arm, [rd.effects.ViscousFriction(0.1)]),
     rd.control.PD(rd.control.quintic(q, q + 0.5, 0.1), 40.0, 4.0),
 )
-setup = rd.Setup(plant, q, duration_s=0.2, controller=controller, method="rk4")
+setup = rd.Setup(plant, q, duration_s=0.2, controller=controller, method="RK4")
 runs = [rd.simulate(setup, engine=each) for each in ("interpreted", "compiled")]
 np.testing.assert_allclose(runs[0].q, runs[1].q, rtol=0, atol=1e-11)
 many = rd.rollouts(setup, np.tile(q, (3, 1)))

@@ -25,7 +25,7 @@ def fall(q0):
         q0=q0,
         v0=[0.0, 0.0],
         duration_s=10.0,
-        method="order_8",
+        method="DP8",
         step_s=0.005,  # with shorter ones the error is that of rounding, which the motion magnifies
         record_every_s=0.01,
     )

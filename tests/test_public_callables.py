@@ -109,7 +109,7 @@ def test_values_compare_and_hash(known: dict[str, Example]) -> None:
 
 def test_equal_runs_and_setups_do_not_raise() -> None:
     robot = rd.load("cart_pole")
-    setups = [rd.Setup(rd.Plant(robot), [0.1, 0.2], duration_s=0.01, method="rk4") for _ in range(2)]
+    setups = [rd.Setup(rd.Plant(robot), [0.1, 0.2], duration_s=0.01, method="RK4") for _ in range(2)]
     runs = [rd.simulate(setup) for setup in setups]
     assert setups[0] != setups[1] and runs[0] != runs[1] and runs[0] == runs[0]
     assert len({*setups, *runs, runs[0].ledger, runs[0].error}) == 6
@@ -123,7 +123,7 @@ def test_equal_runs_and_setups_do_not_raise() -> None:
         lambda robot, run: rd.simulate("ur5"),
         lambda robot, run: rd.linearise("ur5", [0.0]),
         lambda robot, run: rd.save_run(
-            rd.rollouts(rd.Setup(rd.Plant(robot), [0.1, 0.2], duration_s=0.01), method="rk4"), "x.npz"
+            rd.rollouts(rd.Setup(rd.Plant(robot), [0.1, 0.2], duration_s=0.01), method="RK4"), "x.npz"
         ),
         lambda robot, run: rd.plot(run, run),
         lambda robot, run: rd.Robot(robot.model),

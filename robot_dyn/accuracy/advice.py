@@ -205,7 +205,8 @@ def advice_about(setup: Setup, states_of: Callable[[Setup, StateEquation], list[
     methods = {name: method(name) for name in FIXED_STEP} | ({} if own.controls_error else {own.name: own})
     limits = {name: min(longest_step(each, J, n) for J in matrices) for name, each in methods.items()}
     step = 0.0 if own.controls_error else setup.taken_step_s
-    loops = [linearised(plant, setup.controller, t, _own(loop, y)) for t, y in states if period]
+    sampled = [] if controller is None or not period else [(controller, t, _own(loop, y)) for t, y in states]
+    loops = [linearised(plant, *state) for state in sampled]
     factors = [after(each.factor(period), periods(duration, period)) for each in loops]
     factors += [exp(min(max(0.0, excess_rate(own, J, n)(step)) * duration, LARGEST)) for J in matrices if step]
     return Advice(
@@ -232,8 +233,8 @@ def _along(setup: Setup, loop: StateEquation) -> list[State]:
     """Times and states y along a run with control at all times."""
     run = simulate(
         Setup(
-            setup.plant, setup.q0, setup.v0, setup.duration_s, loop.controller, engine=setup.engine,
-            record_every_s=setup.duration_s / (_LOOKS - 1), estimate_error=False,
+            setup.plant, setup.q0, setup.v0, duration_s=setup.duration_s, controller=loop.controller,
+            engine=setup.engine, record_every_s=setup.duration_s / (_LOOKS - 1), estimate_error=False,
         )
     )  # fmt: skip
     z = [] if run.controller_states is None else [run.controller_states]

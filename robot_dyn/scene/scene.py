@@ -16,7 +16,7 @@ from robot_dyn.effects.effect import Effect
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.errors import RobotDynError, SceneError, nearest, shorten, shown
 from robot_dyn.foundations.files import FileKind, read
-from robot_dyn.integrate.adaptive import ADAPTIVE, Adaptive
+from robot_dyn.integrate.adaptive import ADAPTIVE, AUTO, Adaptive
 from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.methods import METHODS, method
 from robot_dyn.model.loading import load
@@ -83,7 +83,7 @@ class Scene(Part):
     """Options for reading the robot's file; unchanged by default."""
     duration_s: Positive
     """Length of the run."""
-    method: Annotated[str, AfterValidator(_known_method)] = Setup.method
+    method: Annotated[str, AfterValidator(_known_method)] = AUTO
     """Integration method."""
     step_s: Positive = STEP_S
     """Step of a method with a fixed step; shorter where samples, ticks and switches require it."""

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import fields, replace
 from time import perf_counter
-from typing import Any, NamedTuple, Unpack
+from typing import Any, NamedTuple, Unpack, cast
 
 from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.validate import function
 from robot_dyn.foundations.values import cached, derived
-from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF
-from robot_dyn.integrate.time_stepping import TimeStepping
+from robot_dyn.integrate.adaptive import AUTO, EXPLICIT, STIFF, Adaptive
+from robot_dyn.integrate.time_stepping import MoreauJean
 from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.simulation.derived import Results
 from robot_dyn.simulation.diagnostics.runaway import judged, runaway
@@ -96,7 +96,7 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
         "error": error,
         "accuracy": None,
     }
-    if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # nothing may be read later
+    if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # later reads are not allowed
         later = [field.name for field in fields(Trajectory) if field.name not in (*known, "statistics")]
         known |= {name: getattr(results, name) for name in later}
     method = ran.setup.method
@@ -167,12 +167,12 @@ def _recorded(setup: Setup, on_progress: Callable[[float], object] | None) -> _R
 
 def with_stiff_method(setup: Setup) -> Setup:
     """Return the setup by the stiff method with the same tolerances."""
-    return replace(setup, method=replace(setup.method, method=STIFF))
+    return replace(setup, method=replace(cast(Adaptive, setup.method), method=STIFF))
 
 
 def with_time_stepping(setup: Setup) -> Setup:
     """Return the setup by time stepping."""
-    return replace(setup, method=TimeStepping())
+    return replace(setup, method=MoreauJean())
 
 
 def _estimated(ran: _Ran, runner: Runner) -> tuple[Recording, ErrorEstimate | None]:

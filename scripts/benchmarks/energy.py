@@ -11,7 +11,7 @@ import robot_dyn as rd
 from benchmarks.measure import Effort, row, table
 
 STEP_S = 5e-3
-METHODS = ("gauss_4", "rk4", "explicit_euler")
+METHODS = ("GaussLegendre4", "RK4", "Euler")
 
 
 def energy(effort: Effort) -> None:

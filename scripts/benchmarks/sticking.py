@@ -2,7 +2,7 @@
 
 distance = the largest |q(t) − q_limit(t)| over joints and samples each 8 ms in 2 s
 
-Beside `time_stepping`, MuJoCo with frictionloss and limits: at its default settings, and at its stiffest, solref
+Beside `MoreauJean`, MuJoCo with frictionloss and limits: at its default settings, and at its stiffest, solref
 (2 h, 1) and solimp 0.9999, which shrink with the step h. Drake has no dry friction of joints to compare with.
 """
 
@@ -45,9 +45,9 @@ def sticking(effort: Effort) -> None:
         table("h, s", *(f"{h:g}" for h in steps), "mean order")
 
         def ours(h: float, plant: rd.Plant = plant, options: dict[str, Any] = options) -> np.ndarray:
-            return rd.simulate(plant, **options, method="time_stepping", step_s=h).q
+            return rd.simulate(plant, **options, method="MoreauJean", step_s=h).q
 
-        _distances("time_stepping", ours, steps, limit.q)
+        _distances("MoreauJean", ours, steps, limit.q)
         for name, stiff in (("MuJoCo, stiffest", True), ("MuJoCo, default", False)):
             _distances(name, lambda h, stiff=stiff: _mujoco(panda, drive, h, stiff, bool(stops)), steps, limit.q)
 

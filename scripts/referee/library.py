@@ -23,18 +23,18 @@ Texts = dict[str, Any]
 
 CACHE_VARIABLE = "ROBOT_DYN_CACHE"  # names the folder of compiled code
 METHODS = {
-    "Euler": "explicit_euler",
-    "semi-implicit Euler": "semi_implicit_euler",
-    "midpoint": "midpoint",
-    "RK4": "rk4",
-    "order 8": "order_8",
-    "Gauss 2": "gauss_2",
-    "Gauss 4": "gauss_4",
-    "Gauss 6": "gauss_6",
-    "Rosenbrock, fixed step": "rosenbrock_5",
-    "time stepping": "time_stepping",
+    "Euler": "Euler",
+    "semi-implicit Euler": "SemiImplicitEuler",
+    "Midpoint": "Midpoint",
+    "RK4": "RK4",
+    "order 8": "DP8",
+    "Gauss 2": "GaussLegendre2",
+    "Gauss 4": "GaussLegendre4",
+    "Gauss 6": "GaussLegendre6",
+    "Rosenbrock, fixed step": "Rodas5PFixed",
+    "time stepping": "MoreauJean",
     "DOP853": "DOP853",
-    "Rosenbrock": "Rosenbrock",
+    "Rodas5P": "Rodas5P",
     "automatic": "auto",
 }
 

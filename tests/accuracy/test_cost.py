@@ -41,7 +41,7 @@ def setup(*effects: Any, **options: Any) -> rd.Setup:
 
 def compiled(of: rd.Setup) -> dict[str, int]:
     """Instructions of the programs that `simulate` runs, by name."""
-    made = machine_code(StateEquation(of.plant, of.controller), rd.integrate.method("rk4"))
+    made = machine_code(StateEquation(of.plant, of.controller), rd.integrate.method("RK4"))
     return {name: len(program) for name, program in made.code.programs.items()}
 
 
@@ -133,7 +133,7 @@ def test_machine_code_of_constants_has_no_inputs_and_the_numbers_of_its_robot() 
     for gravity in ((0.0, 0.0, -9.81), (0.0, 0.0, -3.7)):
         plant = rd.Plant(ARM.with_(gravity=gravity), [FRICTION])
         equation = StateEquation(plant, None)
-        made = machine_code_of_constants(equation, rd.integrate.method("rk4"))
+        made = machine_code_of_constants(equation, rd.integrate.method("RK4"))
         assert made.parameters.size == 0 < sum(each.size for each in parameters(ARM, plant.effects, None))
         y, out = np.array([*Q, *V, 0.0, 0.0]), np.empty((8, 1))
         made.in_python.rate(0.0, y, np.array([0.0, 1.0]), np.zeros((1, 1)), out)

@@ -82,9 +82,9 @@ def test_a_known_shift_is_found_with_its_time() -> None:
 
 
 def test_one_motion_by_two_methods_does_not_part_within_their_errors() -> None:
-    """rk4 with a long step differs from DOP853 by more than the tolerance, and by no more than it says."""
+    """RK4 with a long step differs from DOP853 by more than the tolerance, and by no more than it says."""
     a = coasting(loaded(1.0))
-    b = coasting(loaded(1.0), method="rk4", step_s=0.05, record_every_s=0.05)
+    b = coasting(loaded(1.0), method="RK4", step_s=0.05, record_every_s=0.05)
     found = rd.compare_runs(a, b)
     assert b.error is not None and found.parted is None and 0 < found.joints[0].largest < 4 * b.error.largest
     assert {each.name for each in found.settings} == {"method", "rtol", "atol", "step"}

@@ -79,7 +79,7 @@ def test_help_names_every_plot() -> None:
 @pytest.fixture
 def files(tmp_path: Path, monkeypatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, method="rk4")
+    setup = rd.Setup(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, method="RK4")
     rd.save_run(rd.simulate(setup), "run.npz")
     rd.save_rollouts(rd.rollouts(setup, [[0.1], [0.2]]), "runs.npz")
     return tmp_path

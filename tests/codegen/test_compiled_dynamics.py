@@ -340,7 +340,7 @@ def test_numpy_clip_is_the_minimum_of_a_maximum() -> None:
     """Of six joints with two bounds each: as branches these would be 3⁶."""
     most = np.array([6.0] * 3 + [1.2] * 3)
     law = rd.control.ControlLaw(lambda t, q, v: np.clip(-40.0 * (q - 0.3) - 10.0 * v, -2.0, most), 6)
-    setup = rd.Setup(rd.Plant(rd.load("ur5")), [0.1] * 6, duration_s=0.05, method="rk4", controller=law)
+    setup = rd.Setup(rd.Plant(rd.load("ur5")), [0.1] * 6, duration_s=0.05, method="RK4", controller=law)
     interpreted, compiled = (rd.simulate(setup, engine=each) for each in ("interpreted", "compiled"))
     assert compiled.statistics.engine == "compiled"
     np.testing.assert_allclose(compiled.q, interpreted.q, rtol=0, atol=1e-12)

@@ -135,5 +135,5 @@ def test_machine_code_of_a_robot_and_of_a_batch_is_logged(
         "compiling M of planar_2r, once for these equations",
     ]
     clocks.clear()
-    rd.rollouts(robot, [[0.4, -0.7], [0.1, 0.2]], duration_s=0.01, method="rk4", step_s=1e-3)
+    rd.rollouts(robot, [[0.4, -0.7], [0.1, 0.2]], duration_s=0.01, method="RK4", step_s=1e-3)
     assert "compiling the equations of this run, once for its structure" in ring(clocks, caplog)

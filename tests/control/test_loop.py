@@ -174,7 +174,7 @@ EVERYTHING = rd.control.Loop(
 @pytest.mark.long  # delays, two rates and noise are compared one by one in short
 def test_machine_code_and_rollouts_run_the_same_loop() -> None:
     """To rounding: no sample is near the edge of a step. Steps of RK4 are alike in all three."""
-    setup = rd.Setup(PLANT, Q0, V0, 20 * T, EVERYTHING, "rk4", T / 8, T, estimate_error=False, engine="interpreted")
+    setup = rd.Setup(PLANT, Q0, V0, 20 * T, EVERYTHING, "RK4", T / 8, T, estimate_error=False, engine="interpreted")
     one, two = rd.simulate(setup), rd.simulate(setup, engine="compiled")
     many = rd.rollouts(setup, np.tile(Q0, (70, 1)), np.tile(V0, (70, 1)), record=("q", "v", "u"), threads=2)
     np.testing.assert_allclose(two.q, one.q, atol=1e-13)
@@ -188,7 +188,7 @@ def test_machine_code_and_rollouts_run_the_same_loop() -> None:
 
 
 def test_coefficients_of_blocks_are_swept_by_name() -> None:
-    setup = rd.Setup(PLANT, Q0, V0, 10 * T, EVERYTHING, "rk4", T / 4, T, estimate_error=False)
+    setup = rd.Setup(PLANT, Q0, V0, 10 * T, EVERYTHING, "RK4", T / 4, T, estimate_error=False)
     params = {
         "position.quantisation.resolution": [1e-3, 4e-3], "velocity.low_pass.cutoff": [40.0, 20.0],
         "actuation.rate_limit.rate": [300.0, 50.0], "position.noise.deviation": [1e-4, 0.0], "kp": [9.0, 50.0],
@@ -262,7 +262,7 @@ def test_chatter_is_seen_where_a_torque_acts_late(late: float) -> None:
     M = np.linalg.inv(matrices()[1][2:])
     kd = 2.24 / T / np.abs(np.linalg.eigvals(np.linalg.inv(M))).max()
     loop = rd.control.Loop(rd.control.PD(rd.control.hold(TARGET), 0.0, kd, T), actuation_delay=late)
-    for integrator in ("rk4", "DOP853"):
+    for integrator in ("RK4", "DOP853"):
         for engine in ("interpreted", "compiled"):
             options = {"method": integrator, "engine": engine, "estimate_error": False, "duration_s": 50 * T}
             made = rd.simulate(PLANT, Q0, V0, controller=loop, record_every_s=T, **options)  # type: ignore[arg-type]
@@ -277,7 +277,7 @@ def test_ticks_of_two_instants_a_period() -> None:
 
 def test_what_is_rounded_shows_no_order() -> None:
     """A sample may be rounded the other way in the exact motion: its error is bounded by companions, not divided."""
-    setup = rd.Setup(PLANT, Q0, V0, 10 * T, PD, "rk4", T / 8)
+    setup = rd.Setup(PLANT, Q0, V0, 10 * T, PD, "RK4", T / 8)
     assert rd.simulate(setup).error.verdict is Verdict.ORDER
     made = rd.simulate(setup, controller=rd.control.Loop(PD, position=rd.control.Quantisation(1e-4))).error
     assert made.verdict is Verdict.BOUND

@@ -68,7 +68,7 @@ def test_noise_is_the_same_alone_in_batches_and_in_threads() -> None:
     )
     given = {"duration_s": TICKS * PERIOD, "record_every_s": PERIOD}
     expected = [-WEAK * deviates(SEED, run, TICKS + 1, 2) for run in range(130)]
-    for integrator in ("rk4", "DOP853"):
+    for integrator in ("RK4", "DOP853"):
         for engine in ("interpreted", "compiled"):
             for run in (0, 77):
                 each = replace(loop, run=run)
@@ -89,7 +89,7 @@ def test_each_tick_has_its_noise_whatever_the_steps_and_the_delay() -> None:
         actuation_delay=1.5, seed=4,
     )  # fmt: skip
     run = rd.simulate(
-        ARM, [0.0, 0.0], controller=loop, method="rk4", step_s=1e-3, duration_s=0.1, record_every_s=PERIOD
+        ARM, [0.0, 0.0], controller=loop, method="RK4", step_s=1e-3, duration_s=0.1, record_every_s=PERIOD
     )
     np.testing.assert_array_equal(
         run.u[2:], -WEAK * deviates(4, 0, 11, 2)[:9]

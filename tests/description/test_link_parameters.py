@@ -52,7 +52,7 @@ def setup(robot: rd.Robot, model: rd.Robot | None = None) -> rd.Setup:
     control = None if model is None else rd.control.ComputedTorque(model, plan, 50.0, 9.0)
     return rd.Setup(
         rd.Plant(robot, [rd.effects.ViscousFriction(0.3)]), STATES[0], STATES[1], duration_s=0.2, controller=control,
-        method="rk4", step_s=1e-3, record_every_s=0.02, estimate_error=False,
+        method="RK4", step_s=1e-3, record_every_s=0.02, estimate_error=False,
     )  # fmt: skip
 
 

@@ -19,12 +19,12 @@ BOTH = pytest.mark.parametrize("engine", ["interpreted", "compiled"])
 G = 9.80665
 
 
-@pytest.mark.parametrize("method", [TIGHT, "rk4"], ids=["DOP853", "rk4"])
+@pytest.mark.parametrize("method", [TIGHT, "RK4"], ids=["DOP853", "RK4"])
 @BOTH
 def test_a_slider_keeps_its_momentum_and_the_ledger_has_what_was_lost(method, engine: str) -> None:
     """F on m, M at rest from 0.3 s, μ at the slider's speed from 0.5 s, both dropped by turns: parabolas, 1e-12.
 
-    rk4 is exact on them but for rounding. Work of a body: M g z and ½ M v² that come and go with it.
+    RK4 is exact on them but for rounding. Work of a body: M g z and ½ M v² that come and go with it.
     """
     F, M, mu, z = 2.0, 0.9, 0.4, 0.3
     bodies = [

@@ -32,7 +32,7 @@ Q, V = np.array([0.4, -0.7]), np.array([0.3, 0.9])
 def setup_of(part: Any, **options: Any) -> rd.Setup:
     """Of an effect or a controller."""
     effects, controller = ([part], None) if isinstance(part, Effect) else ((), part)
-    steps = {"duration_s": 0.5, "method": "rk4", "step_s": 1e-3, "estimate_error": False}
+    steps = {"duration_s": 0.5, "method": "RK4", "step_s": 1e-3, "estimate_error": False}
     return rd.Setup(rd.Plant(ARM, effects), Q, V, controller=controller, **steps | options)
 
 
@@ -277,12 +277,12 @@ CHANGED: dict[str, tuple[Any, dict[str, Any]]] = {
 def test_what_has_changed_since_an_earlier_run_is_found(what: str) -> None:
     """What an attribute, a file or a global holds is a constant of the code: it is compared before each run."""
     effects, parts = CHANGED[what]
-    options = {"duration_s": 0.1, "method": "rk4", "estimate_error": False} | parts
+    options = {"duration_s": 0.1, "method": "RK4", "estimate_error": False} | parts
     setup = rd.Setup(rd.Plant(ARM, effects), Q, V, **options)
     OWNED.stiffness = STATE["gain"] = 2.0
     rd.simulate(setup, engine="compiled")
     OWNED.stiffness = STATE["gain"] = 3.0
-    for method in ("rk4", "DOP853"):
+    for method in ("RK4", "DOP853"):
         with pytest.raises(MachineError, match=r"(changing|Law|crosses) differs from the interpreted one"):
             rd.simulate(setup, engine="compiled", method=method)
     assert np.array_equal(rd.simulate(setup).q, rd.simulate(setup, engine="interpreted").q)
@@ -354,7 +354,7 @@ SCENES = {
     "stops": (rd.effects.joint_stops(-0.9, 0.9, 1e4, 10.0), None, "auto"),
     "sticks": ([rd.effects.DryFriction(1.0, 1.2)], None, "auto"),
     "sampled": ((), rd.control.PD(rd.control.hold(Q - 0.3), 40.0, 4.0, period_s=0.01), "auto"),
-    "declared by a user": ([Declared(1.5)], None, "rk4"),
+    "declared by a user": ([Declared(1.5)], None, "RK4"),
 }
 
 
@@ -375,7 +375,7 @@ def test_auto_takes_the_machine_code_that_is_there_and_both_engines_agree_within
 
 def test_auto_has_machine_code_for_other_coefficients_and_none_for_another_structure(monkeypatch) -> None:
     monkeypatch.setenv("ROBOT_DYN_CACHE", "off")
-    base = rd.Setup(rd.Plant(ARM, [rd.effects.Spring(3.0)]), Q, V, 0.2, method="rk4", estimate_error=False)
+    base = rd.Setup(rd.Plant(ARM, [rd.effects.Spring(3.0)]), Q, V, 0.2, method="RK4", estimate_error=False)
     rd.simulate(base, engine="compiled")
     assert rd.simulate(replace(base, plant=rd.Plant(ARM, [rd.effects.Spring(5.0)]))).statistics.engine == "compiled"
     other = rd.Plant(ARM.with_(mass_scale=1.07), [rd.effects.Spring(5.0)])
@@ -427,7 +427,7 @@ def test_models_of_ones_own_controller_have_the_right_angles_of_the_machine_code
     assert run.statistics.engine == "compiled" and np.abs(run.q - same.q).max() < 1e-12
 
 
-METHODS = ("rk4", "gauss_4", "DOP853")
+METHODS = ("RK4", "GaussLegendre4", "DOP853")
 KINDS = (
     rd.control.Controller,
     rd.control.Stateless,
@@ -553,7 +553,7 @@ def test_an_overflow_in_a_users_code_is_an_outcome_of_the_run() -> None:
     def runaway(t, q, v):
         return ARM.inverse_dynamics(q, v, 1e4 * v)
 
-    run = rd.simulate(ARM, Q, V, duration_s=0.2, controller=runaway, method="rk4")
+    run = rd.simulate(ARM, Q, V, duration_s=0.2, controller=runaway, method="RK4")
     assert run.outcome.ending == "diverged" and len(run.t) > 1
 
 
@@ -607,7 +607,7 @@ class Raises(rd.control.Stateless):
 )
 def test_what_cannot_be_traced_says_which_line_stopped_it(effects, controller, part, code, why) -> None:
     line = code.co_firstlineno + (1 if code is opaque.__code__ else 2)
-    setup = rd.Setup(rd.Plant(ARM, effects), Q, V, 0.1, controller, engine="compiled", method="rk4")
+    setup = rd.Setup(rd.Plant(ARM, effects), Q, V, 0.1, controller, engine="compiled", method="RK4")
     with pytest.raises(
         TraceError, match=rf"{part} cannot be compiled \(line {line} of test_declarations.py: {why}"
     ) as caught:
@@ -623,8 +623,8 @@ def test_a_function_is_the_controller_of_the_same_law() -> None:
         return 4.0 * (Q - 0.2 - q) - 1.5 * v
 
     pd = rd.control.PD(rd.control.hold(Q - 0.2), 4.0, 1.5)
-    setup = rd.Setup(rd.Plant(ARM), Q, V, 0.1, pd, "rk4", engine="interpreted")
-    run = rd.simulate(ARM, Q, V, duration_s=0.1, controller=law, method="rk4")
+    setup = rd.Setup(rd.Plant(ARM), Q, V, 0.1, pd, "RK4", engine="interpreted")
+    run = rd.simulate(ARM, Q, V, duration_s=0.1, controller=law, method="RK4")
     assert np.array_equal(run.q, rd.simulate(setup).q)
     assert run.statistics.engine.startswith("interpreted (law declares no thresholds: give a class")
     compiled = rd.simulate(setup, controller=law, engine="compiled")
@@ -657,7 +657,7 @@ def test_recorded_controller_states_obey_their_equation(
     """dz/dt = ki e without a limit; sampled, z⁺ = z + T ki e at each tick, exactly."""
     ki = 3.0
     pid = rd.control.PID(rd.control.hold(Q - 0.2), 8.0, ki, 2.0, period_s=period_s)
-    method = "gauss_4" if canonical else "rk4"
+    method = "GaussLegendre4" if canonical else "RK4"
     run = rd.simulate(rd.Plant(ARM), q0=Q, v0=V, duration_s=0.2, controller=pid, engine=engine, method=method)
     z, e = run.controller_states, Q - 0.2 - run.q
     assert z is not None and z.shape == (len(run.t), 2)

@@ -287,7 +287,7 @@ def exactly_driven_panda() -> rd.Trajectory:
     return driven_panda(rd.integrate.Adaptive(rtol=1e-13, atol=1e-13), record_every_s=2.0)
 
 
-@pytest.mark.parametrize(("method", "coarsest", "order"), long([("rk4", 64, 3.5), ("order_8", 32, 5.0)]))
+@pytest.mark.parametrize(("method", "coarsest", "order"), long([("RK4", 64, 3.5), ("DP8", 32, 5.0)]))
 def test_fixed_steps_keep_their_order_on_an_arm_of_seven_joints(method: str, coarsest: int, order: float) -> None:
     """Mean slope over four halvings from 1/16 s or 1/32 s, where the events are already those of the exact motion."""
     exact = exactly_driven_panda()
@@ -299,13 +299,13 @@ def test_fixed_steps_keep_their_order_on_an_arm_of_seven_joints(method: str, coa
     assert np.log2(errors[0] / errors[-1]) / 4 >= order
 
 
-@pytest.mark.parametrize(("method", "order"), [("rk4", 4), *long([("midpoint", 2), ("order_8", 8)])])
+@pytest.mark.parametrize(("method", "order"), [("RK4", 4), *long([("Midpoint", 2), ("DP8", 8)])])
 def test_fixed_steps_keep_their_order_across_sticking(method: str, order: int) -> None:
     """Mean slope over three halvings, against DOP853 at 1e-12; within 1 of the order of the method."""
     plant = rd.Plant(ARM, [rd.effects.DryFriction([3.0, 1.0])])
     options = {"duration_s": 2.0, "controller": DRIVE, "estimate_error": False, "record_every_s": 2.0}
     exact = rd.simulate(plant, [-1.4, 0.2], method=TIGHT, **options).q[-1]
-    steps = [0.05 / 2**k for k in range(4)] if method != "order_8" else [0.1 / 2**k for k in range(3)]
+    steps = [0.05 / 2**k for k in range(4)] if method != "DP8" else [0.1 / 2**k for k in range(3)]
     errors = [
         np.abs(rd.simulate(plant, [-1.4, 0.2], method=method, step_s=h, **options).q[-1] - exact).max() for h in steps
     ]

@@ -36,7 +36,7 @@ class Ramp(rd.control.Stateless):
 
 
 def slide(effects, control, engine: str, **options) -> rd.Trajectory:
-    options = {"method": "order_8", "step_s": 1e-3, "record_every_s": 0.01, "estimate_error": False} | options
+    options = {"method": "DP8", "step_s": 1e-3, "record_every_s": 0.01, "estimate_error": False} | options
     return rd.simulate(rd.Plant(SLIDER, effects), q0=[0.0], controller=control, engine=engine, **options)
 
 
@@ -114,16 +114,16 @@ def setup(engine: str, period: float = 0.0, **options) -> rd.Setup:
     control = rd.control.PID(rd.control.quintic(Q, [0.6, -0.3], 0.3), 90.0, 60.0, 20.0, period_s=period)
     return rd.Setup(
         rd.Plant(ARM, effects), Q, controller=control, record_every_s=0.01, estimate_error=False, engine=engine,
-        **({"duration_s": 0.3, "method": "rk4", "step_s": 1e-3} | options),
+        **({"duration_s": 0.3, "method": "RK4", "step_s": 1e-3} | options),
     )  # fmt: skip
 
 
-REST = [(name, period) for name in ("semi_implicit_euler", "rosenbrock_5") for period in (0.0, 0.005)]
+REST = [(name, period) for name in ("SemiImplicitEuler", "Rodas5PFixed") for period in (0.0, 0.005)]
 
 
 @pytest.mark.parametrize(
     ("method", "period"),
-    [("rk4", 0.0), ("gauss_4", 0.005), *long([("rk4", 0.005), ("gauss_4", 0.0), *REST])],
+    [("RK4", 0.0), ("GaussLegendre4", 0.005), *long([("RK4", 0.005), ("GaussLegendre4", 0.0), *REST])],
 )
 def test_both_engines_make_the_same_run_of_effects_with_states(method: str, period: float) -> None:
     """Beside controller states, in (q, v) and in (q, p); 100 steps leave some 1e-10 of rounding in stiff ones."""
@@ -137,7 +137,7 @@ def test_both_engines_make_the_same_run_of_effects_with_states(method: str, peri
     for name, z in theirs.effect_states.items():
         assert z.shape == (11, 2) and np.abs(z[-1]).min() > 0
         np.testing.assert_allclose(ours.effect_states[name], z, atol=1e-9)
-    error = {"rk4": 1e-6, "gauss_4": 1e-9, "rosenbrock_5": 1e-6}.get(method, 0.1)
+    error = {"RK4": 1e-6, "GaussLegendre4": 1e-9, "Rodas5PFixed": 1e-6}.get(method, 0.1)
     assert ours.ledger.closure < error
     equation_of_motion = ARM.inverse_dynamics(ours.q, ours.v, ours.a)
     v, z = ours.v, ours.effect_states["lugre_friction"]
@@ -158,7 +158,7 @@ def test_passive_bristles_only_take_energy() -> None:
     """With σ₂ ≥ σ₁ (f_s/f_c − 1)."""
     friction = rd.effects.LuGreFriction(200.0, 0.5, 0.4, 1.0, 1.6, 0.1)
     swing = rd.simulate(
-        rd.Plant(rd.load("pendulum"), [friction]), q0=[0.9], duration_s=3.0, method="rk4", step_s=5e-4,
+        rd.Plant(rd.load("pendulum"), [friction]), q0=[0.9], duration_s=3.0, method="RK4", step_s=5e-4,
         record_every_s=0.01, estimate_error=False,
     )  # fmt: skip
     only_takes_energy(swing, "lugre_friction", 1e-6)

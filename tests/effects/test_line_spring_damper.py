@@ -83,7 +83,7 @@ def test_two_masses_move_as_the_damped_oscillator() -> None:
     expected = centre + gap * np.array([-m[1], m[0]]) / m.sum()
     for engine in ("interpreted", "compiled"):
         run = rd.simulate(
-            rd.Plant(MASSES, [strut]), q0=q0, v0=v0, duration_s=t_end, method="order_8", step_s=0.01, engine=engine,
+            rd.Plant(MASSES, [strut]), q0=q0, v0=v0, duration_s=t_end, method="DP8", step_s=0.01, engine=engine,
             estimate_error=False, record_every_s=0.1,
         )  # fmt: skip
         np.testing.assert_allclose(run.q[-1], expected, atol=1e-12)
@@ -107,7 +107,7 @@ def test_where_the_points_meet_there_is_no_direction() -> None:
     apart = rd.Plant(MASSES, [rd.effects.LineSpringDamper("a", "b", stiffness=0.0, damping=0.0, length=0.1)])
     for engine in ("interpreted", "compiled"):
         run = rd.simulate(
-            apart, q0=[-0.5, 0.5], v0=[1.0, -1.0], duration_s=1.0, method="explicit_euler", step_s=0.125,
+            apart, q0=[-0.5, 0.5], v0=[1.0, -1.0], duration_s=1.0, method="Euler", step_s=0.125,
             engine=engine, estimate_error=False,
         )  # fmt: skip
         assert run.outcome.ending is Ending.DIVERGED

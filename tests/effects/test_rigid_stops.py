@@ -211,7 +211,7 @@ def test_joints_that_stops_throw_at_each_other_end_at_rest_all_of_them() -> None
     assert np.abs(change[others]).max() < 1e-2 * np.abs(change).max()  # what loads do in 4 µs
 
 
-@pytest.mark.parametrize("method", ["time_stepping", "rk4", "DOP853"])
+@pytest.mark.parametrize("method", ["MoreauJean", "RK4", "DOP853"])
 def test_a_start_of_a_batch_beyond_a_stop_is_refused_by_number(method: str) -> None:
     plant = rd.Plant(ARM, [rd.effects.RigidStops([-1.0, -1.0], [1.0, 1.0])])
     with pytest.raises(QueryError, match=r"q0 of run 1: 'joint_2' is 0\.2 beyond its upper stop"):
@@ -221,7 +221,7 @@ def test_a_start_of_a_batch_beyond_a_stop_is_refused_by_number(method: str) -> N
         rd.rollouts(plant, [0.3, 0.6], params={"rigid_stops.upper": upper}, method=method)
 
 
-@pytest.mark.parametrize("method", ["rk4", "DOP853"])
+@pytest.mark.parametrize("method", ["RK4", "DOP853"])
 def test_rollouts_are_the_runs_of_simulate(method: str) -> None:
     """To the last bit, friction swept."""
     plant = rd.Plant(ARM, [rd.effects.DryFriction([3.0, 1.0]), rd.effects.RigidStops([-1.5, -2.0], [1.0, 2.0], 0.5)])

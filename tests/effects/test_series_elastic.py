@@ -26,11 +26,11 @@ def slide(effect: rd.effects.SeriesElastic, engine: str = "interpreted", **optio
 
 
 @pytest.mark.parametrize(
-    "method", [TIGHT, *long(["gauss_6", rd.integrate.Adaptive("Rosenbrock", 1e-11, 1e-13), "order_8"])], ids=str
+    "method", [TIGHT, *long(["GaussLegendre6", rd.integrate.Adaptive("Rodas5P", 1e-11, 1e-13), "DP8"])], ids=str
 )
 @BOTH
 def test_two_masses_and_a_spring_move_by_the_matrix_exponential(method, engine: str) -> None:
-    """q, q̇, δ, θ̇ under a constant force on the motor; dense output of Rosenbrock, of order 4, leaves 1e-10."""
+    """q, q̇, δ, θ̇ under a constant force on the motor; dense output of Rodas5P, of order 4, leaves 1e-10."""
     F = 1.7
     options = {"step_s": 2e-3} if isinstance(method, str) else {}
     options |= {"controller": Ramp(F), "method": method, "duration_s": 1.0}
@@ -121,7 +121,7 @@ def test_stiff_springs_are_the_armature_of_gear_and_rotor() -> None:
     """The distance from M + n² J falls as 1/k: tenfold for a tenfold stiffness, within a tenth."""
     control = rd.control.PD(rd.control.quintic(Q, [0.6, 0.4], 0.5), 100.0, 20.0)
     options = {
-        "duration_s": 0.5, "method": rd.integrate.Adaptive("Rosenbrock", 1e-10, 1e-12), "record_every_s": 0.5,
+        "duration_s": 0.5, "method": rd.integrate.Adaptive("Rodas5P", 1e-10, 1e-12), "record_every_s": 0.5,
         "estimate_error": False, "controller": control,
     }  # fmt: skip
     rigid = rd.simulate(ARM.with_(armature=[0.4 * 2.0**2, 0.05 * 5.0**2]), Q, **options)

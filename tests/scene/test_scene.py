@@ -295,7 +295,7 @@ def test_operational_space_takes_gains_of_the_frame(write) -> None:
 
 HEAD = """robot = "planar_2r"
 duration_s = 0.1
-method = "rk4"
+method = "RK4"
 step_s = 1e-3
 estimate_error = false
 engine = "interpreted"

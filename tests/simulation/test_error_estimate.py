@@ -44,7 +44,7 @@ SCENES = {
 
 
 def setup(plant, law, q0, v0, duration, step) -> rd.Setup:
-    return rd.Setup(plant, q0=q0, v0=v0, duration_s=duration, controller=law, method="rk4", step_s=step)
+    return rd.Setup(plant, q0=q0, v0=v0, duration_s=duration, controller=law, method="RK4", step_s=step)
 
 
 def true_error(run: rd.Trajectory, reference: rd.Trajectory) -> np.ndarray:
@@ -60,7 +60,7 @@ CASES = [pytest.param(scene, id=name) for name, scene in SCENES.items()]
 def test_estimate_is_within_a_factor_of_ten_of_the_true_error(scene) -> None:
     """At its end and at most times on the way; order 8 at half the step is exact to 1e-4 of that, and says so."""
     run = rd.simulate(setup(*scene))
-    reference = rd.simulate(setup(*scene), method=rd.integrate.method("order_8"), step_s=scene[-1] / 2,
+    reference = rd.simulate(setup(*scene), method=rd.integrate.method("DP8"), step_s=scene[-1] / 2,
                             record_every_s=scene[-1], estimate_error=False)  # fmt: skip
     tight = rd.simulate(setup(*scene), method=rd.integrate.Adaptive(rtol=1e-13, atol=1e-14), estimate_error=False)
     error, estimate = true_error(run, reference), run.error
@@ -83,8 +83,8 @@ SAMPLED = rd.control.PD(rd.control.quintic([0.4, -0.7], [0.9, 0.2], 0.5), [60.0,
 @pytest.mark.parametrize(
     ("method", "step", "law"),
     [
-        *(("midpoint", 2e-3, None), ("rk4", 5e-3, SAMPLED)),
-        *long([("rosenbrock_5", 4e-3, None), ("gauss_4", 4e-3, None), ("explicit_euler", 5e-4, None)]),
+        *(("Midpoint", 2e-3, None), ("RK4", 5e-3, SAMPLED)),
+        *long([("Rodas5PFixed", 4e-3, None), ("GaussLegendre4", 4e-3, None), ("Euler", 5e-4, None)]),
     ],
 )
 def test_estimate_holds_for_methods_of_every_order(method: str, step: float, law: rd.control.PD | None) -> None:
@@ -114,7 +114,7 @@ def test_chaos_at_a_coarse_step_is_not_resolved(step: float) -> None:
     """The double pendulum from 2.5 rad tumbles: errors grow e-fold in less than 1 s, up to the size of the motion."""
     chaos = setup(rd.Plant(DOUBLE), None, [2.5, 0.7], [0.3, 0.5], 20.0, step)
     run = rd.simulate(chaos)
-    reference = rd.simulate(chaos, method="order_8", step_s=step / 10, record_every_s=step, estimate_error=False)
+    reference = rd.simulate(chaos, method="DP8", step_s=step / 10, record_every_s=step, estimate_error=False)
     error, estimate = true_error(run, reference), run.error
     assert error[-1] > 1.0  # the end of the run is fiction
     assert estimate is not None
@@ -197,7 +197,7 @@ def test_rounding_that_the_motion_magnifies_is_in_the_estimate_of_an_adaptive_ru
     assert run.error.at(run.error.until_s) >= 0.3 * error
 
 
-@pytest.mark.parametrize("method", [rd.integrate.method("rk4"), rd.integrate.Adaptive(rtol=1e-10)])
+@pytest.mark.parametrize("method", [rd.integrate.method("RK4"), rd.integrate.Adaptive(rtol=1e-10)])
 def test_companions_that_end_before_their_first_shared_state_show_nothing(method, monkeypatch) -> None:
     step = {} if method.controls_error else {"step_s": 5e-3}
     of = rd.Setup(rd.Plant(DOUBLE), [0.4, -0.7], [0.3, 0.5], 0.2, None, method, engine="interpreted", **step)

@@ -53,7 +53,7 @@ def test_grazed_and_struck_stops_are_met_as_in_closed_form(seed: int) -> None:
 def test_a_run_that_ends_far_from_its_start_has_an_estimate() -> None:
     """Of fixed steps that are cut: how far a joint turns in a step is told from its path, which begins at the start."""
     plant = rd.Plant(ARM.with_(gravity=(0, 0, 0)), rd.effects.joint_stops([-9.0, -9.0], [9.0, 9.0]))
-    run = rd.simulate(plant, [0.1, 0.2], [3.0, 0.5], duration_s=2.5, method="rk4", step_s=0.01)
+    run = rd.simulate(plant, [0.1, 0.2], [3.0, 0.5], duration_s=2.5, method="RK4", step_s=0.01)
     assert np.abs(run.q[-1] - run.q[0]).max() > np.pi
     assert run.error is not None
     assert not run.error.note

@@ -41,7 +41,7 @@ def hostile(tame) -> rd.Trajectory:
 
 @pytest.fixture(scope="module")
 def batch() -> rd.Rollouts:
-    setup = rd.Setup(rd.Plant(rd.load("cart_pole")), [0.1, 0.3], [0.2, -0.4], 0.05, method="rk4")
+    setup = rd.Setup(rd.Plant(rd.load("cart_pole")), [0.1, 0.3], [0.2, -0.4], 0.05, method="RK4")
     swept = {"gravity": [[0.0, 0.0, -9.81], [0.1, 1 / 3, -1.6]]}
     return replace(rd.rollouts(setup, params=swept, record=("q", "v", "energy")), joint_names=NAMES)
 
@@ -209,7 +209,7 @@ import sys
 sys.modules.update(dict.fromkeys(("pandas", "xarray", "pyarrow", "mcap", "mcap_ros2", "h5netcdf", "rerun")))
 import robot_dyn as rd
 run = rd.simulate(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01)
-runs = rd.rollouts(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, method="rk4")
+runs = rd.rollouts(rd.Plant(rd.load("pendulum")), [0.1], duration_s=0.01, method="RK4")
 calls = [of.to_pandas for of in (run, runs)] + [of.to_xarray for of in (run, runs)]
 for call in calls + [lambda to=to: rd.export(run, f"{sys.argv[1]}/x.{to}") for to in ("parquet", "nc", "mcap")]:
     try:

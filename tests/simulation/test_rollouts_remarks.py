@@ -37,7 +37,7 @@ LATE = rd.control.Loop(rd.control.PD(GOAL, 500.0, [60.0, 0.1], period_s=0.02), a
 SWEEP = np.linspace(0.2, 1.6, B)
 
 
-def setup(plant: rd.Plant, controller: object, method: str = "rk4", **options) -> rd.Setup:
+def setup(plant: rd.Plant, controller: object, method: str = "RK4", **options) -> rd.Setup:
     own = {} if method == "DOP853" else {"step_s": 4e-3 if getattr(controller, "period_s", 0.0) else 5e-4}
     return rd.Setup(plant, Q, V, 0.8, controller, method=method, record_every_s=0.1, **own | options)
 
@@ -49,12 +49,12 @@ SCENES = {
         setup(LIMITED, rd.control.PD(GOAL, 10.0, 150.0, period_s=0.02)),
         {"effort_limit.limit": 100.0 * SWEEP},
     ),
-    "canonical": (setup(DAMPED, rd.control.PD(GOAL, 400.0, 20.0), "gauss_2"), {"kp": 500 * SWEEP}),
+    "canonical": (setup(DAMPED, rd.control.PD(GOAL, 400.0, 20.0), "GaussLegendre2"), {"kp": 500 * SWEEP}),
     "cut at stops": (
         setup(STOPPED, rd.control.PD(GOAL, 300.0, 20.0)),
         {"kp": 300 * SWEEP, "joint_stops.upper": 0.8 + SWEEP},
     ),
-    "time stepping": (setup(HELD, rd.control.PD(GOAL, 400.0, 20.0), "time_stepping"), {"kp": 400 * SWEEP}),
+    "time stepping": (setup(HELD, rd.control.PD(GOAL, 400.0, 20.0), "MoreauJean"), {"kp": 400 * SWEEP}),
     "one by one": (
         setup(STOPPED, rd.control.PID(GOAL, 300.0, 30.0, 20.0, effort_limit=80.0), "DOP853"),
         {"effort_limit": 60 * SWEEP},
@@ -214,7 +214,7 @@ def test_tracking_errors_of_a_frame() -> None:
     law = rd.control.OperationalSpace(
         arm, "tip", rd.control.line(at, np.add(at, [0.1, 0, 0.1]), 0.2), 50.0, 10.0, rows=(0, 2)
     )
-    given = rd.Setup(rd.Plant(arm), q, duration_s=0.2, controller=law, method="rk4", step_s=4e-3)
+    given = rd.Setup(rd.Plant(arm), q, duration_s=0.2, controller=law, method="RK4", step_s=4e-3)
     runs = rd.rollouts(given, np.add(q, [[0.0, 0.1], [0.2, -0.1], [0.1, 0.3]]), [[0.1, 0.2], [0.3, 0.1], [1e5, 3e7]])
     assert list(runs.diverged) == [False, False, True]
     assert runs.worst == 2
@@ -239,7 +239,7 @@ def test_a_limit_of_no_effort_is_reached_all_the_time_once() -> None:
     given = rd.Setup(
         rd.Plant(CART, [rd.effects.EffortLimit([0.0, 1.0])]), Q, V, 0.2, rd.control.PD(GOAL, 40.0, 4.0, period_s=0.02)
     )
-    runs = rd.rollouts(replace(given, method=rd.integrate.method("rk4")))
+    runs = rd.rollouts(replace(given, method=rd.integrate.method("RK4")))
     for remarks in (runs.remarks, rd.simulate(given, estimate_error=False).remarks):
         (at,) = (each for each in remarks if each.kind is RemarkKind.EFFORT_REACHED and each.joint == "slide")
         assert at.duration == pytest.approx(0.2, rel=1e-9)

@@ -209,7 +209,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(run, tmp_path, size, shape, mes
 def test_runs_of_zeros_are_saved_and_loaded(tmp_path) -> None:
     """The reader's bound for bombs refuses no file of the writer, however well its arrays compress."""
     plant = rd.Plant(rd.load("planar_2r").with_(gravity=(0.0, 0.0, 0.0)), [])
-    runs = rd.rollouts(plant, np.zeros((100, 2)), duration_s=1.0, method="rk4", step_s=1e-3)
+    runs = rd.rollouts(plant, np.zeros((100, 2)), duration_s=1.0, method="RK4", step_s=1e-3)
     back = rd.load_rollouts(rd.save_rollouts(runs, tmp_path / "runs"))
     assert runs.q is not None and back.q is not None
     assert not runs.q.any() and np.array_equal(back.q, runs.q)

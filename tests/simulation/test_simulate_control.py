@@ -16,7 +16,7 @@ DOUBLE = rd.load("planar_2r")
 PLANT = rd.Plant(DOUBLE, [rd.effects.ViscousFriction([0.4, 0.2])])
 START = {"q0": [0.4, -0.7], "v0": [0.3, 0.5]}
 GOAL = rd.control.quintic([0.4, -0.7], [0.9, 0.2], 0.2)
-METHODS = ["rk4", "gauss_4", "DOP853"]
+METHODS = ["RK4", "GaussLegendre4", "DOP853"]
 
 
 def controllers(period: float) -> list:
@@ -79,7 +79,7 @@ def test_continuous_control_is_the_limit_of_a_small_period(kind: int) -> None:
     for period in (0.0, 1e-3, 2e-3, 4e-3):
         law = controllers(period)[kind]
         run = rd.simulate(
-            PLANT, **START, duration_s=0.2, controller=law, method="rk4", step_s=1e-3, estimate_error=False
+            PLANT, **START, duration_s=0.2, controller=law, method="RK4", step_s=1e-3, estimate_error=False
         )
         ends[period] = run.q[-1]
     distance = [np.linalg.norm(ends[period] - ends[0.0]) for period in (1e-3, 2e-3, 4e-3)]
@@ -91,7 +91,7 @@ def test_exact_computed_torque_makes_each_joint_a_linear_oscillator() -> None:
     """ë + 2 ζ ω ė + ω² e = 0 from e(0), whatever the arm: the closed form within the 1e-10 of its estimate."""
     omega, zeta = 9.0, 0.6
     law = rd.control.ComputedTorque(DOUBLE, rd.control.hold([0.9, 0.2]), *rd.control.gains_from(1.0, omega, zeta))
-    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.5, controller=law, method="rk4", step_s=5e-4)
+    run = rd.simulate(rd.Plant(DOUBLE), **START, duration_s=0.5, controller=law, method="RK4", step_s=5e-4)
     e0, de0, decay = np.array([0.5, 0.9]), -np.array(START["v0"]), zeta * omega
     damped, t = omega * np.sqrt(1 - zeta**2), run.t[:, None]
     wave = e0 * np.cos(damped * t) + (de0 + decay * e0) / damped * np.sin(damped * t)
@@ -125,13 +125,13 @@ def test_a_switch_on_a_tick_is_one_cut(edge: float) -> None:
     """3 · 0.1 = 0.30000000000000004 is not 0.3: the two are one end of a step, and companions are not lost to it."""
     push = rd.effects.ExternalWrench("tip", [1.0, 0.0, -2.0, 0.0, -0.5, 0.0], start_s=0.1, end_s=edge)
     law = rd.control.PD(GOAL, [8.0, 2.0], [1.0, 0.2], period_s=0.1)  # slow enough for 10 Hz
-    run = rd.simulate(rd.Plant(DOUBLE, [push]), **START, duration_s=0.9, controller=law, method="rk4", step_s=5e-3)
+    run = rd.simulate(rd.Plant(DOUBLE, [push]), **START, duration_s=0.9, controller=law, method="RK4", step_s=5e-3)
     assert np.diff(run.t).min() > 1e-3
     assert run.error is not None
     assert run.error.largest < 1e-6
 
 
-@pytest.mark.parametrize("method", ["explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8"])
+@pytest.mark.parametrize("method", ["Euler", "SemiImplicitEuler", "Midpoint", "RK4", "DP8"])
 def test_a_run_evaluates_what_its_method_declares_and_nothing_it_does_not_name(method: str) -> None:
     """48 steps; besides them an effect is asked at the two samples only, for their acceleration and power."""
     on, seen = counted()
@@ -148,7 +148,7 @@ def test_a_run_evaluates_what_its_method_declares_and_nothing_it_does_not_name(m
     assert run.statistics.evaluations <= len(seen) <= run.statistics.evaluations + 2 * 2 + 2
 
 
-@pytest.mark.parametrize("method", ["rk4", "gauss_2", "DOP853"])
+@pytest.mark.parametrize("method", ["RK4", "GaussLegendre2", "DOP853"])
 def test_companions_that_are_off_cost_nothing(method) -> None:
     """Of 2, 3 and 5 times the step: 1/2 + 1/3 + 1/5 of the steps more, and looks between them; the run is the same."""
     runs, calls = [], []
@@ -166,7 +166,7 @@ def test_companions_that_are_off_cost_nothing(method) -> None:
     assert without.statistics.evaluations == with_companions.statistics.evaluations
     more = calls[1] - calls[0]
     assert more > 0.3 * without.statistics.evaluations
-    if method == "rk4":
+    if method == "RK4":
         steps = without.statistics.steps
         looks = steps + 1 + 4000 // (steps + 1) * steps  # at the ends of steps and between them
         pushed = 4 * ceil(steps / 3)  # from a start moved by rounding

@@ -65,7 +65,7 @@ def test_a_run_says_that_stability_bounds_its_steps() -> None:
     assert stiff.statistics.steps > 1000
     assert remark.joint == "joint_2"
     assert "steps bounded by stability: the fastest motion decays with" in stiff.summary
-    assert "by 'viscous_friction'; use method='Rosenbrock'" in stiff.summary
+    assert "by 'viscous_friction'; use method='Rodas5P'" in stiff.summary
     short = rd.simulate(ARM, **options | {"duration_s": 20.0, "method": rd.integrate.Adaptive(rtol=1e-13, atol=1e-13)})
     assert short.statistics.steps > 1000
     assert not [each for each in short.remarks if each.kind is RemarkKind.STIFF]
@@ -77,21 +77,21 @@ def test_a_run_that_stability_would_keep_for_hours_ends_with_the_reason(engine: 
     run = rd.simulate(plant, STATE[:2], duration_s=100.0, engine=engine, estimate_error=False, method="DOP853")
     assert run.outcome.ending == "diverged"
     assert run.outcome.t < 1.0
-    assert re.search("of joint 'joint_2', by 'viscous_friction': take Rosenbrock, softer", run.outcome.text)
+    assert re.search("of joint 'joint_2', by 'viscous_friction': take Rodas5P, softer", run.outcome.text)
 
 
 def test_a_stiff_run_is_made_by_the_stiff_method_unless_another_is_named() -> None:
     """Both are right to their estimates; the first takes a few of the steps, and says why."""
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction([1.0, 1e4])])
     chosen, named = (rd.simulate(plant, STATE[:2], duration_s=0.5, method=name) for name in ("auto", "DOP853"))
-    assert chosen.statistics.method == "Rosenbrock"
+    assert chosen.statistics.method == "Rodas5P"
     assert 20 * chosen.statistics.steps < named.statistics.steps
     assert np.abs(chosen.q - named.q).max() < 3 * (
         chosen.error.largest + named.error.largest
     )  # estimates may be 0.3 of it
     (remark,) = (each for each in chosen.remarks if each.kind is RemarkKind.STIFF)
     assert remark.joint == "joint_2"
-    assert "by 'viscous_friction'; made by Rosenbrock instead of DOP853" in chosen.summary
+    assert "by 'viscous_friction'; made by Rodas5P instead of DOP853" in chosen.summary
 
 
 @pytest.mark.parametrize(
@@ -115,5 +115,5 @@ def test_rollouts_are_made_by_the_explicit_method_and_equations_name_one() -> No
     """Where a method is to be chosen: no run of many is another's, and a plain equation has nothing to look at."""
     chosen, named = (rd.rollouts(ARM, [STATE[:2]], duration_s=0.2, method=name) for name in ("auto", "DOP853"))
     np.testing.assert_array_equal(chosen.q, named.q)
-    with pytest.raises(QueryError, match="name 'DOP853' or 'Rosenbrock' here"):
+    with pytest.raises(QueryError, match="name 'DOP853' or 'Rodas5P' here"):
         rd.integrate.Adaptive("auto").solve(System(lambda t, y: -y, 1), 0.0, np.ones(2), 1.0)

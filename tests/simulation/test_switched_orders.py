@@ -43,12 +43,12 @@ def test_halved_steps_keep_the_order(scene: str) -> None:
     assert len(names) == LIMITED.get(scene, len(names))
     errors = []
     for h in 5e-3 / 2 ** np.arange(6):
-        made = run(scene, method="rk4", step_s=h)
+        made = run(scene, method="RK4", step_s=h)
         assert [each.name for each in made.events] == names
         errors.append(np.abs(made.q[-1] - exact.q[-1]).max())
     assert -np.polyfit(np.arange(6), np.log2(errors), 1)[0] == pytest.approx(4, abs=0.15)
     steps, floor = ((0.02, 0.01), 0.0) if scene in LIMITED else ((0.005, 0.0025), 1e-13)
-    coarse, fine = (np.abs(run(scene, method="order_8", step_s=h).q - exact.q).max() for h in steps)
+    coarse, fine = (np.abs(run(scene, method="DP8", step_s=h).q - exact.q).max() for h in steps)
     assert fine < max(coarse / 2**7.5, floor)
     for tolerance in (1e-6, 1e-9) if scene in LIMITED else ():
         loose = run(scene, method=rd.integrate.Adaptive(rtol=tolerance, atol=tolerance))

@@ -24,7 +24,7 @@ def run() -> rd.Trajectory:
 @pytest.fixture(scope="module")
 def batch() -> rd.Rollouts:
     """Three runs, one of which diverges."""
-    setup = replace(SETUP, method="rk4", step_s=5e-3, record_every_s=5e-3)
+    setup = replace(SETUP, method="RK4", step_s=5e-3, record_every_s=5e-3)
     runs = rd.rollouts(setup, params={"kp": [90.0, 45.0, 1e8]}, record=("q", "v", "u", "energy", "work"))
     assert runs.diverged.tolist() == [False, False, True]
     return runs
@@ -99,7 +99,7 @@ def test_what_was_swept_has_its_unit() -> None:
 
 
 def test_a_run_that_recorded_nothing_has_no_rms() -> None:
-    runs = rd.rollouts(replace(SETUP, method="rk4"), record=("q",), params={"kp": [90.0, 45.0]})
+    runs = rd.rollouts(replace(SETUP, method="RK4"), record=("q",), params={"kp": [90.0, 45.0]})
     assert not [heading for heading in runs.table() if heading.startswith(("rms v", "rms u"))]
 
 

@@ -58,9 +58,9 @@ def setups() -> dict[str, rd.Setup]:
         "computed torque": rd.Setup(
             plant, Q, V, controller=rd.control.ComputedTorque(ARM, PLAN, 90.0, 15.0), **compiled, about={"author": "me"}
         ),
-        "sampled, rk4": rd.Setup(plant, Q, V, controller=sampled, method="rk4", **compiled),
+        "sampled, RK4": rd.Setup(plant, Q, V, controller=sampled, method="RK4", **compiled),
         "steps too long": rd.Setup(
-            rd.Plant(ARM), Q, 10 * V, 1.0, method="rk4", step_s=0.05, engine="interpreted"
+            rd.Plant(ARM), Q, 10 * V, 1.0, method="RK4", step_s=0.05, engine="interpreted"
         ),
         "stops": rd.Setup(rd.Plant(ARM, [*stops, rd.effects.Spring(3.0)]), Q, 10 * V, estimate_error=False, **short),
         "held": rd.Setup(rd.Plant(ARM, held), Q, 4 * V, estimate_error=False, **short),
@@ -154,7 +154,7 @@ def test_runs_of_one_setup_do_not_share_what_they_change(name: str) -> None:
 
 def test_threads_that_read_one_run_read_the_same() -> None:
     """What is summed up at the end, such as chatter, is so once."""
-    setup, rng = setups()["sampled, rk4"], np.random.default_rng(5)
+    setup, rng = setups()["sampled, RK4"], np.random.default_rng(5)
     reference = at_once(setup)
     for _ in range(5):
         run = rd.simulate(setup)
@@ -291,7 +291,7 @@ def test_a_robot_that_warns_warns_in_each_run_and_in_none_of_what_is_read() -> N
     changes: dict[str, Any] = {"plant": rd.Plant(arm), "controller": control, "estimate_error": False}
     counts = []
     with pytest.warns(rd.PrecisionWarning):  # so do the checks of the setup, and of its machine code
-        setup = replace(setups()["sampled, rk4"], **changes)
+        setup = replace(setups()["sampled, RK4"], **changes)
         rd.simulate(setup)
     for _ in range(2):
         with pytest.warns(rd.PrecisionWarning) as told:
@@ -303,7 +303,7 @@ def test_a_robot_that_warns_warns_in_each_run_and_in_none_of_what_is_read() -> N
 
 def test_nothing_waits_of_a_run_that_did_not_finish() -> None:
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction(1e4)])
-    run = rd.simulate(plant, Q, V, duration_s=0.1, method="rk4", engine="interpreted", estimate_error=False)
+    run = rd.simulate(plant, Q, V, duration_s=0.1, method="RK4", engine="interpreted", estimate_error=False)
     assert run.outcome.ending is Ending.DIVERGED and vars(run).keys() == set(NAMES)
 
 
@@ -314,7 +314,7 @@ def test_a_text_that_is_added_to_a_setup_later_is_none_of_the_run() -> None:
     assert run.about["author"] == "me"
 
 
-@pytest.mark.parametrize("name", ["computed torque", "sampled, rk4"])
+@pytest.mark.parametrize("name", ["computed torque", "sampled, RK4"])
 def test_what_was_not_read_is_copied_pickled_and_saved_with_the_run(name: str, tmp_path: Path) -> None:
     setup = setups()[name]
     reference = at_once(setup)

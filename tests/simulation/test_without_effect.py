@@ -119,8 +119,11 @@ CONTROL = '[control]\nkind = "{}"\nfrequency_rad_per_s = 10.0\n'
     ("text", "message"),
     [
         (SCENE + "step_s = 0.001\n", "step_s: has no effect because auto chooses its own step; remove it, or name"),
-        (SCENE + 'method = "rk4"\nrtol = 1e-8\n', "rtol: has no effect because rk4 has a fixed step"),
-        (SCENE + 'method = "gauss_6"\natol = 1e-8\n', "atol: has no effect because gauss_6 has a fixed step"),
+        (SCENE + 'method = "RK4"\nrtol = 1e-8\n', "rtol: has no effect because RK4 has a fixed step"),
+        (
+            SCENE + 'method = "GaussLegendre6"\natol = 1e-8\n',
+            "atol: has no effect because GaussLegendre6 has a fixed step",
+        ),
         (SCENE + 2 * GRAVITY, "effect: gravity is named 2 times, but only the last would act; keep one"),
         (
             SCENE + 2 * '[[effect]]\nkind = "armature"\ninertia_kg_m2 = {joint_1 = 0.1}\n',

@@ -23,7 +23,7 @@ def batch(fast: float) -> rd.Rollouts:
     reference = rd.control.quintic(Q, Q + 0.5, 0.1)
     controller = rd.control.PD(reference, 40.0, [4.0, 3.0])
     plant = rd.Plant(ARM, [rd.effects.ViscousFriction([0.3, 0.1])])
-    setup = rd.Setup(plant, Q, duration_s=0.2, controller=controller, method="rk4", step_s=2e-3)
+    setup = rd.Setup(plant, Q, duration_s=0.2, controller=controller, method="RK4", step_s=2e-3)
     q0 = Q + 0.3 * np.random.default_rng(3).normal(size=(COUNT, 2))
     v0 = np.full((COUNT, 2), 0.3)
     v0[LOST] = [0.01 * fast, fast] if fast else 0.3

@@ -213,7 +213,7 @@ def test_the_price_of_a_run_stands_beside_its_plots(browser) -> None:
     """Its numbers are those of the run; that they can be read, axe finds."""
     plant = rd.Plant(rd.load("planar_2r"), [rd.effects.ViscousFriction(0.2)])
     run = rd.simulate(plant, [0.4, -0.7], duration_s=0.3, accuracy=1e-6, engine="interpreted")
-    coarse = rd.simulate(plant, [0.4, -0.7], duration_s=0.3, method="rk4", step_s=0.01, estimate_error=False)
+    coarse = rd.simulate(plant, [0.4, -0.7], duration_s=0.3, method="RK4", step_s=0.01, estimate_error=False)
     accuracy = run.accuracy
     assert accuracy is not None and run.error is not None
     rows = "[...document.querySelectorAll('.price tr')].map((row) => [...row.cells].map((cell) => cell.textContent))"
@@ -222,8 +222,8 @@ def test_the_price_of_a_run_stands_beside_its_plots(browser) -> None:
         head, *table = view.ask(rows)
         *others, price = view.ask(boxes)
     told = {line[0]: line[1:] for line in table}
-    assert head == ["", "method DOP853, …", "method rk4, …"]
-    assert told["method"] == [run.statistics.method, "rk4, step 0.01 s"]
+    assert head == ["", "method DOP853, …", "method RK4, …"]
+    assert told["method"] == [run.statistics.method, "RK4, step 0.01 s"]
     assert told["steps"] == [str(run.statistics.steps), "30"]
     assert told["evaluations"] == [str(run.statistics.evaluations), "120"]
     assert told["estimated error of q [rad]"] == [str(run.error), "not estimated"]
@@ -238,7 +238,7 @@ def test_the_price_of_a_run_stands_beside_its_plots(browser) -> None:
 
 @pytest.fixture(scope="module")
 def swing():
-    return rd.simulate(rd.load("planar_2r"), q0=[0.4, -0.7], duration_s=0.4, method="rk4", estimate_error=False)
+    return rd.simulate(rd.load("planar_2r"), q0=[0.4, -0.7], duration_s=0.4, method="RK4", estimate_error=False)
 
 
 def test_bad_input_is_told_in_one_line(swing, tmp_path) -> None:

@@ -161,6 +161,6 @@ def _short(setup: Setup, steps: int) -> Setup:
         controller = controller.at_period(_STEP_S)
     duration = steps * _STEP_S
     return replace(
-        setup, controller=controller, method=method("rk4"), step_s=_STEP_S, duration_s=duration,
+        setup, controller=controller, method=method("RK4"), step_s=_STEP_S, duration_s=duration,
         record_every_s=duration, estimate_error=False, accuracy=None, events=(), engine="compiled",
     )  # fmt: skip

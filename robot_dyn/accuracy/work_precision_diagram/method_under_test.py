@@ -47,7 +47,7 @@ _LOOSEST, _TIGHTEST = 2, 13  # tolerances 10⁻ᵏ
 _WARM = 64  # steps per record period in runs that load machine code
 _UNKNOWN = 15  # order assumed for a method that chooses its own
 ATOL = 1e-2  # absolute tolerance over the relative one, as in `Adaptive`
-ORDERS = {"DOP853": 8, "Rosenbrock": 5}  # of methods that choose their steps
+ORDERS = {"DOP853": 8, "Rodas5P": 5}  # of methods that choose their steps
 
 
 @final
@@ -272,21 +272,21 @@ def own(setup: Setup, made: Any, engine: str, events: bool = True) -> MethodUnde
 
     order, by, settings = ORDERS.get(made.name), "tolerance", tolerances
     if not made.controls_error:
-        order, by, settings = made.order, "step", partial(_steps, setup, events)
+        order, by, settings = made.order, "step", partial(_steps, setup, made.order, events)
     return MethodUnderTest(made.name, engine, events, order, by, settings, run, lambda: warmed(setup))
 
 
 def at_setting(setup: Setup, setting: float) -> Setup:
     """The setup with its method at a step, in [s], or a relative tolerance."""
-    if setup.method.controls_error:
+    if isinstance(setup.method, Adaptive):
         return replace(setup, method=replace(setup.method, rtol=setting, atol=ATOL * setting))
     return replace(setup, step_s=setting)
 
 
-def _steps(setup: Setup, events: bool) -> Iterator[float]:
+def _steps(setup: Setup, order: int, events: bool) -> Iterator[float]:
     """Steps from the record period on, up to the number that a run may take."""
     before, most = 0, MOST_CUT if events and switches(setup) else _MOST_STEPS  # of more steps none ends at an event
-    for step in step_ladder(setup.record_every_s, setup.method.order):
+    for step in step_ladder(setup.record_every_s, order):
         count = at_setting(setup, step).steps
         if count > most:
             return

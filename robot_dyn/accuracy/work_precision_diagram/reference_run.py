@@ -54,8 +54,8 @@ _LATE = 3  # runs of one method that may take too long
 _LOST = 0.1  # [rad] or [m]: runs that far apart have nothing in common
 _LEAST = 1e-3  # of the duration: a horizon that is shorter shows nothing
 _ULPS = 4.0  # of rounding in any position
-_FIRST = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-12, 1e-14))
-_SECOND = ("gauss_6", "rosenbrock_5")
+_FIRST = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rodas5P", 1e-12, 1e-14))
+_SECOND = ("GaussLegendre6", "Rodas5PFixed")
 _SHARE, _LEAST_S = 0.08, 0.5  # of the budget, for one run; and at least, in [s]
 _PART = 0.02  # of the budget, for one run
 

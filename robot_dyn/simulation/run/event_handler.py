@@ -213,7 +213,7 @@ class EventHandler:
         motion = self.state.equation.equation_of_motion
         excludes_time_stepping = motion.payloads or motion.drives
         if excludes_time_stepping or not self.may_replace:
-            soft, stepping = "soft stops and regularised friction", "method='time_stepping' and a step_s"
+            soft, stepping = "soft stops and regularised friction", "method='MoreauJean' and a step_s"
             remedy = soft if excludes_time_stepping else stepping
             facts = {"changes": len(mode.changes), "span_s": span, "remedy": remedy}
             raise DivergedError(Outcome(Reason.EVENTS_ACCUMULATE, t, joint, facts))

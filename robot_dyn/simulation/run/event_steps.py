@@ -7,7 +7,7 @@ the right-hand side is smooth within a step.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, cast, final
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from robot_dyn.foundations.errors import RobotDynError, is_mistake
 from robot_dyn.foundations.values import cached
 from robot_dyn.integrate import hermite
 from robot_dyn.integrate.adaptive import STEPPERS
+from robot_dyn.integrate.integrator import Integrator
 from robot_dyn.integrate.step_control import ControlledStepper, StepControl, initial_control
 from robot_dyn.simulation.dynamics.loop_state import Ended, LoopConfig, loop_config
 from robot_dyn.simulation.dynamics.state_equation import StateEquation
@@ -176,7 +177,7 @@ class EventSteps:
         state, t, y, equation = self.state, self.time, self.state.y, self._equation
         p, functions = state.table.parameters[state.segment], interpreted(equation, state.watch)
         right_side = system(functions, equation, p, state.lanes.run_parameters[: state.config.held])
-        one_step(state.setup.method, right_side, t, y, float(self.control.h[0]), state.watch)
+        one_step(cast(Integrator, state.setup.method), right_side, t, y, float(self.control.h[0]), state.watch)
         raise state.watch.diverged(Reason.STATE_OVERFLOWS, t, y)
 
     def _widen(self) -> None:

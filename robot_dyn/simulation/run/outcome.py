@@ -81,7 +81,7 @@ class Reason(StrEnum):
     STALLED = "stalled"
     """Error control takes steps so short that the rest of the run would need more than 1e7 of them: it is stiff.
 
-    Take Rosenbrock, softer effects or a larger tolerance.
+    Take Rodas5P, softer effects or a larger tolerance.
     """
 
     STAGES_NOT_FOUND = "stages_not_found"
@@ -93,7 +93,7 @@ class Reason(StrEnum):
     EVENTS_ACCUMULATE = "events_accumulate"
     """Impacts or changes between sliding and sticking follow each other in ever shorter times.
 
-    Take `method="time_stepping"` with a step, or soft stops and regularised friction.
+    Take `method="MoreauJean"` with a step, or soft stops and regularised friction.
     """
 
     TORQUE_NOT_FINITE = "torque_not_finite"

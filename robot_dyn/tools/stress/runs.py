@@ -28,10 +28,10 @@ from robot_dyn.tools.stress.work import Work
 from robot_dyn.tools.stress.worst import shrunk
 
 FAMILIES = ("swing", "friction", "dry friction", "stops", "rigid stops", "PD", "sampled PD")
-_METHODS = ("explicit_euler", "semi_implicit_euler", "midpoint", "rk4", "order_8", "gauss_4", "rosenbrock_5")
+_METHODS = ("Euler", "SemiImplicitEuler", "Midpoint", "RK4", "DP8", "GaussLegendre4", "Rodas5PFixed")
 _DRAWS = 20  # attempts to draw a method that the scene accepts
 _RECORDS = 20
-_BETTER = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rosenbrock", 1e-11, 1e-13))
+_BETTER = (Adaptive("DOP853", 3e-14, 1e-15), Adaptive("Rodas5P", 1e-11, 1e-13))
 _ROUNDING = 1e-12  # relative to 1 + |q|: smaller errors cannot be measured
 _ONE_TIME = 1e-12  # [s]
 _MOST_TRIES = 25  # attempts to simplify the start of a misleading run
@@ -95,7 +95,7 @@ def _method(rng: np.random.Generator) -> tuple[Any, dict[str, Any]]:
     """Draw a random method, with a step or with tolerances."""
     if rng.random() < 0.4:
         rtol = float(f"{10 ** rng.uniform(-10, -5):.0e}")
-        return Adaptive(str(rng.choice(["DOP853", "Rosenbrock"])), rtol, rtol / 100), {}
+        return Adaptive(str(rng.choice(["DOP853", "Rodas5P"])), rtol, rtol / 100), {}
     return method(str(rng.choice(_METHODS))), {"step_s": float(np.round(10 ** rng.uniform(-3.3, -2), 5))}
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import robot_dyn as rd
 
 FAMILIES = ("soft stops", "rigid stops", "dry friction", "window", "effort limit", "bristles", "sampled")
-METHODS = ("rk4", "rk4", "rk4", "order_8", "gauss_4", "DOP853")
-EVENTS = ("rk4", "rk4", "order_8", "DOP853")  # of methods whose steps can end where joints are held
+METHODS = ("RK4", "RK4", "RK4", "DP8", "GaussLegendre4", "DOP853")
+EVENTS = ("RK4", "RK4", "DP8", "DOP853")  # of methods whose steps can end where joints are held
 MOST = 6  # runs
 
 

@@ -33,20 +33,20 @@ PERIOD = 0.01  # [s] between samples
 APART, LEAST = 0.2, 0.3
 METHODS: dict[str, Any] = {
     "planar_2r": {
-        "rk4": ("rk4", 0.01), "gauss_4": ("gauss_4", 0.01), "midpoint": ("midpoint", 1e-3),
-        "semi_implicit_euler": ("semi_implicit_euler", 1e-3), "rosenbrock_5": ("rosenbrock_5", 2e-3),
+        "RK4": ("RK4", 0.01), "GaussLegendre4": ("GaussLegendre4", 0.01), "Midpoint": ("Midpoint", 1e-3),
+        "SemiImplicitEuler": ("SemiImplicitEuler", 1e-3), "Rodas5PFixed": ("Rodas5PFixed", 2e-3),
         "DOP853 of rtol 1e-7": (rd.integrate.Adaptive("DOP853", 1e-7, 1e-9), 0.0),
-        "Rosenbrock of rtol 1e-6": (rd.integrate.Adaptive("Rosenbrock", 1e-6, 1e-8), 0.0),
+        "Rodas5P of rtol 1e-6": (rd.integrate.Adaptive("Rodas5P", 1e-6, 1e-8), 0.0),
     },
-    "panda": {"rk4": ("rk4", 2e-3), "DOP853 of rtol 1e-6": (rd.integrate.Adaptive("DOP853", 1e-6, 1e-8), 0.0)},
+    "panda": {"RK4": ("RK4", 2e-3), "DOP853 of rtol 1e-6": (rd.integrate.Adaptive("DOP853", 1e-6, 1e-8), 0.0)},
 }  # fmt: skip
 FINE = {
-    "order_8": ("order_8", 2e-3), "gauss_6": ("gauss_6", 5e-3),
+    "DP8": ("DP8", 2e-3), "GaussLegendre6": ("GaussLegendre6", 5e-3),
     "DOP853 of rtol 1e-11": (rd.integrate.Adaptive("DOP853", 1e-11, 1e-13), 0.0),
     "DOP853 of rtol 3e-14": (rd.integrate.Adaptive("DOP853", 3e-14, 1e-15), 0.0),
 }  # fmt: skip
-SLOW = ("rosenbrock_5", "Rosenbrock of rtol 1e-6")  # their steps are not compiled: 4 starts
-SHORT = {"planar_2r": ("rk4", "semi_implicit_euler", "DOP853 of rtol 1e-7"), "panda": ("rk4", "DOP853 of rtol 1e-6")}
+SLOW = ("Rodas5PFixed", "Rodas5P of rtol 1e-6")  # their steps are not compiled: 4 starts
+SHORT = {"planar_2r": ("RK4", "SemiImplicitEuler", "DOP853 of rtol 1e-7"), "panda": ("RK4", "DOP853 of rtol 1e-6")}
 NAMES = {"planar_2r": "double pendulum", "panda": "Panda"}
 DURATION = {"planar_2r": 9.0, "panda": 4.0}  # [s]
 GUARD = 1e-3  # [rad] between two truths where the limit is passed

@@ -159,7 +159,7 @@ def test_a_run_follows_the_plan_that_leaves_a_share_of_the_limits() -> None:
         WAY[0],
         duration_s=found.duration,
         controller=controller,
-        method="rk4",
+        method="RK4",
         step_s=2e-3,
         engine="interpreted",
         estimate_error=False,

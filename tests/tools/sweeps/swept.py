@@ -16,7 +16,7 @@ pytest.importorskip("pyarrow")
 SCENE = """
 robot = "planar_2r"
 duration_s = 0.05
-method = "rk4"
+method = "RK4"
 step_s = 0.001
 record_every_s = 0.001
 

@@ -22,7 +22,7 @@ from tests.tools.sweeps.swept import SCENE, VARY, scene, swept
 WEAK = """
 robot = "planar_2r"
 duration_s = 0.2
-method = "rk4"
+method = "RK4"
 step_s = 0.002
 record_every_s = 0.02
 start = {q = [0.4, 0.3]}
@@ -327,7 +327,7 @@ def test_runs_that_end_by_an_event_keep_their_figures_whatever_is_beside_them(tm
         "def setup():\n"
         "    arm = rd.load('planar_2r')\n"
         "    control = rd.control.PD(rd.control.hold([0.6, 0.9]), 40.0, 4.0)\n"
-        "    return rd.Setup(rd.Plant(arm), [0.4, 0.9], duration_s=0.1, controller=control, method='rk4',\n"
+        "    return rd.Setup(rd.Plant(arm), [0.4, 0.9], duration_s=0.1, controller=control, method='RK4',\n"
         "                    events=rd.Event(reached, terminal=True), record_every_s=0.001)\n"
     )
     sys.path.insert(0, str(tmp_path))
