@@ -11,8 +11,7 @@ import pytest
 
 from robot_dyn import RobotDynError, euler_lagrange
 from robot_dyn.description import MassProperties, box, combined, cylinder, from_density
-from robot_dyn.foundations import OverflowedError, QueryError, SingularError
-from robot_dyn.foundations.errors import MissingTimeError
+from robot_dyn.foundations import MissingTimeError, OverflowedError, QueryError, SingularError
 from robot_dyn.lagrange import angular_momentum, body_acceleration, body_wrench, lagrangian_of_particles, world_wrench
 from robot_dyn.lagrange.generalized_force import generalized_force
 
