@@ -43,7 +43,7 @@ CEILINGS = {
     "in place of": 9,
     "so many": 5,
     "but for": 2,
-    "whatever": 7,
+    "whatever": 6,
     "of which": 14,
     "the same holds": 0,
     "each": 142,
