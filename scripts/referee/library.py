@@ -273,8 +273,8 @@ def rollouts_values(runs: Any) -> tuple[Values, Texts]:
 
 
 PARAMETERS = {  # names of parameters that vary, where they differ from those used here
-    "viscous": "viscous_friction.damping",
-    "dry": "dry_friction.level",
+    "viscous": "viscous_friction.viscous",
+    "dry": "dry_friction.coulomb",
     "dry static": "dry_friction.static",
     "limit": "effort_limit.limit",
     "lugre stiffness": "lugre_friction.bristle_stiffness",
@@ -286,7 +286,7 @@ PARAMETERS = {  # names of parameters that vary, where they differ from those us
     "restitution": "rigid_stops.restitution",
     "spring": "spring.stiffness",
     "elastic stiffness": "series_elastic.stiffness",
-    "regularised": "regularised_coulomb_friction.friction",
+    "regularised": "regularised_coulomb_friction.coulomb",
 }
 
 
