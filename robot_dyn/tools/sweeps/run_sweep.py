@@ -11,7 +11,6 @@ from contextlib import suppress
 from pathlib import Path
 from shutil import disk_usage
 from time import perf_counter, process_time
-from typing import Any
 
 import numpy as np
 
@@ -46,7 +45,7 @@ def run(
     folder: str | Path,
     *,
     threads: int | None = None,
-    cluster: Any = None,
+    cluster: object = None,
     share: str | None = None,
     chunk: int | None = None,
     on_progress: Progress | None = None,
@@ -109,7 +108,9 @@ def run(
 
 
 def read(
-    folder: str | Path, scene: str | Path | Callable[..., Any] | None = None, figures: Mapping[str, Any] | None = None
+    folder: str | Path,
+    scene: str | Path | Callable[..., object] | None = None,
+    figures: Mapping[str, object] | None = None,
 ) -> SweepResult:
     """Return the result in the folder of a sweep.
 
