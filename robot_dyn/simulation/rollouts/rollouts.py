@@ -67,8 +67,8 @@ def rollouts(
     threshold (a stop, an effort limit, a reversal of friction with states) are repeated one after the other on each
     thread, with steps that end there, which takes a few milliseconds a run.
 
-    All runs are one after the other on each thread if the method chooses its steps, as the default does. The same is
-    true for a fixed step if dry friction, rigid stops, switched payloads or events end steps, or if samples lie between
+    All runs are one after the other on each thread if the method chooses its steps, as the default does. With a fixed
+    step they are, too, if dry friction, rigid stops, switched payloads or events end steps, or if samples lie between
     the ends of steps that may be cut.
 
     Args:
