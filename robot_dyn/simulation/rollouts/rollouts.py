@@ -254,7 +254,7 @@ def _check(setup: Setup, parameter: Parameter, value: np.ndarray) -> None:
         assert setup.controller is not None
         rebuilt(setup.controller, {key: value})
     elif place[0] == "effect":
-        effect = setup.plant.effects[place[1]]
+        effect: Any = setup.plant.effects[int(place[1])]
         if type(effect).__post_init__ is not Effect.__post_init__:  # it checks more than single coefficients
             replace(effect, **{key: value})
 
