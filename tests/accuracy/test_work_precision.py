@@ -1,4 +1,4 @@
-"""Error against work: orders, the front, the reference and its horizon, what is believed and what is extrapolated."""
+"""Error against work: orders, the front, the reference and its horizon, resolved and extrapolated errors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from robot_dyn.accuracy.work_precision_diagram.method_under_test import (
     recorded,
     whole,
 )
-from robot_dyn.accuracy.work_precision_diagram.peers import found
+from robot_dyn.accuracy.work_precision_diagram.peers import methods_of_peers
 from robot_dyn.accuracy.work_precision_diagram.reference_run import HorizonError, Reference, past_horizon, reference
 from robot_dyn.accuracy.work_precision_diagram.work_precision import programs
 from robot_dyn.foundations import json_text, plain
@@ -167,10 +167,10 @@ def test_a_motion_without_reference_is_refused() -> None:
         rd.accuracy.work_precision(replace(swing(), controller=lambda t, q, v: v * (np.nan if t > 0.1 else 1.0)))
 
 
-def points(*errors: float, believed: bool = True, each_s: float = 1e-3) -> tuple[Point, ...]:
+def points(*errors: float, resolved: bool = True, each_s: float = 1e-3) -> tuple[Point, ...]:
     """Runs that take 1, 2, 4, … times as many steps and as long."""
     return tuple(
-        Point(0.1 / 2**k, 10 * 2**k, 40 * 2**k, e, e, believed, times=(each_s * 2**k,)) for k, e in enumerate(errors)
+        Point(0.1 / 2**k, 10 * 2**k, 40 * 2**k, e, e, resolved, times=(each_s * 2**k,)) for k, e in enumerate(errors)
     )
 
 
@@ -234,20 +234,20 @@ def test_no_run_beats_one_of_the_front_and_each_other_is_beaten() -> None:
     ]
     front = [p for _, p in invented(*(of(str(k), each) for k, each in enumerate(runs))).front]
     assert len(front) > 3
-    believed = [p for each in runs for p in each if p.believed]
-    for p in believed:
-        beaten = any(o.error <= p.error and o.time_s <= p.time_s and o is not p for o in believed)
+    resolved = [p for each in runs for p in each if p.resolved]
+    for p in resolved:
+        beaten = any(o.error <= p.error and o.time_s <= p.time_s and o is not p for o in resolved)
         assert beaten != (p in front)
-    assert all(p.believed for p in front)
+    assert all(p.resolved for p in front)
 
 
-def test_errors_below_that_of_the_reference_are_not_believed(smooth) -> None:
+def test_errors_below_that_of_the_reference_are_not_resolved(smooth) -> None:
     """DOP853 at 1e-13 ends nearer to the reference than the two runs of that are to each other: it takes no part."""
     setup, truth = smooth
     coarse = replace(truth, error=1e-6)
     found = ladder(own(setup, rd.integrate.method("DOP853"), "interpreted"), coarse, 0, 12)
-    assert [p.believed for p in found.points] == [p.error > 1e-6 for p in found.points]
-    assert not found.points[-1].believed and found.points[0].believed
+    assert [p.resolved for p in found.points] == [p.error > 1e-6 for p in found.points]
+    assert not found.points[-1].resolved and found.points[0].resolved
     assert all(p.error > 1e-6 for _, p in invented(found, floor=1e-6).front)
     assert found.price(1e-7) is None
 
@@ -325,7 +325,7 @@ def test_other_programs_solve_the_same_equation(setup: rd.Setup, first: int) -> 
     """
     import_module("mujoco")
     setup, truth = reference(whole(replace(setup, engine="compiled")), Budget(1e3))
-    peers, _ = found(setup)
+    peers, _ = methods_of_peers(setup)
     theirs = {each.method: each for each in peers}
     assert {"SciPy DOP853 + pin.aba", "MuJoCo RK4", "MuJoCo Euler", "MuJoCo implicitfast"} <= theirs.keys()
     ours = ladder(own(setup, rd.integrate.method("RK4"), "compiled", events=False), truth, first, first + 2)
@@ -344,7 +344,7 @@ def test_programs_that_cannot_do_a_scene_are_left_out_with_the_reason() -> None:
         (rd.Setup(plant, [0.4, 0.9], duration_s=0.5), "dry_friction is not given to them"),
         (rd.Setup(rd.Plant(arm), [0.4, 0.9], controller=sampled, duration_s=0.5), "a continuous PD is"),
     ):
-        peers, left_out = found(recorded(setup, 0.5))
+        peers, left_out = methods_of_peers(recorded(setup, 0.5))
         assert not peers and why in left_out[0]
 
 
@@ -372,7 +372,7 @@ def test_a_program_that_cannot_be_imported_is_left_out(monkeypatch) -> None:
 
     monkeypatch.setattr("robot_dyn.accuracy.work_precision_diagram.peers.PEERS", {"scipy": broken})
     setup = recorded(whole(rd.Setup(rd.Plant(rd.load("pendulum")), [0.3])), 0.1)
-    assert found(setup) == ([], ["scipy: cannot be imported (no library)"])
+    assert methods_of_peers(setup) == ([], ["scipy: cannot be imported (no library)"])
 
 
 def test_json_holds_the_runs() -> None:
