@@ -154,7 +154,7 @@ class ArmMotion:
             pairs = {
                 "M": (self.robot.M(q), mass_matrix(q)),
                 "N": (self.robot.inverse_dynamics(q, v, zero), bias(q, v)),
-                "the torques of control and effects": (plant.torque(q, v, t=t) + control, torque(t, q, v)),
+                "the torque of control and effects": (plant.torque(q, v, t=t) + control, torque(t, q, v)),
             }
             for quantity, (ours, theirs) in pairs.items():
                 difference = float(np.abs(ours - theirs).max() / (np.abs(ours).max() or 1.0))
