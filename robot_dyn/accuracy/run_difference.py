@@ -134,7 +134,7 @@ class RunDifference(Result):
         yield ""
 
 
-def compare_runs(a: TrajectoryData, b: TrajectoryData, *, tolerance: float = TOLERANCE) -> RunDifference:
+def diff_runs(a: TrajectoryData, b: TrajectoryData, *, tolerance: float = TOLERANCE) -> RunDifference:
     """Compare two runs of one robot over the time that both cover: differences by joint, and differing settings.
 
     The runs are compared at common samples. In stretches without common samples, q is also compared at the samples of

@@ -44,9 +44,9 @@ def setup(*effects: Any, **options: Any) -> rd.Setup:
 
 
 CONSTRUCTED = [
-    (lambda: ViscousFriction(-0.1), "damping must not be negative"),
-    (lambda: ViscousFriction([0.1, np.nan]), "damping must be finite"),
-    (lambda: ViscousFriction("much"), "damping must be real numbers"),
+    (lambda: ViscousFriction(-0.1), "viscous must not be negative"),
+    (lambda: ViscousFriction([0.1, np.nan]), "viscous must be finite"),
+    (lambda: ViscousFriction("much"), "viscous must be real numbers"),
     (lambda: RegularisedCoulombFriction(1.0, 0.0), "velocity_scale must be positive"),
     (lambda: JointStopSpring(1.0, 0.5, 3.0), "lower stops must lie below"),
     (lambda: ExternalWrench("pole", [1, 2, 3]), r"shape \(6,\)"),
@@ -58,7 +58,7 @@ CONSTRUCTED = [
     (lambda: DryFriction(2.0, stribeck_velocity=0.1), "no effect without static"),
     (lambda: RigidBacklash(0.1, 0.1, restitution=1.5), "restitution must not be greater than 1"),
     (lambda: SeriesElastic(9.0, 0.0), "inertia must be positive"),
-    (lambda: LuGreFriction(1.0, 1.0, 1.0, 2.0, 1.5, 0.1), "breakaway must not be less than coulomb"),
+    (lambda: LuGreFriction(1.0, 1.0, 1.0, 2.0, 1.5, 0.1), "static must not be less than coulomb"),
     (lambda: LineSpringDamper("torso", "torso", **LINE), "both points are fixed to 'torso'"),
     (lambda: LineSpringDamper("torso", None, **LINE | {"stiffness": -1.0}), "stiffness must not be negative"),
     (lambda: CarriedPayload(BODY.payload, 0.2, 0.1), "end_s must lie after start_s, got 0.2 and 0.1"),
@@ -70,22 +70,22 @@ IN_A_PLANT = [
             f"{effect.name}: {name} has values for [13] joints?, but the arm has 2",
         )
         for effect, name in (
-            (ViscousFriction([1.0, 2.0, 3.0]), "damping"),
+            (ViscousFriction([1.0, 2.0, 3.0]), "viscous"),
             (RegularisedCoulombFriction(1.0, [1.0, 2.0, 3.0]), "velocity_scale"),
             (Spring(1.0, [1.0, 2.0, 3.0]), "rest"),
             (JointStopSpring([-1.0, -1.0, -1.0], 1.0, 1.0), "lower"),
             (JointStopDamper(-1.0, [1.0, 1.0, 1.0], 1.0), "upper"),
             (EffortLimit([1.0, 2.0, 3.0]), "limit"),
-            (ViscousFriction([1.0]), "damping"),
+            (ViscousFriction([1.0]), "viscous"),
         )
     ),
     (lambda: plant(Spring({"slid": 1.0}), arm=CART), "stiffness: no joint 'slid'; nearest: slide"),
-    (lambda: plant(ViscousFriction({"slide": -1.0}), arm=CART), "damping must not be negative"),
+    (lambda: plant(ViscousFriction({"slide": -1.0}), arm=CART), "viscous must not be negative"),
     (lambda: plant(EffortLimit({"slide": -1.0}), arm=CART), "limit must not be negative"),
     (lambda: plant(RegularisedCoulombFriction(1.0, {"slide": 0.0}), arm=CART), "velocity_scale must be positive"),
     (lambda: plant(JointStopSpring({"slide": 1.0}, {"slide": -1.0}, 1.0), arm=CART), "lower stops must lie below"),
-    (lambda: plant(ViscousFriction("urdf"), arm=rd.Lagrangian(CART)), "damping='urdf' needs a Robot"),
-    (lambda: plant(ViscousFriction("file"), arm=CART), "damping must be real numbers"),
+    (lambda: plant(ViscousFriction("urdf"), arm=rd.Lagrangian(CART)), "viscous='urdf' needs a Robot"),
+    (lambda: plant(ViscousFriction("file"), arm=CART), "viscous must be real numbers"),
     (lambda: rd.Plant(CART, "friction"), "give effects, or 'urdf'"),
     (lambda: plant(3), "3 is neither a Force nor a Bound"),
     (lambda: rd.Plant(object(), "urdf"), "must be a robot, such as rd.load"),
@@ -117,9 +117,9 @@ IN_A_RUN = [
     *(
         (lambda effect=effect: rd.rollouts(plant(effect), Q, method="RK4", cuts=False), f"cuts=False: {why}")
         for effect, why in (
-            (DRY, "dry_friction holds joints and lets them go, where steps must"),
-            (PLAY, "rigid_backlash holds joints"),
-            (BODY, "carried_payload comes and goes, where steps must end"),
+            (DRY, "dry_friction stops and releases joints, where steps must"),
+            (PLAY, "rigid_backlash stops and releases joints"),
+            (BODY, "carried_payload is attached and detached, where steps must end"),
         )
     ),
 ]

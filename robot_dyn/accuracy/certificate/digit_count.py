@@ -59,8 +59,8 @@ def evaluate(engine: Engine, quantity: Quantity, states: dict[str, np.ndarray]) 
     """Return answers at states (S, n), 512 states at a time; nan where there is no answer."""
     rows = [states[name] for name in quantity.arguments]
     parts = [slice(k, k + 512) for k in range(0, len(rows[0]), 512)]
-    answer = getattr(engine, quantity.name)
-    return np.concatenate([answer(*(x[part] for x in rows), errors="nan") for part in parts])
+    answer = getattr(engine.nan_rows, quantity.name)
+    return np.concatenate([answer(*(x[part] for x in rows)) for part in parts])
 
 
 def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
@@ -89,15 +89,16 @@ def implementations(robot: Robot) -> tuple[list[Implementation], list[str]]:
 
 
 def _articulated_body(robot: Robot) -> SimpleNamespace:
-    """Return an object whose `forward_dynamics`, with the signature of `Dynamics`, uses articulated bodies."""
+    """Return an object that computes `forward_dynamics` by articulated bodies, with the signature of `Dynamics`."""
     lagrangian = Lagrangian(robot)
     equation = partial(articulated_body, lagrangian.linkage)
 
-    def forward_dynamics(q: Array, v: Array, tau: Array, *, errors: str = "raise") -> Array:
+    def forward_dynamics(q: Array, v: Array, tau: Array, *, nan: bool = False) -> Array:
         arguments, n, names = {"q": q, "v": v, "tau": tau}, lagrangian.n, lagrangian.joint_names
-        return answered(equation, arguments, (n,), names, errors, FLOAT64)
+        return answered(equation, arguments, (n,), names, nan, FLOAT64)
 
-    return SimpleNamespace(forward_dynamics=forward_dynamics)
+    with_nan = SimpleNamespace(forward_dynamics=partial(forward_dynamics, nan=True))
+    return SimpleNamespace(forward_dynamics=forward_dynamics, nan_rows=with_nan)
 
 
 @final

@@ -12,6 +12,7 @@ import numpy as np
 from robot_dyn.codegen.parameters import Parameter, described, split
 from robot_dyn.codegen.trace.symbolic import Symbolic, Symbols, array_of, column, inputs
 from robot_dyn.codegen.trace.trace import Trace, Traced
+from robot_dyn.foundations.arithmetic import Scalar
 from robot_dyn.lagrange.tree import Described
 from robot_dyn.queries.dynamics import Dynamics
 
@@ -46,7 +47,7 @@ class SymbolicDynamics(Dynamics[Symbols]):
         """Arithmetic of all numbers."""
         return self._trace.arithmetic
 
-    def of(self, values: Mapping[str, Any]) -> SymbolicDynamics:
+    def of(self, values: Mapping[str, Scalar]) -> SymbolicDynamics:
         """Return a copy whose inputs have these values."""
         if not values:
             return self
@@ -64,9 +65,11 @@ class SymbolicDynamics(Dynamics[Symbols]):
             self._traced[name] = self._trace.quantity(name)
         return self._traced[name]
 
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
+    def _answer(
+        self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...] = (), *, nan: bool = False
+    ) -> Any:
         if frame:  # queries of frames do not need inertias
-            return self._trace.lagrangian._answer(name, state, out, errors, frame).view(Symbols)
+            return self._trace.lagrangian._answer(name, state, out, frame, nan=nan).view(Symbols)
         value = array_of(self._quantity(name).function(*map(column, state), *self._given))
         shape = self._trace.shape(name)
         return value[0, 0] if shape == (1,) else value.reshape(shape).view(Symbols)

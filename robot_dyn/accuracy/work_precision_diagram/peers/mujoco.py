@@ -34,7 +34,7 @@ def methods_under_test(motion: ArmMotion) -> list[MethodUnderTest]:
     """Return MuJoCo's three methods; viscous friction, lines and servos run in C, other torques in Python."""
     module: Any = import_module("mujoco")
     robot, setup, servo, effects = motion.robot, motion.setup, motion.servo, motion.setup.plant.effects
-    damping: Any = sum((effect.damping for effect in effects if isinstance(effect, ViscousFriction)), start=0.0)
+    damping: Any = sum((effect.viscous for effect in effects if isinstance(effect, ViscousFriction)), start=0.0)
     gains = None if servo is None else (servo.kp, servo.kd)
     model = mujoco_model(module, robot, gains, damping, bare=True, lines=motion.lines)
     at = joint_places(model, robot)
