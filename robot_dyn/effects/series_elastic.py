@@ -32,8 +32,8 @@ class SeriesElastic(GearedMotor, Dissipative):
 
     δ = θ − q is the deflection of the spring, θ the motor angle at the output of the gear. The states are δ of all
     driven joints, then θ̇. A run starts with relaxed springs, δ = 0, and motors that move with their joints. The
-    actuation u of a driven joint is the motor torque at the output of the gear, n times the torque of the rotor. With a half
-    gap β the spring exerts no torque while |δ| ≤ β; the damper still acts.
+    actuation u of a driven joint is the motor torque at the output of the gear, n times the torque of the rotor. With
+    a half gap β the spring exerts no torque while |δ| ≤ β; the damper still acts.
 
     In the energy ledger the control does its work on the motors; motors and springs store ½ n² J θ̇² + ½ k δ². The
     motion of the rotors with the arm is neglected.

@@ -45,8 +45,8 @@ class LowPass(Block):
     def check(self, period_s: float) -> None:
         if (np.asarray(self.cutoff_rad_s) >= np.pi / period_s).any():
             raise ControlError(
-                f"cutoff_rad_s must be less than π/period = {np.pi / period_s:.4g} rad/s at a period of {period_s:g} s, got"
-                f" {self.cutoff_rad_s}; lower the cutoff, or shorten the period"
+                f"cutoff_rad_s must be less than π/period = {np.pi / period_s:.4g} rad/s at a period of {period_s:g} s,"
+                f" got {self.cutoff_rad_s}; lower the cutoff, or shorten the period"
             )
 
     def state_size(self, n: int) -> int:
