@@ -217,7 +217,9 @@ def run_values(run: Any) -> tuple[Values, Texts]:
     values |= {f"torque of {name}": x for name, x in sorted((run.effect_torques or {}).items())}
     optional = {
         "reference": run.desired,
-        "deviation": None if run.tracking_error is None else -run.tracking_error,  # the name and sign in stored results
+        "deviation": None
+        if run.tracking_error is None
+        else 0.0 - run.tracking_error,  # name and sign of stored results
         "state of the controller": run.controller_states,
         "extremes": run.extremes,
     }
