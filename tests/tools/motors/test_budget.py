@@ -406,7 +406,10 @@ def test_the_given_motion_is_the_answer_where_it_fits_and_none_that_is_faster_do
     given = budget(PLAN, UR5, payload=LOAD, continuous=[1.001 * each.rms + 0.01 for each in needs.joints])
     fast = fastest(given)
     assert (
-        fast.given and fast.budget is given and fast.duration_s == fast.before_s and fast.plan.reference is PLAN.reference
+        fast.given
+        and fast.budget is given
+        and fast.duration_s == fast.before_s
+        and fast.plan.reference is PLAN.reference
     )
     assert "the original motion, which fits" in repr(fast)
     half = fastest(given, share=0.4)

@@ -96,7 +96,9 @@ class PathPlan(Answer, Value):
 
     @property
     def drawing(self) -> str:
-        return plot("torque, as a share of its limit,", judged_times(self.duration_s), self.ratios) + legend(self.ratios)
+        return plot("torque, as a share of its limit,", judged_times(self.duration_s), self.ratios) + legend(
+            self.ratios
+        )
 
 
 @final
