@@ -172,10 +172,10 @@ def desired_motion(reference: PiecewisePolynomial) -> Callable[[float], np.ndarr
     ends = reference.breaks[1:-1]
 
     def at(t: float) -> np.ndarray:
-        inside = min(max(t, reference.start), reference.end)
+        inside = min(max(t, reference.start_s), reference.end_s)
         piece = int(np.searchsorted(ends, inside, side="right")) if len(ends) else 0
         s = inside - reference.breaks[piece]
-        rate = powers * s**lower if reference.start <= t <= reference.end else 0.0 * powers
+        rate = powers * s**lower if reference.start_s <= t <= reference.end_s else 0.0 * powers
         return np.array([s**powers, rate]) @ reference.coefficients[piece]
 
     return at
