@@ -48,7 +48,8 @@ for name, controller in controllers.items():
         v0=np.zeros(arm.n),
         duration_s=duration_s,
         controller=controller,
-        method=rd.integrate.Adaptive(rtol=1e-8, atol=1e-10),  # the gains make the arm stiff: the method finds its steps
+        rtol=1e-8,
+        atol=1e-10,  # the gains make the arm stiff: the method chooses its steps
         record_every_s=0.01,
     )
     print(f"--- {name}\n{trajectory.summary}\n")

@@ -42,7 +42,8 @@ for carried, arm in arms.items():
             v0=np.zeros(arm.n),
             duration_s=duration_s,
             controller=controller,
-            method=rd.integrate.Adaptive(rtol=1e-8, atol=1e-10),
+            rtol=1e-8,
+            atol=1e-10,
             record_every_s=0.01,
         )
         print(f"--- {name}, {carried}\n{trajectory.summary}\n")

@@ -5,7 +5,7 @@ Other formulations  Lagrangian, compiled, euler_lagrange
 What it answers     info (an arm), why (a torque by cause), explain (what is integrated), sweepable (by rollouts)
 Trust               compare
 A simulation        Plant, Setup, Event, read_scene, simulate, rollouts, linearise, advise
-To look at          replay, show, plot, save_replay, save_plot, compare_runs
+To look at          replay, show, plot, save_replay, save_plot, diff_runs
 To keep             save_run, load_run, save_rollouts, load_rollouts, export
 What comes of it    Trajectory, Rollouts; RobotDynError, ModelWarning, PrecisionWarning; STANDARD_GRAVITY in [m/s²]
 

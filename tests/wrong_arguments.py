@@ -227,7 +227,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.accuracy.save_result, result=certified, path=folder / "digits.csv", theme="dark"),
         call(rd.tools.stress.stress, robot=robot, samples=100, runs=0, seed=3, budget_s=1e-3, on_progress=lambda
             spent, what: None),
-        call(rd.tools.doctor.check, name_or_path="planar_2r", package_dirs=[folder], mass=None, total_mass=None,
+        call(rd.tools.doctor.check_urdf, name_or_path="planar_2r", package_dirs=[folder], mass=None, total_mass=None,
             density=1000.0, allow_overlap=False, units=True, xacro=None),
         call(rd.control.circle, centre=[0.1, 0.2, 0.3], radius=0.1, normal=[0.0, 0.1, 1.0], period_s=1.0, turns=1.0,
             ramp_s=0.1, toward=[1.0, 0.0, 0.0], rotation=eye, start_s=0.1),
@@ -249,7 +249,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.load, name_or_path=urdf, package_dirs=[folder], xacro=None, inertia="stated", mass=None,
             total_mass=None, density=None, allow_overlap=False, download=False, without=()),
         call(rd.load_run, path=saved),
-        call(rd.compare_runs, a=several[0], b=several[0]),
+        call(rd.diff_runs, a=several[0], b=several[0]),
         call(rd.export, run=several, path=folder / "table"),
         call(rd.load_rollouts, path=rd.save_rollouts(several, folder / "all")),
         call(rd.integrate.method, name="RK4"),

@@ -13,5 +13,5 @@ with TemporaryDirectory() as folder:
     scene = Path(folder, "governor.toml")
     scene.write_text(starter("flyball_governor"), encoding="utf-8")
     setup = rd.read_scene(scene)
-run = rd.simulate(setup, method=rd.integrate.Adaptive("Rodas5P", rtol=1e-6, atol=1e-8), record_every_s=0.02)
+run = rd.simulate(setup, method="Rodas5P", rtol=1e-6, atol=1e-8, record_every_s=0.02)
 page = rd.replay(run)

@@ -7,7 +7,7 @@
     save_result        any of these as figure, CSV or JSON
     Ball               an arithmetic of numbers with a radius; midpoint, radius
 
-Results of functions of `rd`: Comparison (compare), Advice (advise), RunDifference (compare_runs).
+Results of functions of `rd`: Comparison (compare), Advice (advise), RunDifference (diff_runs).
 robot_dyn/accuracy/README.md lists its files.
 """
 

@@ -7,7 +7,7 @@ plants that differ only in these share compiled code.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, overload
 
@@ -29,7 +29,7 @@ from robot_dyn.effects.plant import Plant
 from robot_dyn.foundations.arithmetic import Array
 from robot_dyn.foundations.errors import MissingTimeError
 from robot_dyn.model.robot import Robot
-from robot_dyn.queries.dynamics import PLANT
+from robot_dyn.queries.dynamics import PLANT, Dynamics
 
 _TIMES = (float, int, np.float64)  # types of t that machine code accepts; `Engine.ask` handles all others
 
@@ -41,13 +41,22 @@ class CompiledPlant:
     Attributes:
         plant: Plant passed by the user.
         dynamics: Compiled rigid-body dynamics of the plant.
+        is_nan_allowed: True for NaN at states without a result, see `nan_rows`.
     """
 
     plant: Plant
     dynamics: CompiledDynamics
+    is_nan_allowed: bool = False
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return CompiledPlant, (self.plant, self.dynamics)
+        return CompiledPlant, (self.plant, self.dynamics, self.is_nan_allowed)
+
+    @cached_property
+    def nan_rows(self) -> CompiledPlant:
+        """The same queries, with NaN instead of an error for each state without a result; see `Dynamics.nan_rows`."""
+        other = replace(self, is_nan_allowed=True)
+        vars(other)["engine"] = self.engine  # to share the kernels
+        return other
 
     @cached_property
     def interpreted(self) -> Plant:
@@ -105,19 +114,15 @@ class CompiledPlant:
         """Names of the n joints, in the order of q."""
         return self.dynamics.joint_names
 
-    def M(self, q: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None, errors: str = "raise") -> Any:
+    def M(self, q: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
         """Return the mass matrix, (..., n, n); it does not depend on t."""
-        return self._rigid.M(q, out=out, errors=errors)
+        return self._rigid.M(q, out=out)
 
-    def C(
-        self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None, errors: str = "raise"
-    ) -> Any:
+    def C(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
         """Return the Coriolis matrix, (..., n, n); it does not depend on t."""
-        return self._rigid.C(q, v, out=out, errors=errors)
+        return self._rigid.C(q, v, out=out)
 
-    def N(
-        self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None, errors: str = "raise"
-    ) -> Any:
+    def N(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
         """Return gravity minus the torques of the effects, N = ∂V/∂q − Σ τ_effect, (..., n), in [N m] or [N].
 
         Args:
@@ -125,18 +130,15 @@ class CompiledPlant:
             v: Velocity, (..., n).
             t: Times in [s], one or with the shape of a batch; required if an effect depends on the time.
             out: Array that receives the result and is returned.
-            errors: "raise", or "nan" for NaN at states of a batch without a result.
 
         Raises:
             QueryError: If an argument is wrong; MissingTimeError if t is missing.
         """
-        return self._ask("N", (self._any_time if t is None else t, q, v), out, errors)
+        return self._ask("N", (self._any_time if t is None else t, q, v), out)
 
-    def torque(
-        self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None, errors: str = "raise"
-    ) -> Any:
+    def torque(self, q: Array, v: Array, *, t: ArrayLike | None = None, out: np.ndarray | None = None) -> Any:
         """Return Σ τ_effect, (..., n); for arguments and errors, see `N`."""
-        return self._ask("torque", (self._any_time if t is None else t, q, v), out, errors)
+        return self._ask("torque", (self._any_time if t is None else t, q, v), out)
 
     def inverse_dynamics(
         self,
@@ -146,10 +148,9 @@ class CompiledPlant:
         *,
         t: ArrayLike | None = None,
         out: np.ndarray | None = None,
-        errors: str = "raise",
     ) -> Any:
         """Return the actuation τ = M a + C v + N for the acceleration a, (..., n)."""
-        return self._ask("inverse_dynamics", (self._any_time if t is None else t, q, v, a), out, errors)
+        return self._ask("inverse_dynamics", (self._any_time if t is None else t, q, v, a), out)
 
     def forward_dynamics(
         self,
@@ -159,12 +160,11 @@ class CompiledPlant:
         *,
         t: ArrayLike | None = None,
         out: np.ndarray | None = None,
-        errors: str = "raise",
     ) -> Any:
         """Return the acceleration under the actuation u, (..., n)."""
-        return self._ask("forward_dynamics", (self._any_time if t is None else t, q, v, u), out, errors)
+        return self._ask("forward_dynamics", (self._any_time if t is None else t, q, v, u), out)
 
-    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None, errors: str) -> Any:
+    def _ask(self, quantity: str, arguments: tuple[Any, ...], out: np.ndarray | None) -> Any:
         if arguments[0].__class__ in _TIMES:
             y = np.empty(self.n, self.dynamics.dtype) if out is None else out
             if not self.engine.ones[quantity](*arguments, y):
@@ -173,13 +173,13 @@ class CompiledPlant:
         def otherwise(t: float, *state: Any) -> Any:
             return getattr(self.interpreted, quantity)(*state, t=t)
 
-        return self.engine.ask(quantity, arguments, out, errors, otherwise)
+        return self.engine.ask(quantity, arguments, out, self.is_nan_allowed, otherwise)
 
     @cached_property
-    def _rigid(self) -> CompiledDynamics:
+    def _rigid(self) -> Dynamics[np.ndarray]:
         """Rigid bodies; raises a TraceError if a payload comes or goes."""
         _ = self._symbolic
-        return self.dynamics
+        return self.dynamics.nan_rows if self.is_nan_allowed else self.dynamics
 
     @cached_property
     def _any_time(self) -> float:

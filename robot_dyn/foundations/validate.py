@@ -38,7 +38,10 @@ _PLAIN = {float, int, np.float64}  # usual types of entries in lists; bool is ex
 class ArithmeticLike(Protocol):
     """A kind of number to which arguments are converted, such as an `Arithmetic`."""
 
-    dtype: np.dtype
+    @property
+    def dtype(self) -> np.dtype:
+        """Type of the entries of arrays."""
+        ...
 
     def asarray(self, values: object) -> np.ndarray:
         """Return an array of this kind of number; raise TypeError or ValueError if the values are not numbers."""

@@ -63,7 +63,6 @@ from robot_dyn.queries.dynamics import Dynamics
 from robot_dyn.queries.quantity import DOUBTFUL
 
 _F8 = np.dtype(float)
-_RAISE = "raise"
 _STATES = 3  # N is analytic in q: if zero at random states, it is zero everywhere
 # named like an entry point, so that building a model does not import the digit counter
 _CHECK_OF_NEARLY_SINGULAR = "robot_dyn.accuracy.correct_digits:DigitCheck"
@@ -87,8 +86,10 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
     edits: Edits = field(default_factory=Edits)
     answer_check: AnswerCheck | None = None
 
-    def _answer(self, name: str, state: tuple[Any, ...], out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
-        if out is None and errors is _RAISE:
+    def _answer(
+        self, name: str, state: tuple[Any, ...], out: Any, frame: tuple[str, ...] = (), *, nan: bool = False
+    ) -> Any:
+        if out is None and not nan:
             shape, scratch, one_state = self._at_once
             for x in state:
                 if not (x.__class__ is ndarray and x.dtype is _F8 and x.shape == shape and hypot(*x.tolist()) < 1e50):
@@ -100,42 +101,38 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
                     pass
                 else:
                     return call(scratch.data, *state)
-        answer = self._evaluation.answer(name, state, errors, *frame)
+        answer = self._evaluation.answer(name, state, nan, *frame)
         if self.answer_check is not None:
             self.answer_check(self, name, state, answer)
         return into(out, answer)
 
     # --- queries that take microseconds, with a fast path
 
-    def M(self, q: ArrayLike, *, out: ndarray | None = None, errors: str = "raise") -> ndarray:
+    def M(self, q: ArrayLike, *, out: ndarray | None = None) -> ndarray:
         if out is None and is_plain(q, self._uncoupled_shape):
             return pin.crba(self.model, self._scratch.data, q)
-        return self._answer("M", (q,), out, errors)
+        return self._answer("M", (q,), out)
 
-    def N(self, q: ArrayLike, *, out: ndarray | None = None, errors: str = "raise") -> ndarray:
+    def N(self, q: ArrayLike, *, out: ndarray | None = None) -> ndarray:
         if out is None and is_plain(q, self._uncoupled_shape):
             return pin.computeGeneralizedGravity(self.model, self._scratch.data, q)
-        return self._answer("N", (q,), out, errors)
+        return self._answer("N", (q,), out)
 
-    def inverse_dynamics(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: ndarray | None = None, errors: str = "raise"
-    ) -> ndarray:
+    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, out: ndarray | None = None) -> ndarray:
         shape = self._uncoupled_shape
         if out is None and is_state(q, shape) and is_state(v, shape) and is_state(a, shape):
             tau = pin.rnea(self.model, self._scratch.data, q, v, a)
             if is_moderate(tau):  # NaN and inf in any argument propagate to tau
                 return tau
-        return self._answer("inverse_dynamics", (q, v, a), out, errors)
+        return self._answer("inverse_dynamics", (q, v, a), out)
 
-    def forward_dynamics(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: ndarray | None = None, errors: str = "raise"
-    ) -> ndarray:
+    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, out: ndarray | None = None) -> ndarray:
         shape = self._regular_shape
         if out is None and is_state(q, shape) and is_state(v, shape) and is_state(tau, shape):
             a = pin.aba(self.model, self._scratch.data, q, v, tau)
             if is_moderate(a, DOUBTFUL):
                 return a
-        return self._answer("forward_dynamics", (q, v, tau), out, errors)
+        return self._answer("forward_dynamics", (q, v, tau), out)
 
     # --- properties
 
@@ -294,7 +291,7 @@ class Robot(Dynamics[ndarray], Parametrised, Caching):
         length += max(float(np.linalg.norm(body.lever)) for body in self.model.inertias)
         try:
             return bool(
-                np.abs(self._evaluation.answer("N", (q,), _RAISE)).max() > _ROUNDING * self.total_mass * g * length
+                np.abs(self._evaluation.answer("N", (q,), nan=False)).max() > _ROUNDING * self.total_mass * g * length
             )
         except RobotDynError:  # overflows: far from zero
             return True

@@ -24,7 +24,7 @@ def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Pa
     runs or of a budget; JSON contains any result. An existing file is replaced only if it has the same kind.
 
     Args:
-        result: A result of `certify`, `cost`, `stress`, `work_precision`, `compare_runs` or `budget`.
+        result: A result of `certify`, `cost`, `stress`, `work_precision`, `diff_runs` or `budget`.
         path: Path of the file.
         theme: "light" or "dark" background.
 
@@ -36,7 +36,7 @@ def save_result(result: Result, path: str | Path, *, theme: str = "light") -> Pa
         "result",
         result,
         Result,
-        "give a result of rd.accuracy (certify, cost, work_precision), rd.compare_runs or a tool",
+        "give a result of rd.accuracy (certify, cost, work_precision), rd.diff_runs or a tool",
     )
     choice("theme", theme, THEMES)
     path = files.target(path, kinds(type(result)), ResultError)

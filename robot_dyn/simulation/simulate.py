@@ -57,11 +57,12 @@ def simulate(
         on_progress: Called with the time reached, in [s], at each step, and with that of the end at the steps of
             companion runs; in machine code some ten times a second. An exception from it ends the call.
         **options: The other attributes of a `Setup`, with its defaults: duration_s, controller, method, step_s,
-            record_every_s, estimate_error, about, engine, events and accuracy.
+            record_every_s, estimate_error, about, engine, events and accuracy. `rtol` and `atol` are the tolerances of
+            an adaptive method, 1e-10 and 1e-12 by default.
 
     Raises:
-        QueryError: If the setup is not allowed, or its record would not fit into memory. Whatever happens later is
-            reported by the trajectory's outcome.
+        QueryError: If the setup is not allowed, if a method of fixed step is given `rtol` or `atol`, or if the record
+            would not fit into memory. The trajectory's outcome reports what happens during the run.
         AccuracyError: If the requested accuracy cannot be reached.
     """
     function("on_progress", on_progress, "the time reached")
@@ -96,7 +97,7 @@ def _simulated(setup: Setup, on_progress: Callable[[float], object] | None) -> T
         "error": error,
         "accuracy": None,
     }
-    if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # nothing may be read later
+    if not (ran.setup.is_value and recording.outcome.ending is Ending.FINISHED):  # later reads are not allowed
         later = [field.name for field in fields(Trajectory) if field.name not in (*known, "statistics")]
         known |= {name: getattr(results, name) for name in later}
     method = ran.setup.method

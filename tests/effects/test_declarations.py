@@ -332,8 +332,8 @@ class Windy(rd.effects.Dynamics):
 
     robot, n, joint_names = ARM, ARM.n, ARM.joint_names
 
-    def _answer(self, name: str, state: Any, out: Any, errors: str, frame: tuple[str, ...] = ()) -> Any:
-        return ARM._answer(name, state, out, errors, frame) + (name == "N")
+    def _answer(self, name: str, state: Any, out: Any, frame: tuple[str, ...] = (), *, nan: bool = False) -> Any:
+        return ARM._answer(name, state, out, frame, nan=nan) + (name == "N")
 
 
 def test_equations_of_bodies_of_another_class_are_not_those_of_the_robot_in_it() -> None:

@@ -117,9 +117,9 @@ IN_A_RUN = [
     *(
         (lambda effect=effect: rd.rollouts(plant(effect), Q, method="RK4", cuts=False), f"cuts=False: {why}")
         for effect, why in (
-            (DRY, "dry_friction holds joints and lets them go, where steps must"),
-            (PLAY, "rigid_backlash holds joints"),
-            (BODY, "carried_payload comes and goes, where steps must end"),
+            (DRY, "dry_friction stops and releases joints, where steps must"),
+            (PLAY, "rigid_backlash stops and releases joints"),
+            (BODY, "carried_payload is attached and detached, where steps must end"),
         )
     ),
 ]

@@ -134,7 +134,7 @@ def test_a_run_that_diverges_says_so() -> None:
         ({"accuracy": "fine"}, "accuracy must be a"),
         ({"accuracy": {"deg": 1.0}}, "no unit 'deg'; give 'rad', 'm' or both"),
         ({"accuracy": {"m": 1e-3}}, "no value for joints in rad"),
-        ({"accuracy": 1e-6, "method": "RK4"}, "chooses method and tolerance; leave out method"),
+        ({"accuracy": 1e-6, "method": "RK4"}, "chooses method and tolerances; leave out method"),
         ({"accuracy": 1e-6, "method": rd.integrate.Adaptive(rtol=1e-6)}, "leave out method"),
         ({"accuracy": 1e-6, "estimate_error": False}, "leave out estimate_error=False"),
     ],

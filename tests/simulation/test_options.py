@@ -26,8 +26,11 @@ OPTIONS: dict[str, Any] = {
 @pytest.mark.parametrize("function", [rd.simulate, rd.rollouts])
 def test_the_signature_shows_every_attribute_of_a_setup_with_its_default(function) -> None:
     shown, stated = signature(function).parameters, signature(rd.Setup).parameters
-    assert Options.__annotations__.keys() == stated.keys() - {"plant", "q0", "v0"}
-    for name in Options.__annotations__:
+    tolerances = {"rtol", "atol"}
+    assert Options.__annotations__.keys() == stated.keys() - {"plant", "q0", "v0"} | tolerances
+    for name in tolerances:
+        assert (shown[name].kind, shown[name].default) == (Parameter.KEYWORD_ONLY, None)
+    for name in Options.__annotations__.keys() - tolerances:
         assert shown[name].kind is Parameter.KEYWORD_ONLY
         built = {} if name == "about" else stated[name].default  # of the factory, which says nothing
         assert shown[name].default == built, name
@@ -52,6 +55,28 @@ def test_a_robot_a_plant_and_a_setup_give_the_same_run() -> None:
             assert run.about["author"] == "me"
 
 
+@pytest.mark.parametrize("method", ["auto", "DOP853", rd.integrate.Adaptive("Rodas5P", atol=1e-3)], ids=str)
+@pytest.mark.parametrize(
+    "what", [ARM, PLANT, rd.Setup(PLANT, Q, V, method="RK4", step_s=1e-3)], ids=lambda x: type(x).__name__
+)
+def test_tolerances_of_a_call_are_those_of_its_method(what, method) -> None:
+    built = replace(method if isinstance(method, rd.integrate.Adaptive) else rd.integrate.Adaptive(method), rtol=1e-7)
+    options: dict[str, Any] = {"duration_s": 0.05, "estimate_error": False, "engine": "interpreted"}
+    expected = rd.simulate(what, Q, V, method=built, **options)
+    for _ in range(2):  # the second call takes the setup of the first
+        run = rd.simulate(what, Q, V, method=method, rtol=1e-7, **options)
+        np.testing.assert_array_equal(run.q, expected.q)
+    finer = rd.simulate(what, Q, V, method=method, rtol=1e-12, atol=1e-13, **options)
+    assert finer.statistics.steps > run.statistics.steps
+
+
+def test_tolerances_alone_change_those_of_the_method_of_a_setup() -> None:
+    setup = rd.Setup(PLANT, Q, V, 0.05, method=rd.integrate.Adaptive("Rodas5P", 1e-3, 1e-5), engine="interpreted")
+    run = rd.rollouts(setup, [Q, Q], atol=1e-9)
+    expected = rd.rollouts(replace(setup, method=rd.integrate.Adaptive("Rodas5P", 1e-3, 1e-9)), [Q, Q])
+    np.testing.assert_array_equal(run.q, expected.q)
+
+
 def test_rollouts_take_the_same() -> None:
     setup, q0 = rd.Setup(PLANT, Q, V, **OPTIONS), Q + 0.1 * np.arange(6.0).reshape(3, 2)
     expected = rd.rollouts(setup, q0, record=("q", "v", "u"))
@@ -73,7 +98,11 @@ def test_rollouts_take_the_same() -> None:
         (lambda: rd.simulate(ARM, Q, duration=1.0), r"simulate: no option 'duration'; nearest: duration_s"),
         (lambda: rd.simulate(rd.Setup(PLANT, Q), duration=1.0), r"simulate: no option 'duration'; nearest: duration_s"),
         (lambda: rd.rollouts(ARM, Q, duration=1.0), r"rollouts: no option 'duration'; nearest: duration_s"),
-        (lambda: rd.simulate(ARM, Q, rtol=1e-12), r"no option 'rtol'; .* method=rd.integrate.Adaptive\(rtol=…\)"),
+        (lambda: rd.simulate(ARM, Q, method="RK4", rtol=1e-12), "rtol: no effect on RK4, .* step_s"),
+        (lambda: rd.rollouts(ARM, Q, method="RK4", atol=1e-12), "atol: no effect on RK4, .* step_s"),
+        (lambda: rd.simulate(rd.Setup(PLANT, Q, method="Euler"), rtol=1e-9, atol=1e-9), "rtol and atol: .* Euler"),
+        (lambda: rd.simulate(ARM, Q, rtol=1e-16), "rtol must be between"),
+        (lambda: rd.simulate(ARM, Q, accuracy=1e-6, rtol=1e-8), "leave out method, rtol and atol"),
         (lambda: rd.simulate(ARM, plant=PLANT, q0=Q), "simulate: no option 'plant'"),
         (lambda: rd.simulate(ARM, duration_s=1.0), r"simulate: give q0, the position at the start, \(2,\)"),
         (lambda: rd.rollouts(ARM, method="RK4"), r"rollouts: give q0, the position at the start, \(2,\)"),

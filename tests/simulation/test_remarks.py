@@ -327,6 +327,6 @@ def test_chatter_by_the_quantum_of_an_encoder_is_told_from_chatter_by_gains() ->
     for filters, chatters in (([], True), ([rd.control.LowPass(50.0)], False)):
         loop = rd.control.Loop(law, rounded, [rd.control.Differences(), *filters])
         run = rd.simulate(rd.Plant(arm), [0.3, 0.2], controller=loop, duration_s=0.2, estimate_error=False)
-        said = [each.remedy for each in run.remarks if each.kind == "chatter"]
-        assert bool(said) is chatters
-        assert all("kd period_s / M is 0.04, and reverses nothing: quantisation" in text for text in said)
+        facts = [remark.facts for remark in run.remarks if remark.kind == "chatter"]
+        assert bool(facts) is chatters
+        assert all(of["blocks"] == "quantisation" and of["ratio"] == pytest.approx(0.04, rel=0.1) for of in facts)

@@ -1,6 +1,6 @@
 """Runs that reach an implausible speed, over 100 times a velocity limit, and steps that are too long as the cause.
 
-No arm moves like that: the error means nothing, and companion runs would take most of the time.
+No arm moves like that: an error estimate would be meaningless, and companion runs would take most of the time.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def runaway(setup: Setup, speeds: np.ndarray) -> dict[str, float | str]:
     """Return the joint that has passed its speed limit most, its speed and the limit; empty if none has.
 
     Args:
-        setup: What ran.
+        setup: The setup of the run.
         speeds: Largest speed of each joint, (n,).
     """
     limits = cached(setup, speed_limits)
@@ -48,11 +48,17 @@ def runaway(setup: Setup, speeds: np.ndarray) -> dict[str, float | str]:
     return {"joint": dynamics.joint_names[joint], "value": float(speeds[joint]), "limit": limit, "unit": unit_of_v}
 
 
-def step_too_long(setup: Setup, t: float) -> tuple[Remark, ...]:
-    """Return a remark if a fixed step is too long to be stable at the start, and deviations grow by 1e3 until t."""
+def step_too_long(setup: Setup, t: float, step_s: float | None = None) -> tuple[Remark, ...]:
+    """Return a remark if a fixed step is too long to be stable at the start, and deviations grow by 1e3 until t.
+
+    Args:
+        setup: The setup of the run.
+        t: Time reached, in [s].
+        step_s: Longest step of the run, in [s]; None to find it from the setup.
+    """
     if setup.method.controls_error or setup.method.nonsmooth or setup.equation.canonical:
         return ()
-    equation, step = setup.equation, setup.taken_step_s
+    equation, step = setup.equation, setup.taken_step_s if step_s is None else step_s
     y, held = equation.start(setup.q0, setup.v0), np.zeros(len(setup.q0)) if equation.sampled else None
     try:
         linear = setup.method, jacobian(equation, 0.0, y, held), len(setup.q0)
@@ -69,7 +75,7 @@ def judged(setup: Setup, record: Recording, fast: dict[str, float | str]) -> Out
     """Return the outcome of an implausibly fast run by fixed steps: diverged if its ledger does not close.
 
     Args:
-        setup: What ran.
+        setup: The setup of the run.
         record: Its recording.
         fast: The joint that reached an implausible speed, see `runaway`.
     """

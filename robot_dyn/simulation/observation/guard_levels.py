@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, final
 
@@ -50,7 +50,7 @@ class GuardLevels(NamedTuple):
     limits: Array
     bounds: Array
 
-    def of_runs(self, numbers: Sequence[int]) -> GuardLevels:
+    def of_runs(self, numbers: np.ndarray | list[int]) -> GuardLevels:
         """Return the levels of some of the runs."""
         return GuardLevels(self.levels, self.limits[:, numbers], self.bounds[:, numbers])
 

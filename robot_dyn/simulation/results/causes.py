@@ -49,7 +49,7 @@ def broken_away(plant: Plant, t: np.ndarray, columns: Columns, states: dict[str,
     """
     q, v, a, u = columns[:4]
     exerted = effect_torques(plant, t, columns, states)
-    needed, total = plant.dynamics.inverse_dynamics(q, v, a, errors="nan"), sum(exerted.values(), start=0 * u) + u
+    needed, total = plant.dynamics.nan_rows.inverse_dynamics(q, v, a), sum(exerted.values(), start=0 * u) + u
     doubtful = np.abs(needed - total) > _OPEN * (np.abs(needed).max(axis=1) + np.abs(u).max(axis=1))[:, None]
     a, z = a.copy(), _stacked(states)
     for k in np.flatnonzero(doubtful.any(axis=1) & ((v == 0) & (a == 0)).any(axis=1)):

@@ -1,4 +1,4 @@
-"""Files of rollouts: one .npz that holds the recorded arrays of all runs, in the manner of a run file."""
+"""Files of rollouts: one .npz with the recorded arrays of all runs, in the form of a run file."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _check(runs: Rollouts, found: Found) -> None:
         raise StoreError("the times of member 't' are not finite, or do not grow")
     if not all(map(are_times, runs.ended[:, None])):
         raise StoreError("the times in 'ends' are not those of runs")
-    numbered = (number for each in (() if runs.saved is None else runs.saved.remarks) for number in each.runs)
+    numbered = (number for remark in (() if runs.saved is None else runs.saved.remarks) for number in remark.runs)
     if len(runs.observed.levels) != runs.observed.limits.shape[1]:
         raise StoreError("'observed/levels' are not those of member 'observed/limits'")
     if not all(0 <= number < len(runs) for number in (*numbered, 0 if runs.saved is None else runs.saved.worst)):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import MISSING, fields, replace
-from inspect import signature
+from inspect import Parameter, signature
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +29,8 @@ _MAX_SEGMENTS = 1000  # of a cached setup: more take memory, and building them t
 
 
 _BUILT = {field.name: field.default_factory() for field in fields(Setup) if field.default_factory is not MISSING}
-_STATED = {name: signature(Setup).parameters[name] for name in Options.__annotations__}
+_TOLERANCES = {name: Parameter(name, Parameter.KEYWORD_ONLY, default=None) for name in ("rtol", "atol")}
+_STATED = {name: (signature(Setup).parameters | _TOLERANCES)[name] for name in Options.__annotations__}
 takes_options = takes(
     [
         x.replace(default=_BUILT.get(name, x.default), annotation=Options.__annotations__[name].__forward_arg__)
@@ -53,28 +54,43 @@ def setup_of(caller: str, source: Setup | Plant | Dynamics, options: Mapping[str
         options: Attributes of a `Setup` by name, q0 and v0 among them.
 
     Raises:
-        QueryError: If an option is unknown, or q0 is missing.
+        QueryError: If an option is unknown, q0 is missing, or a method of fixed step is given a tolerance.
     """
     if isinstance(source, Setup) and not options:
         return source if source.is_value else copy(source)  # parts may have changed: the copy has an empty cache
-    of_setup = {field.name for field in fields(Setup)}
-    names = of_setup if isinstance(source, Setup) else {"q0", "v0", *Options.__annotations__}
+    attributes = {field.name for field in fields(Setup)} if isinstance(source, Setup) else {"q0", "v0"}
+    names = attributes | Options.__annotations__.keys()
     for name in options.keys() - names:
-        if name in ("rtol", "atol"):  # which are keys of scenes
-            remedy = f"it is of the method: method=rd.integrate.Adaptive({name}=…)"
-        else:
-            remedy = nearest(name, names)
-        raise QueryError(f"{caller}: no option {name!r}; {remedy}")
+        raise QueryError(f"{caller}: no option {name!r}; {nearest(name, names)}")
     if "method" in options and (method := as_method(options["method"])).controls_error:
         if "step_s" in options:
             raise QueryError(no_step(method.name))
         options = {"step_s": None, **options}  # the step of the setup belongs to its own method
     if isinstance(source, Setup):
-        return replace(source, **options)
+        return replace(source, **_with_tolerances(options, source.method))
     plant = source if isinstance(source, Plant) else _plant(source)
     if "q0" not in options:
         raise QueryError(f"{caller}: give q0, the position at the start, ({plant.dynamics.n},)")
     return _latest_or_new(plant, options)
+
+
+def _with_tolerances(options: Mapping[str, Any], default: Any = Setup.method) -> dict[str, Any]:
+    """Return the options with `rtol` and `atol` as tolerances of the method, or of `default` if no method is given.
+
+    Raises:
+        QueryError: If a tolerance is given for a method of fixed step.
+    """
+    attributes = {name: value for name, value in options.items() if name not in _TOLERANCES}
+    tolerances = {name: options[name] for name in _TOLERANCES if options.get(name) is not None}
+    if not tolerances:
+        return attributes
+    method = as_method(attributes.get("method", default))
+    if not isinstance(method, Adaptive):
+        raise QueryError(
+            f"{' and '.join(tolerances)}: no effect on {method.name}, which has a fixed step; use step_s, or an"
+            " adaptive method, for example method='DOP853'"
+        )
+    return attributes | {"method": replace(method, **tolerances)}
 
 
 def _plant(dynamics: Dynamics) -> Plant:
@@ -105,11 +121,11 @@ def _latest_or_new(plant: Plant, options: Mapping[str, Any]) -> Setup:
     try:
         content = _content(dict(sorted(options.items())))
     except _MayChangeError:
-        return Setup(plant, **options)
+        return Setup(plant, **_with_tolerances(options))
     latest = plant.cache.get(Setup)
     if latest is not None and latest.content == content:
         return latest.setup
-    setup = Setup(plant, **options)
+    setup = Setup(plant, **_with_tolerances(options))
     if setup.is_value and not setup.events and segments(setup) <= _MAX_SEGMENTS:
         plant.cache[Setup] = _Latest(options, content, setup)
     return setup

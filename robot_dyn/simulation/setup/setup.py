@@ -56,11 +56,13 @@ CACHED = {
 
 
 class Options(TypedDict, total=False):
-    """Attributes of a `Setup` other than plant and start, in the forms that it accepts."""
+    """Attributes of a `Setup` other than plant and start, in the forms it accepts; tolerances of its method."""
 
     duration_s: float
     controller: Controller | Callable[[float, np.ndarray, np.ndarray], ArrayLike] | None
     method: str | Integrator | Adaptive
+    rtol: float | None
+    atol: float | None
     step_s: float | None
     record_every_s: float
     estimate_error: bool
@@ -156,7 +158,7 @@ class Setup(Value, Caching):
         object.__setattr__(self, "accuracy", least_accuracy(accuracy, self.plant.dynamics))
         if self.method != Adaptive(AUTO):
             name = self.method.name
-            raise QueryError(f"accuracy: chooses method and tolerance; leave out method, got {name!r}")
+            raise QueryError(f"accuracy: chooses method and tolerances; leave out method, rtol and atol, got {name!r}")
         if not self.estimate_error:
             raise QueryError("accuracy: is checked by the error estimate; leave out estimate_error=False")
 

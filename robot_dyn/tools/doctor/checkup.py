@@ -88,7 +88,7 @@ class Checkup(Answer):
         return page(self.sentence, table(heading, rows, right=("line",)) if self.findings else "")
 
 
-def check(
+def check_urdf(
     name_or_path: str | Path, *, package_dirs: Iterable[str | Path] = (), mass: Mapping[str, float] | None = None,
     total_mass: float | None = None, density: float | None = None, allow_overlap: bool = False, units: bool = False,
     xacro: Mapping[str, str | float | bool] | None = None,
@@ -294,7 +294,7 @@ def _rewritten(document: Document, findings: Iterable[Finding]) -> Document:
             continue
         changed |= places
         for change in finding.changes:
-            comment = etree.Comment(f" robot-dyn check: {_plain(f'{change.text}: {finding.what}')} ")
+            comment = etree.Comment(f" robot-dyn check-urdf: {_plain(f'{change.text}: {finding.what}')} ")
             comment.tail = _indent(change.element)
             change.apply()
             change.element.addprevious(comment)

@@ -151,7 +151,7 @@ def _tip(robot: Robot, states: Batch) -> str:
     effort = np.where(np.isfinite(effort), effort, np.nanmin(effort[np.isfinite(effort)], initial=1.0))
 
     def torque(frame: str) -> float:
-        per_kg = np.abs(np.einsum("skj,k->sj", robot.jacobian(q, frame, errors="nan")[:, :3], robot.gravity))
+        per_kg = np.abs(np.einsum("skj,k->sj", robot.nan_rows.jacobian(q, frame)[:, :3], robot.gravity))
         return float((per_kg / effort).max(axis=1).mean())
 
     return max(robot.frame_names, key=torque)
