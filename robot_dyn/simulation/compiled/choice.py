@@ -26,8 +26,8 @@ from robot_dyn.simulation.engine.engine import Engine
 from robot_dyn.simulation.engine.interpreted import Interpreted, interpreted_engine
 from robot_dyn.simulation.setup.setup import Setup, segments
 
-# So many interpreted evaluations, of about 0.1 ms, take as long as imports, trace and LLVM, 1 to 2 s; half as many if
-# the time loop is in the store, which is compiled once for a version of this library.
+# Interpreted evaluations, of about 0.1 ms, that take as long as imports, trace and LLVM, 1 to 2 s; half as many if the
+# time loop is in the store. The loop is compiled once for a version of this library.
 _COMPILED = 20_000
 _WITHOUT_LOOP = _COMPILED / 2
 _GUESSED = 10  # evaluations in a step of an implicit method, without those of its Jacobian
