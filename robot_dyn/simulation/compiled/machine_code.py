@@ -228,7 +228,7 @@ def _places(inputs: Sequence[Parameter], effects: Sequence[Effect], first: int) 
     """Return the places of the mode among the run parameters; the first parameter is at place `first`."""
     places: dict[str, list[int]] = {name: [] for name in _MODE}
     for x in inputs:
-        if x.part[0] == "effect" and isinstance(effects[x.part[1]], SetValued) and x.key in places:
+        if x.part[0] == "effect" and isinstance(effects[int(x.part[1])], SetValued) and x.key in places:
             places[x.key].append(first)
         first += x.size
     return Places(*(np.array(rows, np.int64) for rows in places.values()))
