@@ -55,9 +55,7 @@ _SENTENCES: Mapping[DoubtKind, Parts] = {
     DoubtKind.ENDED_AT_ONCE: ("it ended in its first step",),
     DoubtKind.INTERRUPTED: ("it was interrupted",),
     DoubtKind.IMPLAUSIBLE_SPEED: TOO_FAST,
-    DoubtKind.NO_ORDER_OF_IMPACTS: (
-        "the error of time stepping falls with the step, but has no definite order",
-    ),
+    DoubtKind.NO_ORDER_OF_IMPACTS: ("the error of time stepping falls with the step, but has no definite order",),
     DoubtKind.OSCILLATION_DAMPED: (
         "the energy ledger does not close: ",
         MOTION,
@@ -72,7 +70,8 @@ _SENTENCES: Mapping[DoubtKind, Parts] = {
     DoubtKind.SWITCHES_TWICE: ("joint {joint!r} switches and switches back within {steps} steps", _AT),
     DoubtKind.SWITCHES_LAST: ("joint {joint!r} switches in the last step", _AT),
     DoubtKind.CROSSED_WITHIN_STEP: (
-        "joint {joint!r} passes its {threshold} by {depth:.1e} and leaves it within one step of {step_s:.1e} s", _AT,
+        "joint {joint!r} passes its {threshold} by {depth:.1e} and leaves it within one step of {step_s:.1e} s",
+        _AT,
     ),
     DoubtKind.ACTS_BETWEEN_STEPS: (
         "{part} acts between steps after t = {start:g} s and not at their ends; declare its times as `switches`",
@@ -91,10 +90,10 @@ _SENTENCES: Mapping[DoubtKind, Parts] = {
         "a potential E(q), otherwise declare it Active",
     ),
     DoubtKind.WORK_OF_NO_EFFECT: (
-        "{power:.2g} W at t = {at:.4g} s are work of no effect; M, C and N of the dynamics must belong to its energies, and "
-        "none of them may depend on time",
+        "{power:.2g} W at t = {at:.4g} s belong to no effect; M, C and N of the dynamics must belong to its energies, "
+        "and none of them may depend on time",
     ),
-}  # fmt: skip
+}
 _REMEDIES: Mapping[DoubtKind, Parts] = {  # of the other kinds, a smaller step or tolerance if the facts name one
     DoubtKind.NO_ORDER_OF_IMPACTS: ("compare it with step_s / 4, or with method='DOP853'",),
     DoubtKind.OSCILLATION_DAMPED: ("take shorter steps",),
