@@ -1,4 +1,4 @@
-"""The parameters of a setup that `rollouts` can sweep, with values and units."""
+"""The parameters of a setup that `rollouts` can vary, with values and units."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, final
 
 import numpy as np
 
-from robot_dyn.codegen.parameters import sweepable_parameters, with_parameters
+from robot_dyn.codegen.parameters import variable_parameters, with_parameters
 from robot_dyn.control.controller import Controller
 from robot_dyn.control.digital_loop.block import SIGNAL
 from robot_dyn.control.digital_loop.loop import SIGNALS
@@ -22,11 +22,11 @@ from robot_dyn.simulation.setup.setup import Setup
 
 @final
 @dataclass(frozen=True, eq=False)
-class SweptParameter(Value):
+class SetupParameter(Value):
     """A parameter that may differ from run to run.
 
     Attributes:
-        name: Its key in `params` of `rollouts`.
+        name: Its key in `vary` of `rollouts`.
         value: That of the setup.
         unit: Of a joint that turns, and of one that slides where its unit differs; empty if it has none.
         shape: Of its values over B runs, as "(B,) or (B, 6)".
@@ -43,27 +43,27 @@ class SweptParameter(Value):
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Sweepable(Answer):
-    """The parameters of a setup that `rollouts` can sweep.
+class Parameters(Answer):
+    """The parameters of a setup that `rollouts` can vary.
 
     Attributes:
         parameters: In the order of robot, effects, controller and its models.
     """
 
-    parameters: tuple[SweptParameter, ...]
+    parameters: tuple[SetupParameter, ...]
 
     def blocks(self) -> Iterator[Block]:
-        yield "parameters that rd.rollouts(setup, params={name: values}) can sweep over B runs:"
+        yield "parameters that rd.rollouts(setup, vary={name: values}) can vary over B runs:"
         rows = ((each.name, _shown(each.value), each.unit, each.shape) for each in self.parameters)
         yield Table(("name", "value", "unit", "values"), tuple(rows))
 
 
-def sweepable(what: Setup | Plant | Dynamics) -> Sweepable:
-    """The parameters that `rollouts` can sweep: names, values, units and shapes.
+def parameters(what: Setup | Plant | Dynamics) -> Parameters:
+    """Return the parameters that `rollouts` can vary: names, values, units and shapes.
 
     They are coefficients of effects, gains of the controller, gravity, payloads, armature, the factor on all masses,
     mass and inertia of each link, and the same of the controller's models. Its `repr` is the table that
-    `robot-dyn sweepable` prints, `to_json()` the document of its `--json`.
+    `robot-dyn parameters` prints, `to_json()` the document of its `--json`.
 
     Args:
         what: A setup, a plant or a robot.
@@ -74,19 +74,19 @@ def sweepable(what: Setup | Plant | Dynamics) -> Sweepable:
     setup = what if isinstance(what, Setup) else None
     plant = setup.plant if setup is not None else what if isinstance(what, Plant) else Plant(what)  # pyright: ignore[reportArgumentType]
     controller = None if setup is None else setup.controller
-    known = sweepable_parameters(plant.dynamics, plant.effects, controller)
-    found = {each.name: swept_parameter(each, plant.dynamics) for each in reversed(known)}
-    return Sweepable(tuple(found.values())[::-1])
+    known = variable_parameters(plant.dynamics, plant.effects, controller)
+    found = {each.name: setup_parameter(each, plant.dynamics) for each in reversed(known)}
+    return Parameters(tuple(found.values())[::-1])
 
 
-def swept_parameter(known: Any, dynamics: Any) -> SweptParameter:
+def setup_parameter(known: Any, dynamics: Any) -> SetupParameter:
     """A parameter as `robot_dyn.codegen.parameters` has it, with its unit."""
     types = joint_types_of(dynamics)
     of_joints, size = known.declared.of_joints, known.value.size
     signal = SIGNALS.get(known.name.partition(".")[0], SIGNAL)
     unit = coefficient_unit(replace(known.declared, unit=known.declared.unit.replace(SIGNAL, signal)), types)
     shape = f"(B,) or (B, {size})" if of_joints else f"(B{''.join(f', {n}' for n in known.value.shape)})"
-    return SweptParameter(known.name, known.value, unit, shape.replace("(B)", "(B,)"))
+    return SetupParameter(known.name, known.value, unit, shape.replace("(B)", "(B,)"))
 
 
 def _shown(value: np.ndarray) -> str:
