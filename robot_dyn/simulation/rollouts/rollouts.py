@@ -75,7 +75,7 @@ def rollouts(
         what: A plant, a robot or a setup.
         q0: Positions at the start, (B, n) or (n,), in [rad] or [m] by joint; required unless `what` is a setup.
         v0: Velocities at the start, (B, n) or (n,), in [rad/s] or [m/s]; by default 0, or those of the setup.
-        varied: Values that differ from run to run, by name, (B,) or (B, n) each; `rd.parameters` lists the names:
+        vary: Values that differ from run to run, by name, (B,) or (B, n) each; `rd.parameters` lists the names:
             gains of the controller, "kp"; coefficients of an effect, "viscous_friction.viscous", or of one of several
             of a kind, "external_wrench 2.wrench"; "gravity", (B, 3); mass in [kg] and centre of mass of a payload on a
             link, "payload_mass:tool0" and "payload_com:tool0", (B, 3); "armature", (B, n); "mass_scale", (B,); mass and
