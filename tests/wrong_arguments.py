@@ -269,7 +269,7 @@ def examples(folder: Path) -> dict[str, Example]:
         call(rd.control.quintic, q0=q, q1=v, duration_s=1.0, start_s=0.1, v0=0.1, v1=u, a0=u, a1=0.0),
         call(rd.read_scene, path=scene, effects={"own": rd.effects.Spring}),
         call(rd.replay, run=run, package_dirs=[folder], frame="pole", inertia=True),
-        call(rd.rollouts, what=setup, q0=[q, u], v0=[v, u], params={"viscous_friction.damping": [0.1, 0.2]},
+        call(rd.rollouts, what=setup, q0=[q, u], v0=[v, u], params={"viscous_friction.viscous": [0.1, 0.2]},
             record=("q",), cuts=True, numbers=[3, 1], threads=1, most_bytes=10**9),
         call(rd.tools.sweeps.Sweep, scene=scene, runs=8, vary={"q0": rd.tools.sweeps.uniform(low=[0.1, 0.2],
             high=0.3)}, figures={"peak": rd.tools.sweeps.peak("v")}, design="random", seed=1),

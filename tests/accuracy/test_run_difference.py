@@ -210,7 +210,7 @@ def test_each_setting_that_differs_is_named_and_no_other(changes: str) -> None:
 
     found = {each.name: (each.a, each.b) for each in rd.diff_runs(run(""), run(changes)).settings}
     expected = {
-        "damping": {"viscous_friction.damping": ("0.1 N m s/rad", "0.1000000001 N m s/rad")},
+        "damping": {"viscous_friction.viscous": ("0.1 N m s/rad", "0.1000000001 N m s/rad")},
         "gain": {"control.kp": ("100 1/s²", "101 1/s²")},
         "period": {"control": tuple(f"ComputedTorque, every {x} s, constant between" for x in ("0.001", "0.002"))},
         "model": {"control.model.mass_scale": ("1", "1.1")},

@@ -13,7 +13,7 @@ from tests.command import document, interrupted_at_work, refusal, run
 from tests.long import long
 
 SCENE = 'robot = "planar_2r"\nduration_s = 0.1\n{}\n[start]\nq = [0.4, 0.9]\n[[effect]]\nkind = "gravity"\n'
-DRAG = '[[effect]]\nkind = "viscous_friction"\ndamping_N_m_s_per_rad = 0.3\n'
+DRAG = '[[effect]]\nkind = "viscous_friction"\nviscous_N_m_s_per_rad = 0.3\n'
 SCENES = {"work-precision": SCENE.format('engine = "interpreted"'), "cost": SCENE.format("accuracy = 1e-6") + DRAG}
 METHODS = ("--method", "RK4", "--method", "Euler")
 FEW = {"work-precision": (*METHODS, "--repeats", "1", "--no-peers"), "cost": ("--budget", "0.2", "--repeats", "2")}
@@ -143,5 +143,5 @@ def test_what_is_not_proven_is_told_by_the_exit_code(proven: Path) -> None:
     done = run("prove", proven, "--until", "100", "--budget", "0.2")
     assert done.returncode == 1
     assert re.search(r"Not proven beyond t = 0\.\d+ s, because the budget of 0\.2 s is used up\.", done.stdout)
-    proven.write_text(PROVEN + '[[effect]]\nkind = "dry_friction"\nlevel_N_m = 1.0\n', encoding="utf-8")
+    proven.write_text(PROVEN + '[[effect]]\nkind = "dry_friction"\ncoulomb_N_m = 1.0\n', encoding="utf-8")
     assert "effect dry_friction switches" in refusal(["prove", str(proven)])

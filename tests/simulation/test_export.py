@@ -167,7 +167,7 @@ def test_mcap_is_read_by_rerun(tame, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("of", "suffix", "message"),
     [
-        ("batch", "mcap", r"a log is of one run, and these are 2; give one of them, such as runs\[0\]"),
+        ("batch", "mcap", r"a log contains one run, and these are 2; pass one of them, for example runs\[0\]"),
         ("late", "mcap", "stamps of ROS 2 end"),
         ("tame", "nc", "more than the 2 GiB of netCDF-3; write"),
     ],

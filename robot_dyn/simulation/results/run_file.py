@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -51,8 +50,8 @@ def load_run(path: str | Path) -> Trajectory:
     return replace(run, about=unpacked(run.about, Path(path)))
 
 
-def reader_of(about: Mapping[str, Any]) -> str:
-    """Return what reads a run file of another format, from its JSON."""
+def reader_of(about: Mapping[str, object]) -> str:
+    """Return the reader for a run file of another format, from its JSON."""
     if about["format"] == ROLLOUTS_FORMAT:
         return (
             "it is a file of rollouts, which are many runs: rd.load_rollouts reads it, and rd.save_run writes one of"
