@@ -383,7 +383,7 @@ def test_what_has_no_meaning_is_refused() -> None:
         "no record 'torque'": {"record": ("torque",)},
         "threads .* must be a whole number, from 1": {"threads": 0},
         r"at most .* samples of 4 runs takes .*e-0\d GiB, more than 9.31e-08 GiB: take a longer record_every_s": {
-            "q0": starts(4), "most_bytes": 100,
+            "q0": starts(4), "max_bytes": 100,
         },
     }.items():  # fmt: skip
         with pytest.raises(rd.RobotDynError, match=message):
