@@ -153,7 +153,7 @@ def compare_runs(a: TrajectoryData, b: TrajectoryData, *, tolerance: float = TOL
         QueryError: If they are of different robots, or have no time in common.
     """
     for name, run in (("a", a), ("b", b)):
-        instance(name, run, TrajectoryData, "give the trajectory of rd.simulate or rd.load_run, or a run of rollouts")
+        instance(name, run, TrajectoryData, "give the trajectory of rd.simulate or rd.read, or a run of rollouts")
     tolerance = number("tolerance", tolerance, above=0, error=QueryError)
     found, types = difference(a, b, tolerance), joint_types(a)
     of_q, (first, second) = joint_units("q", types), run_names(a, b)

@@ -151,25 +151,17 @@ class StoredFormat(Generic[Stored]):
         try:
             plain = _without_arrays(self._adapter.dump_python([value], warnings=False)[0], "", arrays)
             arrays[ABOUT] = np.array(json.dumps({"format": self.name, "value": plain}))
-            self._value(dict(arrays))
+            self.value(dict(arrays))
             return save(path, lambda stream: write_arrays(stream, arrays), self.error)
         except (StoreError, TypeError, ValueError) as error:
             raise self.error(f"{path}: cannot be written: {error}; save a value as the library returns it") from None
 
-    def load(self, path: str | Path) -> Stored:
-        """Return the value of a file.
+    def value(self, arrays: dict[str, np.ndarray]) -> Stored:
+        """Return the checked value of arrays; the array `about` contains the JSON.
 
         Raises:
-            RobotDynError: Of type `error`, if the file is missing, damaged, cut short or of another format.
+            StoreError: If the arrays are not a value of this format.
         """
-        with reading(path, self.error, self.remedy) as stream:
-            try:
-                return self._value(_read_arrays(stream))
-            except StoreError as error:
-                raise self.error(f"{path}: cannot be read as {self.kind.name}: {error}; {self.remedy}") from None
-
-    def _value(self, arrays: dict[str, np.ndarray]) -> Stored:
-        """Return the checked value of arrays; the array `about` contains the JSON."""
         from pydantic import ValidationError
 
         about = _about(arrays)
@@ -190,6 +182,23 @@ class StoredFormat(Generic[Stored]):
             raise StoreError(f"member {shorten(min(arrays))!r} is unknown to this version")
         self.check(value, members)
         return value
+
+
+def load_one_of(path: str | Path, *formats: StoredFormat[Any]) -> Any:
+    """Return the value of a file in one of several formats, of one kind of file.
+
+    Raises:
+        RobotDynError: Of type `error` of the first format, if the file is missing, damaged, cut short or of another
+            format.
+    """
+    first = formats[0]
+    with reading(path, first.error, first.remedy) as stream:
+        try:
+            arrays = _read_arrays(stream)
+            name = _about(dict(arrays))["format"]
+            return next((form for form in formats if form.name == name), first).value(arrays)
+        except StoreError as error:
+            raise first.error(f"{path}: cannot be read as {first.kind.name}: {error}; {first.remedy}") from None
 
 
 def _about(arrays: dict[str, np.ndarray]) -> dict[str, Any]:

@@ -7,5 +7,5 @@
 - error_estimate: the estimated error and its verdict.
 - acting: what acts: names, wrenches on links, stops that joints bear on.
 - provenance: texts from which the robot of a run is built again.
-- run_file: files of runs, as `foundations/store.py` writes them.
+- run_file: run files, written by `foundations/store.py`; formats: what `save` writes, by suffix.
 """
